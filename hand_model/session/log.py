@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -14,18 +14,26 @@ from ..errors import SessionError, did_you_mean
 
 Array = NDArray[np.float64]
 
+# Columns that the session format names; a log may hold more.
+COLUMNS = ("time", "position", "current", "setpoint", "speed", "current_limit", "temperature")
+# A recorder hiccups now and then. A log in which more than this share of the rows is out of order, or repeats a time,
+# is not one recording.
+TOLERATED_SHARE = 0.1
+
 
 @dataclass(frozen=True)
 class Log:
     """Columns of an actuator log on its own clock.
 
     time_s: (n,) [s], increasing, irregular. columns: name -> (n,), raw units as the session format states,
-    nan where a sample was lost. path: the file.
+    nan where a sample was lost. path: the file. notes: what was mended, one sentence each.
+    The arrays are read-only: readings are shared.
     """
 
     time_s: Array
     columns: Mapping[str, Array]
     path: Path
+    notes: tuple[str, ...] = ()
 
     def column(self, name: str) -> Array:
         """One column (n,); raises SessionError naming the file and a near name where it is missing."""
@@ -34,28 +42,69 @@ class Log:
         return self.columns[name]
 
 
-def read_log(path: Path) -> Log:
+def build_log(time_s: Array, columns: Mapping[str, Array], path: Path) -> Log:
+    """A log as every reader hands it over: rows in the order of their times, each time once.
+
+    time_s: (n,) [s], as recorded. Rows without a time, or that repeat one, are dropped and rows out of order sorted, with
+    a note, as long as they are few. Raises SessionError where they are many, or where fewer than two rows are left.
+    """
+    total = len(time_s)
+    notes = []
+    keep = np.flatnonzero(np.isfinite(time_s))
+    _tolerate(total - len(keep), total, "have no time", path)
+    if len(keep) < total:
+        notes.append(f"{total - len(keep)} rows without a time were dropped")
+    back = int((np.diff(time_s[keep]) < 0).sum()) if len(keep) else 0
+    _tolerate(back, total, "go back in time", path)
+    if back:
+        keep = keep[np.argsort(time_s[keep], kind="stable")]
+        notes.append(f"rows were sorted by time: it went back {back} times")
+    fresh = np.ones(len(keep), bool)
+    fresh[1:] = np.diff(time_s[keep]) > 0
+    repeated = int((~fresh).sum())
+    _tolerate(repeated, total, "repeat the time of the row before", path)
+    if repeated:
+        keep = keep[fresh]
+        notes.append(f"{repeated} rows that repeated a time were dropped")
+    if len(keep) < 2:
+        raise SessionError(f"{path}: the log holds {len(keep)} samples; two or more at increasing times are needed")
+    picked = {name: np.ascontiguousarray(column[keep]) for name, column in columns.items()}
+    times = time_s[keep]
+    for array in (times, *picked.values()):
+        array.setflags(write=False)
+    return Log(times, picked, path, tuple(notes))
+
+
+def _tolerate(rows: int, total: int, what: str, path: Path) -> None:
+    if rows > max(TOLERATED_SHARE * total, 1):
+        raise SessionError(f"{path}: {rows} of {total} rows {what}; `time` must increase from row to row")
+
+
+def read_log(path: Path, actuator: str | None = None) -> Log:
     """Read a CSV log, a rosbag2 folder or an MCAP file.
 
-    Raises SessionError where it is missing, empty, has no `time` column, or holds a cell that is no number.
+    actuator: whose channel to take from a bag that holds several; a CSV log holds one. A second call on an unchanged log
+    returns the same object. Raises SessionError where the log is missing, empty, has no `time` column, or holds a cell
+    that is no number.
     """
+    path = Path(path)
     if not path.exists():
         raise SessionError(f"{path}: no such file")
-    return _read_csv(path)
+    is_bag = path.is_dir() or path.suffix.lower() == ".mcap"
+    if not is_bag and path.suffix.lower() != ".csv":
+        raise SessionError(f'{path}: cannot read "{path.suffix}" logs; valid: .csv, .mcap, a rosbag2 folder')
+    files = sorted(path.iterdir()) if path.is_dir() else [path]
+    state = tuple((file.name, file.stat().st_mtime_ns, file.stat().st_size) for file in files if file.is_file())
+    return _read_cached(path, actuator if is_bag else None, is_bag, state)
 
 
-def _read_csv(path: Path) -> Log:
-    with path.open(newline="") as stream:
-        rows = list(csv.reader(stream))
-    if len(rows) < 2:
-        raise SessionError(f"{path}: the log is empty; a header and samples are needed")
-    header = [name.strip() for name in rows[0]]
-    try:
-        table = np.array([[float(cell) if cell.strip() else np.nan for cell in row] for row in rows[1:] if row])
-    except ValueError as error:
-        raise SessionError(f"{path}: {error}") from None
-    columns = {name: table[:, i] for i, name in enumerate(header)}
-    if "time" not in columns:
-        raise SessionError(f'{path}: no column "time"; {did_you_mean("time", columns)}')
-    time_s = columns.pop("time")
-    return Log(time_s, columns, path)
+@lru_cache(maxsize=128)
+def _read_cached(path: Path, actuator: str | None, is_bag: bool, state: tuple[tuple[str, int, int], ...]) -> Log:
+    # The readers import this module, so they are imported when first needed (rosbags is heavy besides).
+    if is_bag:
+        from .bag import read_bag
+
+        return read_bag(path, actuator)
+    from .csv_log import read_csv_log
+
+    return read_csv_log(path)

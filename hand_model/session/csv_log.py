@@ -1,0 +1,75 @@
+"""CSV logs: a header with `time`, then samples. Separators `,` `;` or tab, decimal commas where the separator allows."""
+
+from __future__ import annotations
+
+import csv
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import SessionError, did_you_mean
+from .log import COLUMNS, Log, build_log
+from .text import number_table, read_lines
+
+
+def read_csv_log(path: Path) -> Log:
+    """Read a CSV log; an empty cell is a lost sample (nan).
+
+    Raises SessionError where the header is missing, names a column twice or has no `time`, or a line has the wrong width
+    or a cell that is no finite number.
+    """
+    lines = read_lines(path)
+    separator = max((";", "\t", ","), key=lines[0].count)
+    header = [name.strip() for name in _cells(lines[0], separator)]
+    while header and not header[-1]:  # a separator at the end of every line
+        header.pop()
+    _check_header(header, path)
+    numbers = [i for i in range(1, len(lines)) if lines[i].strip()]
+    if not numbers:
+        raise SessionError(f"{path}: the log is empty; samples below the header are needed")
+    rows = [_cells(lines[i], separator) for i in numbers]
+    if separator != "," and any("," in cell for cell in rows[0] + rows[-1]):
+        rows = [[cell.replace(",", ".") for cell in row] for row in rows]
+    width = len(header)
+    for i, row in enumerate(rows):
+        while len(row) > width and not row[-1].strip():
+            row.pop()
+        if len(row) != width:
+            raise SessionError(
+                f"{path}: line {numbers[i] + 1} has {len(row)} cells; {width} are needed, one for each column"
+            )
+    table = number_table(rows, [i + 1 for i in numbers], path)
+    if np.isinf(table).any():
+        row, column = np.argwhere(np.isinf(table))[0]
+        raise SessionError(
+            f'{path}: line {numbers[row] + 1}, column "{header[column]}" is infinite; a number or an empty cell is needed'
+        )
+    columns = {name: table[:, i] for i, name in enumerate(header)}
+    return build_log(columns.pop("time"), columns, path)
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    if '"' in line:
+        return next(csv.reader([line], delimiter=separator), [])
+    return line.split(separator)
+
+
+def _check_header(header: list[str], path: Path) -> None:
+    if "time" not in header:
+        if header and all(_is_number(name) for name in header if name):
+            raise SessionError(f"{path}: no header; the first line must name the columns ({', '.join(COLUMNS[:3])}, ...)")
+        raise SessionError(f'{path}: no column "time"; {did_you_mean("time", header)}')
+    twice = [name for name, count in Counter(header).items() if count > 1]
+    if twice:
+        raise SessionError(f'{path}: the column "{twice[0]}" occurs twice; each column once is needed')
+    if "" in header:
+        raise SessionError(f"{path}: column {header.index('') + 1} has no name; a header cell for each column is needed")
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
