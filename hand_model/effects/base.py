@@ -1,27 +1,38 @@
 """What an effect is: the one thing that a contributor adds to teach the tool new physics, one file each.
 
 A module in this folder that defines `EFFECT = SomeEffect()` is found by `effects.catalogue()`; no other edit is needed.
+The same interface serves three balances, told apart by `station`:
+
+- "drive": effort (current, torque) = declared(position, velocity, acceleration) + effect columns;
+- "encoder": proximal (or downstream) angle = polynomial of the encoder (upstream) position + effect columns;
+- "linkage": distal angle = polynomial of the proximal angle + effect columns.
+
+"marker" and "recording" effects act on marker trajectories or clocks and bring functions of their own.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Amplitude = tuple[str, str, float, float]
 
 
 @dataclass(frozen=True)
 class DriveState:
-    """One drive (a motor of a hand, a joint of a rig) during one trial, as an effect sees it.
+    """One balance (a motor of a hand, a joint of a rig, an angle against an angle) during one trial, as an effect sees it.
 
     time_s: (n,) [s]. position, velocity, acceleration: (n,) in the drive's unit ([%], [rad] or [m], and per second).
-    effort: (n,) measured current or torque, raw or SI. declared: (n, k) columns of the declared model.
-    extra: further channels by name, (n,) each (setpoint, temperature, supply, transmitted load, command...).
+    effort: (n,) measured left side, raw or SI, nan where it is not to be compared. declared: (n, k) columns of the
+    declared model, declared_names: their names ("inertia", "viscous", "coulomb", "spring", "preload", ...).
+    extra: further channels by name, (n,) each: "elapsed" [s] since the first sample of the session, "load", "setpoint",
+    "speed" (commanded), "temperature", "supply", "gravity_x|y|z" in the palm, "sigma" (standard deviation, in effort
+    units, of what the state estimate cannot know, beside the noise).
     """
 
     trial: str
@@ -35,6 +46,20 @@ class DriveState:
     position_unit: str = "%"
     effort_unit: str = "raw"
     extra: Mapping[str, Array] = field(default_factory=dict)
+    declared_names: tuple[str, ...] = ()
+    validate: bool = False
+
+    @property
+    def direction(self) -> Array:
+        """Friction's direction (n,) in [-1, 1]: the declared Coulomb column where there is one, else sign(velocity)."""
+        if "coulomb" in self.declared_names:
+            return self.declared[:, self.declared_names.index("coulomb")]
+        return np.sign(self.velocity)
+
+    @property
+    def elapsed_s(self) -> Array:
+        """Time [s] since the session's first sample (or the trial's, where nothing else is known)."""
+        return self.extra.get("elapsed", self.time_s - self.time_s[0])
 
 
 @dataclass(frozen=True)
@@ -53,7 +78,7 @@ class DriveEffect(Protocol):
     """An effect in the balance effort = declared + columns(state, shape) @ amplitude."""
 
     name: str
-    station: str  # "drive"
+    station: str  # "drive", "encoder" or "linkage"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """Nonlinear parameters, with bounds and starts from the recorded range."""
@@ -63,7 +88,7 @@ class DriveEffect(Protocol):
         """Columns (n, j), linear in their amplitudes, whose sum is the effort that the effect adds."""
         ...
 
-    def amplitudes(self) -> tuple[tuple[str, str, float, float], ...]:
+    def amplitudes(self) -> tuple[Amplitude, ...]:
         """Name, unit, lower and upper bound of each amplitude (j of them); bounds carry the sign that physics allows."""
         ...
 
@@ -74,3 +99,85 @@ class DriveEffect(Protocol):
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """Write the effect into an MJCF tree (lxml); the element's path, or None where only the passive callback can."""
         ...
+
+
+class Effect:
+    """Defaults that an effect's class inherits: no shapes, one free amplitude, nothing native in MJCF.
+
+    Besides `columns`, an effect may change what is already there: `declared` (presliding replaces the Coulomb column),
+    `warp` (a delay shifts every column), `clip` (a saturated channel bends the prediction).
+    """
+
+    name: ClassVar[str]
+    station: ClassVar[str] = "drive"
+    replaces: ClassVar[str | None] = None  # name of the declared column that `declared` changes
+    warps: ClassVar[bool] = False
+    clips: ClassVar[bool] = False
+
+    def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
+        """No nonlinear parameter."""
+        return ()
+
+    def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
+        """Starting shapes: the product of each shape's starts."""
+        points: list[dict[str, float]] = [{}]
+        for shape in self.shapes(states):
+            points = [{**point, shape.name: value} for point in points for value in shape.starts]
+        return points
+
+    def amplitudes(self) -> tuple[Amplitude, ...]:
+        """One amplitude of either sign, in effort units."""
+        return (("amplitude", "effort", -np.inf, np.inf),)
+
+    def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
+        """No column."""
+        return np.zeros((len(state.time_s), 0))
+
+    def declared(self, state: DriveState, shape: Mapping[str, float]) -> Array:
+        """The declared columns as they are."""
+        return state.declared
+
+    def warp(self, state: DriveState, columns: Array, shape: Mapping[str, float]) -> Array:
+        """All columns as they are."""
+        return columns
+
+    def clip(self, prediction: Array, shape: Mapping[str, float]) -> Array:
+        """The prediction as it is."""
+        return prediction
+
+    def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
+                   declared: Mapping[str, float]) -> dict[str, float]:
+        """Parameters by their textbook names, from shapes, amplitudes and declared coefficients."""
+        return {**shape, **amplitude}
+
+    def region(self, states: tuple[DriveState, ...], shape: Mapping[str, float]) -> dict[str, Any] | None:
+        """The part of state in which the effect acts, as `where.region` of a finding; None where it acts everywhere."""
+        return None
+
+    def statement(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """A plain sentence from the name, the place and the parameters."""
+        listed = ", ".join(f"{key} {value:.4g}" for key, value in parameters.items())
+        place = where.get("actuator") or where.get("finger")
+        return f"{place}: {self.name.replace('_', ' ')} ({listed})."
+
+    def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
+        """Not native: the passive-force callback applies it."""
+        return None
+
+
+def position_range(states: tuple[DriveState, ...]) -> tuple[float, float]:
+    """Lowest and highest position over all states where the effort is compared, ends trimmed by 0.5 %."""
+    values = np.concatenate([s.position[np.isfinite(s.effort)] for s in states])
+    if not len(values):
+        return 0.0, 1.0
+    low, high = np.percentile(values, [0.5, 99.5])
+    return float(low), float(max(high, low + 1e-12))
+
+
+def speed_range(states: tuple[DriveState, ...]) -> tuple[float, float]:
+    """5th and 99th percentile of |velocity| where the effort is compared."""
+    values = np.concatenate([np.abs(s.velocity[np.isfinite(s.effort)]) for s in states])
+    if not len(values):
+        return 0.0, 1.0
+    low, high = np.percentile(values, [5, 99])
+    return float(low), float(max(high, 1e-12))

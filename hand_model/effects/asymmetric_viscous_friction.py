@@ -1,0 +1,33 @@
+"""Asymmetric viscous friction: the viscous coefficient differs between flexion and extension."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from .base import Amplitude, Array, DriveState, Effect
+
+
+class AsymmetricViscousFriction(Effect):
+    """b_flexion - b_extension acts on |v| (half of it each way)."""
+
+    name = "asymmetric_viscous_friction"
+
+    def amplitudes(self) -> tuple[Amplitude, ...]:
+        """Half the difference of the two coefficients, either sign."""
+        return (("half_difference", "effort s/position", -np.inf, np.inf),)
+
+    def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
+        """|v|, (n, 1)."""
+        return np.abs(state.velocity)[:, None]
+
+    def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
+                   declared: Mapping[str, float]) -> dict[str, float]:
+        """Coefficients of flexion and extension."""
+        half, viscous = amplitude["half_difference"], declared.get("viscous", np.nan)
+        return {"viscous_flexion": viscous + half, "viscous_extension": viscous - half,
+                "ratio": (viscous + half) / (viscous - half) if viscous != half else np.inf}
+
+
+EFFECT = AsymmetricViscousFriction()

@@ -1,0 +1,33 @@
+"""Current saturation: the current reading, or the drive, clips."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from .base import Amplitude, Array, DriveState, Effect, Shape
+
+
+class CurrentSaturation(Effect):
+    """measured = min(max(current, -limit), limit)."""
+
+    name = "current_saturation"
+    clips = True
+
+    def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
+        """Clipping level, among the highest recorded efforts."""
+        effort = np.concatenate([np.abs(s.effort[np.isfinite(s.effort)]) for s in states])
+        low, high = (np.percentile(effort, 60), effort.max()) if len(effort) else (0.0, 1.0)
+        return (Shape("limit", states[0].effort_unit, float(low), float(high), tuple(np.linspace(low, high, 16)[1:])),)
+
+    def amplitudes(self) -> tuple[Amplitude, ...]:
+        """No amplitude."""
+        return ()
+
+    def clip(self, prediction: Array, shape: Mapping[str, float]) -> Array:
+        """The prediction within the limits."""
+        return np.clip(prediction, -shape["limit"], shape["limit"])
+
+
+EFFECT = CurrentSaturation()

@@ -1,0 +1,39 @@
+"""Detent load: a load tied to one part of the range that does not change sign with direction."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
+
+
+class DetentLoad(Effect):
+    """F = A exp(-((x - c) / w)^2 / 2), either sign."""
+
+    name = "detent_load"
+
+    def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
+        """Centre over the range, width from 1.5 % to 20 % of it (wider is a spring)."""
+        low, high = position_range(states)
+        span, unit = high - low, states[0].position_unit
+        return (Shape("centre", unit, low + 0.03 * span, high - 0.03 * span, tuple(low + span * np.linspace(0.05, 0.95, 19))),
+                Shape("width", unit, 0.015 * span, 0.2 * span, (0.03 * span, 0.06 * span, 0.12 * span)))
+
+    def amplitudes(self) -> tuple[Amplitude, ...]:
+        """Load at the centre, either sign."""
+        return (("load", "effort", -np.inf, np.inf),)
+
+    def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
+        """A bell over position, (n, 1)."""
+        return np.exp(-0.5 * ((state.position - shape["centre"]) / shape["width"]) ** 2)[:, None]
+
+    def region(self, states: tuple[DriveState, ...], shape: Mapping[str, float]) -> dict[str, Any] | None:
+        """Two widths about the centre."""
+        c, w = shape["centre"], shape["width"]
+        return {"position": [c - 2 * w, c + 2 * w], "unit": states[0].position_unit}
+
+
+EFFECT = DetentLoad()

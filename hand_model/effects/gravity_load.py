@@ -1,0 +1,36 @@
+"""Gravity load: weight of finger or support, changing with the pose of the hand."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from .base import Amplitude, Array, DriveState, Effect, Shape
+
+
+class GravityLoad(Effect):
+    """F = a g_x + b g_z, turned by the joint angle: gravity in the frame that moves with the finger, times a constant lever."""
+
+    name = "gravity_load"
+
+    def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
+        """Angle swept over the range of positions, [rad]; with a recorded pose only."""
+        if not any("gravity_x" in s.extra for s in states):
+            return ()
+        return (Shape("sweep", "rad", 0.5, 2.5, (0.8, 1.4, 2.0)),)
+
+    def amplitudes(self) -> tuple[Amplitude, ...]:
+        """Weight times lever along the open finger and across it."""
+        return (("along", "effort", -np.inf, np.inf), ("across", "effort", -np.inf, np.inf))
+
+    def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
+        """Gravity's two components in the plane of the finger, turned with it, (n, 2); none without a recorded pose."""
+        if "gravity_x" not in state.extra or not shape:
+            return np.zeros((len(state.time_s), 2))
+        angle = shape["sweep"] * state.position / 100.0
+        gx, gz = state.extra["gravity_x"] / 9.81, state.extra["gravity_z"] / 9.81
+        return np.stack([gz * np.cos(angle) - gx * np.sin(angle), gx * np.cos(angle) + gz * np.sin(angle)], axis=-1)
+
+
+EFFECT = GravityLoad()

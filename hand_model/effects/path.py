@@ -1,0 +1,114 @@
+"""Operators along the recorded path: turning points, distance since reversal, Dahl friction, play.
+
+Every one runs over strokes (between turning points), in closed form inside a stroke: linear in the samples.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def turning_points(position: Array, threshold: float) -> list[int]:
+    """Sample indices at which the motion reverses by more than `threshold` [position unit], first and last included."""
+    x = np.asarray(position, float)
+    turns, extreme, direction = [0], 0, 0
+    # Only local extremes can turn: the loop visits those, not every sample.
+    step = np.sign(np.diff(x))
+    visit = np.flatnonzero(step[1:] != step[:-1]) + 1
+    for i in [*visit.tolist(), len(x) - 1]:
+        if direction == 0:
+            if abs(x[i] - x[0]) > threshold:
+                direction = 1 if x[i] > x[0] else -1
+                extreme = i
+        elif (x[i] - x[extreme]) * direction > 0:
+            extreme = i
+        elif (x[extreme] - x[i]) * direction > threshold:
+            turns.append(extreme)
+            direction, extreme = -direction, i
+    turns.append(len(x) - 1)
+    return turns
+
+
+def default_threshold(position: Array) -> float:
+    """Reversals below this are noise: six standard deviations of the sample-to-sample jitter, at least 0.5 % of the span."""
+    x = np.asarray(position, float)
+    if len(x) < 5:
+        return 0.0
+    jitter = np.median(np.abs(np.diff(x, 2))) / 0.6745 / np.sqrt(6)
+    return float(max(6 * jitter, 0.005 * (x.max() - x.min())))
+
+
+def strokes(position: Array, threshold: float | None = None) -> list[tuple[int, int, int]]:
+    """(start, stop, direction) of every stroke; samples start..stop-1, direction -1, 0 (no motion) or 1."""
+    x = np.asarray(position, float)
+    if len(x) < 2:
+        return [(0, len(x), 0)]
+    t = default_threshold(x) if threshold is None else threshold
+    turns = turning_points(x, t)
+    out = []
+    for a, b in pairwise(turns):
+        moved = x[b] - x[a]
+        out.append((a, b, int(np.sign(moved)) if abs(moved) > t else 0))
+    out[-1] = (out[-1][0], len(x), out[-1][2])
+    return [s for s in out if s[1] > s[0]]
+
+
+def travelled(position: Array, threshold: float | None = None) -> Array:
+    """Distance (n,) since the last reversal [position unit], never falling within a stroke."""
+    x = np.asarray(position, float)
+    out = np.zeros(len(x))
+    for a, b, d in strokes(x, threshold):
+        if d:
+            out[a:b] = np.maximum.accumulate(np.maximum((x[a:b] - x[a]) * d, 0.0))
+    return out
+
+
+def dahl(position: Array, length: float, start: float = 0.0, threshold: float | None = None) -> Array:
+    """Dahl friction state (n,) in [-1, 1]: dz/ds = (1 - z sign(ds)) / length (Dahl 1968, exponent 1).
+
+    length: [position unit] over which friction builds up after a reversal; start: state at the first sample.
+    """
+    x = np.asarray(position, float)
+    out = np.empty(len(x))
+    z = start
+    for a, b, d in strokes(x, threshold):
+        if d:
+            path = np.maximum.accumulate(np.maximum((x[a:b] - x[a]) * d, 0.0))
+            out[a:b] = d + (z - d) * np.exp(-path / max(length, 1e-12))
+        else:
+            out[a:b] = z
+        z = out[b - 1]
+    return out
+
+
+def jenkins(position: Array, length: float, start: float = 0.0, threshold: float | None = None) -> Array:
+    """Jenkins element state (n,) in [-1, 1]: an elastic element of reach `length` [position unit] that yields (stop operator)."""
+    x = np.asarray(position, float)
+    out = np.empty(len(x))
+    z = start
+    for a, b, d in strokes(x, threshold):
+        if d:
+            path = np.maximum.accumulate(np.maximum((x[a:b] - x[a]) * d, 0.0))
+            out[a:b] = np.clip(z + d * path / max(length, 1e-12), -1, 1)
+        else:
+            out[a:b] = z
+        z = out[b - 1]
+    return out
+
+
+def lowpass(time_s: Array, values: Array, time_constant_s: float) -> Array:
+    """First-order low pass (n,) on irregular samples (exact for a held input), started at rest on the first value."""
+    decay = np.exp(-np.diff(time_s) / max(time_constant_s, 1e-9))
+    v = np.asarray(values, float)
+    out = np.empty(len(v))
+    state = out[0] = v[0]
+    mean = 0.5 * (v[1:] + v[:-1])
+    for i, (e, m) in enumerate(zip(decay.tolist(), mean.tolist(), strict=True), start=1):
+        state = m + (state - m) * e
+        out[i] = state
+    return out

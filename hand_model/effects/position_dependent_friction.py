@@ -1,0 +1,45 @@
+"""Position-dependent friction: a tight spot that opposes motion both ways in one part of the range."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
+
+
+class PositionDependentFriction(Effect):
+    """F = sign(v) A exp(-((x - c) / w)^2 / 2)."""
+
+    name = "position_dependent_friction"
+
+    def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
+        """Centre over the range, width from 2 % to 25 % of it."""
+        low, high = position_range(states)
+        span, unit = high - low, states[0].position_unit
+        return (Shape("centre", unit, low + 0.03 * span, high - 0.03 * span, tuple(low + span * np.linspace(0.05, 0.95, 19))),
+                Shape("width", unit, 0.015 * span, 0.25 * span, (0.03 * span, 0.06 * span, 0.12 * span)))
+
+    def amplitudes(self) -> tuple[Amplitude, ...]:
+        """Extra friction at the centre, never negative."""
+        return (("extra_friction", "effort", 0.0, np.inf),)
+
+    def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
+        """sign(v) times a bell over position, (n, 1)."""
+        bell = np.exp(-0.5 * ((state.position - shape["centre"]) / shape["width"]) ** 2)
+        return (state.direction * bell)[:, None]
+
+    def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
+                   declared: Mapping[str, float]) -> dict[str, float]:
+        """Bell and its height, also as a ratio to Coulomb friction."""
+        return {**shape, **amplitude, "ratio": amplitude["extra_friction"] / declared.get("coulomb", np.nan)}
+
+    def region(self, states: tuple[DriveState, ...], shape: Mapping[str, float]) -> dict[str, Any] | None:
+        """Two widths about the centre."""
+        c, w = shape["centre"], shape["width"]
+        return {"position": [c - 2 * w, c + 2 * w], "unit": states[0].position_unit}
+
+
+EFFECT = PositionDependentFriction()

@@ -1,0 +1,40 @@
+"""Torque ripple: load periodic in motor position (cogging, screw eccentricity)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
+
+
+class TorqueRipple(Effect):
+    """F = A sin(2 pi x / P + phase)."""
+
+    name = "torque_ripple"
+
+    def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
+        """Period from four times the sample spacing at slow speed to half the range, dense in wavenumber."""
+        low, high = position_range(states)
+        span = high - low
+        periods = span / np.arange(2.0, 40.01, 0.25)
+        return (Shape("period", states[0].position_unit, 0.02 * span, 0.55 * span, tuple(periods)),)
+
+    def amplitudes(self) -> tuple[Amplitude, ...]:
+        """Sine and cosine parts."""
+        return (("sine", "effort", -np.inf, np.inf), ("cosine", "effort", -np.inf, np.inf))
+
+    def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
+        """sin and cos of the position's phase, (n, 2)."""
+        phase = 2 * np.pi * state.position / shape["period"]
+        return np.stack([np.sin(phase), np.cos(phase)], axis=-1)
+
+    def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
+                   declared: Mapping[str, float]) -> dict[str, float]:
+        """Amplitude, period and phase [rad]."""
+        return {"amplitude": float(np.hypot(amplitude["sine"], amplitude["cosine"])), "period": shape["period"],
+                "phase": float(np.arctan2(amplitude["cosine"], amplitude["sine"]))}
+
+
+EFFECT = TorqueRipple()

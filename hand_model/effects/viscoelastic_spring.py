@@ -1,0 +1,34 @@
+"""Viscoelastic spring: the spring relaxes or creeps (one Maxwell branch beside the declared spring)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from .base import Amplitude, Array, DriveState, Effect, Shape
+from .path import lowpass
+
+
+class ViscoelasticSpring(Effect):
+    """F = k1 (x - y), dy/dt = (x - y) / tau."""
+
+    name = "viscoelastic_spring"
+
+    def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
+        """Relaxation time between five samples and the length of the longest trial."""
+        step = float(np.median(np.concatenate([np.diff(s.time_s) for s in states])))
+        longest = max(float(s.time_s[-1] - s.time_s[0]) for s in states)
+        low, high = 5 * step, max(longest, 20 * step)
+        return (Shape("relaxation_time", "s", low, high, tuple(np.geomspace(1.5 * low, 0.7 * high, 9))),)
+
+    def amplitudes(self) -> tuple[Amplitude, ...]:
+        """Stiffness of the branch, never negative."""
+        return (("stiffness", "effort/position", 0.0, np.inf),)
+
+    def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
+        """x minus its low pass, (n, 1)."""
+        return (state.position - lowpass(state.time_s, state.position, shape["relaxation_time"]))[:, None]
+
+
+EFFECT = ViscoelasticSpring()
