@@ -1,0 +1,147 @@
+"""The MJCF of a hand."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+
+from ..hand import Hand
+from .drive import Drive, nominal_drives
+from .plan import Link, Plan
+from .xml import child, comment, number, vector
+
+# Equality as stiff as MuJoCo keeps stable at its default step: time constant of two steps, impedance at MuJoCo's upper limit.
+TIMESTEP = 0.002
+SOLREF = (2 * TIMESTEP, 1.0)
+SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+
+
+def mjcf(plan: Plan) -> Any:
+    """The MJCF tree (lxml element) of one plan."""
+    from lxml import etree
+
+    root = etree.Element("mujoco", model=plan.stem)
+    child(root, "compiler", angle="radian", autolimits=True, balanceinertia=False, meshdir="assets")
+    child(root, "option", timestep=TIMESTEP, jacobian="dense", integrator="implicitfast")
+    _defaults(root)
+    asset = child(root, "asset")
+    world = child(root, "worldbody")
+    bodies: dict[str | None, Any] = {None: world}
+    drives = nominal_drives(plan)
+    for link in plan.links:
+        bodies[link.name] = _body(bodies[link.parent], asset, link, drives)
+    if plan.excludes:
+        contact = child(root, "contact")
+        for one, other, reason in plan.excludes:
+            comment(contact, reason)
+            child(contact, "exclude", body1=one, body2=other)
+    _equalities(root, plan)
+    _actuators(root, plan, drives)
+    _physics(root, plan.hand)
+    _keyframes(root, plan)
+    return root
+
+
+def _defaults(root: Any) -> None:
+    default = child(root, "default")
+    visual = child(default, "default", class_="visual")
+    child(visual, "geom", group="2", contype="0", conaffinity="0", mass="0", rgba=(0.75, 0.75, 0.78, 1.0))
+    collision = child(default, "default", class_="collision")
+    child(collision, "geom", type="capsule", group="3", mass="0", condim="4", friction=(0.9, 0.01, 1e-4), rgba=(0.2, 0.5, 0.9, 0.4))
+    marker = child(default, "default", class_="marker")
+    child(marker, "site", size=0.0025, group="4", rgba=(0.9, 0.1, 0.1, 1.0))
+
+
+def _body(parent: Any, asset: Any, link: Link, drives: dict[str, Drive]) -> Any:
+    body = child(parent, "body", name=link.name, pos=link.position_parent)
+    inertia = link.inertia
+    t = inertia.tensor
+    full = (t[0, 0], t[1, 1], t[2, 2], t[0, 1], t[0, 2], t[1, 2])
+    child(body, "inertial", pos=inertia.centre, mass=inertia.mass, fullinertia=full)
+    if link.joint is not None:
+        drive = drives.get(link.joint)
+        joint = child(body, "joint", name=link.joint, type="hinge", pos=(0, 0, 0), axis=link.axis, range=link.range_rad, ref="0")
+        if drive is not None:
+            joint.set("damping", number(drive.damping))
+            if drive.armature:
+                joint.set("armature", number(drive.armature))
+    child(asset, "mesh", name=f"{link.name}_visual", file=f"{link.mesh}.stl")
+    child(body, "geom", class_="visual", type="mesh", mesh=f"{link.name}_visual")
+    for shape in link.shapes:
+        if np.linalg.norm(shape.end - shape.start) < 1e-6:
+            child(body, "geom", class_="collision", type="sphere", size=shape.radius, pos=shape.start)
+        else:
+            child(body, "geom", class_="collision", size=shape.radius, fromto=np.concatenate([shape.start, shape.end]))
+    for name, position in link.sites.items():
+        child(body, "site", name=name, class_="marker", pos=position)
+    return body
+
+
+def _equalities(root: Any, plan: Plan) -> None:
+    if not plan.linkages:
+        return
+    equality = child(root, "equality")
+    for name, (finger, linkage) in plan.linkages.items():
+        coefficients = np.zeros(5)
+        coefficients[: len(linkage.coefficients)] = linkage.coefficients
+        child(
+            equality,
+            "joint",
+            name=name,
+            joint1=plan.names.joint[finger, linkage.follower],
+            joint2=plan.names.joint[finger, linkage.driver],
+            polycoef=coefficients,
+            solref=SOLREF,
+            solimp=SOLIMP,
+        )
+
+
+def _actuators(root: Any, plan: Plan, drives: dict[str, Drive]) -> None:
+    driven = {joint: drive for joint, drive in drives.items() if drive.actuator}
+    if not driven:
+        return
+    ranges = {link.joint: link.range_rad for link in plan.links}
+    actuator = child(root, "actuator")
+    comment(actuator, "nominal, not measured: gains and forces are scaled to the fallback inertias (README)")
+    for joint, d in driven.items():
+        child(
+            actuator, "position", name=d.actuator, joint=joint, kp=d.kp, kv=d.kv, ctrlrange=ranges[joint], forcerange=(-d.force, d.force)
+        )
+
+
+def _physics(root: Any, hand: Hand) -> None:
+    """Identified motors and effects, where those modules know the hand's."""
+    if hand.motors and find_spec("hand_model.compile.motor"):
+        from .motor import write_motors
+
+        write_motors(root, hand)
+
+
+def _keyframes(root: Any, plan: Plan) -> None:
+    keyframe = child(root, "keyframe")
+    joints = [link.joint for link in plan.links if link.joint]
+    for name, angles in plan.keyframes.items():
+        key = child(keyframe, "key", name=name, qpos=[angles[joint] for joint in joints])
+        targets = [a.get("joint") for a in root.iterfind("actuator/position")]
+        if targets and len(targets) == len(root.findall("actuator/*")):
+            key.set("ctrl", vector([angles[joint] for joint in targets]))
+
+
+def scene(plan: Plan) -> Any:
+    """The hand above a floor, with a light and a camera distance that suit its size."""
+    from lxml import etree
+
+    root = etree.Element("mujoco", model=f"{plan.stem}_scene")
+    child(root, "include", file=f"{plan.stem}.xml")
+    reach = plan.reach
+    child(root, "statistic", center=(0.3 * reach, 0.0, 0.0), extent=1.2 * reach, meansize=0.05 * reach)
+    child(child(root, "visual"), "headlight", ambient=(0.4, 0.4, 0.4), diffuse=(0.5, 0.5, 0.5))
+    asset = child(root, "asset")
+    child(asset, "texture", name="floor", type="2d", builtin="checker", rgb1=(0.85, 0.85, 0.85), rgb2=(0.7, 0.7, 0.7), width="64", height="64")
+    child(asset, "material", name="floor", texture="floor", texrepeat=(20, 20), texuniform=True)
+    world = child(root, "worldbody")
+    child(world, "light", pos=(0.0, 0.0, 10 * reach), dir=(0.0, 0.0, -1.0), directional=True)
+    child(world, "geom", name="floor", type="plane", size=(10 * reach, 10 * reach, 0.1), pos=(0.0, 0.0, -2 * reach), material="floor")
+    return root

@@ -1,0 +1,136 @@
+"""The README of a compiled folder: how it was derived, known issues, verification figures."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..hand import Hand
+from .plan import Plan
+from .shape import DENSITY
+
+VERIFICATION = "## Verification"
+
+CHANGELOG = """# Changelog
+
+- First version: compiled by `hand-model compile`; compiling the same hand again gives the same bytes.
+"""
+
+LICENSE = """This description (MJCF, URDF, meshes, hand.json) was generated from recordings by hand_model (MIT).
+The figures in it belong to whoever made the recordings named in README.md; their terms apply to this folder. Where they state
+none, treat it as MIT-licensed:
+
+Permission is hereby granted, free of charge, to any person obtaining a copy of these files, to deal in them without restriction,
+including without limitation the rights to use, copy, modify, merge, publish, distribute, sublicense, and/or sell copies of them,
+subject to this notice being included in all copies or substantial portions of them.
+
+THE FILES ARE PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED. IN NO EVENT SHALL THE AUTHORS OR COPYRIGHT
+HOLDERS BE LIABLE FOR ANY CLAIM, DAMAGES OR OTHER LIABILITY ARISING FROM THE FILES OR THEIR USE.
+"""
+
+
+def readme(hand: Hand, plans: tuple[Plan, ...]) -> str:
+    """The README's text."""
+    parts = [
+        f"# {plans[0].stem}\n\nA {hand.side} {hand.name} hand for MuJoCo (MJCF) and ROS, Pinocchio and others (URDF).\n",
+        _files(plans),
+        _derivation(hand, plans),
+        _joints(hand),
+        _linkages(plans),
+        _keyframes(plans),
+        _known_issues(hand, plans),
+        f"{VERIFICATION}\n\nNot yet run. `hand-model check` on this folder measures every item of it.\n",
+    ]
+    return "\n".join(part for part in parts if part)
+
+
+def _files(plans: tuple[Plan, ...]) -> str:
+    lines = ["## Files\n"]
+    for plan in plans:
+        fingers = ", ".join(f.name for f in plan.hand.fingers)
+        lines.append(f"- `{plan.stem}.xml`, `{plan.stem}.urdf`: {fingers}; {plan.mass * 1e3:.1f} g (fallback, see below)")
+    lines.append("- `scene_*.xml`: the hand with floor and light. `assets/`: meshes.")
+    lines.append("- `hand.json`: encoder maps, uncertainties, exact couplings, motors, effects, provenance; readable as a `.hand` file.")
+    return "\n".join(lines) + "\n"
+
+
+def _derivation(hand: Hand, plans: tuple[Plan, ...]) -> str:
+    steps = [
+        "The `palm` body is the repeatable frame that the three probed palm landmarks define. Every other body has the palm's "
+        "orientation when the hand is open, and its origin at its joint's centre; every joint angle is zero at rest.",
+        "Axes, centres, markers and tips were identified from the recordings listed below; their covariance is in `hand.json`.",
+        "Limits are the recorded ranges, widened to what a follower's polynomial reaches over its driver's range.",
+        "A linkage is the recorded polynomial, enforced by an MJCF joint equality (`joint1` follows `joint2`); URDF holds the "
+        "least-squares line that stays within the limits.",
+        f"Masses and inertias are a fallback: solid capsules between the joints, {DENSITY:.0f} kg/m^3. Nothing of them was measured.",
+        "Visual meshes (group 2) are these capsules. Collision capsules (group 3) are the same, shrunk until nothing touches at any keyframe.",
+    ]
+    if any(plan.names.actuator for plan in plans) and not hand.motors:
+        steps.append("Actuators, armature and damping are nominal, scaled to the fallback inertias: stable, not measured.")
+    steps += hand.notes
+    text = "## How it was derived\n\n" + "\n".join(f"{i}. {step}" for i, step in enumerate(steps, 1)) + "\n"
+    if hand.provenance:
+        rows = "\n".join(f"| `{name}` | `{digest}` |" for name, digest in sorted(hand.provenance.items()))
+        text += f"\n| recording | SHA-256 |\n| --- | --- |\n{rows}\n"
+    return text
+
+
+def _joints(hand: Hand) -> str:
+    rows = ["## Joints\n", "| finger | joint | range, deg | axis sd, deg | centre sd, mm | |", "| --- | --- | --- | --- | --- | --- |"]
+    for finger in hand.fingers:
+        for joint in finger.joints:
+            low, high = np.degrees(joint.range_rad)
+            axis, centre = deviation(np.asarray(joint.covariance, float))
+            note = "degenerate" if joint.degenerate else ""
+            rows.append(f"| {finger.name} | {joint.name} | {low:.1f} to {high:.1f} | {axis} | {centre} | {note} |")
+    return "\n".join(rows) + "\n"
+
+
+def deviation(covariance: np.ndarray) -> tuple[str, str]:
+    """Root of the summed variances of axis [deg] and centre [mm] as text; a dash where they are unknown."""
+    variances = np.diagonal(covariance)
+    out = []
+    for part, scale in ((variances[:3], 180 / np.pi), (variances[3:], 1e3)):
+        known = np.isfinite(part).all() and (part >= 0).all() and part.sum() > 0
+        out.append(f"{np.sqrt(part.sum()) * scale:.2g}" if known else "-")
+    return out[0], out[1]
+
+
+def _linkages(plans: tuple[Plan, ...]) -> str:
+    seen = {name: (finger, k) for plan in plans for name, (finger, k) in plan.linkages.items()}
+    if not seen:
+        return ""
+    rows = ["## Linkages\n", "What URDF's linear mimic loses against the polynomial, at worst over the range:\n"]
+    rows += ["| equality | follower of | angle, deg | tip, mm |", "| --- | --- | --- | --- |"]
+    for name, (_, k) in seen.items():
+        rows.append(f"| `{name}` | {k.follower} of {k.driver} | {np.degrees(k.loss_rad):.2f} | {k.loss_tip_m * 1e3:.2f} |")
+    return "\n".join(rows) + "\n"
+
+
+def _keyframes(plans: tuple[Plan, ...]) -> str:
+    rows = ["## Keyframes\n", "Fraction of its range by which each finger is closed:\n"]
+    for plan in plans:
+        fingers = [f.name for f in plan.hand.fingers]
+        rows += [f"| `{plan.stem}` | " + " | ".join(fingers) + " |", "| --- |" + " --- |" * len(fingers)]
+        rows += [f"| `{name}` | " + " | ".join(f"{reached[f]:.2f}" for f in fingers) + " |" for name, reached in plan.reached.items()]
+        rows.append("")
+    return "\n".join(rows)
+
+
+def _known_issues(hand: Hand, plans: tuple[Plan, ...]) -> str:
+    issues = []
+    for finger in hand.fingers:
+        for joint in finger.joints:
+            if joint.degenerate:
+                issues.append(f"{finger.name} {joint.name}: the recorded arc does not determine axis or centre; see its uncertainty.")
+    for plan in plans:
+        issues += [f"{finger}: the fingertip is a guess ({how})." for finger, how in plan.guessed_tips.items()]
+        for name, reached in plan.reached.items():
+            short = [f for f, fraction in reached.items() if name == "close" and fraction < 1]
+            if short:
+                issues.append(f"`{plan.stem}`, `{name}`: {', '.join(short)} would meet another finger and stops short.")
+        for one, other, reason in plan.excludes:
+            if reason != "share a joint":
+                issues.append(f"`{plan.stem}`: no contact between `{one}` and `{other}`, whose primitives {reason}.")
+    issues.append("The attachment site is the palm frame itself: the wrist's interface was not measured.")
+    issues.append("Masses, inertias and shapes are a fallback until surfaces are probed.")
+    return "## Known issues\n\n" + "\n".join(f"- {issue}" for issue in dict.fromkeys(issues)) + "\n"
