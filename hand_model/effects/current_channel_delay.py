@@ -26,6 +26,8 @@ class CurrentChannelDelay(Effect):
 
     def warp(self, state: DriveState, columns: Array, shape: Mapping[str, float]) -> Array:
         """Columns read at t - delay, linearly interpolated."""
+        if not columns.shape[1]:
+            return columns
         then = state.time_s - shape["delay"]
         return np.stack([np.interp(then, state.time_s, column) for column in columns.T], axis=-1)
 

@@ -1,0 +1,173 @@
+"""A weighted linear balance over several recordings, with effects in it: design matrix, bounded amplitudes, noise.
+
+Everything here is generic in what the effort is (current, torque, an angle) and in which columns are declared.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..effects.base import DriveState
+from ..effects.path import strokes
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Term:
+    """One effect with its shape."""
+
+    effect: Any
+    shape: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """declared: coefficients by name. amplitudes: one mapping per term. prediction: (n,) over all compared samples.
+    rss: weighted residual sum of squares over the training samples. size: number of effect parameters."""
+
+    terms: tuple[Term, ...]
+    declared: Mapping[str, float]
+    amplitudes: tuple[Mapping[str, float], ...]
+    prediction: Array
+    rss: float
+    size: int
+
+
+class Balance:
+    """The compared samples of several DriveStates, stacked.
+
+    effort, weight (1 / standard deviation), train (bool): (n,). sigma: noise of the effort; inflation: integrated
+    autocorrelation of that noise (1 where it is white): a sum of squares counts divided by it.
+    """
+
+    def __init__(self, states: tuple[DriveState, ...], everything: bool = False) -> None:
+        self.states = states
+        self.masks = [np.isfinite(s.effort) & np.isfinite(s.declared).all(1) for s in states]
+        self.effort = np.concatenate([s.effort[m] for s, m in zip(states, self.masks, strict=True)])
+        self.train = np.concatenate([np.full(m.sum(), everything or not s.validate)
+                                     for s, m in zip(states, self.masks, strict=True)])
+        self.names = states[0].declared_names or tuple(f"c{i}" for i in range(states[0].declared.shape[1]))
+        self.stroke = self._strokes()
+        self.sigma, self.inflation = 1.0, 1.0
+        self.weight = np.ones(len(self.effort))
+        self.sigma, self.inflation = noise(self)
+        extra = self.gather(lambda s: s.extra.get("sigma", np.zeros(len(s.time_s))))
+        self.weight = 1 / np.sqrt(self.sigma**2 + extra**2)
+        self.steady = extra <= 0.25 * self.sigma
+
+    def gather(self, value: Any) -> Array:
+        """Stack `value(state)` (n, ...) over the compared samples."""
+        return np.concatenate([np.asarray(value(s))[m] for s, m in zip(self.states, self.masks, strict=True)])
+
+    def _strokes(self) -> NDArray[np.int64]:
+        out, count = [], 0
+        for state in self.states:
+            label = np.zeros(len(state.time_s), int)
+            for a, b, _ in strokes(state.position):
+                label[a:b] = count
+                count += 1
+            out.append(label)
+        return np.concatenate([label[m] for label, m in zip(out, self.masks, strict=True)])
+
+    def columns(self, effect: Any, shape: Mapping[str, float], warps: tuple[Term, ...] = ()) -> Array:
+        """An effect's columns (n, j), shifted by those of `warps`, unweighted."""
+        def one(state: DriveState) -> Array:
+            columns = effect.columns(state, shape)
+            for term in warps:
+                columns = term.effect.warp(state, columns, term.shape)
+            return columns
+
+        return self.gather(one)
+
+    def design(self, terms: tuple[Term, ...]) -> tuple[Array, Array, Array]:
+        """Matrix (n, k + j) of declared and effect columns, lower and upper bounds (k + j,) of their coefficients."""
+        warps = tuple(t for t in terms if t.effect.warps)
+
+        def declared(state: DriveState) -> Array:
+            columns = state.declared
+            for term in terms:
+                if term.effect.replaces is not None:
+                    columns = term.effect.declared(state, term.shape)
+            for term in warps:
+                columns = term.effect.warp(state, columns, term.shape)
+            return columns
+
+        parts = [self.gather(declared)]
+        low, high = [-np.inf] * parts[0].shape[1], [np.inf] * parts[0].shape[1]
+        for term in terms:
+            parts.append(self.columns(term.effect, term.shape, warps))
+            low += [a[2] for a in term.effect.amplitudes()]
+            high += [a[3] for a in term.effect.amplitudes()]
+        return np.concatenate(parts, axis=1), np.array(low), np.array(high)
+
+    def fit(self, terms: tuple[Term, ...] = ()) -> Fit:
+        """Amplitudes and declared coefficients by bounded weighted least squares on the training samples."""
+        matrix, low, high = self.design(terms)
+        w = self.weight * self.train
+        clips = [t for t in terms if t.effect.clips]
+        prediction = np.zeros(len(self.effort))
+        inside = np.ones(len(self.effort), bool)
+        for _ in range(4 if clips else 1):
+            coefficients = bounded_least_squares(matrix * (w * inside)[:, None], self.effort * w * inside, low, high)
+            prediction = raw = matrix @ coefficients
+            for term in clips:
+                prediction = term.effect.clip(prediction, term.shape)
+            inside = prediction == raw
+        rss = float(np.sum(((self.effort - prediction) * w) ** 2))
+        k = len(self.names)
+        amplitudes, start = [], k
+        for term in terms:
+            names = [a[0] for a in term.effect.amplitudes()]
+            amplitudes.append(dict(zip(names, coefficients[start:start + len(names)].tolist(), strict=True)))
+            start += len(names)
+        size = sum(len(t.shape) + len(t.effect.amplitudes()) for t in terms)
+        declared = dict(zip(self.names, coefficients[:k].tolist(), strict=True))
+        return Fit(terms, declared, tuple(amplitudes), prediction, rss, size)
+
+
+def bounded_least_squares(matrix: Array, target: Array, low: Array, high: Array) -> Array:
+    """min |A x - b| with low <= x <= high, bounds 0 or infinite (active set on the normal equations)."""
+    scale = np.linalg.norm(matrix, axis=0)
+    scale = np.where(scale > 0, scale, 1.0)
+    a = matrix / scale
+    gram, right = a.T @ a, a.T @ target
+    gram = gram + 1e-10 * np.eye(len(gram))
+    free = np.ones(len(low), bool)
+    x = np.zeros(len(low))
+    for _ in range(len(low) + 1):
+        x[:] = 0.0
+        x[free] = np.linalg.solve(gram[np.ix_(free, free)], right[free])
+        wrong = free & ((x < low * scale) | (x > high * scale))
+        if not wrong.any():
+            break
+        free &= ~wrong
+    return x / scale
+
+
+def noise(balance: Balance) -> tuple[float, float]:
+    """Standard deviation of the effort's noise and its integrated autocorrelation time in samples.
+
+    Pure error: differences of neighbouring samples of one stroke after the declared fit (von Neumann 1941); the
+    autocorrelation is that of the residual minus its smooth part over position, per stroke.
+    """
+    steady = balance.gather(lambda s: s.extra.get("steady", np.ones(len(s.time_s)))) > 0
+    prediction = _plain_fit(balance, steady)
+    r = balance.effort - prediction
+    same = (balance.stroke[1:] == balance.stroke[:-1]) & steady[1:] & steady[:-1]
+    if same.sum() < 20:
+        return float(np.std(r)) or 1.0, 1.0
+    sigma = float(np.sqrt(np.mean(np.diff(r)[same] ** 2) / 2))
+    return max(sigma, 1e-9), 1.0
+
+
+def _plain_fit(balance: Balance, use: NDArray[np.bool_]) -> Array:
+    matrix = balance.gather(lambda s: s.declared)
+    free = np.full(matrix.shape[1], np.inf)
+    use = use if use.sum() > 5 * matrix.shape[1] else np.ones(len(matrix), bool)
+    return matrix @ bounded_least_squares(matrix[use], balance.effort[use], -free, free)

@@ -1,0 +1,127 @@
+"""Current station: the balance of each motor of a hand, from the log alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..effects.base import DriveState
+from ..effects.path import dahl
+from ..session import Log, Session, Trial
+from .motion import Motion, estimate_motion
+
+Array = NDArray[np.float64]
+
+KINDS = ("flexion", "excitation")
+COULOMB_GIVE = 0.7  # [%] starting bristle length of the declared Coulomb friction: a hard sign function cannot be simulated
+COULOMB_GIVE_MOST = 1.2  # [%] above this, give is presliding
+SETTLE_SAMPLES = (14, 13)  # after a start and before a stop: where acceleration is smeared by the kernel
+
+
+def drive_trials(session: Session) -> dict[str, list[Trial]]:
+    """Actuator -> its flexion and excitation trials with a log, in the order of the manifest."""
+    out: dict[str, list[Trial]] = {}
+    for trial in session.trials:
+        if trial.kind in KINDS and trial.log_path is not None and trial.finger is not None:
+            actuator = session.finger(trial.finger).actuator
+            if actuator is not None:
+                out.setdefault(actuator, []).append(trial)
+    return out
+
+
+def count_range(logs: list[Log]) -> tuple[float, float]:
+    """Counts at 0 % and 100 % of the range: the commanded extremes, else the recorded ones."""
+    name = "setpoint" if all("setpoint" in log.columns for log in logs) else "position"
+    values = np.concatenate([log.columns[name] for log in logs])
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    return low, max(high, low + 1e-9)
+
+
+def drive_states(session: Session) -> dict[str, tuple[DriveState, ...]]:
+    """DriveStates of every actuator, [%] of its range and raw current; one bristle length for the whole session."""
+    raw = {a: [(t, t.log()) for t in trials] for a, trials in drive_trials(session).items()}
+    prepared = {a: _prepare(a, entries) for a, entries in raw.items()}
+    give = session_give({a: states for a, states in prepared.items() if states})
+    return {a: tuple(with_coulomb(s, give) for s in states) for a, states in prepared.items() if states}
+
+
+def _prepare(actuator: str, entries: list[tuple[Trial, Log]]) -> list[DriveState]:
+    low, high = count_range([log for _, log in entries])
+    first = min(float(log.time_s[0]) for _, log in entries)
+    states = []
+    for index, (trial, log) in enumerate(entries):
+        counts, current = log.column("position"), log.column("current")
+        seen = np.isfinite(counts) & np.isfinite(log.time_s) & np.r_[True, np.diff(log.time_s) > 0]
+        if seen.sum() < 50:
+            continue
+        time_s, position = log.time_s[seen], 100 * (counts[seen] - low) / (high - low)
+        motion = estimate_motion(time_s, position)
+        extra = {name: log.columns[name][seen] for name in ("setpoint", "speed", "current_limit", "temperature")
+                 if name in log.columns and np.isfinite(log.columns[name][seen]).all()}
+        extra["elapsed"] = time_s - first
+        extra["trial_index"] = np.full(len(time_s), float(index))
+        effort = np.where(motion.moving, current[seen], np.nan)
+        extra["steady"] = steady(time_s, motion).astype(float)
+        declared = np.stack([motion.acceleration, motion.velocity, np.sign(motion.velocity), motion.position,
+                             np.ones(len(time_s))], axis=-1)
+        states.append(DriveState(trial.name, actuator, time_s, motion.position, motion.velocity, motion.acceleration,
+                                 effort, declared, extra=extra, validate=trial.validate,
+                                 declared_names=("inertia", "viscous", "coulomb", "spring", "preload")))
+    return states
+
+
+def steady(time_s: Array, motion: Motion) -> NDArray[np.bool_]:
+    """Samples (n,) in motion and away from starts and stops, where the state estimate is not smeared."""
+    step = float(np.median(np.diff(time_s)))
+    after, before = SETTLE_SAMPLES
+    return motion.moving & (motion.since_start_s > after * step) & (motion.until_stop_s > before * step)
+
+
+def with_coulomb(state: DriveState, give: float) -> DriveState:
+    """The state with a Dahl column of that bristle length [%] as its Coulomb friction, and with the uncertainty that
+    half a sample of timing means where the declared prediction moves fast."""
+    declared = np.array(state.declared)
+    declared[:, state.declared_names.index("coulomb")] = dahl(state.position, give)
+    return with_timing(replace(state, declared=declared))
+
+
+def with_timing(state: DriveState) -> DriveState:
+    """Adds "sigma": what half a sample interval of timing means for the declared prediction, zero in steady motion."""
+    seen = np.isfinite(state.effort)
+    if seen.sum() < 20:
+        return state
+    scale = np.linalg.norm(state.declared[seen], axis=0) + 1e-12
+    beta = np.linalg.lstsq(state.declared[seen] / scale, state.effort[seen], rcond=None)[0] / scale
+    step = float(np.median(np.diff(state.time_s)))
+    slope = np.abs(np.gradient(state.declared @ beta, state.time_s))
+    slope = np.maximum.reduce([np.roll(slope, k) for k in (-2, -1, 0, 1, 2)])
+    sigma = np.where(state.extra["steady"] > 0, 0.0, 0.5 * step * slope + 0.0)
+    return replace(state, extra={**state.extra, "sigma": sigma})
+
+
+def session_give(prepared: dict[str, list[DriveState]]) -> float:
+    """Bristle length [%] of the declared Coulomb friction: the least that any drive of the session needs.
+
+    Coulomb friction turns over within a small distance in any drive that can be simulated; the drive that gives least
+    shows how small. What a drive gives beyond that is presliding, an effect.
+    """
+    best = []
+    for states in prepared.values():
+        lengths = np.geomspace(0.3, COULOMB_GIVE_MOST, 8)
+        best.append(lengths[int(np.argmin([_misfit(states, length) for length in lengths]))])
+    return float(min(best)) if best else COULOMB_GIVE
+
+
+def _misfit(states: list[DriveState], give: float) -> float:
+    columns, efforts = [], []
+    for state in states:
+        declared = np.array(state.declared)
+        declared[:, 2] = dahl(state.position, give)
+        seen = np.isfinite(state.effort)
+        columns.append(declared[seen])
+        efforts.append(state.effort[seen])
+    a, y = np.concatenate(columns), np.concatenate(efforts)
+    scale = np.linalg.norm(a, axis=0) + 1e-12
+    return float(np.sum((y - a @ (np.linalg.lstsq(a / scale, y, rcond=None)[0] / scale)) ** 2))

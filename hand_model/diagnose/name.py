@@ -1,0 +1,275 @@
+"""Which effects are missing: candidates compete on a balance, by forward and backward selection with joint refits.
+
+Generic: the balance may be a motor's current, a rig's torque or one angle against another; the candidates are whatever
+`effects.catalogue(station)` holds. Decided by penalised likelihood on the training recordings (BIC, Schwarz 1978, with
+samples counted by their correlation time); nothing here sees a validation recording.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from .balance import Balance, Fit, Term
+from .lack_of_fit import LackOfFit, lack_of_fit
+
+Array = NDArray[np.float64]
+
+ALPHA = 0.003  # false alarms per channel: 5 % over some fifteen channels of a session
+EVIDENCE_LEAST = 6.0  # log evidence an effect must bring: e^6 against "none", and against the search over shapes
+CLASS_WIDTH = 3.0  # log evidence within which two effects are one class: 20 to 1
+MOST_TERMS = 5
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A candidate in the place of a finding: its log evidence relative to none, and its fit."""
+
+    name: str
+    evidence: float
+    fit: Fit
+
+
+@dataclass(frozen=True)
+class Named:
+    """One finding of a balance. rivals: every candidate that was tried in its place (best first), the winner included.
+    share: of the explainable residual variance. probability: against all rivals and none."""
+
+    term: Term
+    amplitudes: dict[str, float]
+    rivals: tuple[Rival, ...]
+    share: float
+    probability: float
+
+    @property
+    def members(self) -> tuple[str, ...]:
+        """The class: every effect that these recordings cannot tell from this one."""
+        top = self.rivals[0].evidence
+        return tuple(r.name for r in self.rivals if r.evidence > top - CLASS_WIDTH)
+
+
+@dataclass(frozen=True)
+class Naming:
+    """What a balance says. before, after: lack of fit of the declared model and of the final one. rejected: tried and
+    not kept, with the log evidence that it brought."""
+
+    balance: Balance
+    declared: Fit
+    fit: Fit
+    before: LackOfFit
+    after: LackOfFit
+    found: tuple[Named, ...]
+    rejected: tuple[tuple[str, float], ...]
+
+    @property
+    def consistent(self) -> bool:
+        """True where nothing is missing beyond the noise."""
+        return self.before.p >= ALPHA and not self.found
+
+
+def evidence(balance: Balance, fit: Fit, reference: Fit, scale: float = 1.0) -> float:
+    """Log evidence of a fit over a reference: half the fall of the weighted RSS minus BIC's penalty.
+
+    scale: residual variance over pure error of the best model known, at least 1: a misfit weighs all candidates down.
+    """
+    count = max(balance.train.sum() / balance.inflation, 2.0)
+    gain = 0.5 * (reference.rss - fit.rss) / (scale * balance.inflation)
+    return float(gain - 0.5 * (fit.size - reference.size) * np.log(count))
+
+
+def name_effects(states: tuple[Any, ...], effects: Iterable[Any], progress: Callable[[str], None] | None = None) -> Naming:
+    """Name what is missing from the balance of `states` among `effects`; raises nothing for healthy recordings.
+
+    states: DriveStates of one balance, validation recordings marked by `validate`. The lack-of-fit test alone decides
+    whether anything is missing; without it no effect is named, however well it fits.
+    """
+    balance = Balance(tuple(states))
+    effects = tuple(effects)
+    declared = balance.fit()
+    before = lack_of_fit(balance, declared.prediction, len(balance.names), ALPHA)
+    terms: tuple[Term, ...] = ()
+    fit = declared
+    after = before
+    brought: dict[str, float] = {}
+    while after.p < ALPHA and len(terms) < MOST_TERMS:
+        ranked = rank(balance, effects, terms, fit)
+        for rival in ranked:
+            brought[rival.name] = max(brought.get(rival.name, -np.inf), rival.evidence)
+        if not ranked or ranked[0].evidence < EVIDENCE_LEAST:
+            break
+        terms, fit = settle(balance, effects, ranked[0].fit.terms)
+        after = lack_of_fit(balance, fit.prediction, len(balance.names) + fit.size, ALPHA)
+        if progress is not None:
+            progress(f"{balance.states[0].drive}: {', '.join(t.effect.name for t in terms)}")
+    found = _findings(balance, effects, terms, fit, declared)
+    kept = {t.effect.name for t in terms}
+    rejected = tuple(sorted(((n, e) for n, e in brought.items() if n not in kept), key=lambda item: -item[1]))
+    return Naming(balance, declared, fit, before, after, found, rejected)
+
+
+def rank(balance: Balance, effects: Iterable[Any], terms: tuple[Term, ...], fit: Fit, refine: int = 6) -> list[Rival]:
+    """Every candidate added to `terms`, its shape optimised from several starts; best evidence first."""
+    rough = []
+    for effect in effects:
+        if any(t.effect.name == effect.name for t in terms) and not getattr(effect, "repeats", False):
+            continue
+        best = scan(balance, effect, terms)
+        if best is not None:
+            rough.append((evidence(balance, best, fit, _scale(balance, best)), best))
+    rough.sort(key=lambda item: -item[0])
+    out = []
+    for position, (_, start) in enumerate(rough):
+        best = polish(balance, start, len(terms)) if position < refine else start
+        out.append((start.terms[-1].effect.name, best))
+    scale = min((_scale(balance, f) for _, f in out), default=1.0)
+    rivals = [Rival(name, evidence(balance, f, fit, scale), f) for name, f in out]
+    return sorted(rivals, key=lambda r: -r.evidence)
+
+
+def _scale(balance: Balance, fit: Fit) -> float:
+    return max(fit.rss / max(balance.train.sum(), 1), 1.0)
+
+
+def scan(balance: Balance, effect: Any, terms: tuple[Term, ...]) -> Fit | None:
+    """Best starting shape of `effect` beside `terms`; columns are projected, anything else is refitted."""
+    grid = effect.grid(balance.states)
+    if not grid:
+        return None
+    if effect.replaces is None and not effect.warps and not effect.clips and not any(t.effect.clips for t in terms):
+        grid = _project(balance, effect, terms, grid)
+    fits = [balance.fit((*terms, Term(effect, shape))) for shape in grid]
+    return min(fits, key=lambda f: f.rss) if fits else None
+
+
+def _project(balance: Balance, effect: Any, terms: tuple[Term, ...], grid: list[dict[str, float]]) -> list[dict[str, float]]:
+    """The two best shapes of a grid by the fall of the RSS that its columns, orthogonal to the design, bring."""
+    matrix, _, _ = balance.design(terms)
+    w = (balance.weight * balance.train)[:, None]
+    norm = np.linalg.norm(matrix * w, axis=0)
+    q, _ = np.linalg.qr(matrix * w / np.where(norm > 0, norm, 1.0))
+    residual = balance.effort * w[:, 0]
+    residual = residual - q @ (q.T @ residual)
+    warps = tuple(t for t in terms if t.effect.warps)
+    bounds = effect.amplitudes()
+    gains = []
+    for shape in grid:
+        c = balance.columns(effect, shape, warps) * w
+        size = np.linalg.norm(c, axis=0)
+        c = c - q @ (q.T @ c)
+        if not c.shape[1] or np.any(np.linalg.norm(c, axis=0) < 1e-6 * np.maximum(size, 1e-300)):
+            gains.append(0.0)
+            continue
+        if c.shape[1] == 1:
+            slope = float(c[:, 0] @ residual)
+            allowed = (slope >= 0 or bounds[0][2] < 0) and (slope <= 0 or bounds[0][3] > 0)
+            gains.append(slope**2 / float(c[:, 0] @ c[:, 0]) if allowed else 0.0)
+        else:
+            right = c.T @ residual
+            gains.append(float(right @ np.linalg.lstsq(c.T @ c, right, rcond=None)[0]))
+    order = np.argsort(gains)[::-1]
+    return [grid[i] for i in order[:2] if gains[i] > 0]
+
+
+def polish(balance: Balance, fit: Fit, which: int) -> Fit:
+    """Optimise the shape of one term (Nelder-Mead within its bounds), everything linear refitted at each step."""
+    term = fit.terms[which]
+    shapes = [s for s in term.effect.shapes(balance.states) if s.name not in ("side", "trial")]
+    if not shapes:
+        return fit
+    span = np.array([s.high - s.low for s in shapes])
+    start = np.array([term.shape[s.name] for s in shapes])
+
+    def at(u: Array) -> Fit:
+        values = {s.name: float(np.clip(v, s.low, s.high)) for s, v in zip(shapes, start + u * span, strict=True)}
+        terms = list(fit.terms)
+        terms[which] = Term(term.effect, {**term.shape, **values})
+        return balance.fit(tuple(terms))
+
+    step = [np.zeros(len(shapes))]
+    for i, s in enumerate(shapes):
+        corner = np.zeros(len(shapes))
+        near = [abs(v - start[i]) for v in s.starts if v != start[i]]
+        corner[i] = 0.4 * (min(near) if near else 0.1 * span[i]) / span[i]
+        step.append(corner)
+    result = minimize(lambda u: at(u).rss, np.zeros(len(shapes)), method="Nelder-Mead",
+                      options={"initial_simplex": np.array(step), "maxfev": 30 + 25 * len(shapes), "fatol": 0.02,
+                               "xatol": 1e-4})
+    best = at(result.x)
+    return best if best.rss < fit.rss else fit
+
+
+def settle(balance: Balance, effects: tuple[Any, ...], terms: tuple[Term, ...]) -> tuple[tuple[Term, ...], Fit]:
+    """Joint refit; terms that no longer pay leave; a term that another effect replaces better is exchanged."""
+    fit = refit(balance, balance.fit(terms))
+    for _ in range(3):
+        dropped = _drop(balance, fit)
+        if dropped is not None:
+            fit = dropped
+            continue
+        swapped = _swap(balance, effects, fit) if len(fit.terms) > 1 else None
+        if swapped is None:
+            break
+        fit = swapped
+    return fit.terms, fit
+
+
+def refit(balance: Balance, fit: Fit, rounds: int = 2) -> Fit:
+    """Optimise all shapes, one term after the other, until nothing falls any more."""
+    for _ in range(rounds if len(fit.terms) > 1 else 1):
+        before = fit.rss
+        for which in range(len(fit.terms)):
+            fit = polish(balance, fit, which)
+        if before - fit.rss < 0.5:
+            break
+    return fit
+
+
+def _drop(balance: Balance, fit: Fit) -> Fit | None:
+    """The fit without the term that costs more than it brings; None where every term pays."""
+    for which in range(len(fit.terms)):
+        rest = balance.fit(tuple(t for i, t in enumerate(fit.terms) if i != which))
+        if evidence(balance, fit, rest, _scale(balance, fit)) < EVIDENCE_LEAST:
+            return refit(balance, rest)
+    return None
+
+
+def _swap(balance: Balance, effects: tuple[Any, ...], fit: Fit) -> Fit | None:
+    """The best exchange of one term for another effect, where it raises the evidence; else None."""
+    for which in range(len(fit.terms)):
+        rest = tuple(t for i, t in enumerate(fit.terms) if i != which)
+        without = balance.fit(rest)
+        own = evidence(balance, fit, without, _scale(balance, fit))
+        ranked = [r for r in rank(balance, effects, rest, without, refine=3) if r.name != fit.terms[which].effect.name]
+        if ranked and ranked[0].evidence > own - 10:
+            other = refit(balance, ranked[0].fit)
+            scale = min(_scale(balance, other), _scale(balance, fit))
+            if evidence(balance, other, without, scale) > evidence(balance, fit, without, scale) + 1:
+                return other
+    return None
+
+
+def _findings(balance: Balance, effects: tuple[Any, ...], terms: tuple[Term, ...], fit: Fit, declared: Fit) -> tuple[Named, ...]:
+    """Each term with its rivals (every candidate in its place), its share and its probability; largest share first."""
+    found = []
+    explained = max(declared.rss - fit.rss, 1e-12)
+    losses = [max(balance.fit(tuple(t for i, t in enumerate(terms) if i != which)).rss - fit.rss, 0.0)
+              for which in range(len(terms))]
+    for which, term in enumerate(terms):
+        rest = tuple(t for i, t in enumerate(terms) if i != which)
+        without = balance.fit(rest)
+        ranked = rank(balance, effects, rest, without)
+        own = evidence(balance, fit, without, _scale(balance, fit))
+        rivals = [r for r in ranked if r.name != term.effect.name]
+        rivals.append(Rival(term.effect.name, max([own, *[r.evidence for r in ranked if r.name == term.effect.name]]), fit))
+        rivals.sort(key=lambda r: -r.evidence)
+        weights = np.exp(np.array([r.evidence for r in rivals] + [0.0]) - max(rivals[0].evidence, 0.0))
+        mine = [r.name for r in rivals].index(term.effect.name)
+        share = losses[which] / max(sum(losses), 1e-12) * min(explained / max(explained, 1e-12), 1.0)
+        found.append(Named(term, dict(fit.amplitudes[which]), tuple(rivals), float(share),
+                           float(weights[mine] / weights.sum())))
+    return tuple(sorted(found, key=lambda f: -f.share))
