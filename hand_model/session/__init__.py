@@ -1,18 +1,10 @@
 """Recording sessions (`hand-session/1`): what a laboratory hands over, read and checked, nothing interpreted."""
 
+from .check import check_session
 from .log import Log, read_log
-from .manifest import (
-    Actuator,
-    Finger,
-    PalmMarkers,
-    Probe,
-    Rig,
-    Segment,
-    Session,
-    Trial,
-    read_session,
-)
+from .manifest import read_session
 from .mocap import Mocap, read_mocap
+from .session import Actuator, Finger, PalmMarkers, Probe, Rig, Segment, Session, Trial
 
 __all__ = [
     "Actuator",
@@ -25,6 +17,7 @@ __all__ = [
     "Segment",
     "Session",
     "Trial",
+    "check_session",
     "read_log",
     "read_mocap",
     "read_session",

@@ -74,13 +74,15 @@ def _messages(path: Path) -> dict[str, list[tuple[int, Any]]]:
     from rosbags.typesys import Stores, get_typestore
 
     if path.is_dir() and not (path / "metadata.yaml").is_file():
-        raise SessionError(f"{path}: no metadata.yaml in this folder; a rosbag2 folder or a single .mcap file is needed")
+        raise SessionError(
+            f"{path}: no metadata.yaml in this folder; a rosbag2 folder or a single .mcap file is needed"
+        )
     found: dict[str, list[tuple[int, Any]]] = defaultdict(list)
     try:
         with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:
             for connection, received_ns, raw in reader.messages():
                 found[connection.topic].append((received_ns, reader.deserialize(raw, connection.msgtype)))
-    except Exception as error:  # rosbags lets sqlite3, yaml, struct and assertion errors of damaged bags through
+    except Exception as error:  # noqa: BLE001 rosbags lets sqlite3, yaml, struct and assertion errors of damaged bags through
         reason = " ".join(str(error).split())[:120] or type(error).__name__
         raise SessionError(f"{path}: not a readable ROS 2 bag ({reason}); export it anew") from None
     return found

@@ -101,7 +101,9 @@ def _value(data: bytes, at: int, processor: int) -> Any:
         if dimensions < 2:
             return [text.strip().strip("\0").strip()]
         width = max(shape[0], 1)
-        return [raw[i : i + width].decode("utf-8", "replace").strip().strip("\0").strip() for i in range(0, size, width)]
+        return [
+            raw[i : i + width].decode("utf-8", "replace").strip().strip("\0").strip() for i in range(0, size, width)
+        ]
     if kind == 4:
         return _floats(raw, processor)
     return np.frombuffer(raw, {1: "u1", 2: _order(processor) + "u2"}[kind])
@@ -130,7 +132,9 @@ def _points(
     """Positions (n, m, 3) in the file's unit, and (n, m) whether the point was seen."""
     order = _order(processor)
     if points == 0:
-        raise SessionError(f"{path}: the C3D file holds no marker (analog channels only); marker trajectories are needed")
+        raise SessionError(
+            f"{path}: the C3D file holds no marker (analog channels only); marker trajectories are needed"
+        )
     (analog,) = struct.unpack_from(order + "H", data, 4)
     (start_block,) = struct.unpack_from(order + "H", data, 16)
     start = (start_block or int(np.ravel(parameters["POINT:DATA_START"])[0])) - 1

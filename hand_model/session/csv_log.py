@@ -58,13 +58,17 @@ def _cells(line: str, separator: str) -> list[str]:
 def _check_header(header: list[str], path: Path) -> None:
     if "time" not in header:
         if header and all(_is_number(name) for name in header if name):
-            raise SessionError(f"{path}: no header; the first line must name the columns ({', '.join(COLUMNS[:3])}, ...)")
+            raise SessionError(
+                f"{path}: no header; the first line must name the columns ({', '.join(COLUMNS[:3])}, ...)"
+            )
         raise SessionError(f'{path}: no column "time"; {did_you_mean("time", header)}')
     twice = [name for name, count in Counter(header).items() if count > 1]
     if twice:
         raise SessionError(f'{path}: the column "{twice[0]}" occurs twice; each column once is needed')
     if "" in header:
-        raise SessionError(f"{path}: column {header.index('') + 1} has no name; a header cell for each column is needed")
+        raise SessionError(
+            f"{path}: column {header.index('') + 1} has no name; a header cell for each column is needed"
+        )
 
 
 def _is_number(text: str) -> bool:

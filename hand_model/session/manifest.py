@@ -1,206 +1,233 @@
-"""The manifest `session.toml` and what it declares: hand, probe, actuators, fingers, trials."""
+"""The manifest `session.toml`: read, checked against `hand-session/1`, and turned into a Session.
+
+Where the format is silent:
+
+- A probe whose tip is not known is declared by its labels alone, `[probe] markers = ["T1", "T2", "T3"]`, together with one
+  or more trials `kind = "pivot"` (mocap: the tip stays in a fixed hole while the tool swings); Probe.position_probe is None.
+- A session of kinematics only has fingers without actuator and `flexion` trials without log. Probe and landmark trials
+  are optional; where there are landmark trials, all three landmarks are needed.
+- `thumb_0` and `thumb_1` are one thumb in two positions and may carry the same markers; other fingers may not.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import SessionError, did_you_mean
-from .log import Log, read_log
-from .mocap import Mocap, read_mocap
+from .node import Node
+from .rig import read_rig
+from .session import Actuator, Finger, PalmMarkers, Probe, Rig, Segment, Session, Trial
+from .trials import TRIAL_KINDS, read_trial
 
-Array = NDArray[np.float64]
+__all__ = [
+    "FORMAT",
+    "TRIAL_KINDS",
+    "Actuator",
+    "Finger",
+    "PalmMarkers",
+    "Probe",
+    "Rig",
+    "Segment",
+    "Session",
+    "Trial",
+    "read_session",
+]
 
 FORMAT = "hand-session/1"
-TRIAL_KINDS = ("flexion", "excitation", "grasp", "landmark", "joint_probe", "surface", "motion", "pivot")
-
-
-@dataclass(frozen=True)
-class PalmMarkers:
-    """Labels of the three palm markers."""
-
-    origin: str
-    medial: str
-    lateral: str
-
-    @property
-    def labels(self) -> tuple[str, str, str]:
-        """The labels in the order origin, medial, lateral."""
-        return self.origin, self.medial, self.lateral
-
-
-@dataclass(frozen=True)
-class Probe:
-    """The pointing tool. labels: marker labels. position_probe: (m, 3) [m] in its own frame, tip at the origin;
-    None where the tip is not known and a `pivot` trial calibrates it."""
-
-    labels: tuple[str, ...]
-    position_probe: Array | None
-
-
-@dataclass(frozen=True)
-class Actuator:
-    """One motor: one encoder channel, one current channel. speed_full, current_full: raw full scales."""
-
-    name: str
-    speed_full: float | None = None
-    current_full: float | None = None
-
-
-@dataclass(frozen=True)
-class Segment:
-    """One moving segment of a finger and the labels of its markers (three or more, not on one line)."""
-
-    name: str
-    markers: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Finger:
-    """A finger: its actuator (None for kinematics only) and its segments from the palm outwards."""
-
-    name: str
-    actuator: str | None
-    segments: tuple[Segment, ...]
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """All marker labels of the finger, palm outwards."""
-        return tuple(label for segment in self.segments for label in segment.markers)
-
-
-@dataclass(frozen=True)
-class Rig:
-    """A recorded mechanism that is no hand. model: its MJCF file. signals: log column -> quantity of the model."""
-
-    model: Path
-    signals: Mapping[str, str]
-
-
-@dataclass(frozen=True)
-class Trial:
-    """One recording. name: its file relative to the session, log before mocap; set: parameters the laboratory changed."""
-
-    kind: str
-    name: str
-    finger: str | None = None
-    mocap_path: Path | None = None
-    log_path: Path | None = None
-    landmark: str | None = None
-    joint: str | None = None
-    side: str | None = None
-    segment: str | None = None
-    object: str | None = None
-    stiffness: float | str | None = None
-    validate: bool = False
-    set: Mapping[str, Any] = field(default_factory=dict)
-
-    def mocap(self) -> Mocap:
-        """Read the marker trajectories; raises SessionError where the trial has none."""
-        if self.mocap_path is None:
-            raise SessionError(f'trial "{self.name}" ({self.kind}) has no mocap file')
-        return read_mocap(self.mocap_path)
-
-    def log(self) -> Log:
-        """Read the actuator log; raises SessionError where the trial has none."""
-        if self.log_path is None:
-            raise SessionError(f'trial "{self.name}" ({self.kind}) has no log')
-        return read_log(self.log_path)
-
-
-@dataclass(frozen=True)
-class Session:
-    """A recording session. side: "left" | "right". gravity_world: (3,) [m/s^2] or None. notes: what was ignored."""
-
-    path: Path
-    hand: str
-    side: str
-    gravity_world: Array | None
-    palm: PalmMarkers | None
-    probe: Probe | None
-    actuators: tuple[Actuator, ...]
-    fingers: tuple[Finger, ...]
-    trials: tuple[Trial, ...]
-    rig: Rig | None = None
-    notes: tuple[str, ...] = ()
-
-    def finger(self, name: str) -> Finger:
-        """The finger of that name; raises SessionError with a near name."""
-        for finger in self.fingers:
-            if finger.name == name:
-                return finger
-        raise SessionError(f'{self.path}: no finger "{name}"; {did_you_mean(name, [f.name for f in self.fingers])}')
-
-    def select(self, kind: str, finger: str | None = None, validate: bool | None = None) -> tuple[Trial, ...]:
-        """Trials of one kind, optionally of one finger, optionally only (True) or never (False) validation trials."""
-        return tuple(
-            t
-            for t in self.trials
-            if t.kind == kind and (finger is None or t.finger == finger) and (validate is None or t.validate == validate)
-        )
+SIDES = ("left", "right")
+LANDMARKS = ("origin", "medial", "lateral")
+THUMBS = {"thumb_0", "thumb_1"}
+PROBED = ("landmark", "joint_probe", "surface", "pivot")
 
 
 def read_session(path: str | Path) -> Session:
     """Read and check `session.toml` in a folder (or the file itself); marker and log files are read later, by trial.
 
+    What the manifest says is checked completely, and that its files are there; check.check_session reads them.
     Raises SessionError for anything that breaks `hand-session/1`.
     """
-    import tomllib
-
     root = Path(path)
     root = root.parent if root.name == "session.toml" else root
-    file = root / "session.toml"
+    top = _read_toml(root / "session.toml")
+    if top.has("rig") and (top.has("palm") or top.has("finger")):
+        top.refuse("[rig] stands instead of [palm] and [[finger]]; one of the two is needed")
+    nodes = [top]
+
+    def child(key: str) -> Node | None:
+        if not top.has(key):
+            return None
+        nodes.append(top.child(key))
+        return nodes[-1]
+
+    is_rig = top.has("rig")
+    hand = child("hand") or top.child("hand")
+    name, side = hand.text("name"), hand.choice("side", SIDES, *(("right",) if is_rig else ()))
+    actuators = _actuators(top.children("actuator", "[[actuator]]"), nodes)
+    palm, probe = _palm(child("palm"), top, is_rig), _probe(child("probe"))
+    fingers = _fingers(top.children("finger", "[[finger]]"), actuators, nodes)
+    rig = read_rig(child("rig"), child("signals"), root) if is_rig else None
+    entries = top.children("trial", "[[trial]]")
+    nodes += entries
+    trials = tuple(read_trial(entry, root, fingers, is_rig) for entry in entries)
+    gravity = _gravity(child("world"))
+    _check_markers(top, palm, probe, fingers)
+    _check_trials(top, palm, probe, fingers, trials, is_rig)
+    notes = [note for node in nodes for note in node.unknown()]
+    driven = {finger.actuator for finger in fingers}
+    notes += [f'actuator "{a.name}" drives no finger' for a in actuators if a.name not in driven and not is_rig]
+    return Session(root, name, side, gravity, palm, probe, actuators, fingers, trials, rig, tuple(notes))
+
+
+def _read_toml(file: Path) -> Node:
+    import tomllib
+
     if not file.is_file():
         raise SessionError(f"{file}: no such file; a session is a folder with a session.toml")
     try:
-        table = tomllib.loads(file.read_text())
-    except tomllib.TOMLDecodeError as error:
-        raise SessionError(f"{file}: {error}") from None
-    if table.get("format") != FORMAT:
-        raise SessionError(f'{file}: format is {table.get("format")!r}; this version reads "{FORMAT}"')
-    palm = PalmMarkers(**table["palm"]["markers"]) if "palm" in table else None
-    probe = None
-    if "probe" in table:
-        markers = table["probe"]["markers"]
-        probe = Probe(tuple(markers), np.array(list(markers.values()), float))
-    rig = Rig(root / table["rig"]["model"], dict(table.get("signals", {}))) if "rig" in table else None
-    gravity = table.get("world", {}).get("gravity")
-    return Session(
-        path=root,
-        hand=table["hand"]["name"],
-        side=table["hand"].get("side", "right"),
-        gravity_world=None if gravity is None else np.array(gravity, float),
-        palm=palm,
-        probe=probe,
-        actuators=tuple(Actuator(a["name"], a.get("speed_full"), a.get("current_full")) for a in table.get("actuator", [])),
-        fingers=tuple(
-            Finger(f["name"], f.get("actuator"), tuple(Segment(s["name"], tuple(s["markers"])) for s in f["segments"]))
-            for f in table.get("finger", [])
-        ),
-        trials=tuple(_trial(root, entry) for entry in table.get("trial", [])),
-        rig=rig,
-    )
+        table = tomllib.loads(file.read_text(encoding="utf-8-sig"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError, OSError) as error:
+        raise SessionError(f"{file}: not readable as TOML ({error}); valid TOML in UTF-8 is needed") from None
+    top = Node(file, "", table)
+    if not top.has("format") or table["format"] != FORMAT:
+        top.refuse(f'format is {table.get("format")!r}; this version reads "{FORMAT}"')
+    top.text("format")
+    return top
 
 
-def _trial(root: Path, entry: dict[str, Any]) -> Trial:
-    mocap, log = entry.get("mocap"), entry.get("log")
-    return Trial(
-        kind=entry["kind"],
-        name=log or mocap,
-        finger=entry.get("finger"),
-        mocap_path=root / mocap if mocap else None,
-        log_path=root / log if log else None,
-        landmark=entry.get("name"),
-        joint=entry.get("joint"),
-        side=entry.get("side"),
-        segment=entry.get("segment"),
-        object=entry.get("object"),
-        stiffness=entry.get("stiffness"),
-        validate=entry.get("purpose") == "validate",
-        set=entry.get("set", {}),
-    )
+def _gravity(node: Node | None) -> Any:
+    gravity = node.numbers("gravity", 3, None) if node else None
+    if gravity is None:
+        return None
+    if np.linalg.norm(gravity) > 100.0:
+        node.refuse(f"gravity is {gravity}; metres per second squared are needed, such as [0.0, 0.0, -9.81]")
+    return np.array(gravity)
+
+
+def _palm(node: Node | None, top: Node, is_rig: bool) -> PalmMarkers | None:
+    if node is None:
+        if not is_rig:
+            top.refuse("the table [palm] is missing; it names the palm markers origin, medial and lateral")
+        return None
+    markers = Node(node.file, "[palm] markers", node.get("markers", dict, "a table of origin, medial, lateral"))
+    palm = PalmMarkers(*(markers.text(key) for key in LANDMARKS))
+    if extra := sorted(set(markers.table) - set(LANDMARKS)):
+        markers.refuse(f'"{extra[0]}" is no palm marker; {did_you_mean(extra[0], LANDMARKS)}')
+    return palm
+
+
+def _probe(node: Node | None) -> Probe | None:
+    if node is None:
+        return None
+    kinds = (dict, list)
+    found = node.get("markers", kinds, "a table of positions, or a list of labels where the tip is not known,")
+    if isinstance(found, list):
+        labels = node.texts("markers")
+        if len(labels) < 3:
+            node.refuse(
+                f"{len(labels)} markers ({', '.join(labels)}); three or more are needed where the tip is not known"
+            )
+        return Probe(labels, None)
+    markers = Node(node.file, "[probe] markers", found)
+    position = np.array([markers.numbers(label, 3) for label in found]).reshape(-1, 3)
+    # A tip on the line of the markers is known all the same; any other tip turns about that line.
+    if len(found) < 2 or (_on_one_line(position - position.mean(axis=0)) and not _on_one_line(position)):
+        node.refuse(f"{len(found)} markers ({', '.join(found)}); three or more, not on one line, are needed")
+    reach_m = float(np.linalg.norm(position, axis=1).max())
+    if not 0.005 < reach_m < 2.0:
+        node.refuse(f"the farthest marker is {reach_m:g} m from the tip; positions in metres are needed")
+    return Probe(tuple(found), position)
+
+
+def _on_one_line(position: np.ndarray) -> bool:
+    """Whether positions (n, 3) are within three percent of a line through the origin."""
+    size = np.linalg.svd(position, compute_uv=False)
+    return len(size) < 2 or size[1] <= 0.03 * size[0]
+
+
+def _actuators(entries: list[Node], nodes: list[Node]) -> tuple[Actuator, ...]:
+    nodes += entries
+    actuators = tuple(Actuator(e.name("name"), e.positive("speed_full"), e.positive("current_full")) for e in entries)
+    _once(entries, [actuator.name for actuator in actuators])
+    return actuators
+
+
+def _fingers(entries: list[Node], actuators: tuple[Actuator, ...], nodes: list[Node]) -> tuple[Finger, ...]:
+    fingers = []
+    for entry in entries:
+        name = entry.name("name")
+        actuator = entry.choice("actuator", [a.name for a in actuators], None)
+        parts = entry.children("segments", f"{entry.where} segment")
+        if not parts:
+            entry.refuse("the finger has no segment; segments from the palm outwards are needed")
+        segments = tuple(Segment(part.name("name"), part.texts("markers")) for part in parts)
+        for part, segment in zip(parts, segments, strict=True):
+            if len(segment.markers) < 3:
+                listed = ", ".join(segment.markers) or "none"
+                part.refuse(f"{len(segment.markers)} markers ({listed}); three or more, not on one line, are needed")
+        _once(parts, [segment.name for segment in segments])
+        nodes += [entry, *parts]
+        fingers.append(Finger(name, actuator, segments))
+    _once(entries, [finger.name for finger in fingers])
+    joints = Counter(f"{finger.name}_{segment.name}" for finger in fingers for segment in finger.segments)
+    for joint, count in joints.items():
+        if count > 1:
+            entries[0].refuse(f'two segments would both be called "{joint}"; rename a finger or a segment')
+    return tuple(fingers)
+
+
+def _once(entries: list[Node], names: list[str]) -> None:
+    for i, name in enumerate(names):
+        if name in names[:i]:
+            entries[i].refuse(f'the name "{name}" is taken twice; each name once is needed')
+
+
+def _check_markers(top: Node, palm: PalmMarkers | None, probe: Probe | None, fingers: tuple[Finger, ...]) -> None:
+    """Refuse a marker that two things carry (the two thumb positions are one thumb)."""
+    uses: list[tuple[str, str]] = [(label, "[palm]") for label in palm.labels] if palm else []
+    uses += [(label, "[probe]") for label in probe.labels] if probe else []
+    uses += [(m, f"{f.name}/{s.name}") for f in fingers for s in f.segments for m in s.markers]
+    first: dict[str, str] = {}
+    for label, place in uses:
+        other = first.setdefault(label, place)
+        thumbs = {place.partition("/")[0], other.partition("/")[0]} == THUMBS
+        again = other == place and [use for use in uses if use == (label, place)] != [(label, place)]
+        if again or (other != place and not thumbs):
+            top.refuse(f'the marker "{label}" is used twice, in {other} and {place}; each marker once is needed')
+
+
+def _check_trials(
+    top: Node,
+    palm: PalmMarkers | None,
+    probe: Probe | None,
+    fingers: tuple[Finger, ...],
+    trials: tuple[Trial, ...],
+    is_rig: bool,
+) -> None:
+    """What the trials need of the session, and the session of its trials."""
+    if not trials:
+        top.refuse("there is no [[trial]]; at least one recording is needed")
+    if not fingers and not is_rig:
+        top.refuse("there is no [[finger]]; at least one, or a [rig], is needed")
+    for trial in trials:
+        if trial.kind in PROBED and probe is None:
+            top.refuse(f'trial "{trial.name}" ({trial.kind}) needs a [probe], and there is none; declare its markers')
+    kinds = {trial.kind for trial in trials}
+    if probe and probe.position_probe is None and "pivot" not in kinds and kinds & set(PROBED):
+        top.refuse('[probe] has no tip; marker positions in metres, or a trial of kind "pivot", are needed')
+    probed = {trial.landmark for trial in trials if trial.kind == "landmark"}
+    if probed and (missing := [name for name in LANDMARKS if name not in probed]):
+        top.refuse(f"no landmark trial for {' and '.join(missing)}; all of {', '.join(LANDMARKS)} are needed, or none")
+    for finger in fingers:
+        if not any(trial.kind == "flexion" and trial.finger == finger.name for trial in trials):
+            top.refuse(f'finger "{finger.name}" has no flexion trial; one is needed to find its axes')
+    seen: dict[tuple[Any, ...], Trial] = {}
+    for trial in trials:
+        key = (trial.kind, trial.finger, trial.landmark, trial.joint, trial.side, trial.segment)
+        for file in filter(None, (trial.mocap_path, trial.log_path)):
+            other = seen.setdefault((*key, file.resolve()), trial)
+            if other is not trial:
+                top.refuse(f'trial "{trial.name}" ({trial.kind}) is listed twice; each recording once is needed')

@@ -124,7 +124,9 @@ def frame_times(time_s: Array | None, frames: int, rate_hz: float, path: Path) -
         return regular
     if not (np.diff(time_s) > 0).all():
         frame = int(np.argmax(np.diff(time_s) <= 0)) + 1
-        raise SessionError(f"{path}: the time column does not increase at frame {frame + 1}; increasing times are needed")
+        raise SessionError(
+            f"{path}: the time column does not increase at frame {frame + 1}; increasing times are needed"
+        )
     return time_s
 
 

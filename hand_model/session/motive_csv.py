@@ -38,7 +38,9 @@ def read_motive_csv(path: Path) -> Mocap:
     for i in numbers:
         row = lines[i].split(",")
         if len(row) != width and (any(row[width:]) or len(row) < width):
-            raise SessionError(f"{path}: line {i + 1} has {len(row)} cells; {width} are needed (the file may be truncated)")
+            raise SessionError(
+                f"{path}: line {i + 1} has {len(row)} cells; {width} are needed (the file may be truncated)"
+            )
         rows.append([row[j] for j in picked])
     frames = fields.get("Total Exported Frames")
     if frames and len(rows) < header_number(frames, "Total Exported Frames", path):
@@ -74,7 +76,9 @@ def _marker_columns(header: list[list[str]], path: Path) -> tuple[list[str], lis
     wanted = [j for j, kind in enumerate(kinds) if kind == "Marker" and quantities[j] == "Position"]
     for x, y, z in zip(wanted[::3], wanted[1::3], wanted[2::3], strict=False):
         if [axes[x], axes[y], axes[z]] != ["X", "Y", "Z"] or not names[x] == names[y] == names[z]:
-            raise SessionError(f'{path}: the columns of marker "{names[x]}" are not X, Y, Z side by side; export it anew')
+            raise SessionError(
+                f'{path}: the columns of marker "{names[x]}" are not X, Y, Z side by side; export it anew'
+            )
         labels.append(names[x])
         picked += [x, y, z]
     if not labels or len(wanted) % 3:

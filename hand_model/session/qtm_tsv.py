@@ -31,7 +31,9 @@ def read_qtm_tsv(path: Path) -> Mocap:
         labels.pop()
     stated = header.get("NO_OF_MARKERS")
     if stated and stated[0].strip() != str(len(labels)):
-        raise SessionError(f"{path}: NO_OF_MARKERS is {stated[0]} and MARKER_NAMES has {len(labels)} names; both must agree")
+        raise SessionError(
+            f"{path}: NO_OF_MARKERS is {stated[0]} and MARKER_NAMES has {len(labels)} names; both must agree"
+        )
     rate_hz = header_number((header.get("FREQUENCY") or [None])[0], "FREQUENCY", path)
     numbers = [i for i in range(start, len(lines)) if lines[i].strip(" ")]
     rows = [lines[i].split("\t") for i in numbers]
@@ -40,7 +42,9 @@ def read_qtm_tsv(path: Path) -> Mocap:
     rows = [_exact(row, width, path, i + 1) for row, i in zip(rows, numbers, strict=True)]
     frames = header.get("NO_OF_FRAMES")
     if frames and len(rows) < header_number(frames[0], "NO_OF_FRAMES", path):
-        raise SessionError(f"{path}: truncated file, it holds {len(rows)} of {frames[0].strip()} frames; export it anew")
+        raise SessionError(
+            f"{path}: truncated file, it holds {len(rows)} of {frames[0].strip()} frames; export it anew"
+        )
     table = number_table(rows, [i + 1 for i in numbers], path).reshape(len(rows), width)
     position = table[:, lead:].reshape(len(rows), len(labels), 3) * metres_per(None, path, "unit")
     time_s = frame_times(table[:, 1] if lead == 2 else None, len(rows), rate_hz, path)
