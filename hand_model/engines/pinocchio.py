@@ -1,0 +1,90 @@
+"""Pinocchio: kinematics of a URDF or MJCF. Mimic is not left to it: every joint's angle is passed (it refuses chains of mimics)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import DescriptionError
+from .common import columns, homogeneous, relative
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Model:
+    """A Pinocchio model. joints: those with one angle. frames: name -> (parent joint id, placement (4, 4)); links: names of bodies,
+    points: names of sites and of links without a joint of their own."""
+
+    pin: Any
+    joints: tuple[str, ...]
+    frames: Mapping[str, tuple[int, Array]]
+    links: tuple[str, ...]
+    points: tuple[str, ...]
+
+
+def load(file: str | Path) -> Model:
+    """Load a URDF, or an MJCF as far as Pinocchio's parser goes; raises DescriptionError with its reason where that fails."""
+    import pinocchio as pin
+
+    path = Path(file)
+    if not path.is_file():
+        raise DescriptionError(f"{path}: no such file")
+    build = pin.buildModelFromUrdf if path.suffix == ".urdf" else pin.buildModelFromMJCF
+    try:
+        model = build(str(path))
+    except (ValueError, RuntimeError) as error:
+        raise DescriptionError(f"{path}: Pinocchio cannot load it ({error})") from None
+    frames = {f.name: (int(f.parentJoint), np.array(f.placement.homogeneous)) for f in model.frames if f.type != pin.FrameType.JOINT}
+    bodies = [f for f in model.frames if f.type == pin.FrameType.BODY]
+    own = {f.name for f in bodies if np.array_equal(f.placement.homogeneous, np.eye(4)) and _first(bodies, f)}
+    points = tuple(f.name for f in model.frames if f.type == pin.FrameType.OP_FRAME or (f in bodies and f.name not in own))
+    joints = tuple(name for i, name in enumerate(model.names) if i and model.joints[i].nq == 1)
+    return Model(model, joints, frames, tuple(f.name for f in bodies), points)
+
+
+def _first(bodies: list[Any], frame: Any) -> bool:
+    """Whether a body is the one that its joint carries, and not one fixed to it."""
+    return next(b.name for b in bodies if b.parentJoint == frame.parentJoint) == frame.name
+
+
+def positions(model: Model, joint_angles: Mapping[str, ArrayLike]) -> Mapping[str, Array]:
+    """Positions (n, 3) [m] of sites and of links on fixed joints; joint_angles: joint -> (n,) [rad]."""
+    carried = _joint_poses(model, columns(model.joints, joint_angles))
+    points = {}
+    for name in model.points:
+        parent, placement = model.frames[name]
+        points[name] = carried[parent][:, :3, :3] @ placement[:3, 3] + carried[parent][:, :3, 3]
+    base = {"palm": carried[model.frames["palm"][0]] @ model.frames["palm"][1]} if "palm" in model.frames else {}
+    return relative(base, points)[1]
+
+
+def poses(model: Model, joint_angles: Mapping[str, ArrayLike]) -> Mapping[str, Array]:
+    """Link poses (n, 4, 4); joint_angles: joint -> (n,) [rad]."""
+    carried = _joint_poses(model, columns(model.joints, joint_angles))
+    return relative({name: carried[model.frames[name][0]] @ model.frames[name][1] for name in model.links}, {})[0]
+
+
+def _joint_poses(model: Model, angles: Array) -> list[Array]:
+    """Pose (n, 4, 4) of every joint of the model, the universe first."""
+    import pinocchio as pin
+
+    data = model.pin.createData()
+    ids = [model.pin.getJointId(name) for name in model.joints]
+    address = [model.pin.joints[i].idx_q for i in ids]
+    neutral = pin.neutral(model.pin)
+    n, count = len(angles), len(model.pin.names)
+    rotation, translation = np.empty((count, n, 3, 3)), np.empty((count, n, 3))
+    for k in range(n):
+        q = neutral.copy()
+        q[address] = angles[k]
+        pin.forwardKinematics(model.pin, data, q)
+        for i in range(count):
+            placement = data.oMi[i]
+            rotation[i, k], translation[i, k] = placement.rotation, placement.translation
+    return [homogeneous(rotation[i], translation[i]) for i in range(count)]
