@@ -16,8 +16,11 @@ Array = NDArray[np.float64]
 
 KINDS = ("flexion", "excitation")
 COULOMB_GIVE = 0.7  # [%] starting bristle length of the declared Coulomb friction: a hard sign function cannot be simulated
+START_DOUBT = 0.5  # of the Coulomb friction: 15 % per start, one error common to its dozen samples
 COULOMB_GIVE_MOST = 1.2  # [%] above this, give is presliding
 SETTLE_SAMPLES = (14, 13)  # after a start and before a stop: where acceleration is smeared by the kernel
+
+SETTLE_TRAVEL = 4.0  # [%] some six bristle lengths of a healthy drive
 
 
 def drive_trials(session: Session) -> dict[str, list[Trial]]:
@@ -73,22 +76,27 @@ def _prepare(actuator: str, entries: list[tuple[Trial, Log]]) -> list[DriveState
 
 
 def steady(time_s: Array, motion: Motion) -> NDArray[np.bool_]:
-    """Samples (n,) in motion and away from starts and stops, where the state estimate is not smeared."""
+    """Samples (n,) in motion and away from starts and stops: the state estimate is not smeared and, after a travel of
+    several bristle lengths, friction has turned over."""
     step = float(np.median(np.diff(time_s)))
     after, before = SETTLE_SAMPLES
-    return motion.moving & (motion.since_start_s > after * step) & (motion.until_stop_s > before * step)
+    settled = motion.moving & (motion.since_start_s > after * step) & (motion.until_stop_s > before * step)
+    begin = np.maximum.accumulate(np.where(~motion.moving, np.arange(len(time_s)), 0))
+    return settled & (np.abs(motion.position - motion.position[begin]) > SETTLE_TRAVEL)
 
 
 def with_coulomb(state: DriveState, give: float) -> DriveState:
-    """The state with a Dahl column of that bristle length [%] as its Coulomb friction, and with the uncertainty that
-    half a sample of timing means where the declared prediction moves fast."""
+    """The state with a Dahl column of that bristle length [%] as its Coulomb friction, and with the uncertainty of
+    starts and stops."""
     declared = np.array(state.declared)
     declared[:, state.declared_names.index("coulomb")] = dahl(state.position, give)
-    return with_timing(replace(state, declared=declared))
+    extra = {**state.extra, "give": np.full(len(state.time_s), give)}
+    return with_timing(replace(state, declared=declared, extra=extra))
 
 
 def with_timing(state: DriveState) -> DriveState:
-    """Adds "sigma": what half a sample interval of timing means for the declared prediction, zero in steady motion."""
+    """Adds "sigma" around starts and stops, zero in steady motion: what one sample interval of timing means for the
+    declared prediction, and that friction is unknown within its bounds while it turns over."""
     seen = np.isfinite(state.effort)
     if seen.sum() < 20:
         return state
@@ -97,7 +105,7 @@ def with_timing(state: DriveState) -> DriveState:
     step = float(np.median(np.diff(state.time_s)))
     slope = np.abs(np.gradient(state.declared @ beta, state.time_s))
     slope = np.maximum.reduce([np.roll(slope, k) for k in (-2, -1, 0, 1, 2)])
-    sigma = np.where(state.extra["steady"] > 0, 0.0, 0.5 * step * slope + 0.0)
+    sigma = np.where(state.extra["steady"] > 0, 0.0, step * slope + START_DOUBT * abs(beta[2]))
     return replace(state, extra={**state.extra, "sigma": sigma})
 
 

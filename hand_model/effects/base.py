@@ -57,6 +57,11 @@ class DriveState:
         return np.sign(self.velocity)
 
     @property
+    def friction_position(self) -> Array:
+        """Position (n,) to which the present friction belongs: bristles lag behind by their length, "give" in `extra`."""
+        return self.position - self.direction * self.extra.get("give", np.zeros(len(self.position)))
+
+    @property
     def elapsed_s(self) -> Array:
         """Time [s] since the session's first sample (or the trial's, where nothing else is known)."""
         return self.extra.get("elapsed", self.time_s - self.time_s[0])

@@ -28,7 +28,7 @@ class PositionDependentFriction(Effect):
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """sign(v) times a bell over position, (n, 1)."""
-        bell = np.exp(-0.5 * ((state.position - shape["centre"]) / shape["width"]) ** 2)
+        bell = np.exp(-0.5 * ((state.friction_position - shape["centre"]) / shape["width"]) ** 2)
         return (state.direction * bell)[:, None]
 
     def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],

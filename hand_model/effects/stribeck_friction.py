@@ -1,4 +1,4 @@
-"""Stribeck friction: friction rises as speed falls towards zero (Armstrong-Helouvry 1991)."""
+"""Stribeck friction: friction rises as speed falls towards zero (Tustin 1947, exponent 1)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .base import Amplitude, Array, DriveState, Effect, Shape, speed_range
 
 
 class StribeckFriction(Effect):
-    """F(v) = sign(v) (Fc + (Fs - Fc) exp(-(v / vs)^2))."""
+    """F(v) = sign(v) (Fc + (Fs - Fc) exp(-|v| / vs))."""
 
     name = "stribeck_friction"
 
@@ -26,8 +26,8 @@ class StribeckFriction(Effect):
         return (("static_excess", "effort", 0.0, np.inf),)
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """sign(v) exp(-(v / vs)^2), (n, 1)."""
-        return (state.direction * np.exp(-((state.velocity / shape["stribeck_speed"]) ** 2)))[:, None]
+        """sign(v) exp(-|v| / vs), (n, 1)."""
+        return (state.direction * np.exp(-np.abs(state.velocity) / shape["stribeck_speed"]))[:, None]
 
     def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
                    declared: Mapping[str, float]) -> dict[str, float]:
@@ -36,8 +36,8 @@ class StribeckFriction(Effect):
         return {"static_ratio": 1 + amplitude["static_excess"] / coulomb, "stribeck_speed": shape["stribeck_speed"]}
 
     def region(self, states: tuple[DriveState, ...], shape: Mapping[str, float]) -> dict[str, Any] | None:
-        """Speeds below 1.7 Stribeck speeds hold 94 % of it."""
-        return {"speed": [0.0, 1.7 * shape["stribeck_speed"]], "unit": f"{states[0].position_unit}/s"}
+        """Speeds below two Stribeck speeds hold 86 % of it."""
+        return {"speed": [0.0, 2.0 * shape["stribeck_speed"]], "unit": f"{states[0].position_unit}/s"}
 
 
 EFFECT = StribeckFriction()
