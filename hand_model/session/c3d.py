@@ -20,6 +20,7 @@ from .mocap import Mocap, build_mocap
 from .units import metres_per
 
 BLOCK = 512
+LAST_FRAME = 65535
 INTEL, DEC, MIPS = 84, 85, 86
 
 Parameters = dict[str, Any]
@@ -142,6 +143,9 @@ def _points(
     width, words = (4 if scale < 0 else 2), 4 * points + analog
     available = max(len(data) - start * BLOCK, 0) // (width * words)
     frames = _frames(data, parameters, order, available, width * words, path)
+    if frames == LAST_FRAME < available:  # the header's 16 bits are full, and nothing else says how many frames there are
+        body = np.frombuffer(data, "u1", available * width * words, start * BLOCK).reshape(available, -1)
+        frames = int(np.flatnonzero(body.any(axis=1)).max(initial=frames - 1)) + 1  # the last block is filled with zeros
     body = data[start * BLOCK : start * BLOCK + frames * words * width]
     if scale < 0:
         table = _floats(body, processor)
