@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 Key = tuple[str, str]  # (finger, joint), the palm is ("", "palm")
 
 PALM: Key = ("", "palm")
+SHARE_A_JOINT = "share a joint"
 CLEARANCE = 5e-4  # m between primitives at a keyframe
 LEAST_SHARE = 0.5  # a primitive that would have to shrink below this share of its radius is excluded instead
 
@@ -27,7 +28,7 @@ def adjacent(hand: Hand) -> dict[frozenset[Key], str]:
     for finger in hand.fingers:
         chain = [PALM, *((finger.name, j.name) for j in finger.joints)]
         for inner, outer in zip(chain[:-1], chain[1:], strict=True):
-            pairs[frozenset((inner, outer))] = "share a joint"
+            pairs[frozenset((inner, outer))] = SHARE_A_JOINT
     return pairs
 
 

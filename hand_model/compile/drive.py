@@ -9,7 +9,7 @@ import numpy as np
 
 from .plan import Plan
 
-ROTOR_SHARE = 10.0  # reflected rotor inertia over the finger's own: a geared drive is dominated by its motor
+ROTOR_SHARE = 30.0  # reflected rotor inertia over the finger's own: a geared drive is dominated by its motor
 BANDWIDTH = 50.0  # rad/s of the position loop
 FREE_TIME = 0.1  # s in which a joint without a drive loses its speed
 LEAST_INERTIA = 1e-7  # kg m^2

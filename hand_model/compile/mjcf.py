@@ -13,7 +13,7 @@ from .plan import Link, Plan
 from .xml import child, comment, number, vector
 
 # Equality as stiff as MuJoCo keeps stable at its default step: time constant of two steps, impedance at MuJoCo's upper limit.
-TIMESTEP = 0.002
+TIMESTEP = 0.001
 SOLREF = (2 * TIMESTEP, 1.0)
 SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..hand import Hand
+from .clearance import SHARE_A_JOINT
 from .plan import Plan
 from .shape import DENSITY
 
@@ -129,7 +130,7 @@ def _known_issues(hand: Hand, plans: tuple[Plan, ...]) -> str:
             if short:
                 issues.append(f"`{plan.stem}`, `{name}`: {', '.join(short)} would meet another finger and stops short.")
         for one, other, reason in plan.excludes:
-            if reason != "share a joint":
+            if reason != SHARE_A_JOINT:
                 issues.append(f"`{plan.stem}`: no contact between `{one}` and `{other}`, whose primitives {reason}.")
     issues.append("The attachment site is the palm frame itself: the wrist's interface was not measured.")
     issues.append("Masses, inertias and shapes are a fallback until surfaces are probed.")

@@ -1,0 +1,162 @@
+"""Linkages: who drives whom, how stiffly, and what URDF's mimic makes of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compile.coupling import linkages, source_of
+from ..description import Description, Model
+from ..engines import mujoco as engine
+from ..engines.ours import load
+from ..kinematics import finger_angles
+from .finding import Finding
+from .layout import tree
+
+Array = NDArray[np.float64]
+
+TRACKING = np.radians(0.1)
+STIFFNESS = np.radians(0.05)
+FORCE = 1.0  # N at the tip
+PUSH_S = 0.5
+
+
+def direction(description: Description, model: Model) -> Finding:
+    """Move every driver through its range in MuJoCo and read the followers against the hand's polynomials."""
+    ours, item = load(model.mjcf), f"coupling: {model.stem}"
+    coupled = [f for f in ours.hand.fingers if f.couplings]
+    if not coupled:
+        return Finding(item, True, None, "the hand has no linkage")
+    problems = _roles(ours, tree(model.mjcf))
+    if problems:
+        return Finding(item, False, None, "; ".join(problems[:5]))
+    time = np.linspace(0, 1, 201)
+    drive, wanted = {}, {}
+    for finger in coupled:
+        sources = {source_of(finger, c.follower) for c in finger.couplings}
+        paths = {}
+        for joint in finger.joints:
+            if joint.name in sources:
+                low, high = sorted(joint.range_rad)
+                start = float(np.clip(0, low, high))
+                paths[joint.name] = start + (high - start) * (0.5 - 0.5 * np.cos(np.pi * time))
+        angles = finger_angles(finger, paths)
+        for i, joint in enumerate(finger.joints):
+            name = ours.names.joint[finger.name, joint.name]
+            (drive if joint.name in paths else wanted)[name] = angles[:, i]
+    run = engine.simulate(model.mjcf, time, drive)
+    gap = {n: float(np.abs(run.angles_rad[n] - a).max()) for n, a in wanted.items() if n in run.angles_rad}
+    name = max(gap, key=lambda n: gap[n])
+    passed = gap[name] <= TRACKING and not run.warnings
+    said = f"drivers moved through their ranges, followers within {np.degrees(gap[name]):.2g} deg of the polynomial"
+    return Finding(item, passed, float(np.degrees(gap[name])), said + ("" if passed else f' ("{name}")'))
+
+
+def _roles(ours: Any, root: Any) -> list[str]:
+    found = {e.get("name"): e for e in root.iterfind("equality/joint")}
+    problems = []
+    for finger in ours.hand.fingers:
+        for coupling in finger.couplings:
+            name = ours.names.linkage[finger.name, coupling.follower]
+            driver, follower = (ours.names.joint[finger.name, j] for j in (coupling.driver, coupling.follower))
+            if name not in found:
+                problems.append(f'no equality "{name}"')
+                continue
+            roles = found[name].get("joint1"), found[name].get("joint2")
+            if roles == (driver, follower):
+                problems.append(f'"{name}" has joint1 and joint2 reversed: the dependent joint "{follower}" must be joint1')
+            elif roles != (follower, driver):
+                problems.append(f'"{name}" couples {roles[0]} to {roles[1]} instead of {follower} to {driver}')
+            if not (found[name].get("solref") and found[name].get("solimp")):
+                problems.append(f'"{name}" leaves solref or solimp to the default')
+    return problems
+
+
+def stiffness(description: Description, model: Model) -> Finding:
+    """Push each coupled finger's tip with 1 N, driver held and on its servo, both ways, and read the coupling's error."""
+    ours, item = load(model.mjcf), f"coupling stiffness: {model.stem}"
+    mj = engine.load(model.mjcf).mj
+    worst, where = 0.0, ""
+    followers = engine.followers(mj)
+    if not followers:
+        return Finding(item, not any(f.couplings for f in ours.hand.fingers), None, "the model has no linkage")
+    for finger in ours.hand.fingers:
+        if not finger.couplings:
+            continue
+        for held in (True, False):
+            for sign in (1.0, -1.0):
+                gap = _pushed(model, ours.names.tip[finger.name], [ours.names.joint[finger.name, j.name] for j in finger.joints], held, sign)
+                if not gap <= worst:
+                    worst, where = gap, finger.name
+    said = f"{FORCE:.0f} N at the tip moves a coupling by at most {np.degrees(worst):.2g} deg"
+    return Finding(item, worst <= STIFFNESS, float(np.degrees(worst)), said + f" ({where})")
+
+
+def _pushed(model: Model, tip: str, joints: list[str], held: bool, sign: float) -> float:
+    """Largest coupling error [rad] of a finger under a force that turns with the tip; it flexes (sign 1) or extends the last joint."""
+    import mujoco
+
+    mj = engine.load(model.mjcf).mj
+    mj.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    coupled = engine.followers(mj)
+    mine = {mj.joint(j).id for j in joints}
+    if held:
+        mj.dof_armature[[mj.joint(j).dofadr[0] for j in joints if mj.joint(j).id not in coupled]] = 1e3
+    data = mujoco.MjData(mj)
+    for j in range(mj.njnt):
+        data.qpos[mj.jnt_qposadr[j]] = mj.jnt_range[j].mean()
+    data.qpos[:] = engine.on_linkages(mj, data.qpos)
+    for i in range(mj.nu):  # servos hold where the push starts
+        if mj.actuator_trntype[i] == int(mujoco.mjtTrn.mjTRN_JOINT):
+            data.ctrl[i] = data.qpos[mj.jnt_qposadr[mj.actuator_trnid[i, 0]]]
+    site, last = mj.site(tip).id, mj.joint(joints[-1]).id
+    worst = 0.0
+    for _ in range(round(PUSH_S / mj.opt.timestep)):
+        mujoco.mj_kinematics(mj, data)
+        lever = data.site_xpos[site] - data.xanchor[last]
+        push = np.cross(data.xaxis[last], lever)
+        push *= sign * FORCE / max(float(np.linalg.norm(push)), 1e-9)
+        data.qfrc_applied[:] = 0
+        mujoco.mj_comPos(mj, data)
+        mujoco.mj_applyFT(mj, data, push, np.zeros(3), data.site_xpos[site], mj.site_bodyid[site], data.qfrc_applied)
+        mujoco.mj_step(mj, data)
+        wanted = engine.on_linkages(mj, data.qpos)
+        gaps = [abs(wanted[mj.jnt_qposadr[j]] - data.qpos[mj.jnt_qposadr[j]]) for j in coupled if j in mine]
+        worst = max([worst, *gaps]) if np.isfinite(data.qpos).all() else np.inf
+    return float(worst)
+
+
+def mimic(description: Description, model: Model) -> Finding:
+    """URDF's mimic: a line per follower, source independent and declared earlier, its loss as stated in hand.json."""
+    ours, item = load(model.mjcf), f"mimic: {model.stem}"
+    seen, dependent, problems, worst = [], {}, [], 0.0
+    for joint in tree(model.urdf).findall("joint"):
+        element = joint.find("mimic")
+        if element is not None:
+            dependent[joint.get("name")] = element
+            if element.get("joint") not in seen:
+                problems.append(f'the source of "{joint.get("name")}" is declared later or not at all')
+        seen.append(joint.get("name"))
+    stated = next(m for m in description.table["models"] if m["stem"] == model.stem)["linkages"]
+    for name, element in dependent.items():
+        if element.get("joint") in dependent:
+            problems.append(f'"{name}" mimics "{element.get("joint")}", which mimics another joint')
+    for finger in ours.hand.fingers:
+        for linkage in linkages(finger):
+            name = ours.names.joint[finger.name, linkage.follower]
+            equality = ours.names.linkage[finger.name, linkage.follower]
+            element = dependent.pop(name, None)
+            worst = max(worst, float(np.degrees(linkage.loss_rad)))
+            if element is None:
+                problems.append(f'"{name}" mimics nothing')
+                continue
+            gap = abs(float(element.get("multiplier", "1")) - linkage.multiplier) + abs(float(element.get("offset", "0")) - linkage.offset)
+            if element.get("joint") != ours.names.joint[finger.name, linkage.source] or gap > 1e-6:
+                problems.append(f'"{name}" is not the best line through its polynomial')
+            if abs(stated[equality]["mimic_loss_deg"] - np.degrees(linkage.loss_rad)) > 1e-6:
+                problems.append(f'the loss that hand.json states for "{equality}" is not that of its line')
+    problems += [f'"{name}" mimics a joint, though nothing couples them' for name in dependent]
+    said = "; ".join(problems[:5]) or f"lines, unchained, declared in order; at worst {worst:.2g} deg from the polynomial, as stated"
+    return Finding(item, not problems, worst, said)
