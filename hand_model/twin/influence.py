@@ -92,6 +92,11 @@ class Draw:
         value = float(self.rng.uniform(low, high)) * self.strength
         return self.note(name, float(self.fixed.get(name, value)))
 
+    def raw(self, name: str, low: float, high: float) -> float:
+        """A load [raw] in proportion to the strength, drawn as a share of the motor's Coulomb friction."""
+        value = float(self.rng.uniform(low, high)) * self.strength * self.motor.coulomb
+        return self.note(name, float(self.fixed.get(name, value)))
+
     def note(self, name: str, value: float) -> float:
         """Write a parameter into the answer."""
         self.parameters[name] = value

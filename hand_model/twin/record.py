@@ -89,8 +89,17 @@ def record(
     return Answer(target, answer_table(truth, plan, trials, [a.answer for a in active], seed), done)
 
 
-def _of(active: Sequence[Active], finger: str | None) -> list[Influence]:
-    return [a.influence for a in active if a.finger == finger]
+def _of(truth: HandTruth, active: Sequence[Active], finger: str | None) -> list[Influence]:
+    """Influences on a finger: its own, and those in a drive that it shares (both thumb positions have one)."""
+    if finger is None:
+        return []
+    actuator = truth.finger(finger).actuator
+    shared = ("drive", "channel")
+    return [
+        a.influence
+        for a in active
+        if a.finger == finger or (a.answer["station"] in shared and a.answer["actuator"] == actuator)
+    ]
 
 
 def _record_trial(
@@ -98,7 +107,7 @@ def _record_trial(
 ) -> TrialTruth:
     noise = truth.mocap
     time_s = np.arange(int(trial.duration_s * noise.rate_hz + 1e-9) + 1) / noise.rate_hz
-    own = _of(active, trial.finger)
+    own = _of(truth, active, trial.finger)
     turns = any(a.influence.turns_palm for a in active) and trial.program is not None
     pose = palm_pose(noise, seed, trial.name, turns)
     motion = None
@@ -121,7 +130,7 @@ def _record_trial(
     rotation, position = pose.at(time_s)
     world = {label: rotate(rotation, points) + position for label, points in markers.items()}
     seen = dirty_markers(world, noise, seed, trial)
-    for influence in own:
+    for influence in own if motion is not None else ():
         seen = influence.world(trial, time_s, seen) if influence.world else seen
     write_markers(root / "mocap" / f"{trial.name}.{mocap_format}", seen, noise.rate_hz, noise.unit)
     return TrialTruth(trial, time_s, angle_rad, rotation, position, log_time, motion)
