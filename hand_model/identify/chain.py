@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rotation import perpendicular_basis, rotation_about, rotation_from_vector, skew
+from ..rotation import kabsch, perpendicular_basis, rotation_about, rotation_from_vector, skew
+from ..session import Finger
 
 Array = NDArray[np.float64]
 
@@ -97,6 +98,11 @@ class Pose:
         return Pose(self.rotation @ rotation_from_vector(step[:, 3:6]), translation, self.angle_rad + step[:, 6:])
 
 
+def marker_body(finger: Finger) -> NDArray[np.int64]:
+    """(m,) body of each marker: three of the palm, then those of the finger's segments, palm outwards."""
+    return np.array([0, 0, 0] + [k + 1 for k, segment in enumerate(finger.segments) for _ in segment.markers])
+
+
 def propagate(chain: Chain, body: Array, angle_rad: Array) -> tuple[Array, Array, list[tuple[Array, Array]]]:
     """Forward kinematics: markers (n, m, 3), body rotations (n, k + 1, 3, 3), per joint its moved axis and centre (n, 3).
 
@@ -151,14 +157,12 @@ def jacobians(chain: Chain, body: Array, angle_rad: Array) -> tuple[Array, Array
 def palm_pose(chain: Chain, data: ChainData, weight: Array | None = None) -> Pose:
     """Start values: palm by Kabsch on its markers, then each joint angle in closed form (least squares about a known line).
 
-    weight: (n, m), zero to leave a marker out.
+    weight: (n, m), zero to leave a marker out. A frame whose palm markers are hidden or out of shape starts from the palm pose
+    of the nearest sound frame.
     """
-    from ..rotation import kabsch
-
-    palm = data.body == 0
     n, n_joints = len(data.position_world), len(chain.axis_palm)
     w = np.isfinite(data.position_world[..., 0]) * (1.0 if weight is None else weight)
-    rotation, translation = kabsch(chain.marker_palm[palm], data.position_world[:, palm], w[:, palm])
+    rotation, translation = _palm(chain, data, w)
     pose = Pose(rotation, translation, np.zeros((n, n_joints)))
     z = pose.to_palm(np.nan_to_num(data.position_world))
     angle = np.zeros((n, n_joints))
@@ -173,3 +177,20 @@ def palm_pose(chain: Chain, data: ChainData, weight: Array | None = None) -> Pos
         cosine = (w[:, columns] * np.einsum("nmi,nmi->nm", across, seen)).sum(1)
         angle[:, k] = np.arctan2(sine, cosine)
     return Pose(rotation, translation, angle)
+
+
+def _palm(chain: Chain, data: ChainData, weight: Array) -> tuple[Array, Array]:
+    palm = data.body == 0
+    shape, seen = chain.marker_palm[palm], data.position_world[:, palm]
+    rotation, translation = kabsch(shape, seen, weight[:, palm])
+    miss = np.linalg.norm(seen - np.einsum("nij,mj->nmi", rotation, shape) - translation[:, None], axis=-1)
+    miss = np.where(weight[:, palm] > 0, miss, 0.0).max(1)
+    enough = (weight[:, palm] > 0).sum(1) >= 3
+    if not enough.any():
+        return rotation, translation
+    sound = np.flatnonzero(enough & (miss <= 8 * np.median(miss[enough]) + 1e-9))
+    after = np.minimum(np.searchsorted(sound, np.arange(len(seen))), len(sound) - 1)
+    before = np.maximum(after - 1, 0)
+    frame = np.arange(len(seen))
+    nearest = np.where(np.abs(sound[after] - frame) <= np.abs(frame - sound[before]), sound[after], sound[before])
+    return rotation[nearest], translation[nearest]

@@ -20,10 +20,12 @@ Array = NDArray[np.float64]
 # Beyond this many standard deviations a marker loses weight, with the fourth power. 99.98 % of three-dimensional Gaussian
 # residuals lie within, so nothing is lost on clean data, while ghosts, reflections and wrong labels fade away.
 OUTLIER_LIMIT = 4.5
-# A step of this many standard deviations (all shared unknowns together) ends the search.
-STEP_LIMIT = 0.03
+# A step of this many standard deviations (all shared unknowns together) is the last: the next would be far smaller.
+STEP_LIMIT = 0.1
 # Frames that bring the chain into its basin before all frames are used.
 START_FRAMES = 400
+# There the outlier limit starts this many times wider and halves with every step, so that a poor start is not taken for outliers.
+ANNEALING = 8.0
 
 
 @dataclass(frozen=True)
@@ -59,16 +61,14 @@ class _Normal:
     gradient: Array
 
 
-def fit_chain(data: ChainData, start: Chain, iterations: int = 40) -> ChainFit:
+def fit_chain(data: ChainData, start: Chain, iterations: int = 20) -> ChainFit:
     """Estimate chain and poses from all frames; robust against ghosts and wrong labels, efficient on Gaussian noise.
 
     data: observations. start: a chain within the basin (`start.start_chain`).
     """
     n = len(data.position_world)
-    chain = start
-    if n > 2 * START_FRAMES:
-        few = data.take(np.unique(np.linspace(0, n - 1, START_FRAMES).astype(int)))
-        chain = _optimise(few, chain, iterations)[0]
+    few = data.take(np.unique(np.linspace(0, n - 1, START_FRAMES).astype(int)))
+    chain = _optimise(few, start, iterations, ANNEALING)[0]
     chain, pose, noise, converged = _optimise(data, chain, iterations)
     return _finish(data, chain, pose, noise, converged)
 
@@ -113,19 +113,20 @@ def _linearise(data: ChainData, chain: Chain, pose: Pose) -> tuple[Array, Array,
     return pose.to_palm(data.position_world) - x, by_frame, by_marker, by_joint
 
 
-def _optimise(data: ChainData, chain: Chain, iterations: int) -> tuple[Chain, Pose, float, bool]:
+def _optimise(data: ChainData, chain: Chain, iterations: int, width: float = 1.0) -> tuple[Chain, Pose, float, bool]:
     pose = palm_pose(chain, data)
     damping = 1e-8
     linear = _linearise(data, chain, pose)
     noise = _noise(linear[0], data)
     for _ in range(iterations):
-        cost = robust_cost(linear[0], noise)
-        normal = _assemble(data, linear, robust_weight(linear[0], noise))
+        scale = noise * width
+        cost = robust_cost(linear[0], scale)
+        normal = _assemble(data, linear, robust_weight(linear[0], scale))
         for _ in range(8):
             shared, frames = _step(normal, chain, data, damping)
             new_chain, new_pose = chain.moved(shared), pose.moved(frames)
             new_linear = _linearise(data, new_chain, new_pose)
-            if robust_cost(new_linear[0], noise) <= cost * (1 + 1e-9):
+            if robust_cost(new_linear[0], scale) <= cost * (1 + 1e-9):
                 damping = max(damping / 10, 1e-12)
                 break
             damping = max(damping * 100, 1e-6)
@@ -133,8 +134,9 @@ def _optimise(data: ChainData, chain: Chain, iterations: int) -> tuple[Chain, Po
             return chain, pose, noise, False
         chain, pose, linear = new_chain, new_pose, new_linear
         noise = _noise(linear[0], data)
-        if shared @ normal.reduced @ shared < (STEP_LIMIT * noise) ** 2:
+        if width == 1.0 and shared @ normal.reduced @ shared < (STEP_LIMIT * noise) ** 2:
             return chain, pose, noise, True
+        width = max(1.0, width / 2)
     return chain, pose, noise, False
 
 

@@ -1,0 +1,170 @@
+"""Corrections of the recording before anything is fitted to it: exchanged labels, and markers that slip on their segment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from .chain import ChainData, propagate
+from .likelihood import ChainFit
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Swap:
+    """Labels that were exchanged from frame start to frame stop (inclusive)."""
+
+    labels: tuple[str, ...]
+    start: int
+    stop: int
+
+
+@dataclass(frozen=True)
+class Slip:
+    """A marker that moved on its segment before `frame`. shift_palm: (3,) [m], at rest."""
+
+    label: str
+    frame: int
+    shift_palm: Array
+
+
+def repair_labels(data: ChainData) -> tuple[ChainData, tuple[Swap, ...]]:
+    """Undo exchanged labels: where a cluster loses its shape, markers are followed from the last sound frame.
+
+    A permutation is applied only where it brings every marker nearer to its track than the labels do, by more than half of
+    the smallest distance between two markers.
+    """
+    y = data.position_world
+    broken = _broken(data)
+    if not broken.any() or broken.all():
+        return data, ()
+    spacing = _spacing(data)
+    fixed = y.copy()
+    order = np.tile(np.arange(y.shape[1]), (len(y), 1))
+    for run in _runs(broken):
+        forward = run[0] > 0
+        frames = range(run[0], run[1] + 1) if forward else range(run[1], run[0] - 1, -1)
+        last = _last_seen(fixed, run[0] - 1 if forward else run[1] + 1, forward)
+        for f in frames:
+            permutation = _follow(y[f], last, spacing)
+            order[f] = permutation
+            fixed[f] = y[f, permutation]
+            seen = np.isfinite(fixed[f, :, 0])
+            near = seen & (np.linalg.norm(np.nan_to_num(fixed[f]) - last, axis=1) < spacing / 2)
+            last[near] = fixed[f, near]
+    repaired = replace(data, position_world=fixed)
+    return repaired, _swaps(order, data.labels)
+
+
+def _broken(data: ChainData) -> NDArray[np.bool_]:
+    """Frames in which a distance within a cluster is off its usual value by more than its noise allows."""
+    broken = np.zeros(len(data.position_world), bool)
+    for k in range(data.n_joints + 1):
+        columns = np.flatnonzero(data.body == k)
+        for i, a in enumerate(columns):
+            for b in columns[i + 1 :]:
+                distance = np.linalg.norm(data.position_world[:, a] - data.position_world[:, b], axis=1)
+                off = np.abs(distance - np.nanmedian(distance))
+                with np.errstate(invalid="ignore"):
+                    broken |= off > 10 * np.nanmedian(off) + 1e-9
+    return broken
+
+
+def _spacing(data: ChainData) -> float:
+    y = data.position_world[:: max(1, len(data.position_world) // 200)]
+    distance = np.linalg.norm(y[:, :, None] - y[:, None], axis=-1)
+    distance[:, np.arange(y.shape[1]), np.arange(y.shape[1])] = np.nan
+    return float(np.nanmin(np.nanmedian(distance, axis=0)))
+
+
+def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
+    return list(zip(edges[::2].tolist(), (edges[1::2] - 1).tolist(), strict=True))
+
+
+def _last_seen(y: Array, frame: int, forward: bool) -> Array:
+    last = np.full(y.shape[1:], np.nan)
+    frames = range(frame, max(frame - 500, -1), -1) if forward else range(frame, min(frame + 500, len(y)))
+    for f in frames:
+        missing = np.isnan(last[:, 0])
+        if not missing.any():
+            break
+        last[missing] = y[f, missing]
+    return np.nan_to_num(last, nan=1e6)
+
+
+def _follow(observed: Array, last: Array, spacing: float) -> NDArray[np.int64]:
+    """Which observed column belongs to each label: nearest to the tracks, identity unless clearly better."""
+    m = len(observed)
+    cost = np.linalg.norm(np.nan_to_num(observed, nan=1e3)[None] - last[:, None], axis=-1)
+    cost = np.minimum(cost, 2 * spacing)  # a ghost far away must not push others around
+    permutation = linear_sum_assignment(cost)[1]
+    changed = permutation != np.arange(m)
+    gain = cost[np.arange(m), np.arange(m)] - cost[np.arange(m), permutation]
+    if changed.any() and gain[changed].sum() > spacing / 2 * changed.sum() * 0.5:
+        return permutation
+    return np.arange(m)
+
+
+def _swaps(order: NDArray[np.int64], labels: tuple[str, ...]) -> tuple[Swap, ...]:
+    identity = np.arange(order.shape[1])
+    swaps = []
+    for start, stop in _runs((order != identity).any(1)):
+        involved = np.flatnonzero((order[start : stop + 1] != identity).any(0))
+        swaps.append(Swap(tuple(labels[i] for i in involved), start, stop))
+    return tuple(swaps)
+
+
+def find_slip(fit: ChainFit, block: int = 25) -> Slip | None:
+    """The most evident slip of one marker, or None: a lasting step of its residual, seen in its segment's frame.
+
+    The step must stand out from the scatter of block means around it (that scatter holds every slow misfit of the chain)
+    with odds that no search over markers and moments explains: t above the Gaussian quantile of 1e-9, in a direction found
+    from the data, and be larger than a third of the noise.
+    """
+    rotations = propagate(fit.chain, fit.data.body, fit.pose.angle_rad)[1]
+    best: tuple[float, Slip] | None = None
+    for j, label in enumerate(fit.data.labels):
+        turned = np.einsum("nji,nj->ni", rotations[:, fit.data.body[j]], fit.residual_palm[:, j])
+        frames = np.flatnonzero(fit.weight[:, j] > 1e-4)
+        if len(frames) < 8 * block:
+            continue
+        count = len(frames) // block
+        means = np.median(turned[frames[: count * block]].reshape(count, block, 3), axis=1)  # ghosts do not reach a median
+        score, at, step = _step(means)
+        if np.linalg.norm(step) > fit.noise_m / 3 and (best is None or score > best[0]):
+            best = score, Slip(label, int(frames[at * block]), step)
+    return best[1] if best is not None and best[0] > 6.1 else None
+
+
+def _step(means: Array) -> tuple[float, int, Array]:
+    """Best single step in block means (b, 3): its t value, the block where it starts, the step (3,)."""
+    count = len(means)
+    total, cumulative = means.sum(0), np.cumsum(means, axis=0)[:-1]
+    n_before = np.arange(1, count)[:, None]
+    step = (total - cumulative) / (count - n_before) - cumulative / n_before
+    gain = (step**2).sum(1) * (n_before * (count - n_before) / count)[:, 0]
+    margin = max(2, count // 50)
+    gain[:margin] = gain[-margin:] = 0
+    at = int(np.argmax(gain)) + 1
+    direction = step[at - 1] / max(np.linalg.norm(step[at - 1]), 1e-300)
+    along = means @ direction
+    scatter = np.concatenate([along[:at] - along[:at].mean(), along[at:] - along[at:].mean()])
+    correlated = 1 + 2 * max(0.0, float(np.corrcoef(scatter[:-1], scatter[1:])[0, 1]))
+    deviation = np.sqrt(scatter.var() * correlated * (1 / at + 1 / (count - at)))
+    return float(np.linalg.norm(step[at - 1]) / max(deviation, 1e-300)), at, step[at - 1]
+
+
+def split_marker(data: ChainData, slip: Slip) -> ChainData:
+    """The same observations with the slipped marker as two columns: before and from the slip on."""
+    j = max(i for i, label in enumerate(data.labels) if label == slip.label and np.isfinite(data.position_world[slip.frame :, i, 0]).any())
+    before, after = data.position_world[:, j].copy(), data.position_world[:, j].copy()
+    before[slip.frame :], after[: slip.frame] = np.nan, np.nan
+    y = np.insert(data.position_world, j + 1, after, axis=1)
+    y[:, j] = before
+    labels = (*data.labels[: j + 1], slip.label, *data.labels[j + 1 :])
+    return ChainData(y, np.insert(data.body, j + 1, data.body[j]), labels)
