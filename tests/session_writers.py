@@ -107,7 +107,14 @@ def write_motive(path, labels, position_m, rate_hz=100.0, unit="Meters", version
     scale = {"Meters": 1.0, "Centimeters": 1e-2, "Millimeters": 1e-3, "": 1e-3}[unit]
     n = len(position_m)
     top = ["Format Version", version, "Take Name", "take", "Capture Frame Rate", f"{rate_hz:.6f}"]
-    top += ["Export Frame Rate", f"{rate_hz:.6f}", "Total Exported Frames", str(frames or n), "Rotation Type", "Quaternion"]
+    top += [
+        "Export Frame Rate",
+        f"{rate_hz:.6f}",
+        "Total Exported Frames",
+        str(frames or n),
+        "Rotation Type",
+        "Quaternion",
+    ]
     top += (["Length Units", unit] if unit else []) + ["Coordinate Space", "Global"]
     columns = []
     if rigid_body:

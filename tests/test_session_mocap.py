@@ -214,7 +214,10 @@ REFUSED = {
     "tsv_short": (lambda p: write_tsv(p / "a.tsv", LABELS, X, frames=300), "200 of 300 frames"),
     "tsv_foreign": (lambda p: text_file(p / "a.tsv", "a\tb\n1\t2\n"), "MARKER_NAMES"),
     "tsv_6d": (lambda p: replaced(write_tsv(p / "a.tsv", LABELS, X), "\t3D", "\t6D"), "6D"),
-    "tsv_rate": (lambda p: replaced(write_tsv(p / "a.tsv", LABELS, X), "FREQUENCY\t100", "FREQUENCY\tfast"), "FREQUENCY"),
+    "tsv_rate": (
+        lambda p: replaced(write_tsv(p / "a.tsv", LABELS, X), "FREQUENCY\t100", "FREQUENCY\tfast"),
+        "FREQUENCY",
+    ),
     "tsv_count": (lambda p: replaced(write_tsv(p / "a.tsv", LABELS, X), "MARKERS\t6", "MARKERS\t7"), "NO_OF_MARKERS"),
     "tsv_cell": (lambda p: replaced(write_tsv(p / "a.tsv", LABELS, X), "0.01000", "soon"), "line 10, cell 2.*soon"),
     "trc_cut": (lambda p: cut(write_trc(p / "a.trc", LABELS, X), 0.7), "truncated"),

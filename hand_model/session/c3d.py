@@ -31,7 +31,10 @@ def read_c3d(path: Path) -> Mocap:
 
     Raises SessionError where the file is foreign, truncated, without markers, or in an unknown unit.
     """
-    data = path.read_bytes()
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise SessionError(f"{path}: cannot be read ({error.strerror or error})") from None
     if len(data) < 2 * BLOCK or data[1] != 0x50 or data[0] == 0:
         raise SessionError(f"{path}: not a C3D file (its header or parameters are missing); a complete C3D is needed")
     try:
@@ -39,13 +42,13 @@ def read_c3d(path: Path) -> Mocap:
         labels = _labels(parameters, points := _count(data, parameters, processor))
         unit = parameters.get("POINT:UNITS") or [""]
         rate_hz = float(np.ravel(parameters.get("POINT:RATE", 0.0))[0]) or _floats(data[20:24], processor)[0]
-        position, seen = _points(data, parameters, processor, points, path)
-    except (struct.error, IndexError, ValueError, TypeError, OverflowError, UnicodeDecodeError):
+        with np.errstate(all="ignore"):  # a damaged number becomes infinite or nan, and so a gap
+            position, seen = _points(data, parameters, processor, points, path)
+    except (struct.error, LookupError, ValueError, TypeError, OverflowError):
         raise SessionError(f"{path}: damaged C3D file (its parameters contradict themselves); export it anew") from None
     if not 0.0 < rate_hz < 1e6:
         raise SessionError(f"{path}: POINT:RATE is {rate_hz:g}; a frame rate above zero is needed")
-    with np.errstate(over="ignore", invalid="ignore"):
-        position = position * metres_per(str(unit[0] if isinstance(unit, list) else unit), path, "POINT:UNITS")
+    position *= metres_per(str(unit[0] if isinstance(unit, list) else unit), path, "POINT:UNITS")
     position[~seen] = np.nan
     return build_mocap(labels, np.arange(len(position)) / rate_hz, position, rate_hz, path)
 
@@ -143,16 +146,20 @@ def _points(
     width, words = (4 if scale < 0 else 2), 4 * points + analog
     available = max(len(data) - start * BLOCK, 0) // (width * words)
     frames = _frames(data, parameters, order, available, width * words, path)
-    if frames == LAST_FRAME < available:  # the header's 16 bits are full, and nothing else says how many frames there are
+    if (
+        frames == LAST_FRAME < available
+    ):  # the header's 16 bits are full, and nothing else says how many frames there are
         body = np.frombuffer(data, "u1", available * width * words, start * BLOCK).reshape(available, -1)
-        frames = int(np.flatnonzero(body.any(axis=1)).max(initial=frames - 1)) + 1  # the last block is filled with zeros
+        frames = (
+            int(np.flatnonzero(body.any(axis=1)).max(initial=frames - 1)) + 1
+        )  # the last block is filled with zeros
     body = data[start * BLOCK : start * BLOCK + frames * words * width]
     if scale < 0:
         table = _floats(body, processor)
         quads = table.reshape(frames, words)[:, : 4 * points].reshape(frames, points, 4)
-        return quads[..., :3].astype(float), quads[..., 3] >= 0
+        return quads[..., :3].astype(float), ~(quads[..., 3] < 0)
     quads = np.frombuffer(body, order + "i2").reshape(frames, words)[:, : 4 * points].reshape(frames, points, 4)
-    return quads[..., :3] * scale, quads[..., 3] >= 0
+    return quads[..., :3] * scale, ~(quads[..., 3] < 0)
 
 
 def _frames(data: bytes, parameters: Parameters, order: str, available: int, frame_bytes: int, path: Path) -> int:

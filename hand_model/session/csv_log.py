@@ -29,7 +29,7 @@ def read_csv_log(path: Path) -> Log:
     if not numbers:
         raise SessionError(f"{path}: the log is empty; samples below the header are needed")
     rows = [_cells(lines[i], separator) for i in numbers]
-    if separator != "," and any("," in cell for cell in rows[0] + rows[-1]):
+    if separator != "," and any("," in lines[i] for i in numbers):
         rows = [[cell.replace(",", ".") for cell in row] for row in rows]
     width = len(header)
     for i, row in enumerate(rows):

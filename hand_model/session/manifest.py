@@ -133,19 +133,24 @@ def _probe(node: Node | None) -> Probe | None:
         return Probe(labels, None)
     markers = Node(node.file, "[probe] markers", found)
     position = np.array([markers.numbers(label, 3) for label in found]).reshape(-1, 3)
-    # A tip on the line of the markers is known all the same; any other tip turns about that line.
-    if len(found) < 2 or (_on_one_line(position - position.mean(axis=0)) and not _on_one_line(position)):
-        node.refuse(f"{len(found)} markers ({', '.join(found)}); three or more, not on one line, are needed")
-    reach_m = float(np.linalg.norm(position, axis=1).max())
-    if not 0.005 < reach_m < 2.0:
+    reach_m = float(np.linalg.norm(position, axis=1).max(initial=0.0))
+    if len(found) and not 0.005 < reach_m < 2.0:
         node.refuse(f"the farthest marker is {reach_m:g} m from the tip; positions in metres are needed")
+    if not _determines_tip(position):
+        node.refuse(f"{len(found)} markers ({', '.join(found)}); three or more, not on one line, are needed")
     return Probe(tuple(found), position)
 
 
-def _on_one_line(position: np.ndarray) -> bool:
-    """Whether positions (n, 3) are within three percent of a line through the origin."""
-    size = np.linalg.svd(position, compute_uv=False)
-    return len(size) < 2 or size[1] <= 0.03 * size[0]
+def _determines_tip(position: np.ndarray) -> bool:
+    """Whether markers (n, 3) [m] fix the tip at the origin: off a line by three percent, or on one that meets the tip."""
+    if len(position) < 2:
+        return False
+    middle = position.mean(axis=0)
+    _, size, directions = np.linalg.svd(position - middle)
+    if size[1] > 0.03 * size[0]:
+        return len(position) > 2
+    beside_m = float(np.linalg.norm(middle - middle @ directions[0] * directions[0]))
+    return size[0] > 0 and beside_m < 1e-3  # a probe that turns unseen about its line moves its tip by no more
 
 
 def _actuators(entries: list[Node], nodes: list[Node]) -> tuple[Actuator, ...]:

@@ -16,8 +16,9 @@ def inside(node: Node, key: str, root: Path) -> Path:
     if Path(text).is_absolute() or PureWindowsPath(text).drive or PureWindowsPath(text).root:
         node.refuse(f'{key} is the absolute path "{text}"; a path relative to session.toml is needed')
     try:
+        (root / text).exists()  # names that are too long
         leaves = not (root / text).resolve().is_relative_to(root.resolve())
-    except (OSError, RuntimeError, ValueError) as error:  # endless links, names too long
+    except (OSError, RuntimeError, ValueError) as error:  # endless links besides
         node.refuse(f'{key} "{text}" cannot be followed ({error}); a path relative to session.toml is needed')
     if leaves:
         node.refuse(f'{key} "{text}" leaves the session folder; a path inside it is needed')
