@@ -24,7 +24,7 @@ def _finger(random, name, i, across, joints, tips):
     for k in range(joints):
         axis = np.array([0.0, 1.0, 0.0]) + random.normal(0, 0.15, 3)
         markers = {f"{name}_{k}{letter}": centre + [0.012, 0, 0.015] + random.normal(0, 0.006, 3) for letter in "abc"}
-        tip = centre + [0.027, 0, 0] if tips and k == joints - 1 else None
+        tip = centre + [0.027, 0, 0] + random.normal(0, 0.001, 3) if tips and k == joints - 1 else None
         high = 1.1 + random.uniform(0, 0.3)
         made.append(Joint(f"s{k}", axis / np.linalg.norm(axis), centre, 1e-6 * np.eye(6), (-0.02, high), markers, tip))
         centre = centre + [0.032, 0, 0.003] + random.normal(0, 0.001, 3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ Array = NDArray[np.float64]
 TRACKING = np.radians(0.1)
 STIFFNESS = np.radians(0.05)
 FORCE = 1.0  # N at the tip
-PUSH_S = 0.5
+PUSH_S = 0.3
 
 
 def direction(description: Description, model: Model) -> Finding:
@@ -85,20 +86,20 @@ def stiffness(description: Description, model: Model) -> Finding:
     for finger in ours.hand.fingers:
         if not finger.couplings:
             continue
+        joints = [ours.names.joint[finger.name, j.name] for j in finger.joints]
         for held in (True, False):
             for sign in (1.0, -1.0):
-                gap = _pushed(model, ours.names.tip[finger.name], [ours.names.joint[finger.name, j.name] for j in finger.joints], held, sign)
+                gap = _pushed(copy.copy(mj), ours.names.tip[finger.name], joints, held, sign)
                 if not gap <= worst:
                     worst, where = gap, finger.name
     said = f"{FORCE:.0f} N at the tip moves a coupling by at most {np.degrees(worst):.2g} deg"
     return Finding(item, worst <= STIFFNESS, float(np.degrees(worst)), said + f" ({where})")
 
 
-def _pushed(model: Model, tip: str, joints: list[str], held: bool, sign: float) -> float:
+def _pushed(mj: Any, tip: str, joints: list[str], held: bool, sign: float) -> float:
     """Largest coupling error [rad] of a finger under a force that turns with the tip; it flexes (sign 1) or extends the last joint."""
     import mujoco
 
-    mj = engine.load(model.mjcf).mj
     mj.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
     coupled = engine.followers(mj)
     mine = {mj.joint(j).id for j in joints}
