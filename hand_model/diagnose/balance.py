@@ -18,6 +18,11 @@ from ..effects.path import strokes
 Array = NDArray[np.float64]
 
 
+# What physics allows of a declared coefficient, by its column's name.
+DECLARED_LOW = {"inertia": 0.0, "viscous": 0.0, "coulomb": 0.0, "spring": 0.0}
+DISCRETE = ("side", "trial")  # shapes that choose among few cases: no continuous parameter is spent on them
+
+
 @dataclass(frozen=True)
 class Term:
     """One effect with its shape."""
@@ -58,8 +63,18 @@ class Balance:
         self.weight = np.ones(len(self.effort))
         self.sigma, self.inflation = noise(self)
         extra = self.gather(lambda s: s.extra.get("sigma", np.zeros(len(s.time_s))))
+        timing = self.gather(lambda s: s.extra.get("timing", np.zeros(len(s.time_s))))
         self.weight = 1 / np.sqrt(self.sigma**2 + extra**2)
+        self.sharp = 1 / np.sqrt(self.sigma**2 + timing**2)
         self.steady = extra <= 0.25 * self.sigma
+
+    def sharpened(self) -> Balance:
+        """The same balance with starts and stops weighted by their timing alone, to see delays and give in them."""
+        from copy import copy
+
+        other = copy(self)
+        other.weight = self.sharp
+        return other
 
     def gather(self, value: Any) -> Array:
         """Stack `value(state)` (n, ...) over the compared samples."""
@@ -99,7 +114,8 @@ class Balance:
             return columns
 
         parts = [self.gather(declared)]
-        low, high = [-np.inf] * parts[0].shape[1], [np.inf] * parts[0].shape[1]
+        low = [DECLARED_LOW.get(name, -np.inf) for name in self.names]
+        high = [np.inf] * len(self.names)
         for term in terms:
             parts.append(self.columns(term.effect, term.shape, warps))
             low += [a[2] for a in term.effect.amplitudes()]
@@ -126,7 +142,7 @@ class Balance:
             names = [a[0] for a in term.effect.amplitudes()]
             amplitudes.append(dict(zip(names, coefficients[start:start + len(names)].tolist(), strict=True)))
             start += len(names)
-        size = sum(len(t.shape) + len(t.effect.amplitudes()) for t in terms)
+        size = sum(len([k for k in t.shape if k not in DISCRETE]) + len(t.effect.amplitudes()) for t in terms)
         declared = dict(zip(self.names, coefficients[:k].tolist(), strict=True))
         return Fit(terms, declared, tuple(amplitudes), prediction, rss, size)
 

@@ -66,6 +66,7 @@ def _prepare(actuator: str, entries: list[tuple[Trial, Log]]) -> list[DriveState
         extra["elapsed"] = time_s - first
         extra["trial_index"] = np.full(len(time_s), float(index))
         effort = np.where(motion.moving, current[seen], np.nan)
+        extra["bandwidth_s"] = np.full(len(time_s), motion.bandwidth_s)
         extra["steady"] = steady(time_s, motion).astype(float)
         declared = np.stack([motion.acceleration, motion.velocity, np.sign(motion.velocity), motion.position,
                              np.ones(len(time_s))], axis=-1)
@@ -105,8 +106,9 @@ def with_timing(state: DriveState) -> DriveState:
     step = float(np.median(np.diff(state.time_s)))
     slope = np.abs(np.gradient(state.declared @ beta, state.time_s))
     slope = np.maximum.reduce([np.roll(slope, k) for k in (-2, -1, 0, 1, 2)])
-    sigma = np.where(state.extra["steady"] > 0, 0.0, step * slope + START_DOUBT * abs(beta[2]))
-    return replace(state, extra={**state.extra, "sigma": sigma})
+    turning = state.extra["steady"] <= 0
+    sigma = np.where(turning, step * slope + START_DOUBT * abs(beta[2]), 0.0)
+    return replace(state, extra={**state.extra, "sigma": sigma, "timing": np.where(turning, 0.5 * step * slope, 0.0)})
 
 
 def session_give(prepared: dict[str, list[DriveState]]) -> float:

@@ -17,12 +17,14 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True)
 class Motion:
     """position, velocity, acceleration: (n,) smoothed. noise: standard deviation of the raw position;
+    bandwidth_s: of the kernel [s];
     moving: (n,) bool; since_start_s, until_stop_s: (n,) [s] to the nearest rest before and after (inf where none)."""
 
     position: Array
     velocity: Array
     acceleration: Array
     noise: float
+    bandwidth_s: float
     moving: NDArray[np.bool_]
     since_start_s: Array
     until_stop_s: Array
@@ -63,7 +65,7 @@ def estimate_motion(time_s: Array, position: Array, bandwidth_s: float | None = 
         h *= 1.4
     moving = np.abs(v) > max(5 * velocity_noise, 0.03 * fastest)
     moving = _drop_short(moving, 3)
-    return Motion(x, v, a, noise, moving, _since(time_s, moving), _since(-time_s[::-1], moving[::-1])[::-1])
+    return Motion(x, v, a, noise, h, moving, _since(time_s, moving), _since(-time_s[::-1], moving[::-1])[::-1])
 
 
 def _drop_short(flag: NDArray[np.bool_], shortest: int) -> NDArray[np.bool_]:

@@ -15,13 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from .balance import Balance, Fit, Term
+from .balance import DISCRETE, Balance, Fit, Term
 from .lack_of_fit import LackOfFit, lack_of_fit
 
 Array = NDArray[np.float64]
 
 ALPHA = 0.003  # false alarms per channel: 5 % over some fifteen channels of a session
 EVIDENCE_LEAST = 6.0  # log evidence an effect must bring: e^6 against "none", and against the search over shapes
+STARTS_EVIDENCE = 40.0  # of a delay or give from starts and stops, whose errors repeat from start to start
 CLASS_WIDTH = 3.0  # log evidence within which two effects are one class: 20 to 1
 MOST_TERMS = 5
 
@@ -88,8 +89,14 @@ def name_effects(states: tuple[Any, ...], effects: Iterable[Any], progress: Call
     states: DriveStates of one balance, validation recordings marked by `validate`. The lack-of-fit test alone decides
     whether anything is missing; without it no effect is named, however well it fits.
     """
-    balance = Balance(tuple(states))
-    effects = tuple(effects)
+    naming = _name(Balance(tuple(states)), tuple(effects), progress)
+    if naming.before.p < ALPHA and not naming.found and any(s.validate for s in states):
+        # What happened in a validation recording only cannot be learned from the others.
+        return _name(Balance(tuple(states), everything=True), tuple(effects), progress)
+    return naming
+
+
+def _name(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str], None] | None) -> Naming:
     declared = balance.fit()
     before = lack_of_fit(balance, declared.prediction, len(balance.names), ALPHA)
     terms: tuple[Term, ...] = ()
@@ -106,10 +113,32 @@ def name_effects(states: tuple[Any, ...], effects: Iterable[Any], progress: Call
         after = lack_of_fit(balance, fit.prediction, len(balance.names) + fit.size, ALPHA)
         if progress is not None:
             progress(f"{balance.states[0].drive}: {', '.join(t.effect.name for t in terms)}")
+    terms, fit = _starts(balance, effects, terms, fit)
+    after = lack_of_fit(balance, fit.prediction, len(balance.names) + fit.size, ALPHA)
     found = _findings(balance, effects, terms, fit, declared)
     kept = {t.effect.name for t in terms}
     rejected = tuple(sorted(((n, e) for n, e in brought.items() if n not in kept), key=lambda item: -item[1]))
     return Naming(balance, declared, fit, before, after, found, rejected)
+
+
+def _starts(balance: Balance, effects: tuple[Any, ...], terms: tuple[Term, ...], fit: Fit) -> tuple[tuple[Term, ...], Fit]:
+    """Delays and give show at starts and stops, which weigh little elsewhere: added here where they explain most of the
+    misfit there, by more than the timing of half a sample could."""
+    sharp = balance.sharpened()
+    now = sharp.fit(terms)
+    lively = [e for e in effects if (e.warps or e.replaces) and all(t.effect.name != e.name for t in terms)]
+    ranked = rank(sharp, lively, terms, now)
+    if not ranked or ranked[0].evidence < STARTS_EVIDENCE or not _resolved(balance, ranked[0].fit.terms[-1]):
+        return terms, fit
+    return settle(balance, effects, ranked[0].fit.terms, keep=ranked[0].name)
+
+
+def _resolved(balance: Balance, term: Term) -> bool:
+    """Whether a delay exceeds three quarters of a sample interval; true of anything else."""
+    if "delay" not in term.shape:
+        return True
+    step = float(np.median(np.concatenate([np.diff(s.time_s) for s in balance.states])))
+    return abs(term.shape["delay"]) > 0.75 * step
 
 
 def rank(balance: Balance, effects: Iterable[Any], terms: tuple[Term, ...], fit: Fit, refine: int = 6) -> list[Rival]:
@@ -178,7 +207,7 @@ def _project(balance: Balance, effect: Any, terms: tuple[Term, ...], grid: list[
 def polish(balance: Balance, fit: Fit, which: int) -> Fit:
     """Optimise the shape of one term (Nelder-Mead within its bounds), everything linear refitted at each step."""
     term = fit.terms[which]
-    shapes = [s for s in term.effect.shapes(balance.states) if s.name not in ("side", "trial")]
+    shapes = [s for s in term.effect.shapes(balance.states) if s.name not in DISCRETE]
     if not shapes:
         return fit
     span = np.array([s.high - s.low for s in shapes])
@@ -203,15 +232,19 @@ def polish(balance: Balance, fit: Fit, which: int) -> Fit:
     return best if best.rss < fit.rss else fit
 
 
-def settle(balance: Balance, effects: tuple[Any, ...], terms: tuple[Term, ...]) -> tuple[tuple[Term, ...], Fit]:
-    """Joint refit; terms that no longer pay leave; a term that another effect replaces better is exchanged."""
+def settle(
+    balance: Balance, effects: tuple[Any, ...], terms: tuple[Term, ...], keep: str | None = None
+) -> tuple[tuple[Term, ...], Fit]:
+    """Joint refit; terms that no longer pay leave; a term that another effect replaces better is exchanged.
+
+    keep: name of a term that stays whatever it brings here (it was decided on the starts and stops)."""
     fit = refit(balance, balance.fit(terms))
     for _ in range(3):
-        dropped = _drop(balance, fit)
+        dropped = _drop(balance, fit, keep)
         if dropped is not None:
             fit = dropped
             continue
-        swapped = _swap(balance, effects, fit) if len(fit.terms) > 1 else None
+        swapped = _swap(balance, effects, fit, keep) if len(fit.terms) > 1 else None
         if swapped is None:
             break
         fit = swapped
@@ -229,18 +262,22 @@ def refit(balance: Balance, fit: Fit, rounds: int = 2) -> Fit:
     return fit
 
 
-def _drop(balance: Balance, fit: Fit) -> Fit | None:
+def _drop(balance: Balance, fit: Fit, keep: str | None = None) -> Fit | None:
     """The fit without the term that costs more than it brings; None where every term pays."""
     for which in range(len(fit.terms)):
+        if fit.terms[which].effect.name == keep:
+            continue
         rest = balance.fit(tuple(t for i, t in enumerate(fit.terms) if i != which))
         if evidence(balance, fit, rest, _scale(balance, fit)) < EVIDENCE_LEAST:
             return refit(balance, rest)
     return None
 
 
-def _swap(balance: Balance, effects: tuple[Any, ...], fit: Fit) -> Fit | None:
+def _swap(balance: Balance, effects: tuple[Any, ...], fit: Fit, keep: str | None = None) -> Fit | None:
     """The best exchange of one term for another effect, where it raises the evidence; else None."""
     for which in range(len(fit.terms)):
+        if fit.terms[which].effect.name == keep:
+            continue
         rest = tuple(t for i, t in enumerate(fit.terms) if i != which)
         without = balance.fit(rest)
         own = evidence(balance, fit, without, _scale(balance, fit))

@@ -18,8 +18,8 @@ class StribeckFriction(Effect):
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """Stribeck speed, from below the slowest to the fastest recorded motion."""
         low, high = speed_range(states)
-        return (Shape("stribeck_speed", f"{states[0].position_unit}/s", 0.15 * low, 1.0 * high,
-                      tuple(np.geomspace(0.4 * low, 0.7 * high, 7))),)
+        return (Shape("stribeck_speed", f"{states[0].position_unit}/s", 0.15 * low, 0.6 * high,
+                      tuple(np.geomspace(0.4 * low, 0.5 * high, 7))),)
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Static minus Coulomb friction, never negative."""

@@ -28,7 +28,9 @@ class TorqueRipple(Effect):
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """sin and cos of the position's phase, (n, 2)."""
         phase = 2 * np.pi * state.position / shape["period"]
-        return np.stack([np.sin(phase), np.cos(phase)], axis=-1)
+        # Faster than the state estimate sees, inertia takes the ripple up: nothing is claimed there.
+        blur = 2 * np.pi * np.abs(state.velocity) / shape["period"] * state.extra.get("bandwidth_s", 0.0)
+        return np.stack([np.sin(phase), np.cos(phase)], axis=-1) * np.exp(-0.5 * blur**2)[:, None]
 
     def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
                    declared: Mapping[str, float]) -> dict[str, float]:
