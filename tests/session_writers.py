@@ -137,7 +137,7 @@ def write_motive(path, labels, position_m, rate_hz=100.0, unit="Meters", version
     return path
 
 
-def write_bag(path, topics, storage="sqlite3"):
+def write_bag(path, topics, storage="sqlite3", version=9):
     """rosbag2 folder. topics: name -> (message type, [(received_s, fields)]); a `header` of seconds becomes a stamp."""
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -146,7 +146,7 @@ def write_bag(path, topics, storage="sqlite3"):
     store.register(get_types_from_msg("float64 position\nfloat64 current\nstring note\n", "lab_msgs/msg/Finger"))
     kinds = store.types
     plugin = StoragePlugin.MCAP if storage == "mcap" else StoragePlugin.SQLITE3
-    with Writer(path, version=9, storage_plugin=plugin) as writer:
+    with Writer(path, version=version, storage_plugin=plugin) as writer:
         for topic, (kind, rows) in topics.items():
             connection = writer.add_connection(topic, kind, typestore=store)
             for received_s, fields in rows:

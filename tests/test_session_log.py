@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sqlite3
 import time
 
 import numpy as np
@@ -208,6 +209,28 @@ def test_bag_of_an_unknown_message_with_named_numbers(bag):
     log = read_log(bag({"/finger": ("lab_msgs/msg/Finger", message)}))
     np.testing.assert_array_equal(log.column("position"), np.arange(30.0))
     assert set(log.columns) == {"position", "current"}
+
+
+def test_bag_topics_named_after_the_actuator(bag):
+    t = 50.0 + np.arange(30) * 0.01
+    topics = {f"/{m}_position": (FLOAT, [(x, {"data": float(k)}) for x in t]) for k, m in enumerate(("index", "ring"))}
+    log = read_log(bag(topics), "ring")
+    assert (log.column("position") == 1).all() and (log.column("index_position") == 0).all()
+
+
+def test_bag_without_message_definitions(tmp_path):
+    t = 50.0 + np.arange(30) * 0.01
+    topics = {
+        "/position": (FLOAT, [(x, {"data": float(i)}) for i, x in enumerate(t)]),
+        "/finger": ("lab_msgs/msg/Finger", [(x, {"position": 1.0, "current": -2.0, "note": "n"}) for x in t]),
+    }
+    folder = write_bag(tmp_path / "bag", topics, version=8)
+    database = next(folder.glob("*.db3"))
+    with sqlite3.connect(database) as connection:
+        connection.execute("DELETE FROM message_definitions")
+    log = read_log(folder)
+    np.testing.assert_array_equal(log.column("position"), np.arange(30.0))
+    assert list(log.columns) == ["position"] and "/finger (lab_msgs/msg/Finger)" in log.notes[0]
 
 
 def test_bag_without_numbers_is_refused(bag):

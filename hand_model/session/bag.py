@@ -3,7 +3,7 @@
 The session format names the columns; this module says which messages carry them:
 
 - a message with one number in a field `data` (std_msgs/Float64, Float32, Int32, ...): the column is the last component of
-  the topic, `/hand/index/position` -> `position`;
+  the topic, `/hand/index/position` -> `position`, less the actuator's name, `/index_position` -> `position`;
 - sensor_msgs/JointState: `position`, `velocity`, `effort` of a joint, `effort` also as `current`; with several joints in
   the message the columns are `<joint>_position` and so on, and those of the joint named like the actuator also go by the
   plain names;
@@ -52,9 +52,8 @@ def read_bag(path: Path, actuator: str | None = None) -> Log:
 
     Raises SessionError where the bag cannot be read, or holds no message with numbers.
     """
-    channels = [
-        channel for topic, rows in sorted(_messages(path).items()) if (channel := _channel(topic, rows, actuator))
-    ]
+    messages, notes = _messages(path)
+    channels = [channel for topic, rows in sorted(messages.items()) if (channel := _channel(topic, rows, actuator))]
     if not channels:
         raise SessionError(f"{path}: the bag holds no message with numbers; position, current, ... are needed")
     named = _named(channels, actuator)
@@ -65,11 +64,11 @@ def read_bag(path: Path, actuator: str | None = None) -> Log:
         for name, channel, column in named
         if len(channel.time_s)
     }
-    return build_log(lead.time_s, columns, path)
+    return build_log(lead.time_s, columns, path, notes)
 
 
-def _messages(path: Path) -> dict[str, list[tuple[int, Any]]]:
-    """Deserialised messages by topic, each with its time of reception [ns]."""
+def _messages(path: Path) -> tuple[dict[str, list[tuple[int, Any]]], list[str]]:
+    """Messages by topic, each with its time of reception [ns], and a note on every topic that cannot be decoded."""
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
@@ -78,14 +77,23 @@ def _messages(path: Path) -> dict[str, list[tuple[int, Any]]]:
             f"{path}: no metadata.yaml in this folder; a rosbag2 folder or a single .mcap file is needed"
         )
     found: dict[str, list[tuple[int, Any]]] = defaultdict(list)
+    undecodable: dict[str, str] = {}
     try:
         with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:
             for connection, received_ns, raw in reader.messages():
-                found[connection.topic].append((received_ns, reader.deserialize(raw, connection.msgtype)))
-    except Exception as error:  # noqa: BLE001 rosbags lets sqlite3, yaml, struct and assertion errors of damaged bags through
+                if connection.topic in undecodable:
+                    continue
+                try:
+                    message = reader.deserialize(raw, connection.msgtype)
+                except Exception:  # noqa: BLE001 a type of the laboratory's own, stored without its definition
+                    undecodable[connection.topic] = connection.msgtype
+                    found.pop(connection.topic, None)
+                else:
+                    found[connection.topic].append((received_ns, message))
+    except Exception as error:  # noqa: BLE001 rosbags lets sqlite3, yaml, struct and assertion errors through
         reason = " ".join(str(error).split())[:120] or type(error).__name__
         raise SessionError(f"{path}: not a readable ROS 2 bag ({reason}); export it anew") from None
-    return found
+    return found, [f"topic {topic} ({kind}) cannot be decoded and was ignored" for topic, kind in undecodable.items()]
 
 
 def _channel(topic: str, rows: list[tuple[int, Any]], actuator: str | None) -> _Channel | None:
@@ -101,7 +109,8 @@ def _channel(topic: str, rows: list[tuple[int, Any]], actuator: str | None) -> _
     columns = {name: np.array([field.get(name, np.nan) for field in fields], float)[order] for name in names}
     single = names == ["data"]
     if single:
-        columns = {topic.rstrip("/").rpartition("/")[2]: columns["data"]}
+        name = topic.rstrip("/").rpartition("/")[2]
+        columns = {name.removeprefix(f"{actuator}_"): columns["data"]}
     return _Channel(topic, np.array(stamps_ns, float)[order] * 1e-9, columns, single)
 
 

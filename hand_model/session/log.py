@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -42,14 +42,14 @@ class Log:
         return self.columns[name]
 
 
-def build_log(time_s: Array, columns: Mapping[str, Array], path: Path) -> Log:
+def build_log(time_s: Array, columns: Mapping[str, Array], path: Path, notes: Iterable[str] = ()) -> Log:
     """A log as every reader hands it over: rows in the order of their times, each time once.
 
-    time_s: (n,) [s], as recorded. Rows without a time, or that repeat one, are dropped and rows out of order sorted, with
+    time_s: (n,) [s], as recorded. notes: what the reader has to say. Rows without a time, or that repeat one, are dropped and rows out of order sorted, with
     a note, as long as they are few. Raises SessionError where they are many, or where fewer than two rows are left.
     """
     total = len(time_s)
-    notes = []
+    notes = list(notes)
     keep = np.flatnonzero(np.isfinite(time_s))
     _tolerate(total - len(keep), total, "have no time", path)
     if len(keep) < total:

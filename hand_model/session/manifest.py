@@ -57,7 +57,7 @@ def read_session(path: str | Path) -> Session:
         top.refuse("[rig] stands instead of [palm] and [[finger]]; one of the two is needed")
     nodes = [top]
 
-    def child(key: str) -> Node | None:
+    def child(key: str) -> Node | None:  # noted, so that its unknown keys are said
         if not top.has(key):
             return None
         nodes.append(top.child(key))
