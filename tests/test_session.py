@@ -312,6 +312,15 @@ def test_bag_as_log_gives_the_actuators_channel(root):
     check_session(session)
 
 
+def test_notes_do_not_depend_on_where_the_folder_lies(root):
+    file = root / "log/excitation.csv"
+    lines = file.read_text().splitlines()
+    file.write_text("\n".join([*lines[:50], lines[49], *lines[50:]]))
+    notes = check_session(read_session(root))
+    assert any(note.startswith("log/excitation.csv: ") for note in notes)
+    assert not any(str(root) in note for note in notes)
+
+
 # ---- what only the recordings tell ----
 
 
@@ -371,6 +380,11 @@ def spoil_never_together(root):
     write_c3d(root / "mocap/index.c3d", labels, x)
 
 
+def spoil_length(root):
+    labels, x = index_markers(6)
+    write_c3d(root / "mocap/index.c3d", labels, x)
+
+
 def spoil_probe(root):
     labels = [*PALM, *PROBE]
     x = rigid_markers(labels, 20)
@@ -414,12 +428,13 @@ RECORDINGS_REFUSED = {
     "every_file_in_metres": (spoil_all_scales(1000.0), ["mocap/index.c3d", "unit"]),
     "one_file_in_centimetres": (spoil_scale(10.0), ["index.c3d", "palm", "unit"]),
     "probe_ten_times": (spoil_probe, ["mocap/joint.c3d", "T1, T2, T3", "[probe]"]),
-    "probe_marker_unseen": (spoil_probe_unseen, ["mocap/joint.c3d", "T1, T2, T3", "no frame"]),
+    "probe_marker_unseen": (spoil_probe_unseen, ["mocap/joint.c3d", "T1, T2, T3", "in 0 of 20 frames"]),
     "collinear": (spoil_line(0.0), ["mocap/index.c3d", "IP1, IP2, IP3", "one line"]),
     "collinear_noisy": (spoil_line(4e-4), ["mocap/index.c3d", "IP1, IP2, IP3", "one line"]),
     "occluded_finger": (spoil_occluded(7), ["mocap/index.c3d", '"ID2"', "index/distal", "every frame"]),
     "occluded_palm": (spoil_occluded(1), ["mocap/index.c3d", '"PM"', "palm", "every frame"]),
-    "never_together": (spoil_never_together, ["mocap/index.c3d", "ID1, ID2, ID3", "no frame"]),
+    "never_together": (spoil_never_together, ["mocap/index.c3d", "ID1, ID2, ID3", "in 0 of 300 frames"]),
+    "six_frames": (spoil_length, ["mocap/index.c3d", "6 of 6 frames", "10 or more"]),
     "truncated": (
         lambda root: (root / "mocap/index.c3d").write_bytes((root / "mocap/index.c3d").read_bytes()[:30_000]),
         ["mocap/index.c3d", "truncated"],

@@ -22,6 +22,8 @@ EXTENT_M = (0.005, 3.0)
 UNIT_RATIO = 1.5
 # A rigid body whose markers are nearer to a line than this share of its length does not show its turns about the line.
 FLATNESS = 0.03
+# Fewer frames than this show no flexion.
+FLEXION_FRAMES = 10
 # The longest sampling interval [s] of a log whose `time` can be in seconds.
 INTERVAL_S = 2.0
 # Motion stands out of the noise: range of a channel over the noise of one sample.
@@ -47,13 +49,13 @@ def check_session(session: Session) -> tuple[str, ...]:
     for trial in session.trials:
         if trial.mocap_path is not None:
             mocap = trial.mocap()
-            notes += [f"{trial.mocap_path}: {note}" for note in mocap.notes]
+            notes += [f"{_place(session, mocap)}: {note}" for note in mocap.notes]
             notes += check_mocap(session, trial, mocap)
             if session.palm and all(label in mocap.labels for label in session.palm.labels):
                 palm_sizes[str(trial.mocap_path)] = _size(mocap.markers(session.palm.labels))
         if trial.log_path is not None:
             log = trial.log()
-            notes += [f"{trial.log_path}: {note}" for note in log.notes]
+            notes += [f"{_place(session, log)}: {note}" for note in log.notes]
             notes += check_log(session, trial, log)
             unknown |= set(log.columns) - set(COLUMNS)
         if trial.mocap_path is not None and trial.log_path is not None:
@@ -64,23 +66,32 @@ def check_session(session: Session) -> tuple[str, ...]:
     return tuple(dict.fromkeys(notes))
 
 
+def _place(session: Session, recording: Mocap | Log) -> str:
+    """The file relative to its session: notes are kept with the hand and must not depend on where the folder lies."""
+    return recording.path.relative_to(session.path).as_posix()
+
+
 def check_mocap(session: Session, trial: Trial, mocap: Mocap) -> list[str]:
     """Markers of one trial: labelled, seen, of a possible size, and off a line. Returns notes; raises SessionError."""
     bodies = _bodies(session, trial)
     if trial.kind not in (*PROBED, "flexion", "pivot"):
         missing = [label for labels in bodies.values() for label in labels if label not in mocap.labels]
-        return [f"{mocap.path}: not every marker is here, and the file was ignored ({', '.join(missing)})"] * bool(
-            missing
-        )
+        return [
+            f"{_place(session, mocap)}: not every marker is here, and the file was ignored ({', '.join(missing)})"
+        ] * bool(missing)
     for body, labels in bodies.items():
         position = mocap.markers(labels)
         seen = np.isfinite(position[..., 0])
         if body != "probe" and not seen.any(axis=0).all():
             label = labels[int(np.argmin(seen.any(axis=0)))]
             raise SessionError(f'{mocap.path}: marker "{label}" ({body}) is occluded in every frame; it must be seen')
-        if not (seen.sum(axis=1) >= min(3, len(labels))).any():
+        together = int((seen.sum(axis=1) >= min(3, len(labels))).sum())
+        needed = FLEXION_FRAMES if trial.kind == "flexion" else 1
+        if together < needed:
+            listed = ", ".join(labels)
             raise SessionError(
-                f"{mocap.path}: in no frame are three of the markers {', '.join(labels)} ({body}) seen together; three are needed"
+                f"{mocap.path}: three of the markers {listed} ({body}) are seen together in {together} of {len(seen)} frames; "
+                f"{needed} or more are needed"
             )
         if (
             len(labels) >= 3
@@ -197,7 +208,7 @@ def check_log(session: Session, trial: Trial, log: Log) -> list[str]:
         if lost == 1.0:
             raise SessionError(f'{log.path}: the column "{name}" has no sample; a log with it is needed')
         if lost > 0.1:
-            notes.append(f"{log.path}: {100 * lost:.0f} % of the samples of {name} are lost")
+            notes.append(f"{_place(session, log)}: {100 * lost:.0f} % of the samples of {name} are lost")
     if trial.kind != "grasp" and not moves(log.column("position")):
         raise SessionError(
             f'{log.path}: the column "position" does not move; a {trial.kind} trial needs the finger to move'
@@ -225,9 +236,9 @@ def _check_signals(session: Session, log: Log) -> list[str]:
     for name, target in session.rig.signals.items():
         if name in log.columns:
             if np.isnan(log.columns[name]).all():
-                notes.append(f'{log.path}: the column "{name}" has no sample')
+                notes.append(f'{_place(session, log)}: the column "{name}" has no sample')
         elif target.endswith((":velocity", ":setpoint")):
-            notes.append(f'{log.path}: no column "{name}", which [signals] names')
+            notes.append(f'{_place(session, log)}: no column "{name}", which [signals] names')
         else:
             raise SessionError(
                 f'{log.path}: no column "{name}", which [signals] names; {did_you_mean(name, log.columns)}'
