@@ -1,0 +1,111 @@
+"""The drive simulated in raw units: profile generator, controller, mass, spring and friction; many moves at once.
+
+Plant: inertia a = u - viscous v - F - stiffness p - preload, with the friction of LuGre (Canudas de Wit et al. 1995),
+    F = f + bristle f',  f' = (level(v) - f sign(v)) v / distance,  level(v) = coulomb (1 + (ratio - 1) exp(-|v / stribeck|^exponent)),
+which sticks (any f within its bounds at v = 0) and becomes Coulomb's as the presliding distance goes to zero.
+Controller: u = gain (r - p) + damping (r' - v), within the current limit; r is a trapezoidal velocity profile from the old to the
+new setpoint. Integrated by the implicit midpoint rule, linear within a step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+STEP_S = 2e-3
+PLANT = ("inertia", "viscous", "coulomb", "stiffness", "preload", "presliding", "bristle")
+STRIBECK = ("static_ratio", "stribeck_speed")
+CONTROLLER = ("speed_full", "acceleration", "deceleration", "gain", "damping")
+
+
+@dataclass(frozen=True)
+class Moves:
+    """Moves from rest, one per entry (B,): start_s of the command after the move's own zero [s], origin and target [%],
+    speed [share of full], limit [raw], position at rest [%], duration_s [s]; sorted by falling duration for `simulate`."""
+
+    start_s: Array
+    origin: Array
+    target: Array
+    speed: Array
+    limit: Array
+    position: Array
+    duration_s: Array
+
+
+def profile(time_s: Array, moves: Moves, q: Mapping[str, Array]) -> tuple[Array, Array]:
+    """Reference [%] and its velocity [%/s], (n, B), of trapezoidal moves at times (n,) [s]."""
+    distance, sign = np.abs(moves.target - moves.origin), np.sign(moves.target - moves.origin)
+    up, down = q["acceleration"], q["deceleration"]
+    top = np.minimum(q["speed_full"] * moves.speed, np.sqrt(2 * distance * up * down / (up + down)))
+    top = np.maximum(top, 1e-9)
+    t_up, t_down = top / up, top / down
+    t_flat = np.maximum(distance / top - 0.5 * (t_up + t_down), 0.0)
+    t = time_s[:, None] - moves.start_s
+    a = np.clip(t, 0.0, t_up)
+    b = np.clip(t - t_up, 0.0, t_flat)
+    c = np.clip(t - t_up - t_flat, 0.0, t_down)
+    reference = 0.5 * up * a * a + top * b + (top - 0.5 * down * c) * c
+    return moves.origin + sign * reference, sign * (up * a - down * c)
+
+
+def simulate(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S) -> tuple[Array, Array, Array]:
+    """Time (n,) [s], position (n, B) [%] and current (n, B) [raw] of B moves under B parameter sets (each (B,)).
+
+    Every move starts at rest in balance, so its friction there is what the controller pushes less the spring.
+    Rows after a move's duration are not filled.
+    """
+    n = int(np.ceil(moves.duration_s.max() / step_s)) + 2
+    time_s = np.arange(n) * step_s
+    r, w = profile(time_s, moves, q)
+    active = np.searchsorted(-moves.duration_s, -(time_s - 2 * step_s), side="right")
+    gain, damping, limit = q["gain"], q["damping"], moves.limit
+    spring, preload, viscous = q["stiffness"], q["preload"], q["viscous"]
+    exponent, bristle = q["stribeck_exponent"], q["bristle"]
+    ratio, per_speed = q["static_ratio"] - 1.0, 1.0 / q["stribeck_speed"]
+    coulomb, distance = q["coulomb"], q["presliding"]
+    has_stribeck = bool(np.any(ratio != 0.0))
+    half = 0.5 * step_s
+    mass = q["inertia"] / half
+    position, current = np.empty((n, len(moves.target))), np.empty((n, len(moves.target)))
+    p, v = moves.position.copy(), np.zeros(len(moves.target))
+    u = np.clip(gain * (r[0] - p), -limit, limit)
+    top = coulomb * (1.0 + ratio)
+    f = np.clip(u - spring * p - preload, -top, top)
+    linear = mass + viscous + half * spring
+    closed = gain * half + damping
+    for i in range(n):
+        k = active[i]
+        if k == 0:
+            break
+        if k < len(p):
+            p, v, f = p[:k], v[:k], f[:k]
+        u = gain[:k] * (r[i, :k] - p) + damping[:k] * (w[i, :k] - v)
+        position[i, :k] = p
+        current[i, :k] = np.minimum(np.maximum(u, -limit[:k]), limit[:k])
+        if i + 1 == n:
+            break
+        level = coulomb[:k]
+        if has_stribeck:
+            level = level * (1.0 + ratio[:k] * np.exp(-(np.abs(v * per_speed[:k]) ** exponent[:k])))
+        ahead = gain[:k] * (0.5 * (r[i, :k] + r[i + 1, :k]) - p) + damping[:k] * 0.5 * (w[i, :k] + w[i + 1, :k])
+        rest = mass[:k] * v - spring[:k] * p - preload[:k] - f
+        push = rest + ahead
+        way = np.sign(push)
+        travel = np.maximum(step_s * np.abs(v), 1e-6 * distance[:k])
+        slope = (level - f * way) * -np.expm1(-travel / distance[:k]) / travel
+        inner = linear[:k] + (half + bristle[:k]) * slope
+        middle = push / (inner + closed[:k])
+        u_middle = ahead - closed[:k] * middle
+        over = np.abs(u_middle) > limit[:k]
+        if over.any():
+            middle = np.where(over, (rest + np.sign(u_middle) * limit[:k]) / inner, middle)
+        p = p + step_s * middle
+        v = 2.0 * middle - v
+        limit_f = np.sign(middle) * level
+        f = limit_f + (f - limit_f) * np.exp(-step_s * np.abs(middle) / distance[:k])
+    return time_s, position, current

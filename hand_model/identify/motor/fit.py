@@ -1,0 +1,253 @@
+"""The main call: a session and an actuator in, its identified motor out."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import IdentificationError
+from ...hand import Estimate, Motor
+from ...session import Session
+from . import output_error
+from .corrected import NAMES, Regression, fit_regression
+from .output_error import MoveData, OutputErrorFit, moves_from_rest
+from .published import PublishedFit, fit_published, smear_share
+from .recording import MotorTrial, Scale, actuator_trials, check_trials, motor_trial, trial_scale
+
+Array = NDArray[np.float64]
+
+UNITS = {
+    "inertia": "raw s^2/%",
+    "viscous": "raw s/%",
+    "coulomb": "raw",
+    "stiffness": "raw/%",
+    "preload": "raw",
+    "presliding": "%",
+    "bristle": "s",
+    "static_ratio": "1",
+    "stribeck_speed": "%/s",
+    "stribeck_exponent": "1",
+    "speed_full": "%/s",
+    "acceleration": "%/s^2",
+    "deceleration": "%/s^2",
+    "gain": "raw/%",
+    "damping": "raw s/%",
+}
+BOUNDS = {
+    "inertia": (1e-5, 1e3),
+    "viscous": (-1e3, 1e4),
+    "coulomb": (1e-3, 1e5),
+    "presliding": (0.03, 10.0),
+    "bristle": (0.0, 0.2),
+    "speed_full": (1.0, 1e4),
+    "acceleration": (20.0, 2e5),
+    "deceleration": (20.0, 2e5),
+    "gain": (1e-2, 1e4),
+    "damping": (0.0, 1e3),
+    "static_ratio": (1.0, 8.0),
+    "stribeck_speed": (1.5, 100.0),
+}
+FITTED = tuple(n for n in BOUNDS if n not in ("static_ratio", "stribeck_speed")) + ("stiffness", "preload")
+STRIBECK = ("static_ratio", "stribeck_speed")
+LACK_OF_FIT = 1.35  # residual variance over the noise's, above which output error does not describe the recording
+EVIDENCE = 16.0  # fall of the misfit (in variances, two parameters and two shapes tried): once in about a thousand by chance
+
+
+@dataclass(frozen=True)
+class MotorFit:
+    """An identified drive.
+
+    motor: what goes into the hand. scale: encoder range. values: every parameter of plant, friction and controller (see UNITS);
+    covariance (k, k) of `names`. method: "output error" or "regression" (no setpoints, or none that explain the motion).
+    sigma_position [%], sigma_current [raw]: noise of one sample. regression: the corrected regression; published, alike: the
+    four models with the current as it is, and with both sides filtered alike; smear: share of the reciprocal term's gain that is
+    smear. output_error: its fit, or None. stribeck: whether the recordings show a Stribeck rise; evidence: fall of the misfit by it.
+    """
+
+    motor: Motor
+    scale: Scale
+    values: Mapping[str, float]
+    names: tuple[str, ...]
+    covariance: Array
+    method: str
+    sigma_position: float
+    sigma_current: float
+    regression: Regression
+    published: tuple[PublishedFit, ...]
+    alike: tuple[PublishedFit, ...]
+    smear: float
+    output_error: OutputErrorFit | None
+    stribeck: bool
+    evidence: float
+
+    @property
+    def predictive(self) -> bool:
+        """Whether setpoints alone predict position and current: the controller is identified too."""
+        return self.method == "output error"
+
+
+def white_noise(values: Array, time_s: Array) -> float:
+    """Standard deviation of white noise on a smooth signal (n,): from each sample's distance to the line of its neighbours.
+
+    Rice's difference estimator for irregular times, by the median, so that jumps do not count.
+    """
+    t0, t1, t2 = time_s[:-2], time_s[1:-1], time_s[2:]
+    w = (t1 - t0) / (t2 - t0)
+    d = (values[1:-1] - (1 - w) * values[:-2] - w * values[2:]) / np.sqrt(1 + (1 - w) ** 2 + w**2)
+    return float(1.4826 * np.median(np.abs(d)))
+
+
+def identify_motor(session: Session, actuator: str) -> MotorFit:
+    """Identify one motor from the session's excitation and flexion logs (validation trials take no part).
+
+    Raises IdentificationError where they hold no excitation, one direction only, or a current that is constant, clipped or a command.
+    """
+    found = actuator_trials(session, actuator)
+    if not found:
+        raise IdentificationError(
+            f'{session.path}: actuator "{actuator}" has no excitation or flexion trial with a log; one with motion both ways is needed'
+        )
+    full = next(a.speed_full for a in session.actuators if a.name == actuator)
+    logs = [(t.name, t.log()) for t in found]
+    scale = trial_scale(logs, full)
+    trials = [motor_trial(name, log, scale) for name, log in logs]
+    check_trials(trials)
+    return fit_motor(trials, scale, actuator)
+
+
+def identify_motors(session: Session) -> tuple[tuple[Motor, ...], tuple[str, ...]]:
+    """Motors of all actuators with usable logs, and notes: one sentence for each that could not be identified.
+
+    Raises IdentificationError only where the session has actuators with logs and none of them can be identified.
+    """
+    motors, notes = [], []
+    for actuator in session.actuators:
+        if not actuator_trials(session, actuator.name):
+            notes.append(f'motor "{actuator.name}" not identified: no excitation or flexion trial with a log')
+            continue
+        try:
+            motors.append(identify_motor(session, actuator.name).motor)
+        except IdentificationError as error:
+            notes.append(f'motor "{actuator.name}" not identified: {error}')
+    return tuple(motors), tuple(notes)
+
+
+def fit_motor(trials: Sequence[MotorTrial], scale: Scale, actuator: str = "motor") -> MotorFit:
+    """Identify a motor from checked trials: regression first, then output error from the commands where these explain the motion."""
+    sigma_p = max(float(np.median([white_noise(t.position, t.time_s) for t in trials])), 0.3 / scale.counts_per_percent)
+    sigma_u = max(float(np.median([white_noise(t.current, t.time_s) for t in trials])), 0.3)
+    plain = fit_regression(trials, sigma_p)
+    curved = fit_regression(trials, sigma_p, stribeck=True)
+    published, alike, smear = fit_published(trials), fit_published(trials, both_sides=True), smear_share(trials)
+    moves = [m for t in trials for m in moves_from_rest(t, sigma_p, scale.speed_full)]
+    best, evidence = None, 0.0
+    if len(moves) >= 4:
+        best, evidence = _fit_output_error(moves, plain, curved, (sigma_p, sigma_u))
+    accepted = best is not None and max(best.chi2) < LACK_OF_FIT
+    notes = []
+    if accepted:
+        sigma_p, sigma_u = sigma_p * np.sqrt(best.chi2[0]), sigma_u * np.sqrt(best.chi2[1])
+        values, names, covariance = dict(best.values), best.names, best.covariance
+        stribeck = "static_ratio" in names
+    else:
+        values, names, covariance, stribeck = _from_regression(plain, curved)
+        if best is None:
+            notes.append("no moves from rest with logged setpoints: controller not identified, setpoints do not predict the motion")
+        else:
+            values = {**best.values, **values}
+            notes.append(
+                f"setpoints do not explain the motion (residual variance {best.chi2[0]:.1f} of position, {best.chi2[1]:.1f} of current, "
+                "in units of the noise): parameters are those of the regression, and something is missing from the model"
+            )
+    if stribeck:
+        notes.append(f"friction rises as speed falls (Stribeck): misfit falls by {evidence:.0f} noise variances")
+    motor = Motor(
+        actuator, scale.counts_open, scale.counts_close, _estimates(values, names, covariance, accepted), float(sigma_u),
+        tuple(t.name for t in trials), tuple(notes),
+    )  # fmt: skip
+    return MotorFit(
+        motor, scale, values, names, covariance, "output error" if accepted else "regression", float(sigma_p), float(sigma_u),
+        plain, published, alike, smear, best, stribeck, evidence,
+    )  # fmt: skip
+
+
+def _start(moves: Sequence[MoveData], plain: Regression) -> dict[str, float]:
+    """Starting values: plant from the regression, controller from how fast moves go and what holds the drive off its setpoint."""
+    plant = dict(zip(NAMES, map(float, plain.values), strict=True))
+    plant["inertia"] = max(plant["inertia"], 1e-3)
+    plant["coulomb"] = max(plant["coulomb"], 1.0)
+    ratio, error, hold = [], [], []
+    for m in moves:
+        n = len(m.time_s)
+        way = np.sign(m.target - m.origin)
+        middle = (way * (m.position - m.origin) > 0.25 * abs(m.target - m.origin)) & (
+            way * (m.position - m.origin) < 0.75 * abs(m.target - m.origin)
+        )
+        if middle.sum() >= 5 and m.own[2] > 0:
+            ratio.append(abs(np.polyfit(m.time_s[middle], m.position[middle], 1)[0]) / m.own[2])
+        tail = slice(max(0, n - 6), n)
+        error.append(np.mean(m.target - m.position[tail]))
+        hold.append(np.mean(m.current[tail]))
+    error, hold = np.array(error), np.array(hold)
+    gain = float(error @ hold / max(error @ error, 1e-9))
+    gain = gain if 0.5 < gain < 1e3 else 20.0
+    speed = float(np.median(ratio)) * 1.02 if ratio else 100.0
+    return {
+        **plant, "presliding": 0.5, "bristle": 0.004, "static_ratio": 1.0, "stribeck_speed": 20.0, "stribeck_exponent": 1.0,
+        "speed_full": speed, "acceleration": 9 * speed, "deceleration": 9 * speed, "gain": gain,
+        "damping": 2 * np.sqrt(gain * plant["inertia"]),
+    }  # fmt: skip
+
+
+def _fit_output_error(
+    moves: Sequence[MoveData], plain: Regression, curved: Regression, sigma: tuple[float, float]
+) -> tuple[OutputErrorFit, float]:
+    base = output_error.fit(moves, _start(moves, plain), FITTED, sigma, BOUNDS)
+    fits = [base]
+    # a Stribeck rise is tried where either the regression or the misfit leaves room for one
+    if curved.excess_z > 2.0 or max(base.chi2) > 1.1:
+        ratio = float(np.clip(1 + curved.static_excess / max(base.values["coulomb"], 1.0), 1.1, 3.0))
+        for exponent in (1.0, 2.0):
+            start = {**base.values, "static_ratio": ratio, "stribeck_speed": 20.0, "stribeck_exponent": exponent}
+            fits.append(output_error.fit(moves, start, (*FITTED, *STRIBECK), sigma, BOUNDS, own=base.own))
+    best = min(fits, key=lambda f: f.cost)
+    evidence = (base.cost - best.cost) / max(1.0, *best.chi2)
+    if best is not base and (evidence < EVIDENCE or _is_at_bound(best)):
+        best = base
+    return best, evidence if best is not base else 0.0
+
+
+def _is_at_bound(f: OutputErrorFit) -> bool:
+    i = f.names.index("static_ratio")
+    return f.values["static_ratio"] - 1 < 2 * np.sqrt(f.covariance[i, i])
+
+
+def _from_regression(plain: Regression, curved: Regression) -> tuple[dict[str, float], tuple[str, ...], Array, bool]:
+    stribeck = curved.excess_z > 4.0
+    used = curved if stribeck else plain
+    values = dict(zip(NAMES, map(float, used.values), strict=True))
+    if stribeck:
+        values |= {"static_ratio": 1 + used.static_excess / used.values[2], "stribeck_speed": used.stribeck_speed, "stribeck_exponent": 1.0}
+    return values, NAMES, used.covariance, stribeck
+
+
+def _estimates(values: Mapping[str, float], names: Sequence[str], covariance: Array, accepted: bool) -> dict[str, Estimate]:
+    origin = "output error of the simulated drive" if accepted else "regression, both sides filtered alike"
+    sd = dict(zip(names, np.sqrt(np.maximum(np.diag(covariance), 0)), strict=True))
+    kept = values if accepted else {n: v for n, v in values.items() if n in NAMES or n in STRIBECK}
+    if "static_ratio" not in names:
+        kept = {n: v for n, v in kept.items() if not n.startswith(("static", "stribeck")) or n in names}
+    ordered = [*NAMES, *(n for n in kept if n not in NAMES)]
+    return {
+        n: Estimate(float(kept[n]), (float(kept[n] - 1.96 * sd[n]), float(kept[n] + 1.96 * sd[n])) if n in sd else None, UNITS[n], origin)
+        for n in ordered
+    }
+
+
+def with_notes(motor: Motor, *notes: str) -> Motor:
+    """The motor with further notes."""
+    return dataclasses.replace(motor, notes=(*motor.notes, *notes))

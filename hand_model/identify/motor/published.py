@@ -1,0 +1,117 @@
+"""The identification as published: position filtered, current not, four models by least squares on samples above a speed.
+
+Modelling of Robotic Hands: Kinematic and Dynamic Parameter Identification, section 4.3 and tables 4.12, 4.13.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .recording import MotorTrial
+
+Array = NDArray[np.float64]
+
+CUTOFF_HZ = 6.0
+SPEED_THRESHOLD = 5.0  # [%/s]
+MODELS = ("D", "SMD", "SMD+Fc", "SMD+Frec+Fc")
+TERMS = {
+    "D": ("viscous",),
+    "SMD": ("inertia", "viscous", "stiffness"),
+    "SMD+Fc": ("inertia", "viscous", "stiffness", "coulomb"),
+    "SMD+Frec+Fc": ("inertia", "viscous", "stiffness", "coulomb", "reciprocal"),
+}
+# RMSE of predicted current, raw units, tables 4.12 (right) and 4.13 (left), in the order of MODELS.
+PUBLISHED_RMSE = {
+    "right": {
+        "thumb": (27.624, 18.653, 13.407, 12.872),
+        "index": (23.671, 18.157, 12.393, 11.251),
+        "middle": (19.520, 16.899, 13.041, 11.165),
+        "ring": (10.803, 10.449, 10.292, 10.264),
+        "little": (20.448, 17.727, 14.311, 12.863),
+    },
+    "left": {
+        "thumb": (29.31, 20.830, 15.536, 14.793),
+        "index": (20.103, 17.071, 13.132, 11.714),
+        "middle": (19.719, 16.940, 13.025, 11.154),
+        "ring": (20.033, 17.234, 13.443, 11.687),
+        "little": (20.874, 18.109, 14.579, 13.108),
+    },
+}
+
+
+@dataclass(frozen=True)
+class PublishedFit:
+    """model: one of MODELS; rmse_raw of the current; parameters: term -> value in raw units per percent."""
+
+    model: str
+    rmse_raw: float
+    parameters: Mapping[str, float]
+
+
+def zero_phase(x: Array, rate_hz: float, cutoff_hz: float = CUTOFF_HZ) -> Array:
+    """Second-order Butterworth low-pass, forwards and backwards, of samples (n,) at rate_hz [Hz]."""
+    from scipy.signal import butter, filtfilt
+
+    b, a = butter(2, min(cutoff_hz / (0.5 * rate_hz), 0.95))
+    return filtfilt(b, a, x)
+
+
+def columns(trial: MotorTrial, both_sides: bool = False) -> tuple[dict[str, Array], Array, Array]:
+    """Regressors by term (n,), current (n,) and the mask of samples above the speed threshold of one trial.
+
+    Velocity and acceleration by differences of the filtered position; `both_sides` filters current and friction terms alike.
+    """
+    rate_hz = 1 / float(np.median(np.diff(trial.time_s)))
+    t = np.arange(trial.time_s[0], trial.time_s[-1], 1 / rate_hz)
+    position, current = np.interp(t, trial.time_s, trial.position), np.interp(t, trial.time_s, trial.current)
+    p = zero_phase(position, rate_hz)
+    v = np.gradient(p, t)
+    a = np.gradient(v, t)
+    moving = np.abs(v) > SPEED_THRESHOLD
+    safe = np.where(moving, v, np.sign(v + 1e-300) * SPEED_THRESHOLD)
+    terms = {"inertia": a, "viscous": v, "stiffness": p, "coulomb": np.sign(v), "reciprocal": 1 / safe}
+    if both_sides:
+        # the friction changes sign with the drive, not with its filtered copy: lightly filtered velocity, then the same filter
+        light = np.gradient(zero_phase(position, rate_hz, 3 * CUTOFF_HZ), t)
+        strong = np.abs(light) > SPEED_THRESHOLD
+        sign = _held_sign(light, strong)
+        recip = sign / np.maximum(np.abs(light), SPEED_THRESHOLD)
+        terms = {**terms, "coulomb": zero_phase(sign, rate_hz), "reciprocal": zero_phase(recip, rate_hz)}
+        current = zero_phase(current, rate_hz)
+    return terms, current, moving
+
+
+def _held_sign(v: Array, strong: Array) -> Array:
+    """Sign of the velocity, held through rest: the friction keeps its direction until the drive is pushed the other way."""
+    index = np.maximum.accumulate(np.where(strong, np.arange(len(v)), -1))
+    sign = np.where(index >= 0, np.sign(v[np.maximum(index, 0)]), 0.0)
+    return sign
+
+
+def fit_published(trials: Sequence[MotorTrial], both_sides: bool = False) -> tuple[PublishedFit, ...]:
+    """The four models of tables 4.12 and 4.13 on all trials together; `both_sides` for the comparison with a like filter."""
+    parts = [columns(t, both_sides) for t in trials]
+    current = np.concatenate([u[m] for _, u, m in parts])
+    found = []
+    for model in MODELS:
+        names = TERMS[model]
+        if both_sides:
+            names = (*names, "preload")
+        x = np.concatenate([np.column_stack([c.get(n, np.ones(len(m)))[m] for n in names]) for c, _, m in parts])
+        beta = np.linalg.lstsq(x, current, rcond=None)[0]
+        rmse = float(np.sqrt(np.mean((current - x @ beta) ** 2)))
+        found.append(PublishedFit(model, rmse, dict(zip(names, map(float, beta), strict=True))))
+    return tuple(found)
+
+
+def smear_share(trials: Sequence[MotorTrial]) -> float:
+    """Share (0..1) of the reciprocal term's gain in explained variance that is smear: gone once both sides are filtered alike."""
+    gain = []
+    for alike in (False, True):
+        table = {f.model: f.rmse_raw**2 for f in fit_published(trials, alike)}
+        gain.append(table["SMD+Fc"] - table["SMD+Frec+Fc"])
+    return float(np.clip(1 - gain[1] / gain[0], 0.0, 1.0)) if gain[0] > 0 else 0.0
