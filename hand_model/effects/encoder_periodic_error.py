@@ -1,0 +1,40 @@
+"""Encoder periodic error: an error periodic in counts (eccentric magnet, uneven poles)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
+
+
+class EncoderPeriodicError(Effect):
+    """angle = map(encoder) + A sin(2 pi x / P + phase)."""
+
+    name = "encoder_periodic_error"
+    station = "encoder"
+
+    def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
+        """Period, dense in wavenumber."""
+        low, high = position_range(states)
+        span = high - low
+        return (Shape("period", states[0].position_unit, 0.015 * span, 0.5 * span, tuple(span / np.arange(2.25, 60.01, 0.25))),)
+
+    def amplitudes(self) -> tuple[Amplitude, ...]:
+        """Sine and cosine parts."""
+        return (("sine", "deg", -np.inf, np.inf), ("cosine", "deg", -np.inf, np.inf))
+
+    def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
+        """sin and cos of the encoder's phase, (n, 2)."""
+        phase = 2 * np.pi * state.position / shape["period"]
+        return np.stack([np.sin(phase), np.cos(phase)], axis=-1)
+
+    def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
+                   declared: Mapping[str, float]) -> dict[str, float]:
+        """Amplitude, period and phase [rad]."""
+        return {"amplitude": float(np.hypot(amplitude["sine"], amplitude["cosine"])), "period": shape["period"],
+                "phase": float(np.arctan2(amplitude["cosine"], amplitude["sine"]))}
+
+
+EFFECT = EncoderPeriodicError()

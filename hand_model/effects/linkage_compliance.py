@@ -1,0 +1,27 @@
+"""Linkage compliance: give in the linkage that grows with load."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from .base import Amplitude, Array, DriveState, Effect
+
+
+class LinkageCompliance(Effect):
+    """distal = coupling(proximal) - compliance * load; the load is the smoothed motor current."""
+
+    name = "linkage_compliance"
+    station = "linkage"
+
+    def amplitudes(self) -> tuple[Amplitude, ...]:
+        """Compliance, always yielding to the load."""
+        return (("compliance", "deg/effort", 0.0, np.inf),)
+
+    def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
+        """Minus the load, (n, 1); none where no load is logged."""
+        return -state.extra["load"][:, None] if "load" in state.extra else np.zeros((len(state.time_s), 1))
+
+
+EFFECT = LinkageCompliance()
