@@ -70,9 +70,12 @@ def current_saturation(draw: Draw) -> Influence:
     """The current reading, or the drive itself, clips below the peaks of fast motion."""
     motor = draw.motor
     peak = motor.coulomb + motor.viscous * motor.controller.speed_full + 100.0 * motor.stiffness + motor.preload
-    level = draw.note("level_raw", peak * (1.0 - min(0.5, draw.size("share_cut", 0.18, 0.28))))
+    cut = draw.size("share_cut", 0.18, 0.28)
     if draw.form == "drive":
+        # Enough is left to close the finger slowly: what is cut away is what speed needs.
+        level = draw.note("level_raw", peak - min(0.9, 2.6 * cut) * motor.viscous * motor.controller.speed_full)
         return Influence(terms=DriveTerms(current_limit=level))
+    level = draw.note("level_raw", peak * (1.0 - min(0.5, cut)))
     if draw.form == "reading":
         return Influence(current=lambda motion, raw: np.clip(raw, -level, level))
     knee = 0.12 * level
@@ -87,7 +90,7 @@ def current_delay(draw: Draw) -> Influence:
     def shifted(motion: Motion, raw: Array) -> Array:
         if draw.form == "delay":
             return np.interp(motion.time_s - delay, motion.time_s, raw)
-        keep = math.exp(-(motion.time_s[1] - motion.time_s[0]) / delay)
+        keep = math.exp(-(motion.time_s[1] - motion.time_s[0]) / max(delay, 1e-6))
         out, at = np.empty_like(raw), raw[0]
         for i, x in enumerate(raw.tolist()):
             at = keep * at + (1.0 - keep) * x

@@ -49,20 +49,25 @@ def asymmetric_coulomb(draw: Draw) -> Influence:
     return Influence(terms=DriveTerms(friction=(lambda now: half * now.direction,)))
 
 
-@effect("load_dependent_friction", "drive", "current", ("transmitted", "current"))
+@effect("load_dependent_friction", "drive", "current", ("transmitted", "efficiency"))
 def load_dependent(draw: Draw) -> Influence:
-    """Friction grows with the load behind the gearbox, or with the motor's own current."""
-    if draw.form == "transmitted":
-        share = draw.size("share", 0.35, 0.55)
-        return Influence(terms=DriveTerms(friction=(lambda now: share * abs(now.transmitted),)))
-    share = draw.size("share", 0.22, 0.32)
-    return Influence(terms=DriveTerms(friction=(lambda now: share * abs(now.current),)))
+    """Friction grows with the load behind the gearbox; a leadscrew's share is smaller while the load drives it back.
+
+    (Friction in proportion to the motor's own current would only rescale current against motion: nobody could see it.)
+    """
+    share = draw.size("share", 0.27, 0.42)
+    back = 1.0 if draw.form == "transmitted" else 0.6
+    return Influence(
+        terms=DriveTerms(
+            friction=(lambda now: share * abs(now.transmitted) * (1.0 if now.direction * now.transmitted > 0 else back),)
+        )
+    )
 
 
 @effect("position_dependent_friction", "drive", "current", BUMPS)
 def tight_spot(draw: Draw) -> Influence:
     """A tight spot: more friction both ways in one part of the range."""
-    height = draw.raw("height_raw", 0.28, 0.42)
+    height = draw.raw("height_raw", 0.22, 0.32)
     shape = bump(draw.form, draw.uniform("centre_percent", 22.0, 78.0), draw.uniform("width_percent", 5.0, 9.0))
     return Influence(terms=DriveTerms(friction=(lambda now: height * shape(now.position),)))
 
@@ -70,7 +75,7 @@ def tight_spot(draw: Draw) -> Influence:
 @effect("quadratic_damping", "drive", "current", ("square", "cube"))
 def quadratic(draw: Draw) -> Influence:
     """Drag that grows faster than speed."""
-    at_100 = draw.raw("drag_at_100_raw", 0.45, 0.7)
+    at_100 = draw.raw("drag_at_100_raw", 0.6, 0.9)
     power = 2.0 if draw.form == "square" else 2.6
     return Influence(
         terms=DriveTerms(load=(lambda now: math.copysign(at_100 * abs(now.velocity / 100.0) ** power, now.velocity),))
@@ -80,7 +85,7 @@ def quadratic(draw: Draw) -> Influence:
 @effect("presliding_friction", "drive", "current", ("dahl", "lugre"))
 def presliding(draw: Draw) -> Influence:
     """The Coulomb friction is carried by a bristle that gives way over a small distance before it slides."""
-    give = max(0.05, draw.size("give_percent", 1.0, 2.2))
+    give = max(0.05, draw.size("give_percent", 0.5, 1.1))
     level = draw.motor.coulomb
     damping = 0.0 if draw.form == "dahl" else draw.uniform("bristle_damping_raw", 0.01, 0.04) * level / give
     bristle = [0.0, 0.0]  # deflection [%] and its rate [%/s]

@@ -16,11 +16,11 @@ from .shapes import BUMPS, WAVES, bump, wave
 @effect("detent_load", "drive", "current", (*BUMPS, "notch"))
 def detent(draw: Draw) -> Influence:
     """A load tied to one part of the range, the same in both directions; a notch pulls in, then holds back."""
-    height = draw.raw("height_raw", 0.26, 0.4) * draw.sign()
+    height = draw.raw("height_raw", 0.22, 0.32) * draw.sign()
     centre, width = draw.uniform("centre_percent", 22.0, 78.0), draw.uniform("width_percent", 5.0, 9.0)
     if draw.form == "notch":
         shape = bump("gaussian", centre, width)
-        return Influence(terms=DriveTerms(load=(lambda now: 1.4 * height * (now.position - centre) / width * shape(now.position),)))
+        return Influence(terms=DriveTerms(load=(lambda now: height * (now.position - centre) / width * shape(now.position),)))
     shape = bump(draw.form, centre, width)
     return Influence(terms=DriveTerms(load=(lambda now: height * shape(now.position),)))
 
@@ -36,8 +36,8 @@ def nonlinear_spring(draw: Draw) -> Influence:
     def extra(now: DriveNow) -> float:
         u = max(0.0, now.position) / 100.0
         if draw.form == "knee":
-            return 0.7 * at_full * max(0.0, now.position - knee) / (100.0 - knee)
-        return at_full * (u**3 if draw.form == "cube" else u * u)
+            return 0.55 * at_full * max(0.0, now.position - knee) / (100.0 - knee)
+        return at_full * (0.7 * u**3 if draw.form == "cube" else u * u)
 
     return Influence(terms=DriveTerms(load=(extra,)))
 
@@ -45,7 +45,7 @@ def nonlinear_spring(draw: Draw) -> Influence:
 @effect("gravity_load", "drive", "current", ("finger", "support"))
 def gravity(draw: Draw) -> Influence:
     """The weight of the finger, or of a marker support on it, while the palm turns in the world."""
-    weight = draw.raw("weight_raw", 0.25, 0.4)
+    weight = draw.raw("weight_raw", 0.17, 0.28)
     first, second = draw.finger.joints
     axis = first.axis_palm
     arm = second.centre_palm - first.centre_palm
@@ -102,7 +102,7 @@ def hysteresis(draw: Draw) -> Influence:
 @effect("viscoelastic_spring", "drive", "current", ("maxwell", "two_times"))
 def viscoelastic(draw: Draw) -> Influence:
     """Part of the spring relaxes with time (a Maxwell branch, or two of them)."""
-    stiffness = draw.size("branch_stiffness", 0.55, 0.8) * draw.motor.stiffness
+    stiffness = draw.size("branch_stiffness", 0.8, 1.1) * draw.motor.stiffness
     draw.note("branch_stiffness", stiffness)
     relax = draw.uniform("relaxation_s", 0.8, 2.5)
     stretch = [0.0, 0.0]
@@ -124,15 +124,15 @@ def viscoelastic(draw: Draw) -> Influence:
 @effect("end_stop_contact", "drive", "current", ("linear", "progressive", "open_side"))
 def end_stop(draw: Draw) -> Influence:
     """An elastic stop inside the range, at its closed or its open end; always there."""
-    stiffness = draw.raw("stiffness_raw", 0.055, 0.09)
+    stiffness = draw.raw("stiffness_raw", 0.03, 0.045)
     if draw.form == "open_side":
         at = draw.uniform("at_percent", 6.0, 10.0)
-        return Influence(terms=DriveTerms(load=(lambda now: 0.7 * stiffness * min(0.0, now.position - at),)))
+        return Influence(terms=DriveTerms(load=(lambda now: 1.8 * stiffness * min(0.0, now.position - at),)))
     at = draw.uniform("at_percent", 84.0, 91.0)
 
     def load(now: DriveNow) -> float:
         depth = max(0.0, now.position - at)
-        return stiffness * depth * (0.5 + depth / 8.0 if draw.form == "progressive" else 1.0)
+        return stiffness * depth * (0.4 + depth / 16.0 if draw.form == "progressive" else 1.0)
 
     return Influence(terms=DriveTerms(load=(load,)))
 
@@ -145,12 +145,12 @@ def external_contact(draw: Draw) -> Influence:
     end = flexions[-1].start_s + flexions[-1].duration_s
     draw.where["trials"] = [t.name for t in flexions]
     at = draw.uniform("at_percent", 45.0, 70.0)
-    stiffness = draw.raw("stiffness_raw", 0.014, 0.022)
+    stiffness = draw.raw("stiffness_raw", 0.007, 0.012)
 
     def load(now: DriveNow) -> float:
         depth = now.position - at
         if depth <= 0 or not begin <= now.session_s <= end:
             return 0.0
-        return stiffness * depth if draw.form == "stiff" else stiffness * depth * depth / 25.0
+        return stiffness * depth if draw.form == "stiff" else stiffness * depth * depth / 30.0
 
     return Influence(terms=DriveTerms(load=(load,)))

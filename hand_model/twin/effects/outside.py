@@ -28,7 +28,7 @@ def rhythmic(draw: Draw) -> Influence:
 @effect("current_bias_walk", "outside", "current")
 def bias_walk(draw: Draw) -> Influence:
     """The zero of the current channel wanders."""
-    spread = draw.raw("spread_raw", 0.10, 0.16)
+    spread = draw.raw("spread_raw", 0.07, 0.11)
     memory = draw.uniform("memory_s", 4.0, 9.0)
     root = int(draw.rng.integers(2**31))
 

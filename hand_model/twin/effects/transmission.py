@@ -65,7 +65,7 @@ def coupling_deadband(draw: Draw) -> Influence:
     def linkage(motion: Motion, angle: Array) -> Array:
         if draw.form == "hard":
             return np.maximum(0.0, angle - dead)
-        corner = 0.15 * dead
+        corner = max(0.15 * dead, 1e-9)
         return corner * (np.logaddexp(0.0, (angle - dead) / corner) - np.logaddexp(0.0, -dead / corner))
 
     return Influence(linkage=linkage)
@@ -106,8 +106,7 @@ def spring_decoupling(draw: Draw) -> Influence:
         for begin in windows:
             if begin < now.session_s < begin + length:
                 # The first tenth of the lift already takes the spring off the drive.
-                share = min(1.0, 10.0 * float(lifted(now.session_s)), max(draw.strength, 0.1))
-                return -share * now.spring
+                return -min(1.0, 10.0 * float(lifted(now.session_s))) * min(1.0, draw.strength) * now.spring
         return 0.0
 
     return Influence(
