@@ -207,18 +207,27 @@ def _fit_output_error(
     moves: Sequence[MoveData], plain: Regression, curved: Regression, sigma: tuple[float, float]
 ) -> tuple[OutputErrorFit, float]:
     base = output_error.fit(moves, _start(moves, plain), FITTED, sigma, BOUNDS)
-    fits = [base]
     # a Stribeck rise is tried where either the regression or the misfit leaves room for one
-    if curved.excess_z > 2.0 or max(base.chi2) > 1.1:
-        ratio = float(np.clip(1 + curved.static_excess / max(base.values["coulomb"], 1.0), 1.1, 3.0))
-        for exponent in (1.0, 2.0):
-            start = {**base.values, "static_ratio": ratio, "stribeck_speed": 20.0, "stribeck_exponent": exponent}
-            fits.append(output_error.fit(moves, start, (*FITTED, *STRIBECK), sigma, BOUNDS, own=base.own))
-    best = min(fits, key=lambda f: f.cost)
+    if max(base.chi2) > 4.0 or (curved.excess_z < 2.0 and max(base.chi2) < 1.15):
+        return base, 0.0
+    ratio = float(np.clip(1 + curved.static_excess / max(base.values["coulomb"], 1.0), 1.1, 3.0))
+    fits = []
+    for exponent in (1.0, 2.0):
+        start = {**base.values, "static_ratio": ratio, "stribeck_speed": 20.0, "stribeck_exponent": exponent}
+        fits.append(output_error.fit(moves, start, (*FITTED, *STRIBECK), sigma, BOUNDS, own=base.own))
+    best, other = sorted(fits, key=lambda f: f.cost)
     evidence = (base.cost - best.cost) / max(1.0, *best.chi2)
-    if best is not base and (evidence < EVIDENCE or _is_at_bound(best)):
-        best = base
-    return best, evidence if best is not base else 0.0
+    if evidence < EVIDENCE or _is_at_bound(best):
+        return base, 0.0
+    if other.cost - best.cost < EVIDENCE:
+        best = _either_shape(*fits)
+    return best, evidence
+
+
+def _either_shape(first: OutputErrorFit, second: OutputErrorFit) -> OutputErrorFit:
+    """The first of two shapes of the rise that the recording cannot tell apart, its covariance widened by their difference."""
+    d = np.array([first.values[n] - second.values[n] for n in first.names])
+    return dataclasses.replace(first, covariance=first.covariance + np.outer(d, d) / 3.84)
 
 
 def _is_at_bound(f: OutputErrorFit) -> bool:

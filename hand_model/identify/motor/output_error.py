@@ -12,12 +12,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from .drive import Moves, simulate
+from .drive import STEP_S, Moves, simulate
 from .recording import MotorTrial
 
 Array = NDArray[np.float64]
 
-LOGARITHMIC = ("inertia", "presliding", "static_ratio_excess", "stribeck_speed", "speed_full", "acceleration", "deceleration", "gain")
+COARSE_S = 5e-3
+ABSOLUTE_REACH = {"preload": 20.0, "viscous": 0.1, "stiffness": 0.2, "coulomb": 10.0, "bristle": 0.01, "damping": 2.0}
 OWN_STEP = (5e-4, 2e-3, 2e-4)
 OWN_REACH = np.array([0.01, 0.3, 0.01])  # of one step
 SETTLED = 0.6  # [%]: movement allowed over the samples before a move that starts from rest
@@ -101,12 +102,12 @@ def _arrays(data: Sequence[MoveData], own: Array, repeat: int) -> Moves:
     )  # fmt: skip
 
 
-def simulate_moves(data: Sequence[MoveData], q: Mapping[str, float], own: Array) -> list[Array]:
+def simulate_moves(data: Sequence[MoveData], q: Mapping[str, float], own: Array, step_s: float = STEP_S) -> list[Array]:
     """Simulated position [%] and current [raw], (n, 2) per move."""
     order = np.argsort([-m.time_s[-1] for m in data], kind="stable")
     sorted_data = [data[i] for i in order]
     full = {k: np.full(len(data), v) for k, v in q.items()}
-    t, p, u = simulate(_arrays(sorted_data, own[order], 1), full)
+    t, p, u = simulate(_arrays(sorted_data, own[order], 1), full, step_s)
     out: list[Array] = [np.empty(0)] * len(data)
     for column, i in enumerate(order):
         out[i] = _sample(t, p[:, column], u[:, column], data[i].time_s)
@@ -129,7 +130,7 @@ def _steps(values: Mapping[str, float], names: Sequence[str]) -> Array:
 
 
 def _linearise(
-    data: Sequence[MoveData], q: Mapping[str, float], names: Sequence[str], own: Array, sigma: tuple[float, float]
+    data: Sequence[MoveData], q: Mapping[str, float], names: Sequence[str], own: Array, sigma: tuple[float, float], step_s: float
 ) -> tuple[list[Array], list[Array], list[Array]]:
     """Whitened residuals (2n,), shared (2n, k) and own (2n, 3) Jacobian of every move, one batch of simulations."""
     k = len(names)
@@ -145,7 +146,7 @@ def _linearise(
     owns = np.repeat(own[order], width, axis=0)
     for i, small in enumerate(OWN_STEP):
         owns[k + 1 + i :: width, i] += small
-    t, p, u = simulate(_arrays(ordered, owns, width), values)
+    t, p, u = simulate(_arrays(ordered, owns, width), values, step_s)
     out_r: list = [None] * len(data)
     out_g: list = [None] * len(data)
     out_l: list = [None] * len(data)
@@ -160,9 +161,9 @@ def _linearise(
     return out_r, out_g, out_l
 
 
-def _cost(data: Sequence[MoveData], q: Mapping[str, float], own: Array, sigma: tuple[float, float]) -> float:
+def _cost(data: Sequence[MoveData], q: Mapping[str, float], own: Array, sigma: tuple[float, float], step_s: float) -> float:
     total = 0.0
-    for m, y, x in zip(data, simulate_moves(data, q, own), own, strict=True):
+    for m, y, x in zip(data, simulate_moves(data, q, own, step_s), own, strict=True):
         e = (np.stack([m.position, m.current], axis=1) - y) / np.asarray(sigma)
         total += float(np.sum(e * e) + np.sum(((m.own - x) / m.own_sd) ** 2))
     return total if np.isfinite(total) else np.inf
@@ -174,43 +175,67 @@ def fit(
     names: Sequence[str],
     sigma: tuple[float, float],
     bounds: Mapping[str, tuple[float, float]],
-    iterations: int = 15,
-    tolerance: float = 1e-3,
+    iterations: int = 12,
     own: Array | None = None,
 ) -> OutputErrorFit:
     """Fit the named parameters to the moves by damped Gauss-Newton; the others stay at `start_values`.
 
     sigma: noise of position [%] and current [raw]. bounds: parameter -> (low, high). own: (moves, 3) to start from.
+    A few iterations at a coarse step come first; a fit that stays far from the noise is given up early.
     """
-    q = dict(start_values)
-    own = np.array([m.own for m in data]) if own is None else own.copy()
-    damping, cost = 1e-3, _cost(data, q, own, sigma)
-    for _ in range(iterations):
-        r, g, own_jacobian = _linearise(data, q, names, own, sigma)
-        normal, gradient, blocks, _ = _normal(data, r, g, own_jacobian, own)
-        improved = False
-        for _ in range(6):
-            scale = np.sqrt(np.maximum(np.diag(normal), 1e-30))
-            step = np.linalg.lstsq(normal / np.outer(scale, scale) + damping * np.eye(len(names)), gradient / scale, rcond=1e-12)[0] / scale
-            trial_q = dict(q)
-            for n, d in zip(names, step, strict=True):
-                low, high = bounds.get(n, (-np.inf, np.inf))
-                trial_q[n] = float(np.clip(q[n] + np.clip(d, -0.5 * abs(q[n]) - 1e-2, 0.5 * abs(q[n]) + 20.0), low, high))
-            moved = np.array([trial_q[n] - q[n] for n in names])
-            local = np.array([inverse @ (b - c @ moved) for inverse, b, c in blocks])
-            trial_own = own + np.clip(local, -OWN_REACH, OWN_REACH)
-            new = _cost(data, trial_q, trial_own, sigma)
-            if new < cost:
-                improved = True
+    q, own = dict(start_values), np.array([m.own for m in data]) if own is None else own.copy()
+    samples = 2 * sum(len(m.time_s) for m in data)
+    for step_s, rounds, enough in ((COARSE_S, 5, 2.0), (STEP_S, iterations, 0.1)):
+        damping, cost = 1e-3, _cost(data, q, own, sigma, step_s)
+        for i in range(rounds):
+            linear = _linearise(data, q, names, own, sigma, step_s)
+            normal, gradient, blocks, _ = _normal(data, *linear, own)
+            if (expected := _expected(normal, gradient, blocks)) < enough or (i > 3 and cost > 20 * samples and expected > 0.5 * cost):
                 break
-            damping = max(damping, 1e-4) * 10
-        if not improved:
-            break
-        gain, q, own, cost = cost - new, trial_q, trial_own, new
-        damping = max(damping / 10, 1e-9)
-        if gain < tolerance * max(1.0, len(names)):
-            break
-    return _finish(data, q, names, sigma, own, cost)
+            moved = _step(data, q, names, own, sigma, bounds, (normal, gradient, blocks), cost, damping, step_s)
+            if moved is None:
+                break
+            q, own, cost, damping = moved
+    return _finish(data, linear, q, names, sigma, own, cost)
+
+
+def _expected(normal: Array, gradient: Array, blocks: list[tuple[Array, Array, Array]]) -> float:
+    """Fall of the cost that the linear model promises."""
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-30))
+    shared = (gradient / scale) @ np.linalg.lstsq(normal / np.outer(scale, scale), gradient / scale, rcond=1e-10)[0]
+    return float(shared + sum(b @ inverse @ b for inverse, b, _ in blocks))
+
+
+def _step(
+    data: Sequence[MoveData],
+    q: dict[str, float],
+    names: Sequence[str],
+    own: Array,
+    sigma: tuple[float, float],
+    bounds: Mapping[str, tuple[float, float]],
+    system: tuple[Array, Array, list[tuple[Array, Array, Array]]],
+    cost: float,
+    damping: float,
+    step_s: float,
+) -> tuple[dict[str, float], Array, float, float] | None:
+    """One Levenberg-Marquardt step: new values, own unknowns, cost and damping; None where nothing improves."""
+    normal, gradient, blocks = system
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-30))
+    for _ in range(5):
+        move = np.linalg.lstsq(normal / np.outer(scale, scale) + damping * np.eye(len(names)), gradient / scale, rcond=1e-12)[0] / scale
+        new_q = dict(q)
+        for n, d in zip(names, move, strict=True):
+            low, high = bounds.get(n, (-np.inf, np.inf))
+            reach = 0.5 * abs(q[n]) + ABSOLUTE_REACH.get(n, 0.0)
+            new_q[n] = float(np.clip(q[n] + np.clip(d, -reach, reach), low, high))
+        actual = np.array([new_q[n] - q[n] for n in names])
+        local = np.array([inverse @ (b - c @ actual) for inverse, b, c in blocks])
+        new_own = own + np.clip(local, -OWN_REACH, OWN_REACH)
+        new = _cost(data, new_q, new_own, sigma, step_s)
+        if new < cost:
+            return new_q, new_own, new, max(damping / 10, 1e-9)
+        damping = max(damping, 1e-4) * 10
+    return None
 
 
 def _normal(
@@ -230,9 +255,9 @@ def _normal(
 
 
 def _finish(
-    data: Sequence[MoveData], q: Mapping[str, float], names: Sequence[str], sigma: tuple[float, float], own: Array, cost: float
+    data: Sequence[MoveData], linear: tuple[list[Array], ...], q: Mapping[str, float], names: Sequence[str], sigma: tuple[float, float], own: Array, cost: float
 ) -> OutputErrorFit:
-    r, g, local = _linearise(data, q, names, own, sigma)
+    r, g, local = linear
     normal, _, _, score = _normal(data, r, g, local, own)
     k = len(names)
     meat = score.T @ score * len(score) / max(1, len(score) - 1)
