@@ -96,6 +96,7 @@ def linkage_states(angles: FingerAngles, joint: int = 1) -> tuple[DriveState, ..
         raw = q[:, joint - 1]
         follower = np.where(motion.moving, q[:, joint], np.nan)
         extra = {"trial_index": np.full(len(t), float(index)), "load": _load(record, t)}
+        extra["slope"] = _slope(motion.position, raw, q[:, joint], motion.moving, 4)
         states.append(DriveState(record.trial.name, f"{angles.finger.name}/{name}", t, motion.position, motion.velocity,
                                  motion.acceleration, follower, np.stack([(raw / scale) ** k for k in range(5)], axis=-1),
                                  "deg", "deg", _known(extra), _names(4), record.trial.validate))
@@ -133,10 +134,19 @@ def encoder_states(angles: FingerAngles, low: float, high: float) -> tuple[Drive
         extra = {"trial_index": np.full(len(t), float(index)), "clock_s": t - middle}
         if current is not None and np.isfinite(current).all():
             extra["load"] = local_quadratic(t, current[seen], 0.05)[0]
+        effort = np.where(inside, q, np.nan)
+        extra["slope"] = _slope(motion.position, motion.position, q, inside, 3)
         states.append(DriveState(record.trial.name, angles.finger.name, t, motion.position, motion.velocity, motion.acceleration,
-                                 np.where(inside, q, np.nan), declared, "%", "deg", extra,
+                                 effort, declared, "%", "deg", extra,
                                  (*_names(3), *(f"offset_{i}" for i in range(len(records)))), record.trial.validate))
     return tuple(states)
+
+
+def _slope(at: Array, driver: Array, follower: Array, use: NDArray[np.bool_], order: int) -> Array:
+    """Slope (n,) at `at` of the polynomial that maps driver to follower."""
+    from numpy.polynomial import Polynomial
+
+    return Polynomial.fit(driver[use], follower[use], order).deriv()(at)
 
 
 def _names(order: int) -> tuple[str, ...]:

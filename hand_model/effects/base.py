@@ -62,6 +62,11 @@ class DriveState:
         return self.position - self.direction * self.extra.get("give", np.zeros(len(self.position)))
 
     @property
+    def slope(self) -> Array:
+        """Slope (n,) of the map from position to effort, "slope" in `extra`; one where nothing is known."""
+        return self.extra.get("slope", np.ones(len(self.position)))
+
+    @property
     def elapsed_s(self) -> Array:
         """Time [s] since the session's first sample (or the trial's, where nothing else is known)."""
         return self.extra.get("elapsed", self.time_s - self.time_s[0])

@@ -19,7 +19,7 @@ class DetentLoad(Effect):
         """Centre over the range, width from 1.5 % to 20 % of it (wider is a spring)."""
         low, high = position_range(states)
         span, unit = high - low, states[0].position_unit
-        return (Shape("centre", unit, low + 0.03 * span, high - 0.03 * span, tuple(low + span * np.linspace(0.05, 0.95, 19))),
+        return (Shape("centre", unit, low + 0.08 * span, high - 0.08 * span, tuple(low + span * np.linspace(0.08, 0.92, 18))),
                 Shape("width", unit, 0.015 * span, 0.2 * span, (0.03 * span, 0.06 * span, 0.12 * span)))
 
     def amplitudes(self) -> tuple[Amplitude, ...]:

@@ -11,29 +11,29 @@ from .path import jenkins
 
 
 class LinkageBacklash(Effect):
-    """The distal angle lags by half the gap in the direction of travel."""
+    """What follows lags by half the gap, taken on the proximal angle: map(x - gap/2 * play state)."""
 
     name = "linkage_backlash"
     station = "linkage"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """Travel of the proximal angle within which the play is crossed."""
+        """Travel of the proximal angle that crosses the play."""
         low, high = position_range(states)
         span = high - low
-        return (Shape("gap", states[0].position_unit, 0.003 * span, 0.12 * span, tuple(span * np.geomspace(0.006, 0.08, 6))),)
+        return (Shape("crossing", states[0].position_unit, 0.002 * span, 0.15 * span, tuple(span * np.geomspace(0.004, 0.1, 7))),)
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
-        """Half the lost motion of the distal angle, always a lag."""
+        """Half the lost motion of the proximal angle, always a lag."""
         return (("half_play", "deg", 0.0, np.inf),)
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """Minus the play's state in [-1, 1] along the path, (n, 1)."""
-        return -jenkins(state.position, shape["gap"] / 2)[:, None]
+        """Minus the play's state in [-1, 1] along the path, times the slope of the map that follows it, (n, 1)."""
+        return -(state.slope * jenkins(state.position, shape["crossing"] / 2))[:, None]
 
     def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
                    declared: Mapping[str, float]) -> dict[str, float]:
-        """Whole lost motion of the distal angle, and the travel that crosses it."""
-        return {"play": 2 * amplitude["half_play"], "gap": shape["gap"]}
+        """Whole lost motion (as seen: twice the lag), and the travel that crosses it."""
+        return {"play": 2 * amplitude["half_play"], "crossing": shape["crossing"]}
 
 
 EFFECT = LinkageBacklash()
