@@ -292,7 +292,13 @@ def test_session_with_everything_is_declared(tmp_path):
     soft = answer.trials["grasp_index_foam_1"].motion
     assert stiff.position.max() < soft.position.max()
     assert stiff.current.max() <= 160.0
-    assert answer.table["grasps"]["grasp_index_foam_1"]["stiffness"] == 3.0
+    told = answer.table["grasps"]["grasp_index_foam_1"]
+    assert told["stiffness"] == 3.0
+    spring = truth.motors["index"].stiffness * soft.position + truth.motors["index"].preload
+    touching = soft.load > spring + 1e-9
+    assert soft.time_s[touching][0] == pytest.approx(told["contact_s"], abs=2e-3)
+    assert soft.position[touching].min() > told["at_percent"] - 1e-9
+    assert (soft.position[~touching] < soft.position.max()).all()
 
 
 def test_sweeps_lie_on_the_true_surface():

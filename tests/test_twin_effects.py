@@ -131,7 +131,7 @@ def test_the_balance_still_holds_and_friction_never_drives(name):
         assert (motion.friction * motion.velocity >= 0).all(), form
         assert motion.position.max() > 80.0, form  # the finger still closes
         if name != "external_contact":  # that one waits for its moment
-            assert np.abs(motion.current - plain.current).max() > 1.0, form
+            assert np.abs(motion.current - plain.current).max() > 0.3, form
 
 
 def friction_at(name: str, form: str, position: float, velocity: float, **parameters: float) -> float:

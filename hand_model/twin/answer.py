@@ -8,12 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from .schedule import Plan, TrialPlan
+from .schedule import TrialPlan
 from .truth import HandTruth
 
 
 def answer_table(
-    truth: HandTruth, plan: Plan, trials: Sequence[TrialPlan], effects: Sequence[Mapping[str, Any]], seed: int
+    truth: HandTruth,
+    trials: Sequence[TrialPlan],
+    effects: Sequence[Mapping[str, Any]],
+    seed: int,
+    contacts: Mapping[str, Mapping[str, Any]],
 ) -> dict[str, Any]:
     """Effects (a single "none" where nothing is hidden), kinematics, motors, clock, noise, contacts and surfaces."""
     return _plain(
@@ -37,7 +41,7 @@ def answer_table(
             "motor": {name: asdict(motor) for name, motor in truth.motors.items()},
             "clock": {"offset_s": truth.log.clock_offset_s, "rate": truth.log.clock_rate},
             "trials": {t.name: {"start_s": t.start_s, "duration_s": t.duration_s} for t in trials},
-            "grasps": {t.name: {"object": t.object, "stiffness": t.stiffness} for t in trials if t.kind == "grasp"},
+            "grasps": contacts,
             "surfaces": {s.segment: asdict(s) for s in truth.surfaces},
             "noise": {"mocap": asdict(truth.mocap), "log": asdict(truth.log)},
         }

@@ -157,11 +157,11 @@ def activate(hidden: Hidden, truth: HandTruth, schedule: Sequence[TrialPlan], se
     if not (math.isfinite(hidden.strength) and hidden.strength >= 0):
         raise HandModelError(f'effect "{hidden.effect}" has strength {hidden.strength}; a number of zero or more is needed')
     declared = CATALOGUE[hidden.effect]
-    rng = stream(seed, "effect", hidden.effect)
+    finger = truth.finger(hidden.finger) if hidden.finger else truth.fingers[0]
+    rng = stream(seed, "effect", hidden.effect, finger.name)
     form = hidden.form or str(rng.choice(declared.forms))
     if form not in declared.forms:
         raise HandModelError(f'effect "{hidden.effect}" has no form "{form}"; {did_you_mean(form, declared.forms)}')
-    finger = truth.finger(hidden.finger) if hidden.finger else truth.fingers[0]
     draw = Draw(truth, finger, truth.motors[finger.actuator], schedule, hidden.strength, rng, hidden.parameters, form)
     influence = declared.build(draw)
     answer = {

@@ -8,7 +8,7 @@ import numpy as np
 
 from .truth import Controller
 
-REST_S = 1.2  # the first second of every trial is at rest, hand open
+REST_S = 1.6  # at rest, hand open; a recorder that starts up to half a second late still sees a second of it
 SPEED_SHARE = {"full": 1.0, "fast": 0.7, "half": 0.5, "medium": 0.45, "low": 0.27, "slow": 0.15}
 
 

@@ -19,10 +19,11 @@ from .dirt import dirty_markers, log_columns, sample_times
 from .files import write_log, write_markers
 from .geometry import rotate
 from .influence import Active, Hidden, Influence, activate, merge_terms
-from .kinematics import gravity_palm, joint_angles, palm_pose, probe_markers, segment_markers
+from .kinematics import PalmPose, gravity_palm, joint_angles, palm_pose, probe_markers, segment_markers
 from .manifest import manifest_text
 from .motor import STEP_S, DriveNow, DriveTerms, Motion, simulate
 from .schedule import Plan, TrialPlan, schedule
+from .streams import stream
 from .truth import HandTruth
 
 Array = NDArray[np.float64]
@@ -86,7 +87,19 @@ def record(
         if target.exists():
             target.rmdir()
         shutil.move(str(root), str(target))
-    return Answer(target, answer_table(truth, plan, trials, [a.answer for a in active], seed), done)
+    return Answer(target, answer_table(truth, trials, [a.answer for a in active], seed, _contacts(done, seed)), done)
+
+
+def _contacts(trials: Mapping[str, TrialTruth], seed: int) -> dict[str, dict[str, Any]]:
+    """Grasp trial -> object, stiffness [raw/%], where [%] and when [s of the trial] the finger first meets it."""
+    out = {}
+    for name, trial in trials.items():
+        met = contact_percent(trial.plan, seed)
+        if met is not None:
+            touched = np.flatnonzero(trial.motion.position > met)
+            when = float(trial.motion.time_s[touched[0]]) if len(touched) else None
+            out[name] = {"object": trial.plan.object, "stiffness": trial.plan.stiffness, "at_percent": met, "contact_s": when}
+    return out
 
 
 def _of(truth: HandTruth, active: Sequence[Active], finger: str | None) -> list[Influence]:
@@ -106,13 +119,14 @@ def _record_trial(
     truth: HandTruth, trial: TrialPlan, active: Sequence[Active], root: Path, seed: int, mocap_format: str
 ) -> TrialTruth:
     noise = truth.mocap
-    time_s = np.arange(int(trial.duration_s * noise.rate_hz + 1e-9) + 1) / noise.rate_hz
+    skew = noise.start_skew_s * float(stream(seed, "skew", trial.name).uniform()) if trial.program is not None else 0.0
+    time_s = skew + np.arange(int((trial.duration_s - skew) * noise.rate_hz + 1e-9) + 1) / noise.rate_hz
     own = _of(truth, active, trial.finger)
     turns = any(a.influence.turns_palm for a in active) and trial.program is not None
     pose = palm_pose(noise, seed, trial.name, turns)
     motion = None
     if trial.program is not None:
-        motion, angles = _move(truth, trial, own, pose)
+        motion, angles = _move(truth, trial, own, pose, seed)
         _write_log(truth, trial, motion, own, active, root, seed)
     if not trial.mocap:
         return TrialTruth(trial, time_s, None, None, None, sample_times(truth.log, trial, seed), motion)
@@ -136,15 +150,16 @@ def _record_trial(
     return TrialTruth(trial, time_s, angle_rad, rotation, position, log_time, motion)
 
 
-def _move(truth: HandTruth, trial: TrialPlan, influences: Sequence[Influence], pose: Any) -> tuple[Motion, Array]:
+def _move(truth: HandTruth, trial: TrialPlan, influences: Sequence[Influence], pose: PalmPose, seed: int) -> tuple[Motion, Array]:
     """Drive and angles (n, 2) [rad] at the simulation's steps."""
     motor = truth.motors[truth.finger(trial.finger).actuator]
     for influence in influences:
         if influence.start:
             influence.start(trial)
     parts = [i.terms for i in influences if i.terms is not None]
-    if trial.stiffness is not None:
-        parts.append(grasp_terms(truth, trial))
+    met = contact_percent(trial, seed)
+    if met is not None:
+        parts.append(grasp_terms(trial, met))
     gravity = None
     if any(i.turns_palm for i in influences):
         gravity = gravity_palm(pose, truth, np.arange(round(trial.duration_s / STEP_S) + 1) * STEP_S)
@@ -152,15 +167,17 @@ def _move(truth: HandTruth, trial: TrialPlan, influences: Sequence[Influence], p
     return motion, joint_angles(truth.finger(trial.finger), motion, influences)
 
 
-CONTACT_PERCENT = 55.0
+def contact_percent(trial: TrialPlan, seed: int) -> float | None:
+    """Where the object of a grasp is met [%]; None in other trials."""
+    return None if trial.stiffness is None else float(stream(seed, "object", trial.name).uniform(40.0, 70.0))
 
 
-def grasp_terms(truth: HandTruth, trial: TrialPlan) -> DriveTerms:
-    """The object of a grasp: a one-sided spring from CONTACT_PERCENT on, with a little damping while it is pressed."""
+def grasp_terms(trial: TrialPlan, at_percent: float) -> DriveTerms:
+    """The object of a grasp: a one-sided spring from `at_percent` on, with a little damping while it is pressed."""
     stiffness = float(trial.stiffness or 0.0)
 
     def contact(now: DriveNow) -> float:
-        depth = now.position - CONTACT_PERCENT
+        depth = now.position - at_percent
         return max(0.0, stiffness * depth + 0.02 * stiffness * now.velocity) if depth > 0 else 0.0
 
     return DriveTerms(load=(contact,))

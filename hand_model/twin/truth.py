@@ -78,7 +78,8 @@ class MocapNoise:
 
     ghosts_per_minute: unlabelled trajectories per trial; ghost_label_share: share of ghosts that steal a marker's label;
     swaps_per_minute: short label swaps. drift_*: slow motion of the palm; shake_*: its trembling. probe_m: placing error of
-    the tip on landmarks and screw heads [m]. unit: "mm" or "m" in the files.
+    the tip on landmarks and screw heads [m]; blunder_share: joint trials in which it misses the screw head by blunder_m.
+    start_skew_s: the mocap starts up to that much after the trial does. unit: "mm" or "m" in the files.
     """
 
     rate_hz: float = 100.0
@@ -93,6 +94,9 @@ class MocapNoise:
     shake_rad: float = 0.003
     shake_m: float = 2e-4
     probe_m: float = 2e-4
+    blunder_share: float = 0.0
+    blunder_m: float = 0.006
+    start_skew_s: float = 0.0
     unit: str = "mm"
 
 
