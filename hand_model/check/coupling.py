@@ -41,8 +41,7 @@ def direction(description: Description, model: Model) -> Finding:
         for joint in finger.joints:
             if joint.name in sources:
                 low, high = sorted(joint.range_rad)
-                start = float(np.clip(0, low, high))
-                paths[joint.name] = start + (high - start) * (0.5 - 0.5 * np.cos(np.pi * time))
+                paths[joint.name] = low + (high - low) * (0.5 - 0.5 * np.cos(np.pi * time))
         angles = finger_angles(finger, paths)
         for i, joint in enumerate(finger.joints):
             name = ours.names.joint[finger.name, joint.name]

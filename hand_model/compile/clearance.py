@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,19 +27,23 @@ def adjacent(hand: Hand) -> dict[frozenset[Key], str]:
     pairs: dict[frozenset[Key], str] = {}
     for finger in hand.fingers:
         chain = [PALM, *((finger.name, j.name) for j in finger.joints)]
-        for inner, outer in zip(chain[:-1], chain[1:], strict=True):
+        for inner, outer in pairwise(chain):
             pairs[frozenset((inner, outer))] = SHARE_A_JOINT
     return pairs
 
 
 def cleared(
-    hand: Hand, shapes: Mapping[Key, tuple[Capsule, ...]], postures: Mapping[str, Mapping[Key, float]]
+    hand: Hand,
+    shapes: Mapping[Key, tuple[Capsule, ...]],
+    postures: Mapping[str, Mapping[Key, float]],
+    known: Mapping[frozenset[Key], str] | None = None,
 ) -> tuple[dict[Key, tuple[Capsule, ...]], dict[frozenset[Key], str]]:
     """Shrunk capsules and excluded pairs -> reason, so that nothing touches at rest or at any posture.
 
     shapes: body -> capsules in the palm frame at rest. postures: keyframe -> {(finger, joint): angle [rad]}.
+    known: pairs that are excluded already.
     """
-    excluded = adjacent(hand)
+    excluded = adjacent(hand) | dict(known or {})
     placed = {name: _placed(hand, shapes, angles) for name, angles in {"rest": {}, **postures}.items()}
     radius = {key: [c.radius for c in capsules] for key, capsules in shapes.items()}
     closest: list[tuple[float, Key, int, Key, int, str]] = []

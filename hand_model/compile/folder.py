@@ -16,10 +16,12 @@ from ..description import Description, read_description
 from ..errors import DescriptionError
 from ..hand import Hand
 from .mesh import capsule_mesh, joined, stl
-from .mjcf import mjcf, scene
+from .mjcf import mjcf
 from .names import sanitised
 from .plan import Plan, complete, planned, variants
 from .readme import CHANGELOG, LICENSE, readme
+from .ros2_control import ros2_control
+from .scene import cylinder_scene, scene
 from .shape import DENSITY
 from .urdf import urdf
 from .xml import document
@@ -53,6 +55,10 @@ def _write(folder: Path, hand: Hand, plans: tuple[Plan, ...]) -> None:
         (folder / f"{plan.stem}.xml").write_bytes(document(mjcf(plan)))
         (folder / f"{plan.stem}.urdf").write_bytes(document(urdf(plan)))
         (folder / f"{scene_stem(plan)}.xml").write_bytes(document(scene(plan)))
+        extra = {f"{scene_stem(plan)}_cylinder.xml": cylinder_scene(plan), f"{plan.stem}.ros2_control.xacro": ros2_control(plan)}
+        for name, tree in extra.items():
+            if tree is not None:
+                (folder / name).write_bytes(document(tree))
         for link in plan.links:
             mesh = joined([capsule_mesh(shape) for shape in link.solid])
             (folder / "assets" / f"{link.mesh}.stl").write_bytes(stl(*mesh))

@@ -127,21 +127,3 @@ def _keyframes(root: Any, plan: Plan) -> None:
         targets = [a.get("joint") for a in root.iterfind("actuator/position")]
         if targets and len(targets) == len(root.findall("actuator/*")):
             key.set("ctrl", vector([angles[joint] for joint in targets]))
-
-
-def scene(plan: Plan) -> Any:
-    """The hand above a floor, with a light and a camera distance that suit its size."""
-    from lxml import etree
-
-    root = etree.Element("mujoco", model=f"{plan.stem}_scene")
-    child(root, "include", file=f"{plan.stem}.xml")
-    reach = plan.reach
-    child(root, "statistic", center=(0.3 * reach, 0.0, 0.0), extent=1.2 * reach, meansize=0.05 * reach)
-    child(child(root, "visual"), "headlight", ambient=(0.4, 0.4, 0.4), diffuse=(0.5, 0.5, 0.5))
-    asset = child(root, "asset")
-    child(asset, "texture", name="floor", type="2d", builtin="checker", rgb1=(0.85, 0.85, 0.85), rgb2=(0.7, 0.7, 0.7), width="64", height="64")
-    child(asset, "material", name="floor", texture="floor", texrepeat=(20, 20), texuniform=True)
-    world = child(root, "worldbody")
-    child(world, "light", pos=(0.0, 0.0, 10 * reach), dir=(0.0, 0.0, -1.0), directional=True)
-    child(world, "geom", name="floor", type="plane", size=(10 * reach, 10 * reach, 0.1), pos=(0.0, 0.0, -2 * reach), material="floor")
-    return root

@@ -15,7 +15,7 @@ from ..kinematics import unit
 from .clearance import PALM, Key, cleared
 from .coupling import Linkage, checked, limits, linkages
 from .names import Names, named, sanitised
-from .posture import grips_of, known_grip_fingers, posture
+from .posture import finger_posture, grips_of, known_grip_fingers, posture
 from .shape import Capsule, Inertia, capsule_inertia, combined, finger_capsules, palm_capsules, with_tips
 
 Array = NDArray[np.float64]
@@ -72,10 +72,10 @@ class Plan:
     @property
     def reach(self) -> float:
         """Distance [m] of the furthest site from the palm frame's origin, open."""
-        start = {link.name: self._start(link) for link in self.links}
-        return max([0.02, *(float(np.linalg.norm(start[k.name] + p)) for k in self.links for p in k.sites.values())])
+        return max([0.02, *(float(np.linalg.norm(self.origin(k) + p)) for k in self.links for p in k.sites.values())])
 
-    def _start(self, link: Link) -> Array:
+    def origin(self, link: Link) -> Array:
+        """Origin (3,) [m] of a link's frame in the palm frame, at rest."""
         position, by_name = np.zeros(3), {k.name: k for k in self.links}
         while link.parent is not None:
             position, link = position + link.position_parent, by_name[link.parent]
@@ -129,12 +129,14 @@ def planned(stem: str, suffix: str, hand: Hand, guessed_tips: Mapping[str, str])
     names = named(hand)
     shapes: dict[Key, tuple[Capsule, ...]] = {PALM: palm_capsules(hand)}
     for finger in hand.fingers:
-        for joint, capsule in zip(finger.joints, finger_capsules(finger), strict=True):
+        for joint, capsule in zip(finger.joints, finger_capsules(hand, finger), strict=True):
             shapes[finger.name, joint.name] = (capsule,)
+    fist = {(f.name, j): a for f in hand.fingers if not f.name.startswith("thumb") for j, a in finger_posture(f, 1.0).items()}
+    fitted, fitted_excluded = cleared(hand, shapes, {"close": fist})  # fingers side by side, before any grip
     postures, reached = {}, {}
     for name, fractions in grips_of(hand).items():
-        postures[sanitised(name)], reached[sanitised(name)] = posture(hand, fractions, shapes)
-    shrunk, excluded = cleared(hand, shapes, postures)
+        postures[sanitised(name)], reached[sanitised(name)] = posture(hand, fractions, fitted, fitted_excluded)
+    shrunk, excluded = cleared(hand, fitted, postures, fitted_excluded)
     links = [_palm(hand, names, shapes[PALM], shrunk[PALM], f"palm{suffix}")]
     for finger in hand.fingers:
         links += _finger_links(hand, finger.name, names, shapes, shrunk)

@@ -50,18 +50,20 @@ def _files(plans: tuple[Plan, ...]) -> str:
         fingers = ", ".join(f.name for f in plan.hand.fingers)
         lines.append(f"- `{plan.stem}.xml`, `{plan.stem}.urdf`: {fingers}; {plan.mass * 1e3:.1f} g (fallback, see below)")
     lines.append("- `scene_*.xml`: the hand with floor and light. `assets/`: meshes.")
+    lines.append("- `scene_*_cylinder.xml` (hands with the grip `power`): close the hand, lower the mocap body `support`, and it holds.")
+    lines.append("- `*.ros2_control.xacro` (hands with actuators): on a robot's link (argument `parent`), actuators under ros2_control.")
     lines.append("- `hand.json`: encoder maps, uncertainties, exact couplings, motors, effects, provenance; readable as a `.hand` file.")
     return "\n".join(lines) + "\n"
 
 
 def _derivation(hand: Hand, plans: tuple[Plan, ...]) -> str:
     steps = [
-        "The `palm` body is the repeatable frame that the three probed palm landmarks define. Every other body has the palm's "
-        "orientation when the hand is open, and its origin at its joint's centre; every joint angle is zero at rest.",
-        "Axes, centres, markers and tips were identified from the recordings listed below; their covariance is in `hand.json`.",
+        "The `palm` body is the repeatable frame that the three probed palm landmarks define.",
+        "Every other body has the palm's orientation at rest, and its origin at its joint's centre; joint angles are zero there.",
+        hand.extra.get("origin", "Axes, centres and markers were identified from the recordings listed below; covariances: `hand.json`."),
         "Limits are the recorded ranges, widened to what a follower's polynomial reaches over its driver's range.",
-        "A linkage is the recorded polynomial, enforced by an MJCF joint equality (`joint1` follows `joint2`); URDF holds the "
-        "least-squares line that stays within the limits.",
+        "A linkage is its polynomial, enforced by an MJCF joint equality (`joint1` follows `joint2`).",
+        "URDF's mimic holds the least-squares line through that polynomial that stays within the limits.",
         f"Masses and inertias are a fallback: solid capsules between the joints, {DENSITY:.0f} kg/m^3. Nothing of them was measured.",
         "Visual meshes (group 2) are these capsules. Collision capsules (group 3) are the same, shrunk until nothing touches at any keyframe.",
     ]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +19,7 @@ Array = NDArray[np.float64]
 DENSITY = 1100.0  # kg/m^3: plastics with some metal in them; nothing that was measured
 SLENDERNESS = 0.22  # radius over length of a finger segment
 LEAST_LENGTH = 0.004  # m
+SPREAD = 0.6  # breadth of the palm at its middle over that at the fingers' bases
 
 
 @dataclass(frozen=True)
@@ -71,13 +73,14 @@ def _tip_guess(finger: Finger) -> tuple[Array, str]:
     return centre + np.array([0.025, 0.0, 0.0]), "neither tip nor markers nor a segment before it: 25 mm along palm x"
 
 
-def finger_capsules(finger: Finger) -> tuple[Capsule, ...]:
-    """One capsule per segment in the palm frame at rest; the finger must carry its tip."""
-    points = [np.asarray(j.centre_palm, float) for j in finger.joints]
-    points.append(np.asarray(finger.joints[-1].tip_palm, float))
-    lengths = [max(float(np.linalg.norm(b - a)), LEAST_LENGTH) for a, b in zip(points[:-1], points[1:], strict=True)]
-    # a finger does not grow thicker outwards: no segment is wider than the one before it
-    radii = np.minimum.accumulate([SLENDERNESS * length for length in lengths])
+def finger_capsules(hand: Hand, finger: Finger) -> tuple[Capsule, ...]:
+    """One capsule per segment in the palm frame at rest; the hand must carry its tips.
+
+    A finger does not grow thicker outwards, and no segment is much thicker than the hand's median one would be.
+    """
+    points, lengths = _bones(finger)
+    usual = float(np.median([length for f in hand.fingers for length in _bones(f)[1]]))
+    radii = np.minimum.accumulate([SLENDERNESS * min(length, 1.3 * usual) for length in lengths])
     shapes = []
     for i, radius in enumerate(radii):
         start, end = points[i], points[i + 1]
@@ -87,15 +90,27 @@ def finger_capsules(finger: Finger) -> tuple[Capsule, ...]:
     return tuple(shapes)
 
 
+def _bones(finger: Finger) -> tuple[list[Array], list[float]]:
+    points = [np.asarray(j.centre_palm, float) for j in finger.joints]
+    points.append(np.asarray(finger.joints[-1].tip_palm, float))
+    return points, [max(float(np.linalg.norm(b - a)), LEAST_LENGTH) for a, b in pairwise(points)]
+
+
 def palm_capsules(hand: Hand) -> tuple[Capsule, ...]:
-    """One capsule per finger in the palm frame, from the middle of the palm's landmarks (or markers) to the finger's base."""
+    """One capsule per finger in the palm frame, to the finger's base from the middle of the palm's landmarks (or markers).
+
+    Those of the fingers beside the thumb start spread out, as the bones of a palm do.
+    """
     known = list(hand.landmarks_palm.values()) or list(hand.palm_markers_palm.values()) or [np.zeros(3)]
     hub = np.mean(np.array(known, float), axis=0)
+    bases = [np.asarray(f.joints[0].centre_palm, float) for f in hand.fingers if not f.name.startswith("thumb")]
+    middle = np.mean(bases or [hub], axis=0)
     shapes = []
     for finger in hand.fingers:
         base = np.asarray(finger.joints[0].centre_palm, float)
-        radius = finger_capsules(finger)[0].radius
-        shapes.append(Capsule(hub, base, min(radius, max(0.5 * float(np.linalg.norm(base - hub)), LEAST_LENGTH))))
+        start = hub if finger.name.startswith("thumb") else hub + SPREAD * (base - middle)
+        radius = finger_capsules(hand, finger)[0].radius
+        shapes.append(Capsule(start, base, min(radius, max(0.5 * float(np.linalg.norm(base - start)), LEAST_LENGTH))))
     return tuple(shapes)
 
 

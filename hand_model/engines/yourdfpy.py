@@ -38,7 +38,7 @@ def load(file: str | Path) -> Model:
         for joint in robot.joints:
             joint.mimic = None
         urdf = yourdfpy.URDF(robot=robot, build_scene_graph=True, load_meshes=False)
-    except Exception as error:  # it raises whatever its XML layer raised
+    except Exception as error:  # noqa: BLE001 (it raises whatever its XML layer raised)
         raise DescriptionError(f"{path}: yourdfpy cannot load it ({error})") from None
     carrier = {j.child: j for j in robot.joints}
     fixed: dict[str, tuple[str, Array]] = {}
