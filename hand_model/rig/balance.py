@@ -1,0 +1,259 @@
+"""The balance of effort at every joint: what the drive puts in against columns of the declared physics.
+
+Coupled joints are projected on the independent one (virtual work): J^T of (inertia + friction - effort) = 0.
+Effort, columns and states pass the same filter; samples at rest are left out, since friction is unknown there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .dynamics import INERTIAL, inertial_columns, inertial_parameters
+from .model import RigModel, RigTrial, apply_overrides
+from .states import choose_cutoff, differentiate, fill_gaps, low_pass, noise_std, uniform_time, velocity_noise
+
+Array = NDArray[np.float64]
+MAX_RATE_HZ = 250.0  # faster recordings are thinned to this: joints move below 50 Hz
+MAX_SAMPLES = 4000  # per trial: residuals are correlated over far longer than this spacing
+
+
+@dataclass(frozen=True)
+class Column:
+    """One declared parameter that the balance is linear in. kind: "inertial", "armature", "damping", "frictionloss",
+    "stiffness", "offset", "gain" or "spring"; name: body, joint, drive or tendon; value: as declared."""
+
+    kind: str
+    name: str
+    part: str
+    value: float
+
+    @property
+    def label(self) -> str:
+        """kind:name:part, as parameters are reported."""
+        return f"{self.kind}:{self.name}" + (f":{self.part}" if self.part else "")
+
+
+@dataclass(frozen=True)
+class Rows:
+    """The balance of one independent joint in one trial.
+
+    Full-rate grid (n,): time_s, states, extra channels (never filtered: an effect reads them as they are), load_columns
+    (n, P) and load_known (n,): what the joint carries besides its own drive and friction, at parameters theta the load
+    is load_columns @ theta - load_known. Filtered and thinned (m,): effort, columns (m, P), moving (bool).
+    """
+
+    trial: str
+    joint: str
+    validate: bool
+    time_s: Array
+    position: Array
+    velocity: Array
+    acceleration: Array
+    effort: Array
+    columns: Array
+    moving: Array
+    rest_speed: float
+    cutoff_hz: float
+    rate_hz: float
+    extra: Mapping[str, Array]
+    load_columns: Array
+    load_known: Array
+    step: int
+
+    @property
+    def filtered_effort(self) -> Array:
+        """Effort (n,) at full rate, through the filter."""
+        return low_pass(self.extra["effort"], self.rate_hz, self.cutoff_hz)
+
+    def filtered(self, values: Array) -> Array:
+        """Full-rate columns (n, ...) through the filter of this balance, thinned to (m, ...)."""
+        return low_pass(values, self.rate_hz, self.cutoff_hz)[:: self.step]
+
+    def load(self, theta: Array) -> Array:
+        """Load (n,) that the joint transmits at declared parameters theta (P,)."""
+        return self.load_columns @ theta - self.load_known
+
+
+def compile_model(rig: RigModel, trial: RigTrial | None = None) -> Any:
+    """The rig's mjModel, with a trial's overrides applied."""
+    import mujoco
+
+    model = mujoco.MjModel.from_xml_string(rig.xml.decode())
+    if trial is not None:
+        apply_overrides(model, trial.set)
+    return model
+
+
+def declared_columns(rig: RigModel) -> tuple[Column, ...]:
+    """The parameters that the MJCF declares: every number in it that is not zero is a starting value to be fitted; a
+    declared zero is a statement (a symmetric body, a joint without friction) and stays."""
+    model = compile_model(rig)
+    columns: list[Column] = []
+    inertial = inertial_parameters(model)
+    for b in range(1, model.nbody):
+        for p, part in enumerate(INERTIAL):
+            if inertial[b - 1, p] != 0:
+                columns.append(Column("inertial", model.body(b).name, part, float(inertial[b - 1, p])))
+    for j, joint in enumerate(rig.joints):
+        for kind, value in (("armature", model.dof_armature[j]), ("damping", model.dof_damping[j]),
+                            ("stiffness", model.jnt_stiffness[j])):  # fmt: skip
+            if value != 0:
+                columns.append(Column(kind, joint, "", float(value)))
+        key = f"joint:{joint}:frictionloss"
+        levels = sorted({float(np.atleast_1d(t.set[key])[0]) for t in rig.trials if key in t.set})
+        if not levels and model.dof_frictionloss[j] != 0:
+            columns.append(Column("frictionloss", joint, "", float(model.dof_frictionloss[j])))
+        columns += [Column("frictionloss", joint, repr(level), level) for level in levels]
+    for drive in rig.drives:
+        if drive.offset:
+            columns.append(Column("offset", drive.name, "", 0.0))
+        if drive.kind == "voltage":  # back-EMF: damping while the leads are connected
+            columns.append(Column("back_emf", drive.name, "", _back_emf(model, drive.name)))
+    columns += [Column("spring", model.tendon(t).name, "", float(model.tendon_stiffness[t])) for t in range(model.ntendon)
+                if model.tendon_stiffness[t] != 0]  # fmt: skip
+    return tuple(columns)
+
+
+def _back_emf(model: Any, name: str) -> float:
+    a = model.actuator(name).id
+    resistance, constant = model.actuator_gainprm[a, :2]
+    return float(constant**2 / resistance * model.actuator_gear[a, 0] ** 2)
+
+
+def trial_rows(rig: RigModel, trial: RigTrial, columns: tuple[Column, ...], cutoff_hz: float | None = None) -> tuple[Rows, ...]:
+    """The balance of every independent joint whose effort is known (or whose drive is absent or open) in one trial."""
+    missing = [j for j in rig.joints if j not in trial.position]
+    if missing:
+        return ()
+    model = compile_model(rig, trial)
+    grid = uniform_time(trial.time_s)
+    rate = 1.0 / (grid[1] - grid[0])
+    skip = max(1, int(rate / MAX_RATE_HZ)) if cutoff_hz is None or cutoff_hz < 0.3 * MAX_RATE_HZ else 1
+    raw = {j: _thinned(np.interp(grid, trial.time_s, fill_gaps(trial.time_s, trial.position[j])), rate, skip) for j in rig.joints}
+    effort = {j: None if e is None else _thinned(e, rate, skip) for j, e in _joint_effort(rig, trial, grid).items()}
+    grid, channels = grid[::skip], {k: c[::skip] for k, c in _channels(trial, grid).items()}
+    rate = rate / skip
+    cutoff = cutoff_hz or min(choose_cutoff(raw[j], rate) for j in rig.independent)
+    q = np.stack([low_pass(raw[j], rate, cutoff) for j in rig.joints], 1)
+    v = differentiate(q, rate)
+    a = differentiate(v, rate)
+    rest = np.array([max(3 * velocity_noise(raw[j], rate, cutoff), 1e-3 * float(np.std(v[:, i])))
+                     for i, j in enumerate(rig.joints)])  # fmt: skip
+    sign = np.clip(v / rest, -1.0, 1.0)
+    thin = max(1, int(rate / max(12 * cutoff, 24.0)))
+    q, v, a, sign = (x[::thin] for x in (q, v, a, sign))
+    effort = {j: None if e is None else _thinned(e, rate, thin) for j, e in effort.items()}
+    grid, channels = grid[::thin], {k: c[::thin] for k, c in channels.items()}
+    rate = rate / thin
+    values = _column_values(rig, trial, model, columns, q, v, a, sign)
+    step = max(1, int(np.ceil(len(grid) / MAX_SAMPLES)), int(rate / (6 * cutoff)))
+    external = np.array([c.kind in ("inertial", "spring", "stiffness") for c in columns])
+    rows = []
+    for joint in rig.independent:
+        jacobian = _jacobian(rig, joint, q)
+        if any(effort[j] is None for j in jacobian):
+            continue
+        i = rig.joints.index(joint)
+        y = sum(effort[j] * w for j, w in jacobian.items())
+        x = sum(values[:, rig.joints.index(j)] * w[:, None] for j, w in jacobian.items())
+        rows.append(
+            Rows(trial.name, joint, trial.validate, grid, q[:, i], v[:, i], a[:, i],
+                 low_pass(y, rate, cutoff)[::step], low_pass(x, rate, cutoff)[::step],
+                 (np.abs(v[:, i]) > rest[i])[::step], float(rest[i]), cutoff, rate,
+                 {"effort": y, **channels}, x * external, y - effort[joint], step)
+        )  # fmt: skip
+    return tuple(rows)
+
+
+def _thinned(values: Array, rate: float, skip: int) -> Array:
+    """Every skip-th sample (m,) after an anti-alias filter."""
+    return values if skip == 1 else low_pass(values, rate, 0.4 * rate / skip)[::skip]
+
+
+def _channels(trial: RigTrial, grid: Array) -> dict[str, Array]:
+    channels = dict(trial.extra) | {f"setpoint:{j}": s for j, s in trial.setpoint.items()}
+    channels |= {f"position:{j}": s for j, s in trial.position.items()} | {f"voltage:{j}": s for j, s in trial.voltage.items()}
+    return {k: np.interp(grid, trial.time_s, fill_gaps(trial.time_s, s)) for k, s in channels.items()}
+
+
+def _jacobian(rig: RigModel, joint: str, q: Array) -> dict[str, Array]:
+    """d(joint j) / d(independent joint), (n,) each, for the joint itself and all that hang on it by couplings."""
+    out = {joint: np.ones(len(q))}
+    grown = True
+    while grown:
+        grown = False
+        for c in rig.couplings:
+            if c.independent in out and c.dependent not in out:
+                x = q[:, rig.joints.index(c.independent)]
+                slope = sum(k * c.polycoef[k] * x ** (k - 1) for k in range(1, 5))
+                out[c.dependent] = out[c.independent] * slope
+                grown = True
+    return out
+
+
+def _joint_effort(rig: RigModel, trial: RigTrial, grid: Array) -> dict[str, Array | None]:
+    """Known effort on each joint (n,), None where a connected drive's effort is not recorded."""
+    out: dict[str, Array | None] = {}
+    for joint in rig.joints:
+        drive = rig.drive(joint)
+        if drive is None or joint not in trial.live:
+            out[joint] = np.zeros(len(grid))
+        elif joint in trial.effort:
+            out[joint] = np.interp(grid, trial.time_s, fill_gaps(trial.time_s, trial.effort[joint]))
+        elif joint in trial.voltage:
+            out[joint] = drive.gain * np.interp(grid, trial.time_s, fill_gaps(trial.time_s, trial.voltage[joint]))
+        elif drive.kind == "position" and joint in trial.setpoint:
+            target = np.interp(grid, trial.time_s, fill_gaps(trial.time_s, trial.setpoint[joint]))
+            position = np.interp(grid, trial.time_s, fill_gaps(trial.time_s, trial.position[joint]))
+            out[joint] = drive.gain * (target - position)
+        else:
+            out[joint] = None
+    return out
+
+
+def _column_values(rig: RigModel, trial: RigTrial, model: Any, columns: tuple[Column, ...], q: Array, v: Array, a: Array,
+                   sign: Array) -> Array:  # fmt: skip
+    """Effort per unit of each parameter at each joint, (n, joints, P); what the physics takes is positive."""
+    out = np.zeros((len(q), len(rig.joints), len(columns)))
+    inertial = inertial_columns(model, q, v, a, np.array(model.opt.gravity))
+    for p, c in enumerate(columns):
+        if c.kind == "inertial":
+            out[:, :, p] = inertial[:, :, model.body(c.name).id - 1, INERTIAL.index(c.part)]
+        elif c.kind == "spring":
+            out[:, :, p] = _tendon_column(model, c.name, q)
+        elif c.kind in ("offset", "back_emf"):
+            drive = next(d for d in rig.drives if d.name == c.name)
+            j = rig.joints.index(drive.joint)
+            out[:, j, p] = (-drive.gear if c.kind == "offset" else v[:, j]) * (drive.joint in trial.live)
+        else:
+            j = rig.joints.index(c.name)
+            if c.kind == "frictionloss":
+                level = trial.set.get(f"joint:{c.name}:frictionloss")
+                mine = not c.part or (level is not None and repr(float(np.atleast_1d(level)[0])) == c.part)
+                out[:, j, p] = sign[:, j] * mine
+            else:
+                state = {"armature": a, "damping": v, "stiffness": q - model.qpos_spring[j]}[c.kind]
+                out[:, j, p] = state[:, j]
+    return out
+
+
+def _tendon_column(model: Any, name: str, q: Array) -> Array:
+    """Effort (n, joints) per unit stiffness of a fixed tendon with a dead band, what the spring takes from the joints."""
+    t = model.tendon(name).id
+    coef = np.zeros(model.nv)
+    for w in range(model.tendon_adr[t], model.tendon_adr[t] + model.tendon_num[t]):
+        coef[model.wrap_objid[w]] = model.wrap_prm[w]
+    length = q @ coef
+    low, high = model.tendon_lengthspring[t]
+    stretch = np.where(length > high, length - high, np.where(length < low, length - low, 0.0))
+    return stretch[:, None] * coef
+
+
+def resolution(trial: RigTrial, joint: str) -> float:
+    """White noise of a joint's encoder [position unit]."""
+    return noise_std(fill_gaps(trial.time_s, trial.position[joint]))

@@ -1,0 +1,122 @@
+"""What may be missing at a joint: every drive effect of the catalogue, and those that only a rig can show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..effects import DriveState, catalogue
+from .balance import Rows, compile_model
+from .declared import DeclaredFit
+from .dynamics import INERTIAL, inertial_parameters
+from .model import RigModel
+
+Array = NDArray[np.float64]
+NOT_FOR_RIGS = frozenset({"external_contact", "gravity_load", "spring_decoupling", "asymmetric_friction"})
+Bound = tuple[str, str, float, float]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One effect at one joint. columns(row, shape) -> (n, j) at full rate; grid: starting shapes; warp: shape -> delay
+    [s] by which every column comes later (None: no delay); needs: says in words what variant this is."""
+
+    effect: str
+    variant: str
+    joint: str
+    amplitudes: tuple[Bound, ...]
+    grid: tuple[dict[str, float], ...]
+    columns: Callable[[Rows, Mapping[str, float]], Array]
+    delays: bool = False
+
+    @property
+    def key(self) -> str:
+        """effect@joint, with the variant where there is one."""
+        return f"{self.effect}{'/' + self.variant if self.variant else ''}@{self.joint}"
+
+
+def direction(row: Rows) -> Array:
+    """Friction's direction (n,) in [-1, 1]: the sign of velocity, linear where it drowns in noise."""
+    return np.clip(row.velocity / row.rest_speed, -1.0, 1.0)
+
+
+def drive_state(rig: RigModel, row: Rows, theta: Array) -> DriveState:
+    """The row as an effect of the catalogue reads it."""
+    extra: dict[str, Array] = {"load": row.load(theta)}
+    for channel, values in row.extra.items():
+        extra[channel.split(":")[0] if channel == f"setpoint:{row.joint}" else channel] = values
+    declared = np.stack([row.acceleration, row.velocity, direction(row)], 1)
+    effort = np.where(np.abs(row.velocity) > row.rest_speed, row.extra["effort"], np.nan)  # at rest friction is unknown
+    return DriveState(row.trial, row.joint, row.time_s, row.position, row.velocity, row.acceleration, effort, declared,
+                      rig.unit(row.joint), rig.effort_unit(row.joint), extra,
+                      ("inertia", "viscous", "coulomb"), row.validate)  # fmt: skip
+
+
+def candidates(rig: RigModel, fit: DeclaredFit, joint: str) -> tuple[Candidate, ...]:
+    """All candidates at one joint, from the catalogue and from the rig itself."""
+    rows = [r for r in fit.rows if r.joint == joint and not r.validate and r.trial not in fit.outliers]
+    if not rows:
+        return ()
+    states = {r.trial: drive_state(rig, r, fit.theta) for r in fit.rows if r.joint == joint}
+    train = tuple(states[r.trial] for r in rows)
+    found = [_from_catalogue(e, joint, train, states) for e in catalogue("drive") if _usable(e)]
+    found += _own(rig, fit, joint, rows)
+    return tuple(c for c in found if c.grid)
+
+
+def _usable(effect: Any) -> bool:
+    return effect.name not in NOT_FOR_RIGS and effect.replaces is None and not effect.clips
+
+
+def _from_catalogue(effect: Any, joint: str, train: tuple[DriveState, ...], states: Mapping[str, DriveState]) -> Candidate:
+    grid = tuple(effect.grid(train))
+    if len(grid) > 40:  # a coarse look first; the winner's shape is refined
+        grid = grid[:: int(np.ceil(len(grid) / 40))]
+    return Candidate(effect.name, "", joint, tuple(effect.amplitudes()), grid,
+                     lambda row, shape: np.asarray(effect.columns(states[row.trial], shape), float), bool(effect.warps))  # fmt: skip
+
+
+def _own(rig: RigModel, fit: DeclaredFit, joint: str, rows: list[Rows]) -> list[Candidate]:
+    """Offset, load-dependent friction of several kinds, weight off its declared axis, sag, delay of the drive."""
+    free = (-np.inf, np.inf)
+    drive = rig.drive(joint)
+    speeds = np.concatenate([np.abs(r.velocity) for r in rows])
+    knees = tuple({"stribeck_speed": float(s)} for s in np.geomspace(*np.percentile(speeds[speeds > 0], [10, 90]), 6))
+    load = {r.trial: np.abs(r.load(fit.theta)) for r in fit.rows if r.joint == joint}
+    own = [
+        Candidate("load_dependent_friction", "low speed", joint, (("per_load", "1", 0.0, np.inf),), knees,
+                  lambda r, s: (direction(r) * load[r.trial] * np.exp(-((r.velocity / s["stribeck_speed"]) ** 2)))[:, None]),
+        Candidate("load_dependent_friction", "with speed", joint, (("per_load_speed", "s", 0.0, np.inf),), ({},),
+                  lambda r, s: (r.velocity * load[r.trial])[:, None]),
+    ]  # fmt: skip
+    if drive is None or not drive.offset:
+        own.append(Candidate("asymmetric_friction", "", joint, (("offset", rig.effort_unit(joint), *free),), ({},),
+                             lambda r, s: np.ones((len(r.time_s), 1))))  # fmt: skip
+    return own + _weight(rig, joint, rows)
+
+
+def _weight(rig: RigModel, joint: str, rows: list[Rows]) -> list[Candidate]:
+    """A centre of mass off the declared axis (a zero that is none): sine and cosine of the pose, by the regressor."""
+    from .dynamics import inertial_columns
+
+    model = compile_model(rig)
+    declared = inertial_parameters(model)
+    i = rig.joints.index(joint)
+    body = int(model.jnt_bodyid[i])
+    zero = [p for p in (1, 2, 3) if declared[body - 1, p] == 0]
+    gravity = np.array(model.opt.gravity)
+    if not zero or len(rig.joints) > 1 or not np.any(gravity):
+        return []
+
+    def columns(row: Rows, shape: Mapping[str, float]) -> Array:
+        q, v, a = (x[:, None] for x in (row.position, row.velocity, row.acceleration))
+        return inertial_columns(model, q, v, a, gravity)[:, i, body - 1][:, zero]
+
+    seen = columns(rows[0], {})
+    zero = [p for p, c in zip(zero, seen.T, strict=True) if np.std(c) > 1e-9]
+    bounds = tuple((f"moment_{INERTIAL[p]}", "kg m", -np.inf, np.inf) for p in zero)
+    return [Candidate("gravity_load", "centre of mass off its axis", joint, bounds, ({},), columns)] if zero else []

@@ -1,0 +1,239 @@
+"""Is a channel what it is said to be? Asked before anything is fitted to it.
+
+A torque that is a few sinusoids of time, a static function of the position, or another channel over again is a
+command; one that does not move is dead; one that stands on its limits clips; one without the sign of the motion it
+drives is unsigned.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .balance import Rows
+from .declared import DeclaredFit
+from .model import RigModel, RigTrial
+from .states import fill_gaps, uniform_time
+
+Array = NDArray[np.float64]
+SAME = 0.01  # a measured channel differs from its command by more than this share: drives, sensors and CAN buses do
+STRANGE = 0.7  # share of an effort that may stay unexplained before it is said to explain nothing
+CLIPPED = 0.05  # share of samples on one and the same extreme value
+
+
+@dataclass(frozen=True)
+class ChannelIssue:
+    """What is wrong with a channel. kind: an effect name of the findings; refuse: not to be fitted; share: how closely
+    (residual over rms, or share of samples)."""
+
+    kind: str
+    channel: str
+    joint: str | None
+    trials: tuple[str, ...]
+    reason: str
+    refuse: bool
+    share: float
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(np.square(values)))) if len(values) else 0.0
+
+
+def check_channels(rig: RigModel) -> tuple[ChannelIssue, ...]:
+    """All issues with the effort, voltage and position channels of a rig."""
+    issues: list[ChannelIssue] = []
+    column = {(kind, name, attribute): c for c, (kind, name, attribute) in rig.quantity.items()}
+    for drive in rig.drives:
+        channel = column.get(("actuator", drive.name, "force")) or column.get(("actuator", drive.name, "ctrl"))
+        if channel is None:
+            continue
+        issues += _check_effort(rig, drive.joint, channel)
+    for joint in rig.joints:
+        issues += _check_position(rig, joint, column.get(("joint", joint, "position"), joint))
+    return tuple(issues)
+
+
+def _check_effort(rig: RigModel, joint: str, channel: str) -> list[ChannelIssue]:
+    found: dict[tuple[str, str], list[tuple[str, float, str]]] = {}
+    usable = [t for t in rig.trials if joint in t.live and (joint in t.effort or joint in t.voltage)]
+    for trial in usable:
+        raw = trial.effort.get(joint, trial.voltage.get(joint))
+        values = fill_gaps(trial.time_s, raw)
+        if np.ptp(values) <= 1e-9 * (np.abs(values).max() + 1e-12):
+            if np.ptp(trial.position[joint]) > 0:
+                found.setdefault(("command_as_measurement", "dead"), []).append((trial.name, 0.0, "is constant"))
+            continue
+        measured = joint in trial.effort
+        for kind, share, reason in _looks(trial, joint, values, measured):
+            found.setdefault((kind, reason), []).append((trial.name, share, reason))
+    return _gather(rig, joint, channel, found, len(usable))
+
+
+def _looks(trial: RigTrial, joint: str, values: Array, measured: bool) -> list[tuple[str, float, str]]:
+    out = []
+    limits = [np.mean(values == e) for e in (values.min(), values.max())]
+    if min(limits) > CLIPPED and abs(values.max() + values.min()) < 0.02 * np.ptp(values) and len(np.unique(values)) > 20:
+        out.append(("current_saturation", float(sum(limits)), "stands on its limits, the same both ways"))
+    if not measured:
+        return out
+    share = sinusoids_left(trial.time_s, values)
+    if share < SAME:
+        out.append(("command_as_measurement", share, "is a sinusoid of time"))
+    share = static_left(trial, joint, values)
+    if share < SAME:
+        out.append(("command_as_measurement", share, "is a static function of the position"))
+    for name, other in trial.extra.items():
+        share = copy_left(values, fill_gaps(trial.time_s, other))
+        if share < SAME:
+            out.append(("command_as_measurement", share, f'repeats the channel "{name}"'))
+    return out
+
+
+def _reverses(trial: RigTrial, joint: str) -> bool:
+    step = np.diff(fill_gaps(trial.time_s, trial.position[joint]))
+    up, down = step[step > 0].sum(), -step[step < 0].sum()
+    return min(up, down) > 0.2 * max(up, down)
+
+
+def _gather(rig: RigModel, joint: str, channel: str, found: dict, usable: int) -> list[ChannelIssue]:
+    """One issue per kind and reason; a command in half of the recordings or more is one in all: the column is the same."""
+    out = []
+    flagged = {n for (kind, _), hits in found.items() if kind == "command_as_measurement" for n, _, _ in hits}
+    whole = usable > 0 and len(flagged) >= 0.5 * usable
+    for (kind, reason), hits in found.items():
+        trials = tuple(dict.fromkeys(n for n, _, _ in hits))
+        if kind == "command_as_measurement" and whole:
+            trials = tuple(t.name for t in rig.trials)
+        share = float(np.median([s for _, s, _ in hits]))
+        refuse = kind == "command_as_measurement"
+        out.append(ChannelIssue(kind, channel, joint, trials, f"{channel} {reason} (to {100 * share:.2g} %)", refuse, share))
+    return out
+
+
+def sinusoids_left(time_s: Array, values: Array, most: int = 2) -> float:
+    """Share (residual rms over rms) that up to `most` sinusoids and a mean leave; frequencies refined from the spectrum."""
+    from scipy.optimize import minimize_scalar
+
+    grid = uniform_time(time_s)
+    y = np.interp(grid, time_s, values)
+    total = _rms(y - y.mean())
+    if total == 0 or len(y) < 50:
+        return 1.0
+    trim = slice(int(0.02 * len(y)), None)  # the first instants, before the generator runs
+    grid, y = grid[trim], y[trim]
+    design = [np.ones_like(grid)]
+    left = y - y.mean()
+    for _ in range(most):
+        spectrum = np.abs(np.fft.rfft(left * np.hanning(len(left))))
+        k = int(np.argmax(spectrum[1:])) + 1
+        step = 1.0 / (grid[-1] - grid[0])
+
+        def cost(f: float, base: list = design) -> float:
+            return _rms(_solve([*base, np.sin(2 * np.pi * f * grid), np.cos(2 * np.pi * f * grid)], y))
+
+        f = minimize_scalar(cost, bounds=((k - 1) * step, (k + 1) * step), method="bounded", options={"xatol": 1e-6 * step}).x
+        design += [np.sin(2 * np.pi * f * grid), np.cos(2 * np.pi * f * grid)]
+        left = _solve(design, y)
+    return float(np.median(np.abs(left)) / 0.6745 / total)
+
+
+def _solve(columns: list[Array], y: Array) -> Array:
+    x = np.stack(columns, 1)
+    return y - x @ np.linalg.lstsq(x, y, rcond=None)[0]
+
+
+def static_left(trial: RigTrial, joint: str, values: Array) -> float:
+    """Share that sine, cosine and cubic of the position leave, over samples where the joint goes both ways at speed.
+
+    Friction alone keeps a true torque from being a function of the position: it changes sign with the motion.
+    """
+    q = fill_gaps(trial.time_s, trial.position[joint])
+    if not _reverses(trial, joint) or np.ptp(q) == 0:
+        return 1.0
+    x = np.stack([np.ones_like(q), q, q**2, q**3, np.sin(q), np.cos(q)], 1)
+    scale = np.abs(x).max(0) + 1e-300
+    left = values - (x / scale) @ np.linalg.lstsq(x / scale, values, rcond=1e-10)[0]
+    return _rms(left) / max(float(np.std(values)), 1e-300)
+
+
+def copy_left(values: Array, other: Array) -> float:
+    """Share that a gain and an offset of another channel leave."""
+    if np.ptp(other) == 0:
+        return 1.0
+    left = _solve([np.ones_like(other), other], values)
+    return _rms(left) / max(float(np.std(values)), 1e-300)
+
+
+def check_balance(rig: RigModel, fit: DeclaredFit) -> tuple[ChannelIssue, ...]:
+    """Issues that only the balance shows: an unsigned effort, a computed one, one that explains nothing of the motion."""
+    out: list[ChannelIssue] = []
+    column = {name: c for c, (kind, name, attribute) in rig.quantity.items() if kind == "actuator" and attribute == "force"}
+    start = np.array([c.value for c in fit.columns])
+    for row in fit.rows:
+        drive = rig.drive(row.joint)
+        if drive is None or drive.name not in column or row.moving.sum() < 30:
+            continue
+        y, x = row.effort[row.moving], row.columns[row.moving]
+        predicted = x @ start
+        size = _rms(y)
+        found = None
+        signed, unsigned = copy_left(y, predicted), copy_left(y, np.abs(predicted))
+        if y.min() > -0.05 * y.max() and predicted.min() < -0.3 * predicted.max() and unsigned < 0.5 * signed:
+            found = ("has no sign: it follows the size of the expected effort", unsigned)
+        elif (static := _static(row, x, start)) is not None:
+            found = ("is a static function of the position, without the friction and inertia of the motion", static)
+        elif _stranger(fit, row) and (left := _own_fit(fit, row)) > STRANGE:
+            found = ("explains nothing of the motion, though it does in other recordings", left)
+        if found is not None:
+            name = column[drive.name]
+            out.append(ChannelIssue("command_as_measurement", name, row.joint, (row.trial,), f"{name} {found[0]}", True, found[1]))
+    return tuple(out)
+
+
+def _stranger(fit: DeclaredFit, row: Rows) -> bool:
+    """Whether a recording is left unexplained while most others of its joint are explained."""
+    others = [share for (trial, joint), share in fit.quality.items() if joint == row.joint and trial != row.trial]
+    return bool(others) and fit.quality[row.trial, row.joint] > STRANGE and float(np.median(others)) < 0.5
+
+
+def _own_fit(fit: DeclaredFit, row: Rows) -> float:
+    """Share of the effort that the declared columns leave when fitted to this recording alone, offset included."""
+    x = np.concatenate([row.columns, np.ones((len(row.effort), 1))], 1)[row.moving]
+    y = row.effort[row.moving]
+    x = x / (np.abs(x).max(0) + 1e-300)
+    return _rms(y - x @ np.linalg.lstsq(x, y, rcond=1e-9)[0]) / max(_rms(y), 1e-300)
+
+
+def _static(row: Rows, x: Array, start: Array) -> float | None:
+    """Share that a static function of position leaves, where it is tiny beside what friction and inertia should add."""
+    q, y = row.position[:: row.step][row.moving], row.effort[row.moving]
+    static = np.stack([np.ones_like(q), q, q**2, q**3, np.sin(q), np.cos(q)], 1)
+    static = static / (np.abs(static).max(0) + 1e-300)
+    left = _rms(y - static @ np.linalg.lstsq(static, y, rcond=1e-10)[0]) / max(_rms(y), 1e-300)
+    expected = x @ start
+    moving = _rms(expected - static @ np.linalg.lstsq(static, expected, rcond=1e-10)[0]) / max(_rms(expected), 1e-300)
+    return left if left < SAME and moving > 5 * left else None
+
+
+def _check_position(rig: RigModel, joint: str, channel: str) -> list[ChannelIssue]:
+    """Jumps by a whole turn within one sample (a counter not unwrapped) and encoders that never move."""
+    wrapped, dead = [], []
+    for trial in rig.trials:
+        if joint not in trial.position:
+            continue
+        q = fill_gaps(trial.time_s, trial.position[joint])
+        step = np.abs(np.diff(q))
+        typical = float(np.percentile(step, 99)) if len(step) else 0.0
+        if joint not in rig.slides and np.any(np.abs(step - 2 * np.pi) < 0.3) and typical < 1.0:
+            wrapped.append(trial.name)
+        if np.ptp(q) == 0:
+            dead.append(trial.name)
+    out = []
+    if wrapped:
+        out.append(ChannelIssue("command_as_measurement", channel, joint, tuple(wrapped),
+                                f"{channel} jumps by a whole turn: it is not unwrapped", True, 1.0))  # fmt: skip
+    if dead and len(dead) == len(rig.trials):
+        out.append(ChannelIssue("command_as_measurement", channel, joint, tuple(dead), f"{channel} never moves: dead", True, 1.0))
+    return out

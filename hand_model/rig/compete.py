@@ -1,0 +1,234 @@
+"""Candidates compete by the error on blocks of the recording that they were not fitted to.
+
+Blocks, not samples, because residuals are correlated (Bergmeir & Benitez 2012); the probability that a candidate is
+the best is the share of resampled sets of blocks in which it is (Efron's bootstrap). Validation trials are never seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .balance import Rows
+from .candidates import Candidate
+from .declared import DeclaredFit, bounds, prior
+from .solve import solve_bounded
+
+Array = NDArray[np.float64]
+FOLDS, RESAMPLES = 6, 600
+LEAST_GAIN = 0.04  # of the held-out residual variance: less is not worth a name
+LEAST_PROBABILITY = 0.95
+MOST_TERMS = 4
+
+
+@dataclass(frozen=True)
+class Term:
+    """A candidate with its shape."""
+
+    candidate: Candidate
+    shape: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Score:
+    """A candidate added to the terms so far. error (B,): squared error of every block when left out [normalised]."""
+
+    term: Term
+    error: Array
+    train: float
+
+
+@dataclass(frozen=True)
+class Step:
+    """One round of the competition: winner, its probability against none, rivals with theirs, share of variance."""
+
+    winner: Score
+    probability: float
+    rivals: tuple[tuple[str, float], ...]
+    gain: float
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Training rows cut into blocks. base: fit with scale; fold (B,): which fold leaves a block out."""
+
+    fit: DeclaredFit
+    rows: tuple[Rows, ...]
+    block: tuple[Array, ...]
+    fold: Array
+
+
+def pose(fit: DeclaredFit) -> Problem:
+    """Cut the training recordings into at least a dozen blocks; neighbours in one recording go to different folds."""
+    rows = tuple(r for r in fit.rows if not r.validate and r.trial not in fit.outliers and r.moving.sum() > 10)
+    trials = list(dict.fromkeys(r.trial for r in rows))
+    each = int(np.clip(np.ceil(18 / max(len(trials), 1)), 2, 18))
+    block, first = [], {t: k * each for k, t in enumerate(trials)}
+    for r in rows:
+        n = len(r.effort)
+        block.append(first[r.trial] + np.minimum(np.arange(n) * each // n, each - 1))
+    count = each * len(trials)
+    fold = np.arange(count) % min(FOLDS, count)
+    if len(trials) >= FOLDS:  # whole recordings are left out where there are enough of them
+        fold = (np.arange(count) // each) % FOLDS
+    return Problem(fit, rows, tuple(block), fold)
+
+
+def term_columns(row: Rows, term: Term) -> Array:
+    """Filtered, thinned columns (m, j) of a term; none of its own joint's rows are anything but zero elsewhere."""
+    width = len(term.candidate.amplitudes)
+    if row.joint != term.candidate.joint:
+        return np.zeros((len(row.effort), width))
+    return row.filtered(term.candidate.columns(row, term.shape)).reshape(len(row.effort), width)
+
+
+def design(row: Rows, terms: Sequence[Term]) -> Array:
+    """Declared columns and those of the terms (m, P + J), each delayed where a term says so."""
+    matrix = np.concatenate([row.columns, *(term_columns(row, t) for t in terms)], 1)
+    for t in terms:
+        if t.candidate.delays and t.candidate.joint == row.joint:
+            grid = row.time_s[:: row.step]
+            matrix = np.stack([np.interp(grid - t.shape["delay"], grid, c) for c in matrix.T], 1)
+    return matrix
+
+
+def limits(fit: DeclaredFit, terms: Sequence[Term]) -> tuple[Array, Array, Array, Array]:
+    """Lower and upper bounds, prior mean and weight of all parameters (P + J,)."""
+    low, high = bounds(fit.columns)
+    mean, weight = prior(fit.columns)
+    extra = [a for t in terms for a in t.candidate.amplitudes]
+    more = np.array([[a[2], a[3]] for a in extra]).reshape(-1, 2)
+    zero = np.zeros(len(extra))
+    return (np.concatenate([low, more[:, 0]]), np.concatenate([high, more[:, 1]]),
+            np.concatenate([mean, zero]), np.concatenate([weight, zero + 1e-12]))  # fmt: skip
+
+
+def normal(problem: Problem, terms: Sequence[Term]) -> tuple[Array, Array, Array, Array]:
+    """Normal equations by block: gram (B, P, P), moment (B, P), square (B,), count (B,)."""
+    count = len(problem.fold)
+    parts = None
+    for row, block in zip(problem.rows, problem.block, strict=True):
+        x = design(row, terms) / problem.fit.scale[row.joint]
+        y = row.effort / problem.fit.scale[row.joint]
+        if parts is None:
+            p = x.shape[1]
+            parts = np.zeros((count, p, p)), np.zeros((count, p)), np.zeros(count), np.zeros(count)
+        for b in np.unique(block):
+            m = row.moving & (block == b)
+            xb, yb = x[m], y[m]
+            parts[0][b] += xb.T @ xb
+            parts[1][b] += xb.T @ yb
+            parts[2][b] += yb @ yb
+            parts[3][b] += len(yb)
+    return parts
+
+
+def held_out(problem: Problem, terms: Sequence[Term], parts: tuple) -> tuple[Array, float]:
+    """Squared error (B,) of every block under the fit to the other folds, and the training error of the whole fit."""
+    gram, moment, square, count = parts
+    low, high, mean, weight = limits(problem.fit, terms)
+    error = np.zeros(len(square))
+    total_g, total_m = gram.sum(0), moment.sum(0)
+    for f in np.unique(problem.fold):
+        out = problem.fold == f
+        theta = solve_bounded(total_g - gram[out].sum(0), total_m - moment[out].sum(0), low, high, mean, weight)
+        error[out] = square[out] - 2 * moment[out] @ theta + np.einsum("p,bpq,q->b", theta, gram[out], theta)
+    theta = solve_bounded(total_g, total_m, low, high, mean, weight)
+    train = float(square.sum() - 2 * total_m @ theta + theta @ total_g @ theta)
+    return np.maximum(error, 0.0), train
+
+
+def solution(problem: Problem, terms: Sequence[Term]) -> Array:
+    """All parameters (P + J,) on all training blocks."""
+    gram, moment, _, _ = normal(problem, terms)
+    return solve_bounded(gram.sum(0), moment.sum(0), *limits(problem.fit, terms))
+
+
+def _extended(problem: Problem, terms: Sequence[Term], new: Term, parts: tuple) -> tuple:
+    """Normal equations with one more term, from those without it: only its own columns are multiplied out."""
+    gram, moment, square, count = parts
+    p, j = moment.shape[1], len(new.candidate.amplitudes)
+    g, m = np.zeros((len(square), p + j, p + j)), np.zeros((len(square), p + j))
+    g[:, :p, :p], m[:, :p] = gram, moment
+    for row, block in zip(problem.rows, problem.block, strict=True):
+        if row.joint != new.candidate.joint:
+            continue
+        scale = problem.fit.scale[row.joint]
+        x, y = problem_design(problem, row, terms) / scale, row.effort / scale
+        c = term_columns(row, new) / scale
+        for b in np.unique(block):
+            k = row.moving & (block == b)
+            cross = x[k].T @ c[k]
+            g[b, :p, p:] += cross
+            g[b, p:, :p] += cross.T
+            g[b, p:, p:] += c[k].T @ c[k]
+            m[b, p:] += c[k].T @ y[k]
+    return g, m, square, count
+
+
+def problem_design(problem: Problem, row: Rows, terms: Sequence[Term]) -> Array:
+    """The design of a row; cached by the caller's round."""
+    key = (row.trial, row.joint, tuple((t.candidate.key, tuple(t.shape.items())) for t in terms))
+    if key not in _CACHE:
+        if len(_CACHE) > 200:
+            _CACHE.clear()
+        _CACHE[key] = design(row, terms)
+    return _CACHE[key]
+
+
+_CACHE: dict = {}
+
+
+def score(problem: Problem, terms: Sequence[Term], candidate: Candidate, parts: tuple) -> Score:
+    """The candidate at the best of its starting shapes (by held-out error over its own few shapes)."""
+    best: Score | None = None
+    for shape in candidate.grid:
+        term = Term(candidate, shape)
+        extended = normal(problem, [*terms, term]) if candidate.delays else _extended(problem, terms, term, parts)
+        error, train = held_out(problem, [*terms, term], extended)
+        if best is None or train < best.train:
+            best = Score(term, error, train)
+    return best
+
+
+def compete(problem: Problem, rivals: Sequence[Candidate]) -> tuple[tuple[Term, ...], tuple[Step, ...], tuple[Score, ...]]:
+    """Forward selection: the candidate that lowers the held-out error most, while it does so beyond doubt.
+
+    Returns the terms, the rounds, and the scores of the last round (all that was not taken).
+    """
+    _CACHE.clear()
+    terms: tuple[Term, ...] = ()
+    steps: list[Step] = []
+    scores: list[Score] = []
+    while True:
+        parts = normal(problem, terms)
+        none, _ = held_out(problem, terms, parts)
+        taken = {t.candidate.key for t in terms}
+        scores = [score(problem, terms, c, parts) for c in rivals if c.key not in taken]
+        step = _judge(none, scores)
+        if step is None or len(terms) >= MOST_TERMS:
+            return terms, tuple(steps), tuple(scores)
+        terms = (*terms, step.winner.term)
+        steps.append(step)
+
+
+def _judge(none: Array, scores: Sequence[Score]) -> Step | None:
+    """The winner of a round, or None where no candidate beats "nothing" beyond doubt and by enough."""
+    if not scores:
+        return None
+    errors = np.array([s.error for s in scores])
+    best = int(np.argmin(errors.sum(1)))
+    gain = 1.0 - errors[best].sum() / max(none.sum(), 1e-300)
+    random = np.random.default_rng(0)
+    draw = random.integers(0, len(none), (RESAMPLES, len(none)))
+    resampled = errors[:, draw].sum(2)
+    probability = float(np.mean(resampled[best] < none[draw].sum(1)))
+    if gain < LEAST_GAIN or probability < LEAST_PROBABILITY:
+        return None
+    wins = np.bincount(np.argmin(resampled, 0), minlength=len(scores)) / RESAMPLES
+    order = np.argsort(-wins)
+    rivals = tuple((scores[i].term.candidate.key, float(wins[i])) for i in order if wins[i] > 0.005)
+    return Step(scores[best], probability, rivals, float(gain))

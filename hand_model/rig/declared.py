@@ -1,0 +1,143 @@
+"""The declared parameters fitted to the recordings, and written back: the "before" of every comparison."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .balance import Column, Rows, compile_model, declared_columns, trial_rows
+from .dynamics import INERTIAL, inertial_parameters
+from .model import RigModel, RigTrial
+from .solve import solve_bounded
+
+Array = NDArray[np.float64]
+
+NONNEGATIVE = ("damping", "frictionloss", "armature", "back_emf", "spring", "stiffness")
+CORRELATED = 30.0  # neighbouring samples say the same thing: so many of them weigh as one against the prior
+CUTOFFS = (2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 35.0, 60.0)
+
+
+@dataclass(frozen=True)
+class DeclaredFit:
+    """Declared parameters after the fit. columns and theta (P,) correspond; scale: joint -> residual rms [effort unit];
+    rows: every trial's balance at the chosen cut-off; quality: (trial, joint) -> share of the effort left unexplained
+    (residual rms / effort rms); outliers: trials left out because their effort does not explain their motion."""
+
+    columns: tuple[Column, ...]
+    theta: Array
+    scale: dict[str, float]
+    rows: tuple[Rows, ...]
+    cutoff_hz: float
+    quality: dict[tuple[str, str], float]
+    outliers: tuple[str, ...]
+
+    def residual(self, row: Rows) -> Array:
+        """Effort that the declared model leaves (m,), on the thinned grid."""
+        return row.effort - row.columns @ self.theta
+
+
+def bounds(columns: Sequence[Column]) -> tuple[Array, Array]:
+    """Physical bounds of declared parameters: dissipation, springs and rotor inertia are never negative."""
+    low = np.array([0.0 if c.kind in NONNEGATIVE or c.part in ("m", "Ixx", "Iyy", "Izz") else -np.inf for c in columns])
+    return low, np.full(len(columns), np.inf)
+
+
+def prior(columns: Sequence[Column]) -> tuple[Array, Array]:
+    """Prior mean and weight (P,): a mass may be wrong by as much as itself, friction and springs by a hundred times."""
+    value = np.array([c.value for c in columns])
+    loose = np.array([1.0 if c.kind == "inertial" else 100.0 for c in columns])
+    weight = CORRELATED / np.maximum(np.abs(value * loose), 1e-150) ** 2
+    return value, np.where(value == 0, 1e-12, weight)
+
+
+def fit_rows(columns: Sequence[Column], rows: Sequence[Rows], scale: dict[str, float], weight: dict[str, float]) -> Array:
+    """theta (P,) from the moving samples of the rows; scale: joint -> residual rms; weight: trial -> 0..1."""
+    p = len(columns)
+    gram, moment = np.zeros((p, p)), np.zeros(p)
+    for row in rows:
+        w = weight.get(row.trial, 1.0) / scale[row.joint] ** 2
+        x, y = row.columns[row.moving], row.effort[row.moving]
+        gram += w * x.T @ x
+        moment += w * x.T @ y
+    low, high = bounds(columns)
+    mean, stiff = prior(columns)
+    return solve_bounded(gram, moment, low, high, mean, stiff)
+
+
+def fit_declared(rig: RigModel, refused: Collection[tuple[str, str]] = (), cutoff_hz: float | None = None) -> DeclaredFit:
+    """Fit the declared parameters to the trials that do not validate.
+
+    refused: (trial, joint) whose effort channel cannot be trusted; their balance is not fitted, nor kept. A trial that
+    disagrees with the others weighs less (its residual rms over the median of all, squared, beyond two).
+    The cut-off is the one at which the declared model explains the largest share of the effort: below it the motion is
+    lost, above it noise and flexibility that no rigid model holds.
+    """
+    columns = declared_columns(rig)
+    refused = set(refused)
+    best: DeclaredFit | None = None
+    sample, most = _sample(rig), 0.0
+    for cutoff in [cutoff_hz] if cutoff_hz else CUTOFFS:
+        rows = [r for t in sample for r in trial_rows(rig, t, columns, cutoff) if (r.trial, r.joint) not in refused]
+        if not rows or cutoff > 0.3 * min(r.rate_hz for r in rows):
+            continue
+        seen = float(np.mean([r.moving.mean() for r in rows]))
+        most = max(most, seen)
+        if seen < 0.9 * most:  # noise hides when the joint moves
+            break
+        fit = _robust_fit(columns, tuple(rows), cutoff)
+        if best is None or _unexplained(fit) < 0.98 * _unexplained(best):
+            best = fit
+    cutoff = best.cutoff_hz if best else None
+    rows = tuple(r for t in rig.trials for r in trial_rows(rig, t, columns, cutoff) if (r.trial, r.joint) not in refused)
+    return _robust_fit(columns, rows, cutoff or (rows[0].cutoff_hz if rows else float("nan")))
+
+
+def _sample(rig: RigModel, most: int = 5) -> list[RigTrial]:
+    """Training trials enough to choose a cut-off by."""
+    train = rig.select(validate=False)
+    return list(train[:: max(1, int(np.ceil(len(train) / most)))])
+
+
+def _unexplained(fit: DeclaredFit) -> float:
+    """Mean over joints of the log share of training effort left."""
+    shares: dict[str, list[float]] = {}
+    for row in fit.rows:
+        if not row.validate and row.trial not in fit.outliers:
+            shares.setdefault(row.joint, []).append(fit.quality[row.trial, row.joint])
+    return float(np.exp(np.mean([np.log(np.sqrt(np.mean(np.square(s))) + 1e-12) for s in shares.values()])))
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
+
+
+def _robust_fit(columns: tuple[Column, ...], rows: tuple[Rows, ...], cutoff: float) -> DeclaredFit:
+    train = [r for r in rows if not r.validate and r.moving.sum() > 10]
+    joints = sorted({r.joint for r in train})
+    size = {j: _rms(np.concatenate([_known(r, columns)[r.moving] for r in train if r.joint == j])) + 1e-300 for j in joints}
+    scale, weight = dict(size), {}
+    theta = np.array([c.value for c in columns])
+    for _ in range(12):
+        theta = fit_rows(columns, train, scale, weight)
+        left = {(r.trial, r.joint): _rms((r.effort - r.columns @ theta)[r.moving]) for r in train}
+        for j in joints:
+            scale[j] = max(float(np.median([left[r.trial, r.joint] for r in train if r.joint == j])), 1e-3 * size[j])
+        weight = {t: min(1.0, min((2.0 * scale[j] / max(left[t, j], 1e-300)) ** 2 for j in joints if (t, j) in left))
+                  for t in {r.trial for r in train}}  # fmt: skip
+    quality = {}
+    for r in rows:
+        m = r.moving
+        quality[r.trial, r.joint] = _rms((r.effort - r.columns @ theta)[m]) / (_rms(_known(r, columns)[m]) + 1e-300)
+    return DeclaredFit(columns, theta, scale, rows, cutoff, quality, ())
+
+
+def _known(row: Rows, columns: Sequence[Column]) -> Array:
+    """What the balance has to explain: the effort, or, on a passive or open joint, the largest declared term."""
+    if _rms(row.effort) > 0:
+        return row.effort
+    value = np.array([c.value for c in columns])
+    terms = row.columns * value
+    return terms[:, int(np.argmax(np.sum(terms**2, 0)))]

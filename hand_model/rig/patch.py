@@ -1,0 +1,159 @@
+"""Fitted numbers and named effects written into the rig's MJCF.
+
+What MuJoCo has an attribute for goes there. The rest is kept in the same file, as JSON in
+`custom/text[@name="hand_model"]`, and is applied by `replay.EffectStepper` (or the passive callback made from it).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import DescriptionError
+from .balance import Column, compile_model
+from .dynamics import INERTIAL, inertial_parameters
+from .model import RigModel
+
+Array = NDArray[np.float64]
+TEXT = "hand_model"
+
+
+def parse(xml: bytes) -> Any:
+    """The MJCF tree, comments kept."""
+    from lxml import etree
+
+    try:
+        return etree.fromstring(xml)
+    except etree.XMLSyntaxError as error:
+        raise DescriptionError(f"the rig's MJCF is not XML: {error}") from None
+
+
+def serialise(root: Any) -> bytes:
+    """The tree as bytes, the same for the same tree."""
+    from lxml import etree
+
+    return etree.tostring(root, encoding="utf-8", xml_declaration=False) + b"\n"
+
+
+def number(*values: float) -> str:
+    """Numbers with all their digits, blank between."""
+    return " ".join(repr(float(v)) for v in values)
+
+
+def find(root: Any, tag: str, name: str) -> Any:
+    """The element <tag name="name">; raises DescriptionError where there is none."""
+    for element in root.iter(tag):
+        if element.get("name") == name:
+            return element
+    raise DescriptionError(f'the rig\'s MJCF has no {tag} "{name}"')
+
+
+def write_declared(rig: RigModel, columns: Sequence[Column], theta: Array) -> bytes:
+    """The rig's MJCF with the fitted declared parameters (theta (P,) of columns) in place of the starting values."""
+    root = parse(rig.xml)
+    model = compile_model(rig)
+    values = {(c.kind, c.name, c.part): float(t) for c, t in zip(columns, theta, strict=True)}
+    _write_bodies(root, model, values)
+    for (kind, name, part), value in values.items():
+        if kind in ("armature", "damping", "frictionloss", "stiffness") and not part:
+            find(root, "joint", name).set(kind, number(value))
+        elif kind == "offset":
+            drive = _actuator(root, name)
+            drive.set("biasprm", number(value, 0.0, 0.0))
+        elif kind == "spring":
+            _tendon(root, name).set("stiffness", number(value))
+        elif kind == "back_emf":
+            gain = next(d for d in rig.drives if d.name == name)
+            constant = max(value, 1e-12) / abs(gain.gain)
+            _actuator(root, name).set("motorconst", number(constant, constant))
+            _actuator(root, name).set("resistance", number(constant * abs(gain.gear) / abs(gain.gain)))
+    return serialise(root)
+
+
+def _actuator(root: Any, name: str) -> Any:
+    for section in root.iter("actuator"):
+        for element in section:
+            if element.get("name") == name:
+                return element
+    raise DescriptionError(f'the rig\'s MJCF has no actuator "{name}"')
+
+
+def _tendon(root: Any, name: str) -> Any:
+    for section in root.iter("tendon"):
+        for element in section:
+            if element.get("name") == name:
+                return element
+    raise DescriptionError(f'the rig\'s MJCF has no tendon "{name}"')
+
+
+def _write_bodies(root: Any, model: Any, values: Mapping[tuple[str, str, str], float]) -> None:
+    """Mass, centre and inertia of every body whose parameters were fitted, kept physical."""
+    declared = inertial_parameters(model)
+    for b in range(1, model.nbody):
+        name = model.body(b).name
+        p = declared[b - 1].copy()
+        for i, part in enumerate(INERTIAL):
+            p[i] = values.get(("inertial", name, part), p[i])
+        if np.allclose(p, declared[b - 1], rtol=1e-12, atol=0):
+            continue
+        body = find(root, "body", name)
+        inertial = body.find("inertial")
+        if inertial is None:
+            continue
+        mass, centre, inertia = physical(p)
+        inertial.set("mass", number(mass))
+        inertial.set("pos", number(*centre))
+        for attribute in ("diaginertia", "fullinertia", "quat", "euler", "axisangle"):
+            inertial.attrib.pop(attribute, None)
+        if np.allclose(inertia, np.diag(np.diag(inertia)), atol=1e-12 * np.trace(inertia)):
+            inertial.set("diaginertia", number(*np.diag(inertia)))
+        else:
+            i = inertia
+            inertial.set("fullinertia", number(i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]))
+
+
+def physical(p: Array) -> tuple[float, Array, Array]:
+    """Mass [kg], centre (3,) [m], inertia about it (3, 3) [kg m2] of parameters (10,), the nearest that a body can have.
+
+    Moments that the motion does not show may be contradicted by those it does: they are raised until each principal
+    moment is at most the sum of the other two (triangle inequality; Traversaro et al. 2016).
+    """
+    mass = max(float(p[0]), 1e-6)
+    centre = p[1:4] / mass
+    about = np.array([[p[4], p[7], p[8]], [p[7], p[5], p[9]], [p[8], p[9], p[6]]])
+    inertia = about - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    level, axes = np.linalg.eigh(0.5 * (inertia + inertia.T))
+    level = np.maximum(level, 1e-9 * max(level.max(), 1e-9))
+    excess = level[2] - level[0] - level[1]
+    if excess > 0:
+        level[:2] += 0.5 * excess * (1 + 1e-9)
+    inertia = axes @ np.diag(level) @ axes.T
+    return mass, centre, inertia
+
+
+def write_effects(xml: bytes, effects: Sequence[Mapping[str, Any]]) -> bytes:
+    """The MJCF with effects that have no attribute kept as JSON in custom/text; [] removes them."""
+    root = parse(xml)
+    for section in root.findall("custom"):
+        for text in [t for t in section.findall("text") if t.get("name") == TEXT]:
+            section.remove(text)
+        if not len(section):
+            root.remove(section)
+    if effects:
+        from lxml import etree
+
+        section = etree.SubElement(root, "custom")
+        etree.SubElement(section, "text", name=TEXT, data=json.dumps(list(effects), sort_keys=True))
+    return serialise(root)
+
+
+def read_effects(xml: bytes) -> list[dict[str, Any]]:
+    """Effects that `write_effects` kept in an MJCF."""
+    for text in parse(xml).iter("text"):
+        if text.get("name") == TEXT:
+            return json.loads(text.get("data"))
+    return []

@@ -1,0 +1,215 @@
+"""The rig's file in MuJoCo against its recordings: motion simulated in open loop, effort by inverse dynamics."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..session import Session
+from .balance import Rows, compile_model, declared_columns, trial_rows
+from .model import RigModel, RigTrial, load_rig
+from .patch import read_effects
+from .states import choose_cutoff, differentiate, fill_gaps, low_pass, uniform_time
+from .swing import INDEX, vector
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class JointResidual:
+    """What differs at one joint in one trial.
+
+    position_rmse [rad or m]: simulated in open loop over the whole trial minus recorded (nan where that was not run or
+    left the recorded range by more than its width: diverged). effort_rmse [N m or N]: recorded effort minus inverse
+    dynamics at the recorded motion, moving samples only (nan where no effort is known).
+    """
+
+    trial: str
+    joint: str
+    validate: bool
+    position_rmse: float
+    position_mae: float
+    effort_rmse: float
+    samples: int
+    time_s: Array = field(repr=False, default_factory=lambda: np.zeros(0))
+    simulated: Array = field(repr=False, default_factory=lambda: np.zeros(0))
+
+
+@dataclass(frozen=True)
+class RigResiduals:
+    """All residuals of a session, and figures over several trials."""
+
+    joints: tuple[JointResidual, ...]
+
+    def figure(self, metric: str, validate: bool, joint: str | None = None) -> float:
+        """Root mean square (or mean, of position_mae) over trials, weighted by samples; nan where there is none."""
+        chosen = [r for r in self.joints if r.validate == validate and joint in (None, r.joint)]
+        values = np.array([getattr(r, metric) for r in chosen])
+        weight = np.array([r.samples for r in chosen], float)
+        good = np.isfinite(values)
+        if not good.any():
+            return float("nan")
+        power = 1 if metric.endswith("mae") else 2
+        return float((np.sum(weight[good] * values[good] ** power) / weight[good].sum()) ** (1 / power))
+
+
+class EffectStepper:
+    """Applies the effects that a file keeps in custom/text, between mj_step1 and mj_step2.
+
+    Dry friction enters as the bound of MuJoCo's friction constraint, everything else as passive force: what the
+    passive callback (mjcb_passive) can do too, and `passive` is that callback.
+    """
+
+    def __init__(self, model: Any, effects: list[dict[str, Any]]) -> None:
+        self.model = model
+        self.coulomb = np.array(model.dof_frictionloss)
+        self.entries = [(model.joint(e["joint"]).id, e["swing"]) for e in effects if "swing" in e]
+
+    def delay_s(self) -> float:
+        """By how much the drive acts late [s]."""
+        return max((e.get("delay", 0.0) for _, e in self.entries), default=0.0)
+
+    def control(self, drive: Array, supply: Array) -> Array:
+        """The recorded control (n,) less sag and scaled with the supply; drive in the unit of effort per gain."""
+        out = drive
+        for joint, e in self.entries:
+            gain = self._gain(joint)
+            out = out * (1.0 + e.get("supply", 0.0) * supply)
+            out = out * (1.0 - e.get("sag", 0.0) * np.abs(gain * out))
+        return out
+
+    def _gain(self, joint: int) -> float:
+        for a in range(self.model.nu):
+            if self.model.actuator_trnid[a, 0] == joint:
+                resistance, constant = self.model.actuator_gainprm[a, :2]
+                return float(constant / resistance)
+        return 0.0
+
+    def passive(self, model: Any, data: Any) -> None:
+        """Add the effects to qfrc_passive and to the bound of dry friction, at the state in `data`."""
+        for joint, e in self.entries:
+            get = e.get
+            q, v = float(data.qpos[joint]), float(data.qvel[joint])
+            external = -float(data.qfrc_bias[joint]) + get("offset", 0.0)
+            data.qfrc_passive[joint] += get("offset", 0.0) - get("lateral", 0.0) * np.cos(q) - get("stiffness", 0.0) * q
+            external += -get("lateral", 0.0) * np.cos(q) - get("stiffness", 0.0) * q - get("offset", 0.0)
+            shaft = float(data.qfrc_actuator[joint])
+            damping = get("load_speed", 0.0) * abs(external) + get("damping_asymmetry", 0.0) * np.sign(v)
+            data.qfrc_passive[joint] -= damping * v
+            low = np.exp(-((v / get("stribeck_speed", 1.0)) ** 2))
+            more = (get("load_gear", 0.0) * abs(external - shaft) + get("load_motor", 0.0) * abs(shaft)
+                    + get("load_external", 0.0) * abs(external) + get("motor_squared", 0.0) * shaft**2
+                    + get("external_squared", 0.0) * external**2 + get("asymmetry", 0.0) * np.sign(v)
+                    + low * (get("static_excess", 0.0) + get("load_gear_low", 0.0) * abs(external - shaft)
+                             + get("load_motor_low", 0.0) * abs(shaft) + get("load_external_low", 0.0) * abs(external)))  # fmt: skip
+            # the bound takes effect in the next step: the constraint of this one stands already
+            model.dof_frictionloss[joint] = max(self.coulomb[joint] + more, 1e-9)
+
+
+def simulate_trial(rig: RigModel, trial: RigTrial) -> tuple[Array, Array]:
+    """Positions (n, joints) simulated in open loop at the trial's time stamps (n,), and those stamps.
+
+    Start: recorded position and smoothed velocity. Recorded effort or control goes in; nothing is fed back.
+    """
+    import mujoco
+
+    model = compile_model(rig, trial)
+    data = mujoco.MjData(model)
+    effects = EffectStepper(model, read_effects(rig.xml))
+    step = float(model.opt.timestep)
+    grid = np.arange(0.0, trial.time_s[-1] + step, step)
+    control = _controls(rig, trial, model, effects, grid)
+    data.qpos[:], data.qvel[:] = recorded_start(rig, trial)
+    out = np.empty((len(grid), model.nq))
+    plain = not effects.entries
+    for k in range(len(grid)):
+        out[k] = data.qpos
+        data.ctrl[:] = control[k]
+        if plain:
+            mujoco.mj_step(model, data)
+            continue
+        mujoco.mj_step1(model, data)
+        mujoco.mj_fwdActuation(model, data)
+        effects.passive(model, data)
+        mujoco.mj_step2(model, data)
+        if not np.isfinite(data.qpos).all():
+            out[k:] = np.nan
+            break
+    at = np.stack([np.interp(trial.time_s, grid, column) for column in out.T], 1)
+    return trial.time_s, at
+
+
+def recorded_start(rig: RigModel, trial: RigTrial) -> tuple[Array, Array]:
+    """Recorded position and smoothed velocity (joints,) at the first sample."""
+    grid = uniform_time(trial.time_s)
+    rate = 1.0 / (grid[1] - grid[0])
+    q0, v0 = [], []
+    for joint in rig.joints:
+        raw = np.interp(grid, trial.time_s, fill_gaps(trial.time_s, trial.position[joint]))
+        smooth = low_pass(raw, rate, choose_cutoff(raw, rate))
+        q0.append(smooth[0])
+        v0.append(differentiate(smooth, rate)[0])
+    return np.array(q0), np.array(v0)
+
+
+def _controls(rig: RigModel, trial: RigTrial, model: Any, effects: EffectStepper, grid: Array) -> Array:
+    """Control of every actuator (n, nu) on the simulation's grid, late and sagging where the file says so."""
+    out = np.zeros((len(grid), model.nu))
+    at = grid - effects.delay_s()
+    supply = np.zeros(len(grid))
+    for channel in ("supply", "voltage_supply", "bus_voltage"):
+        if channel in trial.extra:
+            level = fill_gaps(trial.time_s, trial.extra[channel])
+            supply = np.interp(grid, trial.time_s, level / np.mean(level) - 1.0)
+    for drive in rig.drives:
+        a = model.actuator(drive.name).id
+        if drive.joint in trial.voltage:
+            out[:, a] = effects.control(np.interp(at, trial.time_s, fill_gaps(trial.time_s, trial.voltage[drive.joint])), supply)
+        elif drive.kind == "position" and drive.joint in trial.setpoint:
+            out[:, a] = np.interp(at, trial.time_s, fill_gaps(trial.time_s, trial.setpoint[drive.joint]))
+        elif drive.joint in trial.effort and drive.gain:
+            effort = np.interp(at, trial.time_s, fill_gaps(trial.time_s, trial.effort[drive.joint]))
+            out[:, a] = effort / drive.gain
+    return out
+
+
+def replay_rig(session: Session, model: bytes | RigModel | None = None, simulate: bool = True) -> RigResiduals:
+    """Replay every trial of a rig session on its own file, or on `model` (MJCF bytes, or a RigModel).
+
+    Raises SessionError and DescriptionError as `load_rig` does.
+    """
+    rig = model if isinstance(model, RigModel) else load_rig(session, model)
+    columns = declared_columns(rig)
+    theta = np.array([c.value for c in columns])
+    out: list[JointResidual] = []
+    for trial in rig.trials:
+        rows = {r.joint: r for r in trial_rows(rig, trial, columns)}
+        if not all(j in trial.position for j in rig.joints):
+            continue
+        time_s, simulated = simulate_trial(rig, trial) if simulate else (trial.time_s, None)
+        for i, joint in enumerate(rig.joints):
+            out.append(_residual(trial, joint, time_s, None if simulated is None else simulated[:, i], rows.get(joint), theta))
+    return RigResiduals(tuple(out))
+
+
+def _residual(trial: RigTrial, joint: str, time_s: Array, simulated: Array | None, row: Rows | None, theta: Array) -> JointResidual:
+    recorded = fill_gaps(trial.time_s, trial.position[joint])
+    rmse = mae = float("nan")
+    if simulated is not None:
+        error = simulated - recorded
+        if np.isfinite(error).all() and np.abs(error).max() < 2 * np.ptp(recorded) + 1e-9:
+            rmse, mae = float(np.sqrt(np.mean(error**2))), float(np.mean(np.abs(error)))
+    effort = float("nan")
+    if row is not None and row.moving.any():
+        effort = float(np.sqrt(np.mean((row.effort - row.columns @ theta)[row.moving] ** 2)))
+    return JointResidual(trial.name, joint, trial.validate, rmse, mae, effort, len(recorded), time_s,
+                         np.zeros(0) if simulated is None else simulated)  # fmt: skip
+
+
+def swing_vector(effects: list[Mapping[str, Any]]) -> Array:
+    """Swing parameters that a file keeps, as a vector with all else neutral."""
+    return vector({k: v for e in effects for k, v in e.get("swing", {}).items() if k in INDEX})

@@ -1,0 +1,71 @@
+"""Smooth states of a recorded joint: position, velocity and acceleration by one zero-phase filter, effort by the same.
+
+The cut-off is chosen from the recording: as high as the position noise lets the acceleration be (Gautier 1997 asks for
+both sides of the balance to pass one filter; the cut-off rule is ours).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+NOISE_SHARE = 0.03  # acceleration noise allowed, as a share of the acceleration itself
+ORDER = 4
+
+
+def fill_gaps(time_s: Array, values: Array) -> Array:
+    """Linear interpolation over lost samples (nan), (n,); constant beyond the ends."""
+    good = np.isfinite(values)
+    return values if good.all() else np.interp(time_s, time_s[good], values[good])
+
+
+def uniform_time(time_s: Array) -> Array:
+    """An even grid over the trial at the median rate, (m,) [s]."""
+    step = float(np.median(np.diff(time_s)))
+    return np.arange(int(np.floor((time_s[-1] - time_s[0]) / step + 1e-6)) + 1) * step + time_s[0]
+
+
+def noise_std(values: Array) -> float:
+    """Standard deviation of the white part of an evenly sampled signal, from fourth differences, or its step/sqrt(12)."""
+    fourth = np.diff(values, 4)
+    white = float(np.median(np.abs(fourth - np.median(fourth)))) / 0.6745 / np.sqrt(70.0)
+    levels = np.unique(values)
+    step = float(np.median(np.diff(levels))) if 1 < len(levels) < 0.5 * len(values) else 0.0
+    return max(white, step / np.sqrt(12.0), 1e-12 * (np.ptp(values) + 1e-12))
+
+
+def low_pass(values: Array, rate_hz: float, cutoff_hz: float) -> Array:
+    """Zero-phase Butterworth low-pass (both ways, order 4) along the first axis; no change where the cut-off is too high."""
+    from scipy.signal import butter, sosfiltfilt
+
+    if cutoff_hz >= 0.45 * rate_hz or len(values) < 30:
+        return values
+    sos = butter(ORDER // 2, cutoff_hz / (0.5 * rate_hz), output="sos")
+    pad = min(len(values) - 2, int(3 * rate_hz / cutoff_hz))
+    return sosfiltfilt(sos, values, axis=0, padlen=pad)
+
+
+def differentiate(values: Array, rate_hz: float) -> Array:
+    """Central differences, second order, (n,)."""
+    return np.gradient(values, 1.0 / rate_hz, axis=0, edge_order=2)
+
+
+def choose_cutoff(position: Array, rate_hz: float) -> float:
+    """Highest cut-off [Hz] at which white position noise is at most NOISE_SHARE of the acceleration, (n,) even samples."""
+    sigma = noise_std(position)
+    best = 1.0
+    for cutoff in np.geomspace(1.0, 0.25 * rate_hz, 25) if rate_hz > 4 else [0.25 * rate_hz]:
+        acceleration = differentiate(differentiate(low_pass(position, rate_hz, cutoff), rate_hz), rate_hz)
+        noise = sigma * np.sqrt(2.0 / rate_hz * (2 * np.pi) ** 4 * cutoff**5 / 5.0)
+        if noise <= NOISE_SHARE * float(np.std(acceleration)):
+            best = float(cutoff)
+        elif cutoff > best * 1.5:
+            break
+    return min(best, 0.25 * rate_hz)
+
+
+def velocity_noise(position: Array, rate_hz: float, cutoff_hz: float) -> float:
+    """Standard deviation of the smoothed velocity's noise [position unit / s]."""
+    return noise_std(position) * np.sqrt(2.0 / rate_hz * (2 * np.pi) ** 2 * cutoff_hz**3 / 3.0)

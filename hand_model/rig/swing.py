@@ -1,0 +1,287 @@
+"""One joint simulated many times at once: trials x parameter sets in the lanes of one vector, and its output-error fit.
+
+Semi-implicit Euler with implicit damping and the friction impulse clipped to what stops the joint within a step
+(as in MuJoCo's and BAM's discrete dry friction). Output error after Ljung (1999, ch. 7): the recorded drive in, the
+simulated position out, nothing filtered.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+STEP_S = 2e-3
+
+# All physics the simulator knows. Declared first; the rest is zero (or neutral) unless an effect is being tried.
+PARAMETERS = (
+    "inertia", "gain", "back_emf", "damping", "coulomb",  # declared
+    "static_excess", "stribeck_speed",  # + static_excess exp(-(v / vs)^2)
+    "load_gear", "load_motor", "load_external",  # + k |tau_external - tau_motor|, k |tau_motor|, k |tau_external|
+    "load_gear_low", "load_motor_low", "load_external_low",  # the same, times exp(-(v / vs)^2)
+    "motor_squared", "external_squared",  # + k tau^2
+    "load_speed",  # damping that grows with |tau_external|
+    "asymmetry", "damping_asymmetry", "drag", "offset", "lateral", "stiffness",
+    "sag", "supply", "delay",
+)  # fmt: skip
+INDEX = {name: i for i, name in enumerate(PARAMETERS)}
+DECLARED = PARAMETERS[:5]
+
+
+@dataclass(frozen=True)
+class Lane:
+    """One stretch of one trial to be simulated: drive and measured position on an even grid of the swing's step_s.
+
+    drive (n,): recorded voltage, or effort, or zeros; live: drive connected; position (n,) [rad or m]; start: (q, v);
+    supply (n,): relative deviation of the supply from its mean; used (n,): weights 0 or 1 (recorded, not padded).
+    """
+
+    trial: str
+    validate: bool
+    drive: Array
+    live: float
+    position: Array
+    start: tuple[float, float]
+    supply: Array
+    used: Array
+    coulomb_scale: float = 1.0
+
+
+@dataclass(frozen=True)
+class Swing:
+    """All stretches of a session, and the joint's weight: gravity effort = sine sin q + cosine cos q (what holds it)."""
+
+    lanes: tuple[Lane, ...]
+    sine: float
+    cosine: float
+    initial: Mapping[str, float]
+    driven: bool
+    step_s: float = STEP_S
+
+    def train(self) -> Array:
+        """Indices of stretches that may be fitted."""
+        return np.array([i for i, lane in enumerate(self.lanes) if not lane.validate])
+
+
+def vector(values: Mapping[str, float]) -> Array:
+    """Parameter vector from names; what is not named is neutral."""
+    out = np.zeros(len(PARAMETERS))
+    out[INDEX["stribeck_speed"]] = 1.0
+    for name, value in values.items():
+        out[INDEX[name]] = value
+    return out
+
+
+def simulate(swing: Swing, theta: Array, lanes: Array) -> Array:
+    """Positions (steps, L) of L runs: run l simulates stretch lanes[l] with parameters theta[l]; (L, len(PARAMETERS))."""
+    chosen = [swing.lanes[i] for i in lanes]
+    steps = max(len(c.position) for c in chosen)
+    drive = _delayed(swing, theta, lanes, steps)
+    p = {name: np.ascontiguousarray(theta[:, i]) for name, i in INDEX.items()}
+    live = np.array([c.live for c in chosen])
+    q = np.array([c.start[0] for c in chosen])
+    v = np.array([c.start[1] for c in chosen])
+    scale = np.array([c.coulomb_scale for c in chosen])
+    h = swing.step_s
+    hi = h / p["inertia"]
+    coulomb, emf = p["coulomb"] * scale, p["back_emf"] * live
+    viscous = p["damping"] + emf
+    lateral, has = swing.cosine + p["lateral"], {k: bool(np.any(p[k])) for k in PARAMETERS}
+    low = has["static_excess"] or has["load_gear_low"] or has["load_motor_low"] or has["load_external_low"]
+    inverse = 1.0 / p["stribeck_speed"]
+    out = np.empty((steps, len(chosen)))
+    gentle = has["load_gear_low"] or has["load_motor_low"] or has["load_external_low"]
+    for k in range(steps):
+        out[k] = q
+        external = -(swing.sine * np.sin(q) + lateral * np.cos(q))
+        if has["stiffness"]:
+            external = external - p["stiffness"] * q
+        motor = drive[k]
+        friction = coulomb
+        shaft = motor - emf * v
+        if has["load_gear"]:
+            friction = friction + p["load_gear"] * np.abs(external - shaft)
+        if has["load_motor"]:
+            friction = friction + p["load_motor"] * np.abs(shaft)
+        if has["load_external"]:
+            friction = friction + p["load_external"] * np.abs(external)
+        if low:
+            level = p["static_excess"]
+            if gentle:
+                level = (level + p["load_gear_low"] * np.abs(external - shaft) + p["load_motor_low"] * np.abs(shaft)
+                         + p["load_external_low"] * np.abs(external))  # fmt: skip
+            friction = friction + level * np.exp(-((v * inverse) ** 2))
+        if has["motor_squared"] or has["external_squared"]:
+            friction = friction + p["motor_squared"] * shaft**2 + p["external_squared"] * external**2
+        b = viscous
+        if has["load_speed"]:
+            b = b + p["load_speed"] * np.abs(external)
+        if has["drag"]:
+            b = b + p["drag"] * np.abs(v)
+        if has["asymmetry"]:
+            friction = friction + p["asymmetry"] * np.sign(v)
+        if has["damping_asymmetry"]:
+            b = b + p["damping_asymmetry"] * np.sign(v)
+        free = (v + hi * (external + motor + p["offset"])) / (1.0 + hi * b)
+        v = np.sign(free) * np.maximum(np.abs(free) - hi * np.maximum(friction, 0.0) / (1.0 + hi * b), 0.0)
+        q = q + h * v
+    return out
+
+
+def _delayed(swing: Swing, theta: Array, lanes: Array, steps: int) -> Array:
+    """Drive effort (steps, L): gain x recorded drive, late by the delay, less by sag, scaled by the supply."""
+    out = np.zeros((steps, len(lanes)))
+    if not swing.driven:
+        return out
+    for i in np.unique(lanes):
+        lane, mine = swing.lanes[i], np.flatnonzero(lanes == i)
+        if lane.live == 0:
+            continue
+        n = len(lane.drive)
+        t = theta[mine]
+        delay = t[:, INDEX["delay"]] / swing.step_s
+        if np.any(delay):
+            at = np.clip(np.arange(n)[:, None] - delay, 0, n - 1.0001)
+            low = at.astype(int)
+            u = lane.drive[low] * (1 - (at - low)) + lane.drive[np.minimum(low + 1, n - 1)] * (at - low)
+        else:
+            u = np.repeat(lane.drive[:, None], len(mine), 1)
+        u = u * (1.0 + t[:, INDEX["supply"]] * lane.supply[:, None]) * t[:, INDEX["gain"]]
+        out[:n, mine] = u * (1.0 - t[:, INDEX["sag"]] * np.abs(u))
+    return out
+
+
+def errors(swing: Swing, theta: Array, lanes: Array) -> Array:
+    """Position residuals (steps, L), zero where nothing was recorded."""
+    simulated = simulate(swing, theta, lanes)
+    out = np.zeros_like(simulated)
+    for run, i in enumerate(lanes):
+        lane = swing.lanes[i]
+        n = len(lane.position)
+        out[:n, run] = np.nan_to_num(simulated[:n, run] - lane.position, nan=1e3, posinf=1e3, neginf=-1e3) * lane.used
+    return np.clip(out, -10.0, 10.0)
+
+
+@dataclass(frozen=True)
+class Task:
+    """One fit among many that run together. free: names; start: all parameters; stretches: which may be fitted."""
+
+    free: tuple[str, ...]
+    start: Array
+    stretches: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A task's result: theta (len(PARAMETERS),), its mean squared error on its stretches, evaluations used."""
+
+    theta: Array
+    cost: float
+    evaluations: int
+
+
+LOW = {"inertia": 1e-9, "stribeck_speed": 1e-3, "asymmetry": -np.inf, "damping_asymmetry": -np.inf, "offset": -np.inf,
+       "lateral": -np.inf, "stiffness": -np.inf, "supply": -1.0, "delay": 0.0, "load_speed": 0.0}  # fmt: skip
+
+
+def typical(swing: Swing) -> Array:
+    """A natural size of every parameter: the unit in which steps are taken and differences made."""
+    i = swing.initial
+    weight = max(abs(swing.sine), abs(swing.cosine), i.get("coulomb", 0.0), 1e-12)
+    speed = 3.0 * max(np.ptp(lane.position) for lane in swing.lanes)
+    dry = max(i.get("coulomb", 0.0), 1e-4 * weight)
+    wet = max(i.get("damping", 0.0), 0.1 * dry / speed)
+    share = dry / weight
+    size = {"inertia": i["inertia"], "gain": i.get("gain", 1.0), "back_emf": i.get("back_emf", 1.0), "damping": wet,
+            "coulomb": dry, "static_excess": dry, "stribeck_speed": 0.1 * speed, "motor_squared": share / weight,
+            "external_squared": share / weight, "load_speed": wet / weight, "asymmetry": dry, "drag": wet / speed,
+            "damping_asymmetry": wet, "offset": dry, "lateral": dry, "stiffness": dry,
+            "sag": 0.1 / weight, "supply": 0.5, "delay": 0.01}  # fmt: skip
+    size = {k: v or 1.0 for k, v in size.items()} | {k: share for k in PARAMETERS if k.startswith("load_") and k not in size}
+    return vector(size)
+
+
+def fit_together(swing: Swing, tasks: Sequence[Task], iterations: int = 14) -> list[Fitted]:
+    """Levenberg-Marquardt on all tasks at once: every Jacobian column of every task is a lane of one simulation."""
+    unit = typical(swing)
+    low = np.array([LOW.get(name, 0.0) for name in PARAMETERS])
+    theta = [t.start.copy() for t in tasks]
+    damping = np.full(len(tasks), 1e-2)
+    cost = np.full(len(tasks), np.inf)
+    count = np.zeros(len(tasks), int)
+    active = np.ones(len(tasks), bool)
+    jacobians: list = [None] * len(tasks)
+    for _ in range(iterations):
+        todo = [k for k in range(len(tasks)) if active[k]]
+        if not todo:
+            break
+        for k, (r, jac) in zip(todo, _jacobians(swing, [(tasks[k], theta[k]) for k in todo], unit, low), strict=True):
+            cost[k] = float(r @ r)
+            jacobians[k] = (r, jac)
+            count[k] += len(tasks[k].free) + 1
+        trials = {k: [_moved(tasks[k], theta[k], *jacobians[k], damping[k] * f, unit, low) for f in (0.1, 1.0, 10.0, 100.0)]
+                  for k in todo}  # fmt: skip
+        values = _costs(swing, [(tasks[k], t) for k in todo for t in trials[k]])
+        for n, k in enumerate(todo):
+            mine = values[4 * n : 4 * n + 4]
+            count[k] += 4
+            best = int(np.argmin(mine))
+            if mine[best] < cost[k]:
+                active[k] = mine[best] < cost[k] * (1 - 1e-4) or damping[k] < 1e-6
+                theta[k], cost[k] = trials[k][best], mine[best]
+                damping[k] = np.clip(damping[k] * (0.1, 1.0, 10.0, 100.0)[best], 1e-7, 1e7)
+            else:
+                damping[k] *= 300.0
+                active[k] = damping[k] < 1e6
+    size = [sum(swing.lanes[i].used.sum() for i in t.stretches) for t in tasks]
+    return [Fitted(th, c / max(s, 1), int(n)) for th, c, s, n in zip(theta, cost, size, count, strict=True)]
+
+
+def _moved(task: Task, theta: Array, r: Array, jac: Array, damping: float, unit: Array, low: Array) -> Array:
+    free = [INDEX[n] for n in task.free]
+    h = jac.T @ jac
+    h = h + damping * np.diag(np.diag(h) + 1e-9 * np.trace(h) / len(free) + 1e-12)
+    step = -np.linalg.solve(h, jac.T @ r) * unit[free]
+    out = theta.copy()
+    out[free] = np.maximum(theta[free] + np.clip(step, -5 * unit[free], 5 * unit[free]), low[free])
+    return out
+
+
+def _runs(pairs: Sequence[tuple[Task, Array]]) -> tuple[Array, Array]:
+    theta = np.concatenate([np.repeat(t[None], len(task.stretches), 0) for task, t in pairs])
+    return theta, np.concatenate([np.array(task.stretches) for task, _ in pairs])
+
+
+def _costs(swing: Swing, pairs: Sequence[tuple[Task, Array]]) -> Array:
+    theta, lanes = _runs(pairs)
+    square = np.sum(errors(swing, theta, lanes) ** 2, 0)
+    edges = np.cumsum([0] + [len(task.stretches) for task, _ in pairs])
+    return np.array([square[a:b].sum() for a, b in zip(edges[:-1], edges[1:], strict=True)])
+
+
+def _jacobians(swing: Swing, pairs: Sequence[tuple[Task, Array]], unit: Array, low: Array) -> list[tuple[Array, Array]]:
+    """Residuals (n,) and Jacobian (n, free) in units of `unit`, central where the bounds allow."""
+    varied = []
+    for task, theta in pairs:
+        varied.append((task, theta))
+        for name in task.free:
+            i = INDEX[name]
+            moved = theta.copy()
+            moved[i] += 3e-3 * unit[i]
+            varied.append((task, moved))
+    theta, lanes = _runs(varied)
+    residual = errors(swing, theta, lanes)
+    out, at = [], 0
+    for task, _ in pairs:
+        n = len(task.stretches)
+        r = residual[::3, at : at + n].T.ravel() * np.sqrt(3.0)
+        columns = []
+        for j in range(len(task.free)):
+            b = at + n * (j + 1)
+            columns.append((residual[::3, b : b + n].T.ravel() * np.sqrt(3.0) - r) / 3e-3)
+        out.append((r, np.stack(columns, 1)))
+        at += n * (len(task.free) + 1)
+    return out

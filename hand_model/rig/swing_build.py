@@ -1,0 +1,76 @@
+"""A session with one moving joint as stretches to simulate: even grids, recorded starts, the joint's weight."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .balance import compile_model
+from .declared import DeclaredFit
+from .dynamics import inertial_columns, inertial_parameters
+from .model import RigModel, RigTrial
+from .states import choose_cutoff, differentiate, fill_gaps, low_pass, uniform_time
+from .swing import STEP_S, Lane, Swing
+
+LONGEST_S = 8.0  # a longer trial is fitted in stretches (multiple shooting, Bock 1981), so that phase errors stay small
+
+
+def can_swing(rig: RigModel) -> bool:
+    """Whether the rig is one joint whose drive is a voltage or absent: then simulation in open loop is the natural test."""
+    drive = rig.drive(rig.joints[0])
+    return len(rig.joints) == 1 and (drive is None or drive.kind == "voltage")
+
+
+def build_swing(rig: RigModel, fit: DeclaredFit, step_s: float = STEP_S, longest_s: float = LONGEST_S) -> Swing:
+    """Stretches of all trials, and the declared parameters as a start.
+
+    The scale of effort is the declared weight's where there is gravity, else the declared inertia's: motion alone shows
+    ratios only.
+    """
+    model = compile_model(rig)
+    joint = rig.joints[0]
+    zero, right = np.zeros((1, 1)), np.full((1, 1), np.pi / 2)
+    theta = inertial_parameters(model)
+    gravity = np.array(model.opt.gravity)
+    weight = [float(np.sum(inertial_columns(model, q, zero, zero, gravity)[0, 0] * theta)) for q in (zero, right)]
+    inertia = float(np.sum(inertial_columns(model, zero, zero, zero + 1, 0 * gravity)[0, 0] * theta))
+    drive = rig.drive(joint)
+    initial = {
+        "inertia": inertia + float(model.dof_armature[0]),
+        "damping": float(model.dof_damping[0]),
+        "coulomb": float(model.dof_frictionloss[0]),
+    }
+    if drive is not None:
+        initial["gain"] = drive.gain
+        initial["back_emf"] = next((c.value for c in fit.columns if c.kind == "back_emf"), 0.0)
+    lanes = tuple(lane for t in rig.trials for lane in _stretches(rig, t, step_s, longest_s))
+    return Swing(lanes, weight[1], weight[0], initial, drive is not None, step_s)
+
+
+def _stretches(rig: RigModel, trial: RigTrial, step_s: float, longest_s: float) -> list[Lane]:
+    joint = rig.joints[0]
+    if joint not in trial.position:
+        return []
+    grid = uniform_time(trial.time_s)
+    rate = 1.0 / (grid[1] - grid[0])
+    raw = np.interp(grid, trial.time_s, fill_gaps(trial.time_s, trial.position[joint]))
+    smooth = low_pass(raw, rate, choose_cutoff(raw, rate))
+    velocity = differentiate(smooth, rate)
+    fine = np.arange(0.0, grid[-1], step_s)
+    position = np.interp(fine, trial.time_s, fill_gaps(trial.time_s, trial.position[joint]))
+    voltage = trial.voltage.get(joint)
+    drive = np.zeros(len(fine)) if voltage is None else np.interp(fine, trial.time_s, fill_gaps(trial.time_s, voltage))
+    supply = np.zeros(len(fine))
+    for channel in ("supply", "voltage_supply", "bus_voltage"):
+        if channel in trial.extra:
+            level = fill_gaps(trial.time_s, trial.extra[channel])
+            supply = np.interp(fine, trial.time_s, level / np.mean(level) - 1.0)
+    pieces = max(1, int(np.ceil(fine[-1] / longest_s)))
+    size = len(fine) // pieces
+    live = 1.0 if joint in trial.live else 0.0
+    out = []
+    for k in range(pieces):
+        s = slice(k * size, (k + 1) * size if k < pieces - 1 else len(fine))
+        start = (float(np.interp(fine[s.start], grid, smooth)), float(np.interp(fine[s.start], grid, velocity)))
+        out.append(Lane(trial.name, trial.validate, drive[s], live, position[s], start, supply[s],
+                        np.ones(len(position[s]))))  # fmt: skip
+    return out

@@ -1,0 +1,187 @@
+"""Effects of a simulated joint compete by the motion of recordings that they were not fitted to.
+
+Every candidate is fitted to all training recordings first; the best few are fitted again with recordings left out, and
+only the error on those decides. All fits of a round run in one batch of lanes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .swing import DECLARED, INDEX, Fitted, Swing, Task, errors, fit_together
+
+Array = NDArray[np.float64]
+FOLDS, RESAMPLES, SHORTLIST = 4, 600, 6
+LEAST_GAIN, LEAST_PROBABILITY, MOST_TERMS = 0.05, 0.95, 4
+PARTS = 4  # a recording's error is resampled in so many parts
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One way an effect can act: starting values of the parameters it frees (fractions of the declared scale)."""
+
+    effect: str
+    name: str
+    start: Mapping[str, float]
+
+    @property
+    def key(self) -> str:
+        """effect, with the variant where there is one."""
+        return self.effect + (f"/{self.name}" if self.name else "")
+
+
+@dataclass(frozen=True)
+class Round:
+    """A round of the competition. error of "none" and of the winner (blocks,), winner, rivals with probabilities."""
+
+    variant: Variant
+    probability: float
+    gain: float
+    rivals: tuple[tuple[str, float], ...]
+    equals: tuple[str, ...]
+
+
+def variants(swing: Swing) -> tuple[Variant, ...]:
+    """What may be missing at a joint driven by a voltage (or by nothing)."""
+    speed = float(np.percentile(np.concatenate([np.abs(np.diff(lane.position)) for lane in swing.lanes]), 97)) / swing.step_s
+    out = [Variant("stribeck_friction", f"{k:g}", {"static_excess": 0.0, "stribeck_speed": k * speed}) for k in (0.05, 0.2)]
+    out += [
+        Variant("asymmetric_friction", "", {"offset": 0.0}),
+        Variant("asymmetric_viscous_friction", "", {"damping_asymmetry": 0.0}),
+        Variant("quadratic_damping", "", {"drag": 0.0}),
+        Variant("nonlinear_spring", "", {"stiffness": 0.0}),
+    ]
+    if swing.sine or swing.cosine:
+        out += [
+            Variant("load_dependent_friction", "external", {"load_external": 0.0}),
+            Variant("load_dependent_friction", "with speed", {"load_speed": 0.0}),
+            Variant("load_dependent_friction", "low speed", {"load_external_low": 0.0, "stribeck_speed": 0.2 * speed}),
+            Variant("gravity_load", "centre of mass off its axis", {"lateral": 0.0}),
+            Variant("gravity_load", "off its axis, and offset", {"lateral": 0.0, "offset": 0.0}),
+        ]
+    if swing.driven:
+        out += [
+            Variant("load_dependent_friction", "gear", {"load_gear": 0.0}),
+            Variant("load_dependent_friction", "motor", {"load_motor": 0.0}),
+            Variant("load_dependent_friction", "directional", {"load_motor": 0.0, "load_external": 0.0}),
+            Variant("drive_sag", "", {"sag": 0.0}),
+            Variant("command_delay", "", {"delay": 0.005}),
+        ]
+        if any(np.any(lane.supply) for lane in swing.lanes):
+            out.append(Variant("drive_sag", "supply", {"supply": 0.0}))
+    return tuple(out)
+
+
+def free_declared(swing: Swing) -> tuple[str, ...]:
+    """The declared parameters of this joint; the scale (the weight) is not among them."""
+    return tuple(n for n in DECLARED if n in swing.initial and (n != "inertia" or swing.sine or swing.cosine or swing.driven))
+
+
+def _blocks(swing: Swing, theta: Array, lanes: Sequence[int]) -> Array:
+    """Squared error of every part of every stretch, (len(lanes) * PARTS,), mean within it."""
+    residual = errors(swing, np.repeat(theta[None], len(lanes), 0), np.array(lanes))
+    out = []
+    for run, lane in enumerate(lanes):
+        n = len(swing.lanes[lane].position)
+        out += [float(np.mean(p**2)) * len(p) for p in np.array_split(residual[:n, run], PARTS)]
+    return np.array(out)
+
+
+def compete_swing(swing: Swing, declared: Fitted) -> tuple[tuple[Variant, ...], Fitted, tuple[Round, ...]]:
+    """Forward selection; returns the variants taken, the fit with all of them, and the rounds."""
+    train = tuple(int(i) for i in swing.train())
+    trials = list(dict.fromkeys(swing.lanes[i].trial for i in train))
+    folds = _folds(swing, train, trials)
+    taken: tuple[Variant, ...] = ()
+    current, rounds = declared, []
+    while len(taken) < MOST_TERMS:
+        free = _free(swing, taken)
+        rivals = [v for v in variants(swing) if not set(v.start) <= set(free)]
+        tasks = [Task(_free(swing, (*taken, v)), _started(current.theta, v), train) for v in rivals]
+        fits = fit_together(swing, tasks, 10)
+        order = sorted(range(len(rivals)), key=lambda k: fits[k].cost)[:SHORTLIST]
+        none, scores = _left_out(swing, folds, (Task(free, current.theta, train), current),
+                                 [(tasks[k], fits[k]) for k in order])  # fmt: skip
+        found = _judge(none, scores, [rivals[k] for k in order], [len(tasks[k].free) for k in order])
+        if found is None:
+            break
+        best, round_ = found
+        taken = (*taken, rivals[order[best]])
+        current = polish(swing, Task(_free(swing, taken), fits[order[best]].theta, train))
+        rounds.append(round_)
+    return taken, current, tuple(rounds)
+
+
+def polish(swing: Swing, task: Task, starts: int = 5, iterations: int = 14) -> Fitted:
+    """The best of several starts around a task's own: stiction makes the cost rugged."""
+    random = np.random.default_rng(1)
+    free = [INDEX[n] for n in task.free]
+    tasks = [task]
+    for _ in range(starts - 1):
+        theta = task.start.copy()
+        theta[free] *= np.exp(random.normal(0.0, 0.4, len(free)))
+        tasks.append(replace(task, start=theta))
+    fits = fit_together(swing, tasks, iterations)
+    best = min(fits, key=lambda f: f.cost)
+    return replace(best, evaluations=sum(f.evaluations for f in fits))
+
+
+def _folds(swing: Swing, train: Sequence[int], trials: Sequence[str]) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
+    """(kept, left out) stretches; whole recordings are left out where there are enough, else stretches."""
+    names = [swing.lanes[i].trial for i in train] if len(trials) >= FOLDS else [str(i) for i in train]
+    groups = list(dict.fromkeys(names))
+    count = min(FOLDS, len(groups))
+    member = {g: k % count for k, g in enumerate(groups)}
+    return [(tuple(i for i, n in zip(train, names, strict=True) if member[n] != f),
+             tuple(i for i, n in zip(train, names, strict=True) if member[n] == f)) for f in range(count)]  # fmt: skip
+
+
+def _free(swing: Swing, taken: Sequence[Variant]) -> tuple[str, ...]:
+    names = list(free_declared(swing)) + [name for v in taken for name in v.start]
+    return tuple(dict.fromkeys(names))
+
+
+def _started(theta: Array, variant: Variant) -> Array:
+    out = theta.copy()
+    for name, value in variant.start.items():
+        if name != "stribeck_speed" or out[INDEX[name]] == 1.0:
+            out[INDEX[name]] = value
+    return out
+
+
+def _left_out(swing: Swing, folds: list, none: tuple[Task, Fitted], rivals: list[tuple[Task, Fitted]]) -> tuple[Array, list[Array]]:
+    """Block errors of "none" and of each rival on the recordings left out."""
+    everyone = [none, *rivals]
+    tasks = [replace(task, start=fit.theta, stretches=kept) for task, fit in everyone for kept, _ in folds]
+    fits = fit_together(swing, tasks, 5)
+    out = []
+    for k in range(len(everyone)):
+        parts = [_blocks(swing, fits[k * len(folds) + f].theta, left) for f, (_, left) in enumerate(folds)]
+        out.append(np.concatenate(parts))
+    return out[0], out[1:]
+
+
+def _judge(none: Array, scores: list[Array], rivals: Sequence[Variant], sizes: Sequence[int]) -> tuple[int, Round] | None:
+    """Index of the winner and what the round says, or None where nothing beats "none" beyond doubt."""
+    errors_ = np.array(scores)
+    draw = np.random.default_rng(0).integers(0, len(none), (RESAMPLES, len(none)))
+    resampled, base = errors_[:, draw].sum(2), none[draw].sum(1)
+    best = int(np.argmin(errors_.sum(1)))
+    # of those that cannot be told from the best, the one with fewest parameters (Occam)
+    close = [k for k in range(len(scores)) if np.mean(resampled[best] < resampled[k]) < LEAST_PROBABILITY]
+    gain = 1.0 - errors_[best].sum() / none.sum()
+    probability = float(np.mean(resampled[best] < base))
+    if gain < LEAST_GAIN or probability < LEAST_PROBABILITY:
+        return None
+    wins = np.bincount(np.argmin(resampled, 0), minlength=len(scores)) / RESAMPLES
+    order = np.argsort(-wins)
+    same = tuple(dict.fromkeys(rivals[k].effect for k in sorted(close, key=lambda k: errors_[k].sum())))
+    if best not in (simple := sorted(close, key=lambda k: (sizes[k], errors_[k].sum())))[:1]:
+        best = simple[0]
+        gain = 1.0 - errors_[best].sum() / none.sum()
+    return best, Round(rivals[best], probability, float(gain),
+                       tuple((rivals[k].key, float(wins[k])) for k in order if wins[k] > 0.005), same)  # fmt: skip

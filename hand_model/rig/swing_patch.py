@@ -1,0 +1,73 @@
+"""A fitted swing written as MJCF: the declared parameters and, where they exist, MuJoCo's own attributes for effects."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .model import RigModel
+from .patch import find, number, parse, serialise, write_effects, _actuator
+from .swing import DECLARED, INDEX, PARAMETERS, Swing
+
+Array = NDArray[np.float64]
+# Dry friction is a soft constraint in MuJoCo; left at its defaults a joint creeps while it should stick.
+SOLREF, SOLIMP = (0.002, 1.0), (0.9999, 0.9999, 0.001, 0.5, 2.0)
+
+
+def write_swing(rig: RigModel, swing: Swing, theta: Array) -> bytes:
+    """The rig's MJCF with parameters theta (len(PARAMETERS),) of the swing.
+
+    Inertia goes to the joint's armature where the declared bodies hold less than it, else the bodies are scaled.
+    Native: inertia, gain, back-EMF, damping, Coulomb friction, quadratic drag. All else: custom/text.
+    """
+    value = {name: float(theta[i]) for name, i in INDEX.items()}
+    joint = rig.joints[0]
+    root = parse(rig.xml)
+    element = find(root, "joint", joint)
+    bodies = _body_inertia(rig)
+    if value["inertia"] >= bodies:
+        element.set("armature", number(value["inertia"] - bodies))
+    else:
+        element.set("armature", number(0.0))
+        _scale_inertia(root, value["inertia"] - bodies)
+    effects = {k: v for k, v in value.items() if k not in DECLARED and _matters(k, v, value)}
+    drag = effects.pop("drag", 0.0)
+    element.set("damping", number(value["damping"], drag) if drag else number(value["damping"]))
+    element.set("frictionloss", number(max(value["coulomb"], 1e-9)))
+    element.set("solreffriction", number(*SOLREF))
+    element.set("solimpfriction", number(*SOLIMP))
+    drive = rig.drive(joint)
+    if drive is not None and drive.kind == "voltage":
+        constant = max(value["back_emf"], 1e-9) / value["gain"]
+        motor = _actuator(root, drive.name)
+        motor.set("motorconst", number(constant, constant))
+        motor.set("resistance", number(constant * drive.gear / value["gain"]))
+    kept = [{"joint": joint, "swing": effects}] if effects else []
+    return write_effects(serialise(root), kept)
+
+
+def _matters(name: str, value: float, all_values: dict[str, float]) -> bool:
+    if name == "stribeck_speed":
+        return any(all_values[k] for k in ("static_excess", "load_gear_low", "load_motor_low", "load_external_low"))
+    return value != 0.0
+
+
+def _body_inertia(rig: RigModel) -> float:
+    from .balance import compile_model
+    from .dynamics import inertial_columns, inertial_parameters
+
+    model = compile_model(rig)
+    zero = np.zeros((1, 1))
+    return float(np.sum(inertial_columns(model, zero, zero, zero + 1, np.zeros(3))[0, 0] * inertial_parameters(model)))
+
+
+def _scale_inertia(root, missing: float) -> None:
+    """Take the excess out of the bodies' inertia about their own centres, as far as it goes."""
+    for inertial in root.iter("inertial"):
+        own = np.array([float(x) for x in inertial.get("diaginertia", "").split()])
+        if len(own) == 3:
+            inertial.set("diaginertia", number(*np.maximum(own + missing, 1e-9)))
+            return
+
+
+__all__ = ["PARAMETERS", "write_swing"]
