@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +17,14 @@ Array = NDArray[np.float64]
 class LackOfFit:
     """p: probability of a residual as structured as this if nothing is missing (Bonferroni over the groupings).
     ratio: variance of cell means over what pure error explains, of the most telling grouping. telling: its name.
-    cells: grouping -> (keys, means, counts), the residual map in effort units."""
+    limit: the ratio that pure error stays below with probability 1 - alpha. excess: weighted sum of squares of cell means
+    beyond what pure error explains, of the grouping that holds most: the explainable mismatch."""
 
     p: float
     ratio: float
     telling: str
     limit: float
+    excess: float = 0.0
 
 
 def groupings(balance: Balance) -> dict[str, NDArray[np.int64]]:
@@ -64,16 +66,17 @@ def lack_of_fit(balance: Balance, prediction: Array, parameters: int, alpha: flo
 
     z = (balance.effort - prediction) * balance.weight
     use = balance.steady
-    best = LackOfFit(1.0, 0.0, "", 0.0)
+    best, excess = LackOfFit(1.0, 0.0, "", 0.0), 0.0
     cells = groupings(balance)
     for name, label in cells.items():
-        labels, index = np.unique(label[use], return_inverse=True)
+        index = np.unique(label[use], return_inverse=True)[1]
         count = np.bincount(index)
         total = np.bincount(index, z[use])
         keep = count >= 3
         statistic = float(np.sum(total[keep] ** 2 / count[keep])) / balance.inflation
         degrees = max(int(keep.sum()) - (parameters if name != "stroke" else 2), 1)
+        excess = max(excess, statistic - degrees)
         p = min(float(chi2.sf(statistic, degrees)) * len(cells), 1.0)
         if p < best.p or not best.telling:
             best = LackOfFit(p, statistic / degrees, name, float(chi2.isf(alpha / len(cells), degrees)) / degrees)
-    return best
+    return replace(best, excess=float(excess))

@@ -8,7 +8,7 @@ samples counted by their correlation time); nothing here sees a validation recor
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -103,8 +103,11 @@ def _name(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str], 
     fit = declared
     after = before
     brought: dict[str, float] = {}
-    while after.p < ALPHA and len(terms) < MOST_TERMS:
+    while len(terms) < MOST_TERMS and (after.p < ALPHA or not terms):
         ranked = rank(balance, effects, terms, fit)
+        if not terms and ranked:
+            # Directed test: along the known effects lack of fit shows earlier than in any grouping of cells.
+            before = after = replace(before, p=min(before.p, float(np.exp(-max(ranked[0].evidence, 0.0)))))
         for rival in ranked:
             brought[rival.name] = max(brought.get(rival.name, -np.inf), rival.evidence)
         if not ranked or ranked[0].evidence < EVIDENCE_LEAST:

@@ -14,6 +14,9 @@ class ClockDrift(Effect):
 
     name = "clock_drift"
     station = "encoder"
+    signal = "log"
+    joint = None
+    correction = "log time mapped to the mocap clock with the estimated rate"
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Rate of the log's clock over the mocap clock, minus one."""

@@ -1,0 +1,238 @@
+"""Session -> Findings: three stations, corrections of the recording before physics, one ranked list."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..effects import catalogue
+from ..errors import IdentificationError
+from ..session import Finger, Session, read_session
+from .drive import drive_states, drive_trials
+from .findings import Finding, Findings
+from .interval import held_out, parameter_intervals, variance_ratio
+from .name import ALPHA, Named, Naming, name_effects
+
+EXPLAINED_LEAST = 0.7  # of the explainable mismatch: below, the names are not believed
+
+
+def diagnose(session: Session | str | Path, model: Any = None, output: str | Path | None = None,
+             say: Callable[[str], None] | None = None) -> Findings:
+    """Say what physics is missing from the declared model of a recorded hand.
+
+    session: a session or its folder. model: a compiled folder or Hand (only its name is kept: the declared model is fitted
+    to the session itself). output: folder that gets `findings.json`. say: called with one line per result as it comes.
+    Raises SessionError for a session that breaks its format.
+    """
+    session = session if isinstance(session, Session) else read_session(session)
+    tell = say or (lambda line: None)
+    stations: list[Station] = []
+    for actuator, states in drive_states(session).items():
+        naming = name_effects(states, catalogue("drive"))
+        stations.append(Station("current", _finger_of(session, actuator), actuator, None, naming))
+        tell(stations[-1].line())
+    notes: list[str] = []
+    marker_findings: list[tuple[float, Finding]] = []
+    stations += _kinematic_stations(session, tell, notes, marker_findings)
+    findings = assemble(stations, marker_findings, notes)
+    if output is not None:
+        findings.save(output)
+    return findings
+
+
+class Station:
+    """One balance of one finger and what was named there."""
+
+    def __init__(self, signal: str, finger: str | None, actuator: str | None, joint: str | None, naming: Naming) -> None:
+        self.signal, self.finger, self.actuator, self.joint, self.naming = signal, finger, actuator, joint, naming
+
+    @property
+    def missing(self) -> bool:
+        """Whether the lack-of-fit test says that something is missing."""
+        return self.naming.before.p < ALPHA
+
+    @property
+    def explained(self) -> float:
+        """Share of the explainable mismatch that the named effects take away."""
+        before = max(self.naming.before.excess, 1e-9)
+        return float(np.clip(1 - max(self.naming.after.excess, 0.0) / before, 0, 1))
+
+    @property
+    def believed(self) -> bool:
+        """Whether the names stand: the final model passes the test, or takes most of the mismatch away."""
+        return bool(self.naming.found) and (self.naming.after.p >= ALPHA or self.explained >= EXPLAINED_LEAST)
+
+    def line(self) -> str:
+        """One line for a progress display."""
+        place = " ".join(x for x in (self.finger, self.joint, self.signal) if x)
+        if not self.missing:
+            return f"{place}: consistent (p {self.naming.before.p:.2g})"
+        names = ", ".join(f.term.effect.name for f in self.naming.found) if self.believed else "unexplained"
+        return f"{place}: {names} (p {self.naming.before.p:.2g} -> {self.naming.after.p:.2g})"
+
+
+def _finger_of(session: Session, actuator: str) -> str | None:
+    return next((f.name for f in session.fingers if f.actuator == actuator), None)
+
+
+def _kinematic_stations(session: Session, tell: Callable[[str], None], notes: list[str],
+                        marker_findings: list[tuple[float, Finding]]) -> list[Station]:
+    if session.palm is None:
+        return []
+    from ..identify.identification import palm_shape
+    from .angles import ranges_of_counts
+
+    if not session.select("flexion") or not any(t.mocap_path for t in session.select("flexion")):
+        return []
+    try:
+        shape = palm_shape(session)
+    except IdentificationError as error:
+        notes.append(str(error))
+        return []
+    counts = ranges_of_counts(session)
+    out: list[Station] = []
+    for finger in session.fingers:
+        try:
+            out += _finger_stations(session, finger, shape, counts, tell, marker_findings)
+        except IdentificationError as error:
+            notes.append(str(error))
+    return out
+
+
+def _finger_stations(session: Session, finger: Finger, shape: Any, counts: dict[str, tuple[float, float]],
+                     tell: Callable[[str], None], marker_findings: list[tuple[float, Finding]]) -> list[Station]:
+    from .angles import encoder_states, finger_angles, linkage_states
+
+    angles = finger_angles(session, finger, shape)
+    out = []
+    states = encoder_states(angles, *counts[finger.actuator]) if finger.actuator in counts else ()
+    if states:
+        out.append(Station("encoder", finger.name, finger.actuator, finger.segments[0].name,
+                           name_effects(states, catalogue("encoder"))))
+        tell(out[-1].line())
+    for joint in range(1, len(finger.segments)):
+        states = linkage_states(angles, joint)
+        if states:
+            out.append(Station("markers", finger.name, finger.actuator, finger.segments[joint].name,
+                               name_effects(states, catalogue("linkage"))))
+            tell(out[-1].line())
+    return out
+
+
+def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding]], notes: list[str]) -> Findings:
+    """One ranked list from all stations; weight: log likelihood that an effect's model takes off."""
+    ranked: list[tuple[float, Finding]] = list(marker_findings)
+    rejected: list[dict[str, str]] = []
+    unexplained: list[dict[str, Any]] = []
+    for station in stations:
+        if station.believed:
+            ranked += [_finding(station, named) for named in station.naming.found]
+        elif station.missing:
+            unexplained.append(_unexplained(station, 1.0))
+        if station.believed and station.naming.after.p < ALPHA and station.explained < 0.95:
+            unexplained.append(_unexplained(station, 1 - station.explained))
+        rejected += [{"effect": name, "where": str(station.finger), "reason": _reason(value)}
+                     for name, value in station.naming.rejected[:4]]
+    ranked.sort(key=lambda item: -item[0])
+    found = tuple(f for _, f in ranked)
+    verdict = "mismatch" if found else "unexplained" if unexplained else "consistent"
+    worst = max(stations, key=lambda s: variance_ratio(s.naming, s.naming.declared), default=None)
+    lack = {"before": 1.0, "after": 1.0, "limit": 1.0}
+    if worst is not None:
+        n = worst.naming.balance
+        count = max(int((~n.train & n.steady).sum()) or int(n.steady.sum()), 1)
+        lack = {"before": variance_ratio(worst.naming, worst.naming.declared),
+                "after": variance_ratio(worst.naming, worst.naming.fit), "limit": 1 + 2.6 * float(np.sqrt(2 / count))}
+    return Findings(verdict, lack, _protocol(stations), found, tuple(rejected), tuple(unexplained), _next(found),
+                    tuple(_channel(s) for s in stations), tuple(notes))
+
+
+def _reason(log_evidence: float) -> str:
+    if log_evidence <= 0:
+        return f"the fit does not gain what its parameters cost (log evidence {log_evidence:.1f})"
+    return f"another effect explains it better, or what it brings is within the noise (log evidence {log_evidence:.1f})"
+
+
+def _finding(station: Station, named: Named) -> tuple[float, Finding]:
+    naming = station.naming
+    which = naming.fit.terms.index(named.term)
+    effect = named.term.effect
+    parameters = parameter_intervals(naming, which)
+    values = {k: v["value"] for k, v in parameters.items()}
+    where: dict[str, Any] = {
+        "finger": station.finger,
+        "joint": getattr(effect, "joint", station.joint) if station.signal != "current" else None,
+        "actuator": station.actuator,
+        "signal": getattr(effect, "signal", station.signal),
+        "marker": None,
+        "trials": [s.trial for s in naming.balance.states],
+        "region": effect.region(naming.balance.states, named.term.shape),
+        "share_of_mismatch": named.share * station.explained,
+    }
+    top = named.rivals[0].evidence
+    weights = np.exp(np.array([r.evidence for r in named.rivals] + [0.0]) - max(top, 0.0))
+    weights = weights / weights.sum()
+    alternatives = tuple((r.name, float(p)) for r, p in zip(named.rivals, weights[:-1], strict=True)
+                         if r.name != effect.name and p > 1e-3)[:4]
+    unit = naming.balance.states[0].effort_unit
+    fit = {"metric": f"{station.signal}_rmse", "unit": unit, **held_out(naming, which), "engine": "balance"}
+    members = named.members if effect.name in named.members else (effect.name, *named.members)
+    native = getattr(effect, "native", None)
+    recording = getattr(effect, "correction", None)
+    model = None if recording else {"native": native is not None, "mjcf": native,
+                                    "urdf": "not expressible: kept in hand.json"}
+    weight = 0.5 * max(naming.declared.rss - naming.fit.rss, 0.0) * named.share
+    return weight, Finding(effect.name, members, named.probability, alternatives, where,
+                           effect.statement(where, values), parameters, fit, model, recording)
+
+
+def _unexplained(station: Station, share: float) -> dict[str, Any]:
+    return {
+        "where": {"finger": station.finger, "joint": station.joint, "actuator": station.actuator, "signal": station.signal},
+        "share_of_mismatch": share,
+        "shape": f"varies with {station.naming.after.telling}",
+    }
+
+
+def _channel(station: Station) -> dict[str, Any]:
+    n = station.naming
+    return {"finger": station.finger, "joint": station.joint, "signal": station.signal, "p_before": n.before.p,
+            "p_after": n.after.p, "varies_with": n.before.telling, "noise": n.balance.sigma,
+            "effects": [f.term.effect.name for f in n.found], "explained": station.explained}
+
+
+def _protocol(stations: list[Station]) -> dict[str, Any]:
+    drives = [s for s in stations if s.signal == "current"]
+    if not drives:
+        return {}
+    states = drives[0].naming.balance.states
+    speeds = {v for s in states if "speed" in s.extra for v in np.unique(s.extra["speed"]).tolist()}
+    step = float(np.median(np.concatenate([np.diff(s.time_s) for s in states])))
+    return {"repeats": len(states), "rate_hz": round(1 / step, 1), "speeds": len(speeds), "isolable": [],
+            "not_isolable": [["asymmetric_friction", "spring_preload"]]}
+
+
+EXPERIMENTS = {
+    frozenset(("stribeck_friction", "quadratic_damping")): "moves at a tenth of full speed and at three speeds between",
+    frozenset(("drive_backlash", "series_elasticity")): "the same flexion with a known weight at the tip",
+    frozenset(("linkage_backlash", "linkage_compliance")): "the same flexion with a known weight at the tip",
+    frozenset(("nonlinear_spring", "gravity_load")): "the same flexion with the palm turned over",
+    frozenset(("detent_load", "end_stop_contact")): "slow moves that end at three places short of the end of the range",
+}
+
+
+def _next(found: tuple[Finding, ...]) -> str | None:
+    for finding in found:
+        if len(finding.members) > 1:
+            for pair, text in EXPERIMENTS.items():
+                if pair <= set(finding.members):
+                    return f"{text}: it would separate {' from '.join(sorted(pair))}"
+            return (f"slow and fast full-range moves repeated five times on {finding.where['finger']}, and half-range moves "
+                    f"from both ends: they would separate {', '.join(finding.members)}")
+    return None
+
+
+__all__ = ["Station", "assemble", "diagnose", "drive_trials"]

@@ -1,0 +1,105 @@
+"""What a diagnosis says (`hand-findings/1`), as frozen dataclasses and as JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+FORMAT = "hand-findings/1"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One named departure. members: the class of effects that these recordings cannot tell from it (itself included).
+
+    parameters: name -> {"value", "unit", "ci95"}; fit: before, after and noise floor on held-out recordings; model: where it
+    is written; correction: for recordings, what was corrected.
+    """
+
+    effect: str
+    members: tuple[str, ...]
+    probability: float
+    alternatives: tuple[tuple[str, float], ...]
+    where: Mapping[str, Any]
+    statement: str
+    parameters: Mapping[str, Mapping[str, Any]]
+    fit: Mapping[str, Any]
+    model: Mapping[str, Any] | None = None
+    correction: str | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """The finding as the format has it."""
+        out: dict[str, Any] = {
+            "effect": self.effect,
+            "class": list(self.members),
+            "probability": self.probability,
+            "alternatives": [{"effect": name, "probability": p} for name, p in self.alternatives],
+            "where": dict(self.where),
+            "statement": self.statement,
+            "parameters": {k: dict(v) for k, v in self.parameters.items()},
+            "fit": dict(self.fit),
+            "model": None if self.model is None else dict(self.model),
+        }
+        if self.correction is not None:
+            out["correction"] = self.correction
+        return out
+
+
+@dataclass(frozen=True)
+class Findings:
+    """The diagnosis of a session. verdict: "consistent", "mismatch" or "unexplained"."""
+
+    verdict: str
+    lack_of_fit: Mapping[str, float]
+    protocol: Mapping[str, Any]
+    findings: tuple[Finding, ...] = ()
+    rejected: tuple[Mapping[str, str], ...] = ()
+    unexplained: tuple[Mapping[str, Any], ...] = ()
+    next_experiment: str | None = None
+    channels: tuple[Mapping[str, Any], ...] = ()
+    notes: tuple[str, ...] = field(default=())
+
+    def to_dict(self) -> dict[str, Any]:
+        """The whole as the format has it; `channels` (what each balance said) and `notes` are additions."""
+        return {
+            "format": FORMAT,
+            "verdict": self.verdict,
+            "lack_of_fit": dict(self.lack_of_fit),
+            "protocol": dict(self.protocol),
+            "findings": [f.to_dict() for f in self.findings],
+            "rejected": [dict(r) for r in self.rejected],
+            "unexplained": [dict(u) for u in self.unexplained],
+            "next_experiment": self.next_experiment,
+            "channels": [dict(c) for c in self.channels],
+            "notes": list(self.notes),
+        }
+
+    def to_json(self) -> str:
+        """findings.json as text; numbers that are not finite become null."""
+        return json.dumps(_plain(self.to_dict()), indent=1, allow_nan=False) + "\n"
+
+    def save(self, folder: str | Path) -> Path:
+        """Write `findings.json` into a folder (made if needed), whole or not at all; returns its path."""
+        target = Path(folder) / "findings.json"
+        target.parent.mkdir(parents=True, exist_ok=True)
+        sibling = target.with_name(".findings.json.part")
+        sibling.write_text(self.to_json())
+        sibling.replace(target)
+        return target
+
+
+def _plain(value: Any) -> Any:
+    """numpy scalars and arrays as Python numbers and lists, nan and infinities as None."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value

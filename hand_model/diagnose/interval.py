@@ -1,0 +1,141 @@
+"""Intervals of an effect's parameters, and what modelling it brings on recordings that took no part."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .balance import DISCRETE, Balance, Fit, Term
+from .name import Naming
+
+Array = NDArray[np.float64]
+
+MISFIT_LIMIT = 1.5  # residual variance over pure error above which no interval is given
+
+
+def parameter_intervals(naming: Naming, which: int) -> dict[str, dict[str, Any]]:
+    """Parameters of the fit's term `which` with 95 % intervals (Gauss-Newton, delta method), by name.
+
+    Where the model does not fit (residual variance more than 1.5 times the pure error) the interval is left out.
+    """
+    balance, fit = naming.balance, naming.fit
+    term = fit.terms[which]
+    theta, build = _vector(fit)
+    shape, amplitude, declared = build(theta)
+    now = term.effect.parameters(shape[which], amplitude[which], declared)
+    scale = max(fit.rss / max(balance.train.sum(), 1), 1.0)
+    covariance = None
+    if scale < MISFIT_LIMIT:
+        covariance = _covariance(balance, fit, theta, build) * scale * balance.inflation
+    units = _units(term, balance)
+    out = {}
+    for name, value in now.items():
+        entry: dict[str, Any] = {"value": float(value), "unit": units.get(name, "1")}
+        if covariance is not None and name not in DISCRETE:
+            gradient = np.zeros(len(theta))
+            for i in range(len(theta)):
+                step = 1e-4 * (abs(theta[i]) + 1e-6)
+                up, down = theta.copy(), theta.copy()
+                up[i], down[i] = theta[i] + step, theta[i] - step
+                gradient[i] = (_one(term, which, name, build(up)) - _one(term, which, name, build(down))) / (2 * step)
+            sd = float(np.sqrt(max(gradient @ covariance @ gradient, 0.0)))
+            if np.isfinite(sd):
+                entry["ci95"] = [float(value) - 1.96 * sd, float(value) + 1.96 * sd]
+        out[name] = entry
+    return out
+
+
+def _one(term: Term, which: int, name: str, values: Any) -> float:
+    shape, amplitude, declared = values
+    return float(term.effect.parameters(shape[which], amplitude[which], declared)[name])
+
+
+def _units(term: Term, balance: Balance) -> dict[str, str]:
+    units = {s.name: s.unit for s in term.effect.shapes(balance.states)}
+    state = balance.states[0]
+    for name, unit, _, _ in term.effect.amplitudes():
+        units[name] = unit.replace("effort", state.effort_unit).replace("position", state.position_unit)
+    return {**getattr(term.effect, "units", {}), **units}
+
+
+def _vector(fit: Fit) -> tuple[Array, Any]:
+    """All parameters as one vector, and the way back to (shapes, amplitudes, declared)."""
+    names = list(fit.declared)
+    shapes = [[k for k in t.shape if k not in DISCRETE] for t in fit.terms]
+    values = list(fit.declared.values())
+    for amplitude in fit.amplitudes:
+        values += list(amplitude.values())
+    for term, keys in zip(fit.terms, shapes, strict=True):
+        values += [term.shape[k] for k in keys]
+
+    def build(theta: Array) -> tuple[list[dict[str, float]], list[dict[str, float]], dict[str, float]]:
+        values = iter(theta.tolist())
+        declared = {k: next(values) for k in names}
+        amplitudes = [{k: next(values) for k in a} for a in fit.amplitudes]
+        shape = [{**t.shape, **{k: next(values) for k in keys}} for t, keys in zip(fit.terms, shapes, strict=True)]
+        return shape, amplitudes, declared
+
+    return np.array(values, float), build
+
+
+def predict(balance: Balance, fit: Fit, theta: Array, build: Any) -> Array:
+    """Prediction (n,) of the model at a parameter vector."""
+    shape, amplitude, declared = build(theta)
+    terms = tuple(Term(t.effect, s) for t, s in zip(fit.terms, shape, strict=True))
+    matrix, _, _ = balance.design(terms)
+    linear = list(declared.values()) + [v for a in amplitude for v in a.values()]
+    out = matrix @ np.array(linear)
+    for term in terms:
+        if term.effect.clips:
+            out = term.effect.clip(out, term.shape)
+    return out
+
+
+def _covariance(balance: Balance, fit: Fit, theta: Array, build: Any) -> Array:
+    w = balance.weight * balance.train
+    columns = []
+    for i in range(len(theta)):
+        step = 1e-4 * (abs(theta[i]) + 1e-3)
+        up, down = theta.copy(), theta.copy()
+        up[i], down[i] = theta[i] + step, theta[i] - step
+        columns.append((predict(balance, fit, up, build) - predict(balance, fit, down, build)) / (2 * step) * w)
+    jacobian = np.stack(columns, axis=1)
+    size = np.linalg.norm(jacobian, axis=0)
+    size = np.where(size > 0, size, 1.0)
+    inverse = np.linalg.pinv((jacobian / size).T @ (jacobian / size), rcond=1e-12)
+    return inverse / np.outer(size, size)
+
+
+def held_out(naming: Naming, which: int, seed: int = 0) -> dict[str, Any]:
+    """Root-mean-square error on the validation recordings (steady samples), without and with the term `which`, the noise
+    floor, and a bootstrap interval over strokes of the reduction. Without validation recordings: on all recordings."""
+    balance, fit = naming.balance, naming.fit
+    without = balance.fit(tuple(t for i, t in enumerate(fit.terms) if i != which))
+    use = ~balance.train & balance.steady
+    if not use.any():
+        use = balance.steady
+    r0, r1 = ((balance.effort - f.prediction)[use] ** 2 for f in (without, fit))
+    _, block = np.unique(balance.stroke[use], return_inverse=True)
+    n, s0, s1 = (np.bincount(block, v) for v in (np.ones(use.sum()), r0, r1))
+    pick = np.random.default_rng(seed).integers(0, len(n), (1000, len(n)))
+    count = n[pick].sum(1)
+    reduction = np.sqrt(s0[pick].sum(1) / count) - np.sqrt(s1[pick].sum(1) / count)
+    trials = [s.trial for s in balance.states if s.validate] if (~balance.train).any() else []
+    return {
+        "before": float(np.sqrt(r0.mean())),
+        "after": float(np.sqrt(r1.mean())),
+        "noise_floor": balance.sigma,
+        "ci95_reduction": np.percentile(reduction, [2.5, 97.5]).tolist(),
+        "held_out": trials,
+    }
+
+
+def variance_ratio(naming: Naming, fit: Fit) -> float:
+    """Residual variance over the pure-error variance on validation recordings (all, where there are none)."""
+    balance = naming.balance
+    use = ~balance.train & balance.steady
+    if not use.any():
+        use = balance.steady
+    return float(np.mean(((balance.effort - fit.prediction)[use] / balance.sigma) ** 2))
