@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..effects import effect
 from ..hand import Hand
 from .drive import Drive, nominal_drives
 from .plan import Link, Plan
@@ -112,11 +113,16 @@ def _actuators(root: Any, plan: Plan, drives: dict[str, Drive]) -> None:
 
 
 def _physics(root: Any, hand: Hand) -> None:
-    """Identified motors and effects, where those modules know the hand's."""
+    """Identified motors and effects, as far as MJCF can hold them."""
     if hand.motors and find_spec("hand_model.compile.motor"):
         from .motor import write_motors
 
         write_motors(root, hand)
+    fingers = {f.name for f in hand.fingers} | {None}
+    for found in hand.effects:
+        if found.where.get("finger") in fingers:
+            values = {name: estimate.value for name, estimate in found.parameters.items()}
+            effect(found.effect).write_mjcf(root, found.where, values)
 
 
 def _keyframes(root: Any, plan: Plan) -> None:
