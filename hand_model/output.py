@@ -1,0 +1,66 @@
+"""Writing results whole or not at all: into a temporary sibling first, then renamed."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from .errors import HandModelError
+
+
+def refuse_foreign(folder: str | Path, ours: Collection[str]) -> None:
+    """Raise HandModelError where `folder` is a file, or holds anything that is not named in `ours`."""
+    target = Path(folder)
+    if not target.exists():
+        return
+    if not target.is_dir():
+        raise HandModelError(f"{target}: is a file; name a folder to write into")
+    foreign = sorted(entry.name for entry in target.iterdir() if entry.name not in ours)
+    if foreign:
+        raise HandModelError(f'{target}: holds "{foreign[0]}", which this command did not write; name a new or an empty folder')
+
+
+@contextmanager
+def new_folder(folder: str | Path, ours: Collection[str]) -> Iterator[Path]:
+    """A folder to fill, which takes the place of `folder` when the block ends well; else nothing is left of it.
+
+    ours: names that an earlier run of the same command wrote; a folder with anything else is refused (HandModelError).
+    """
+    target = Path(folder)
+    refuse_foreign(target, ours)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    staging = Path(tempfile.mkdtemp(prefix=f".{target.name}.", dir=target.parent))
+    try:
+        yield staging
+        staging.chmod(0o755)
+        if target.exists():
+            retired = Path(tempfile.mkdtemp(prefix=f".{target.name}.old.", dir=target.parent))
+            os.rename(target, retired / "old")
+            os.rename(staging, target)
+            shutil.rmtree(retired)
+        else:
+            os.rename(staging, target)
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+
+
+@contextmanager
+def new_file(file: str | Path) -> Iterator[Path]:
+    """A file to write, which takes the place of `file` when the block ends well; raises HandModelError for a folder."""
+    target = Path(file)
+    if target.is_dir():
+        raise HandModelError(f"{target}: is a folder; name a file")
+    target.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+    os.close(handle)
+    staging = Path(name)
+    try:
+        yield staging
+        staging.chmod(0o644)
+        os.replace(staging, target)
+    finally:
+        staging.unlink(missing_ok=True)

@@ -1,0 +1,196 @@
+"""Sections about what was identified: axes and centres, encoder maps, linkages, repairs. From the hand alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..checks import parallelism
+from ..hand import Finger, Hand, Joint
+from ..published import mapping_rmse_deg
+from .comparison import angle_cells, angle_words
+from .page import Cell, Section, folded, heading, listing, note, table
+from .words import count, listed, number, span
+
+ORDER = {1: "linear", 2: "quadratic", 3: "cubic", 4: "quartic"}
+
+
+def axis_sd_deg(joint: Joint) -> float:
+    """Standard deviation of the axis in its worst direction [deg], the palm frame's own uncertainty included."""
+    return float(np.rad2deg(np.sqrt(max(np.linalg.eigvalsh(joint.covariance[:3, :3])[-1], 0.0))))
+
+
+def centre_sd_mm(joint: Joint) -> float:
+    """Standard deviation of the centre in its worst direction [mm]."""
+    return float(1e3 * np.sqrt(max(np.linalg.eigvalsh(joint.covariance[3:, 3:])[-1], 0.0)))
+
+
+def axes_section(hand: Hand) -> Section:
+    """Axes and centres with their uncertainty, the published method beside them."""
+    joints = [(finger, joint) for finger in hand.fingers for joint in finger.joints]
+    published = {(f, j): row for f, rows in hand.extra.get("published_method", {}).items() for j, row in rows.items()}
+    rows = [_axis_row(finger, joint, published.get((finger.name, joint.name), {})) for finger, joint in joints]
+    columns = ["finger", "joint", "x", "y", "z", "± deg", "x", "y", "z", "± mm", "deg", "deg", "mm"]
+    groups = [("", 2), ("axis", 4), ("centre [mm]", 4), ("arc", 1), ("published method off by", 2)]
+    body = [table(columns, rows, groups=groups, text_columns=2)]
+    body.append(
+        note(
+            "Palm frame of the landmarks; ± is one standard deviation in the worst direction, with the probing of the landmarks in it. "
+            "Published method: axis by Gamage & Lasenby (2002), centre by Chang & Pollard (2007) on the same markers, as its distance from "
+            "the maximum-likelihood chain (for the centre, across the axis)."
+        )
+    )
+    parallel = parallelism(hand)
+    if parallel:
+        body.append(heading("Are the axes of a finger parallel?"))
+        body.append(note(angle_words(parallel, "are parallel within their uncertainty")))
+        columns = ["finger", "joints", "angle", "noise alone", "95 % interval", "thesis"]
+        body.append(table(columns, [[r.finger, r.joint, *angle_cells(r)] for r in parallel], text_columns=2, caption="Degrees, in the form of table 4.11"))
+    return Section("axes", "Axes and centres", _axes_words(joints, published), tuple(body))
+
+
+def _axis_row(finger: Finger, joint: Joint, old: Mapping[str, Any]) -> list[str | Cell]:
+    sd = number(axis_sd_deg(joint))
+    cells: list[str | Cell] = [finger.name, joint.name, *(number(v, 4) for v in joint.axis_palm)]
+    cells.append(Cell(f"{sd} not determined", "flag") if joint.degenerate else sd)
+    cells += [number(1e3 * v) for v in joint.centre_palm] + [number(centre_sd_mm(joint))]
+    cells.append(number(old.get("arc_deg", np.rad2deg(np.ptp(joint.range_rad))), 0))
+    if "failed" in old:
+        return [*cells, Cell("fails", "flag"), Cell("–", "dim")]
+    off = old.get("centre_off_m")
+    return [*cells, Cell(number(old.get("axis_off_deg")), "dim"), Cell(number(None if off is None else 1e3 * off), "dim")]
+
+
+def _axes_words(joints: list[tuple[Finger, Joint]], published: Mapping[tuple[str, str], Mapping[str, Any]]) -> str:
+    weak = [f"{f.name} {j.name}" for f, j in joints if j.degenerate]
+    known = [j for _, j in joints if not j.degenerate]
+    words = ""
+    if known:
+        words = f"{'All' if not weak else len(known)} of the {count(len(joints), 'axis', 'axes')} are known to {number(max(map(axis_sd_deg, known)))} deg "
+        words = words.replace("All of the", "All") + f"and {number(max(map(centre_sd_mm, known)))} mm or better (one standard deviation)"
+    if weak:
+        verb = "does not determine its axis" if len(weak) == 1 else "do not determine their axes"
+        words += f"{'; ' if words else ''}the recorded {'arc' if len(weak) == 1 else 'arcs'} of {listed(weak)} {verb}"
+    off = {k: row for k, row in published.items() if "axis_off_deg" in row}
+    if off:
+        worst = max(off, key=lambda k: off[k]["axis_off_deg"])
+        far = max(row["centre_off_m"] for row in off.values())
+        words += (
+            f"; on the same markers the published method lands up to {number(off[worst]['axis_off_deg'], 1)} deg ({' '.join(worst)}, "
+            f"an arc of {number(off[worst]['arc_deg'], 0)} deg) and {number(1e3 * far, 1)} mm away"
+        )
+    return words[0].upper() + words[1:] + "."
+
+
+def maps_section(hand: Hand, pictures: tuple[Any, ...] = ()) -> Section | None:
+    """RMSE of encoder counts to angle in the form of tables 4.5 to 4.8, the thesis's figures beside; None without a log."""
+    fingers = [f for f in hand.fingers if f.encoder_maps]
+    if not fingers:
+        return None
+    places = list(dict.fromkeys(j.name for f in fingers for j in f.joints))
+    body = list(pictures)
+    ours: dict[str, list[float]] = {}
+    theirs: dict[str, list[float]] = {}
+    for place in places:
+        rows = []
+        for finger in fingers:
+            for joint, fitted in zip(finger.joints, finger.encoder_maps, strict=True):
+                if joint.name == place:
+                    thesis = mapping_rmse_deg(hand.side, place, finger.name)
+                    rows.append(_rmse_row(finger.name, fitted, thesis))
+                    ours.setdefault(place, []).append(_chosen(fitted.rmse_held_out_rad, fitted.coefficients))
+                    theirs.setdefault(place, []).extend(thesis[2:] if thesis else [])
+        orders = _orders(fingers, place)
+        groups = [("", 1), *[(ORDER[o], 3) for o in orders]]
+        columns = ["finger", *["fitted", "held out", "thesis"] * len(orders)]
+        body.append(table(columns, rows, f"RMSE of encoder to {place} angle [deg]", groups))
+    body.append(
+        note(
+            "Fitted: on the cycles that it was fitted to, as the thesis reports it. Held out: on cycles left out in turn; it chooses the "
+            "order (bold). Thesis: tables 4.5 to 4.8, another specimen in another laboratory."
+        )
+    )
+    words = []
+    for place, values in ours.items():
+        beside = f" (thesis, cubic, fitted data: {span(theirs[place])} deg)" if theirs[place] else ""
+        words.append(f"{place} angle within {span(values)} deg{beside}")
+    conclusion = f"Encoder counts alone give the {listed(words)}: root mean square on held-out cycles, order chosen there."
+    return Section("maps", "Encoder to angles", conclusion, tuple(body))
+
+
+def _orders(fingers: list[Finger], place: str) -> list[int]:
+    return sorted({int(o) for f in fingers for j, m in zip(f.joints, f.encoder_maps, strict=True) if j.name == place for o in m.rmse_rad})
+
+
+def _chosen(table_rad: Mapping[str, float], coefficients: Any) -> float:
+    return float(np.rad2deg(table_rad[str(len(coefficients) - 1)]))
+
+
+def _rmse_row(name: str, fitted: Any, thesis: tuple[float, ...] | None) -> list[str | Cell]:
+    row: list[str | Cell] = [name]
+    for order in sorted(map(int, fitted.rmse_rad)):
+        kind = "best" if order == len(fitted.coefficients) - 1 else ""
+        row.append(Cell(number(np.rad2deg(fitted.rmse_rad[str(order)]), 3), kind))
+        row.append(Cell(number(np.rad2deg(fitted.rmse_held_out_rad[str(order)]), 3), kind))
+        row.append(Cell(number(thesis[order - 1] if thesis and order <= len(thesis) else None, 3), "dim"))
+    return row
+
+
+def coupling_section(hand: Hand) -> Section | None:
+    """Linkages: polynomial, order, error; None where no finger has any."""
+    links = [(f, c) for f in hand.fingers for c in f.couplings]
+    if not links:
+        return None
+    rows: list[list[str | Cell]] = []
+    for finger, c in links:
+        low, high = finger.joints[0].range_rad
+        ends = np.rad2deg([c.follower_rad(low), c.follower_rad(high)])
+        order = len(c.coefficients) - 1
+        line = np.polyfit(q := np.linspace(low, high, 200), c.follower_rad(q), 1)
+        bend = np.rad2deg(np.abs(c.follower_rad(q) - np.polyval(line, q)).max())
+        rows.append([finger.name, f"{c.follower} of {c.driver}", ORDER.get(order, str(order)), _polynomial(c.coefficients)])
+        rows[-1] += [f"{ends[0]:.1f} to {ends[1]:.1f}", number(bend), number(_chosen(c.rmse_rad, c.coefficients), 3)]
+        rows[-1].append(Cell(number(_chosen(c.rmse_held_out_rad, c.coefficients), 3), "best"))
+    held = [_chosen(c.rmse_held_out_rad, c.coefficients) for _, c in links]
+    bends = [float(str(row[5])) for row in rows]
+    conclusion = (
+        f"One polynomial per linkage, monotonic over the recorded range, follows the driven joint within {span(held)} deg on held-out cycles; "
+        f"a straight line, all that a URDF's mimic can say, would be off by up to {number(max(bends), 1)} deg."
+    )
+    columns = ["finger", "linkage", "order", "follower [rad] of driver q [rad]", "range [deg]", "bend [deg]", "fitted [deg]", "held out [deg]"]
+    return Section("linkages", "Linkages", conclusion, (table(columns, rows, text_columns=4),))
+
+
+def _polynomial(coefficients: Any) -> str:
+    terms = []
+    for power, value in enumerate(coefficients):
+        sign = "−" if value < 0 else "+"
+        unit = "" if power == 0 else " q" if power == 1 else f" q{'²³⁴⁵'[power - 2]}"
+        terms.append(f"{sign} {abs(value):.4f}{unit}")
+    text = " ".join(terms)
+    return text[2:] if text.startswith("+ ") else text
+
+
+def repairs_section(hand: Hand) -> Section:
+    """What was put right in the recordings before anything was fitted, and what a user should know."""
+    items = []
+    for r in hand.extra.get("repairs", []):
+        markers = listed(r["markers"])
+        if r["kind"] == "swap":
+            items.append(f"{r['trial']}: {markers} carried each other's label from {r['from_s']:.2f} to {r['to_s']:.2f} s; put right.")
+        else:
+            items.append(f"{r['trial']}: {markers} moved by {1e3 * r['shift_m']:.2f} mm on its segment at {r['at_s']:.2f} s; two epochs fitted.")
+    swaps = sum(r["kind"] == "swap" for r in hand.extra.get("repairs", []))
+    slips = len(items) - swaps
+    if items:
+        conclusion = f"{count(swaps, 'exchange')} of labels and {count(slips, 'slipped marker')} were found in the recordings and corrected; the files are untouched."
+    else:
+        conclusion = "No exchanged label and no slipped marker was found in the recordings that were fitted."
+    body = [listing(items)] if items else []
+    if hand.notes:
+        body += [heading("Notes"), listing(hand.notes)]
+    hashes = [f"{file}  {sha}" for file, sha in hand.provenance.items()]
+    body.append(folded(f"SHA-256 of the {count(len(hashes), 'file')} that the hand was identified from", listing(hashes)))
+    return Section("repairs", "Repairs and origin", conclusion, tuple(body))
