@@ -19,8 +19,8 @@ from .tree import Array, Tree, inverse, pose, zero_lines, zero_poses
 
 LEVER = 0.03
 """Length [m] by which angles are weighed against distances: a phalanx."""
-SCALE = 1e-6
-"""Distance [m] beyond which a feature counts as not matching; the cost grows with its logarithm only."""
+SCALE = 1e-7
+"""Distance [m] beyond which a feature counts as not coinciding."""
 
 
 @dataclass(frozen=True)
@@ -112,8 +112,8 @@ def features(a: Tree, b: Tree, pairing: Pairing) -> Features:
         com_a, com_b = a.nodes[i].com, b.nodes[j].com
         if k >= 0 and own and com_a is not None and com_b is not None:
             coms[k] = (_apply(poses_a[i], com_a), _apply(poses_b[j], com_b))
-    slack_a = np.array([_slack(a, x, parents[k], order, 0) for k, (x, _) in enumerate(order)])
-    slack_b = np.array([_slack(b, y, parents[k], order, 1) for k, (_, y) in enumerate(order)])
+    slack_a = np.array([_slack(a, x, base_a if parents[k] < 0 else a.joint_node[order[parents[k]][0]]) for k, (x, _) in enumerate(order)])
+    slack_b = np.array([_slack(b, y, base_b if parents[k] < 0 else b.joint_node[order[parents[k]][1]]) for k, (_, y) in enumerate(order)])
     slide = tuple(a.joint(x).kind == "slide" for x, _ in order)
     parents_b = tuple(_paired_ancestor(b, y, index_b) for _, y in order)
     return Features(
@@ -131,9 +131,10 @@ def _paired_ancestor(tree: Tree, name: str, index: dict[str, int]) -> int:
     return _nearest(tree, parent, index) if parent >= 0 else -1
 
 
-def _slack(tree: Tree, name: str, parent: int, order, side: int) -> tuple[float, float]:
-    stop = tree.joint_node[order[parent][side]] if parent >= 0 else -1
-    chain = [tree.nodes[i] for i in tree.ancestors(tree.joint_node[name]) if i != stop]
+def _slack(tree: Tree, name: str, stop: int) -> tuple[float, float]:
+    """Half units [m, rad] of all numbers between node `stop` and the joint."""
+    path, above = tree.ancestors(tree.joint_node[name]), set(tree.ancestors(stop))
+    chain = [tree.nodes[i] for i in path if i not in above]
     turned = sum(n.slack_rad for n in chain) + tree.joint(name).slack_rad
     return sum(n.slack_m for n in chain), turned
 
@@ -151,16 +152,18 @@ def line_distance(axis_a: Array, point_a: Array, axis_b: Array, point_b: Array) 
 
 
 def _line_cost(f: Features, carry: Array, wanted: list[int], other: list[int] | None = None) -> Array:
-    """Logarithmic cost (k,) of b's lines `other`, carried over, against a's lines `wanted`."""
+    """Robust cost (k,) of b's lines `other`, carried over, against a's lines `wanted`."""
     other = wanted if other is None else other
     axes, points = f.axes_b[other] @ carry[:3, :3].T, _apply(carry, f.points_b[other])
     angle, gap = line_distance(f.axes_a[wanted], f.points_a[wanted], axes, points)
     distance = np.linalg.norm(gap, axis=-1) * ~np.array([f.slide[k] for k in wanted], bool)
-    return _log(np.hypot(LEVER * angle, distance))
+    return _robust(np.hypot(LEVER * angle, distance))
 
 
-def _log(distance: Array) -> Array:
-    return np.log1p((np.asarray(distance) / SCALE) ** 2)
+def _robust(distance: Array) -> Array:
+    """Nearly flat beyond SCALE (Geman & McClure 1985), so that features count by whether they coincide; a faint slope remains."""
+    squared = (np.asarray(distance) / SCALE) ** 2
+    return 10 * squared / (1 + squared) + 0.3 * np.log1p(squared)
 
 
 def _turn(frame: Array) -> float:
@@ -173,7 +176,7 @@ def _frame_cost(conventions: Iterable[Array], frame_a: Array, frame_b: Array, ca
     best = np.inf
     for convention in conventions:
         best = min(best, _differs(convention, actual))
-    return float(_log(best))
+    return float(_robust(best))
 
 
 def _differs(first: Array, second: Array) -> float:
@@ -182,9 +185,9 @@ def _differs(first: Array, second: Array) -> float:
     return float(np.hypot(LEVER * _turn(rest[:3, :3]), np.linalg.norm(rest[:3, 3])))
 
 
-def align(f: Features) -> Alignment:
-    """Align b with a under their pairing."""
-    base = base_transform(f)
+def align(f: Features, base: Array | None = None) -> Alignment:
+    """Align b with a under their pairing. base: (4, 4) from b's base frame to a's, estimated where it is not given."""
+    base = base_transform(f) if base is None else base
     carries: dict[int, Array] = {-1: base}
     conventions: dict[int, Array] = {}
     conventions[-1] = _convention(f, -1, base)
@@ -226,7 +229,7 @@ def _fit(f: Features, k: int, up: Array, conventions: list[Array], frame_weight:
     def farther(carry: Array) -> float:
         out = float(_line_cost(f, carry, direct).sum()) if direct else 0.0
         out += 0.2 * float(_line_cost(f, carry, deeper).sum()) if deeper else 0.0
-        return out + sum(w * float(_log(np.linalg.norm(x - _apply(carry, y)))) for x, y, w in points)
+        return out + sum(w * float(_robust(np.linalg.norm(x - _apply(carry, y)))) for x, y, w in points)
 
     def cost(carry: Array) -> float:
         return farther(carry) + frame_weight * sum(_frame_cost(conventions, x, y, carry) for x, y in frames)
@@ -238,7 +241,7 @@ def _fit(f: Features, k: int, up: Array, conventions: list[Array], frame_weight:
             turned = about(axis, point, offset) @ start if offset else start
             for advance in [0.0, *_advances(f, axis, turned, direct, points, frames)]:
                 moved = pose(np.eye(3), advance * axis) @ turned if advance else turned
-                price = cost(moved) + 2.0 * (offset != 0) + 2.0 * (advance != 0) + 0.1 * follows
+                price = cost(moved) + 4.0 * (offset != 0) + 5.0 * (advance != 0) + 0.1 * follows
                 if best is None or price < best[0] - 1e-9:
                     best = (price, moved, offset, advance, follows, farther(start) > farther(moved) + 2.0)
     _, carry, offset, advance, follows, seen = best
@@ -327,13 +330,15 @@ def base_transform(f: Features) -> Array:
     roots = f.children.get(-1, [])
     fixed = f.frames.get(-1, [])[1:]
     plain = _line_cost(f, np.eye(4), roots)
-    points = sum(float(_log(np.linalg.norm(x[:3, 3] - y[:3, 3]))) for x, y, *_ in fixed)
-    if 2 * int((plain < 14).sum()) >= len(roots) or (len(roots) == 1 and f.parent != f.parent_b):
+    points = sum(float(_robust(np.linalg.norm(x[:3, 3] - y[:3, 3]))) for x, y, *_ in fixed)
+    if 2 * int((plain < 15.5).sum()) >= len(roots) or (len(roots) == 1 and f.parent != f.parent_b):
+        return np.eye(4)
+    if len(roots) == 1 and _same_frames(f):
         return np.eye(4)
     everything = list(range(len(f.names)))
 
     def price(carry: Array) -> float:
-        near = sum(float(_log(np.linalg.norm(x[:3, 3] - _apply(carry, y[:3, 3])))) for x, y, *_ in fixed)
+        near = sum(float(_robust(np.linalg.norm(x[:3, 3] - _apply(carry, y[:3, 3])))) for x, y, *_ in fixed)
         return float(_line_cost(f, carry, roots).sum()) + 0.2 * float(_line_cost(f, carry, everything).sum()) + near
 
     best = (float(plain.sum()) + 0.2 * float(_line_cost(f, np.eye(4), everything).sum()) + points - 2.0, np.eye(4))
@@ -343,7 +348,19 @@ def base_transform(f: Features) -> Array:
             for carry in _from_two_lines(f, i, j):
                 if (cost := price(carry)) < best[0] - 1e-9:
                     best = (cost, carry)
+                if best[0] < 0.01:  # everything coincides: no other hypothesis does better
+                    return best[1]
     return best[1]
+
+
+def _same_frames(f: Features) -> bool:
+    """The files share their link frames but for what a few joints carry along: then the base frame is no exception.
+
+    With one joint at the base, a change of that joint and another base frame look alike; only the frames beyond tell.
+    """
+    at = align(f, np.eye(4))
+    plain = [_differs(np.eye(4), _convention(f, k, fit.carry)) < 1e-5 for k, fit in enumerate(at.fits) if f.frames.get(k)]
+    return 2 * sum(plain) > len(plain)
 
 
 def _from_two_lines(f: Features, i: int, j: int) -> list[Array]:
@@ -408,20 +425,26 @@ def exchange(f: Features, pairing: Pairing, a: Tree, b: Tree) -> tuple[Pairing, 
 
 def _swaps(f: Features, at: Alignment, wrong: list[int]) -> list[dict[int, int]]:
     """Swaps worth a trial: two like subtrees, or two joints whose lines fit better the other way round."""
-    out, seen = [], set(wrong)
-    for n, i in enumerate(wrong):
-        for j in wrong[n + 1 :]:
+    spoilt = set(wrong).union(*(f.below(k) for k in wrong))
+
+    def trusted(k: int) -> Array:
+        """The transform of the nearest link towards the base that nothing spoils."""
+        while (k := f.parent[k]) >= 0:
+            if k not in spoilt:
+                return at.fits[k].carry
+        return at.base
+
+    out, suspects = [], sorted(spoilt)
+    for n, i in enumerate(suspects):
+        for j in suspects[n + 1 :]:
             if f.slide[i] != f.slide[j]:
                 continue
             chain_i, chain_j = [i, *f.below(i)], [j, *f.below(j)]
             if f.parent[i] == f.parent[j] and len(chain_i) == len(chain_j) > 1:
                 out.append({**dict(zip(chain_i, chain_j, strict=True)), **dict(zip(chain_j, chain_i, strict=True))})
-            up_i, up_j = (at.base if f.parent[k] < 0 else at.fits[f.parent[k]].carry for k in (i, j))
-            crossed = min(_line_cost(f, c, [i], [j])[0] for c in (up_i, at.base)), min(
-                _line_cost(f, c, [j], [i])[0] for c in (up_j, at.base)
-            )
-            straight = _line_cost(f, up_i, [i])[0] + _line_cost(f, up_j, [j])[0]
-            if min(crossed) < 12 and sum(crossed) < straight - 2 and {i, j} <= seen:
+            crossed = _line_cost(f, trusted(i), [i], [j])[0], _line_cost(f, trusted(j), [j], [i])[0]
+            straight = _line_cost(f, trusted(i), [i])[0] + _line_cost(f, trusted(j), [j])[0]
+            if min(crossed) < 14.4 and sum(crossed) < straight - 2:
                 out.append({i: j, j: i})
     return out
 

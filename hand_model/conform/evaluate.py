@@ -16,7 +16,9 @@ AGREEMENT_M = 1e-9
 
 
 def verify(trees: Sequence[Tree], values: Mapping[str, Array], partner: Mapping[str, str], engines: Collection[str]) -> str:
-    """Evaluate every pose with the engines and compare each link with this package's kinematics; say by how much they differ.
+    """Evaluate every pose with the engines and compare the far links with this package's kinematics; say by how much they differ.
+
+    A far link carries none of the other joints: its pose holds every joint before it.
 
     values: joint of the first tree -> (n,) [rad or m]; partner: joint of the first -> joint of the second. Raises
     DescriptionError where an engine cannot load a file or differs by more than 1e-9 m (or the same number in a rotation).
@@ -29,7 +31,7 @@ def verify(trees: Sequence[Tree], values: Mapping[str, Array], partner: Mapping[
         engine = "mujoco" if tree.format == "mjcf" else "pinocchio"
         if engine not in engines:
             continue
-        links = [tree.joint_node[n] for n in mine if tree.nodes[tree.joint_node[n]].kind == "link"]
+        links = _far(tree, list(mine))
         run = _mujoco if engine == "mujoco" else _pinocchio
         positions, rotations = run(tree, mine, links)
         own = forward(tree, mine, links)
@@ -40,6 +42,12 @@ def verify(trees: Sequence[Tree], values: Mapping[str, Array], partner: Mapping[
             raise DescriptionError(f"{tree.path}: {engine} places its links {worst:.3g} m away from this package's kinematics")
         said.append(f"{engine} agrees on {tree.path.name} to {worst:.1e} m")
     return "; ".join(said) if said else "no engine asked for reads these formats"
+
+
+def _far(tree: Tree, joints: Sequence[str]) -> list[int]:
+    nodes = [tree.joint_node[n] for n in joints if tree.nodes[tree.joint_node[n]].kind == "link"]
+    inner = {up for i in nodes for up in tree.ancestors(i)[1:]}
+    return [i for i in nodes if i not in inner]
 
 
 def skeleton(tree: Tree) -> str:
