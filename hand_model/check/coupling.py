@@ -49,7 +49,7 @@ def direction(description: Description, model: Model) -> Finding:
     run = engine.simulate(model.mjcf, time, drive)
     gap = {n: float(np.abs(run.angles_rad[n] - a).max()) for n, a in wanted.items() if n in run.angles_rad}
     name = max(gap, key=lambda n: gap[n])
-    passed = gap[name] <= TRACKING and not run.warnings
+    passed = bool(gap[name] <= TRACKING and not run.warnings)
     said = f"drivers moved through their ranges, followers within {np.degrees(gap[name]):.2g} deg of the polynomial"
     return Finding(item, passed, float(np.degrees(gap[name])), said + ("" if passed else f' ("{name}")'))
 
@@ -92,7 +92,7 @@ def stiffness(description: Description, model: Model) -> Finding:
                 if not gap <= worst:
                     worst, where = gap, finger.name
     said = f"{FORCE:.0f} N at the tip moves a coupling by at most {np.degrees(worst):.2g} deg"
-    return Finding(item, worst <= STIFFNESS, float(np.degrees(worst)), said + f" ({where})")
+    return Finding(item, bool(worst <= STIFFNESS), float(np.degrees(worst)), said + f" ({where})")
 
 
 def _pushed(mj: Any, tip: str, joints: list[str], held: bool, sign: float) -> float:

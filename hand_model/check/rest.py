@@ -69,6 +69,6 @@ def quiet(description: Description, model: Model) -> Finding:
         out = np.maximum(mj.jnt_range[limited, 0] - angle, angle - mj.jnt_range[limited, 1])
         beyond = max(beyond, float(out.max(initial=0.0)))
     warnings = engine.raised(data)
-    passed = not warnings and beyond < 0.2 and bool(np.isfinite(data.qpos).all())
+    passed = bool(not warnings and beyond < 0.2 and np.isfinite(data.qpos).all())
     said = f"{RANDOM_S:.0f} s of random control: {', '.join(warnings) or 'no warning'}, at most {np.degrees(beyond):.2g} deg beyond a limit"
     return Finding(f"quiet: {model.stem}", passed, float(np.degrees(beyond)), said)

@@ -117,7 +117,12 @@ def _physics(root: Any, hand: Hand) -> None:
     if hand.motors and find_spec("hand_model.compile.motor"):
         from .motor import write_motors
 
+        nominal = root.findall("actuator/position")
         write_motors(root, hand)
+        names = [a.get("name") for a in root.findall("actuator/*")]
+        for element in nominal:  # an identified drive takes the nominal one's place
+            if names.count(element.get("name")) > 1:
+                element.getparent().remove(element)
     fingers = {f.name for f in hand.fingers} | {None}
     for found in hand.effects:
         if found.where.get("finger") in fingers:
@@ -126,10 +131,12 @@ def _physics(root: Any, hand: Hand) -> None:
 
 
 def _keyframes(root: Any, plan: Plan) -> None:
+    """Every joint of the tree at its angle; joints that a motor or an effect brought in rest at zero, as do controls that are no angle."""
     keyframe = child(root, "keyframe")
-    joints = [link.joint for link in plan.links if link.joint]
+    joints = [e.get("name") for e in root.find("worldbody").iter("joint")]
+    actuators = root.findall("actuator/*")
     for name, angles in plan.keyframes.items():
-        key = child(keyframe, "key", name=name, qpos=[angles[joint] for joint in joints])
-        targets = [a.get("joint") for a in root.iterfind("actuator/position")]
-        if targets and len(targets) == len(root.findall("actuator/*")):
-            key.set("ctrl", vector([angles[joint] for joint in targets]))
+        key = child(keyframe, "key", name=name, qpos=[angles.get(joint, 0.0) for joint in joints])
+        targets = [angles.get(a.get("joint"), 0.0) if a.tag == "position" else 0.0 for a in actuators]
+        if any(a.tag == "position" for a in actuators):
+            key.set("ctrl", vector(targets))

@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 DENSITY = 1100.0  # kg/m^3: plastics with some metal in them; nothing that was measured
 SLENDERNESS = 0.22  # radius over length of a finger segment
 LEAST_LENGTH = 0.004  # m
+USUAL_TAPER = 0.8  # length of a last segment over that of the one before it
 SPREAD = 0.6  # breadth of the palm at its middle over that at the fingers' bases
 
 
@@ -43,8 +44,8 @@ class Inertia:
 def with_tips(hand: Hand) -> tuple[Hand, Mapping[str, str]]:
     """The hand with a tip on every finger's last segment, and finger -> how it was guessed where none was recorded.
 
-    A missing tip is put as far from the last joint as the segment's furthest marker, in the direction of the segment's
-    markers; without markers, 0.8 times as far as the last joint is from the one before it; else 25 mm along palm x.
+    A missing tip is put straight on from the segment before the last, as far as a marker reaches that way and at least 0.8 times as far
+    as that segment is long; for a single segment, across its axis towards its markers, as far as the furthest; else 25 mm along palm x.
     """
     guessed: dict[str, str] = {}
     fingers = []
@@ -60,16 +61,19 @@ def with_tips(hand: Hand) -> tuple[Hand, Mapping[str, str]]:
 def _tip_guess(finger: Finger) -> tuple[Array, str]:
     last = finger.joints[-1]
     centre = np.asarray(last.centre_palm, float)
-    if last.markers_palm:
-        offset = np.array(list(last.markers_palm.values()), float) - centre
-        direction = offset.mean(0)
-        if np.linalg.norm(direction) > 1e-6:
-            reach = np.linalg.norm(offset, axis=1).max()
-            return centre + reach * direction / np.linalg.norm(direction), "no tip was recorded: as far out as the furthest marker"
+    offsets = np.array(list(last.markers_palm.values()), float).reshape(-1, 3) - centre
     if len(finger.joints) > 1:
         step = centre - np.asarray(finger.joints[-2].centre_palm, float)
-        if np.linalg.norm(step) > 1e-6:
-            return centre + 0.8 * step, "neither tip nor markers: 0.8 times the segment before it"
+        length = float(np.linalg.norm(step))
+        if length > 1e-6:
+            reach = max([USUAL_TAPER * length, *(offsets @ step / length)])
+            return centre + reach * step / length, "no tip was recorded: straight on from the segment before it, as far as markers reach"
+    if len(offsets):
+        sideways = np.asarray(last.axis_palm, float)
+        direction = offsets.mean(0) - (offsets.mean(0) @ sideways) * sideways
+        if np.linalg.norm(direction) > 1e-6:
+            reach = np.linalg.norm(offsets, axis=1).max()
+            return centre + reach * direction / np.linalg.norm(direction), "no tip was recorded: as far out as the furthest marker"
     return centre + np.array([0.025, 0.0, 0.0]), "neither tip nor markers nor a segment before it: 25 mm along palm x"
 
 
