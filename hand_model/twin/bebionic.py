@@ -141,6 +141,7 @@ def _mocap_noise(rng: np.random.Generator) -> MocapNoise:
         drift_m=float(rng.uniform(0.001, 0.02)),
         shake_rad=float(rng.uniform(0.0, 0.006)),
         shake_m=float(rng.uniform(0.0, 5e-4)),
+        landmark_m=float(rng.uniform(5e-5, 1.5e-4)),
         probe_m=float(rng.uniform(1e-4, 3e-4)),
         blunder_share=float(rng.choice([0.0, 0.1])),
         start_skew_s=float(rng.uniform(0.0, 0.5)),

@@ -21,6 +21,19 @@ WEAK = 0.4
 # A refused channel hides whatever else is in the recording, and an asymmetric Coulomb friction is a preload by definition.
 ALONE = ("command_as_measurement", "asymmetric_friction")
 
+# Effects that imitate each other closely enough that a pair of them would be a riddle rather than a test.
+FAMILIES = (
+    ("stribeck_friction", "quadratic_damping", "asymmetric_viscous_friction"),
+    ("elastoplastic_hysteresis", "presliding_friction", "viscoelastic_spring"),
+    ("detent_load", "nonlinear_spring", "end_stop_contact", "external_contact"),
+    ("drive_backlash", "series_elasticity", "clock_drift", "spring_decoupling"),
+    ("linkage_backlash", "linkage_compliance"),
+    ("coupling_deadband", "distal_stop"),
+    ("joint_wobble", "moving_centre"),
+    ("marker_slip", "support_slip", "palm_marker_slip", "marker_swap"),
+    ("drive_sag", "current_saturation"),
+)
+
 
 @dataclass(frozen=True)
 class Case:
@@ -51,7 +64,7 @@ def outside() -> tuple[str, ...]:
 def draw_case(seed: int, kind: str = "single", effect: str | None = None, strength: float | None = None) -> Case:
     """Draw a case: side, two fingers, geometry, noise, sampling, programs and what is hidden.
 
-    kind: "single", "none", "pair" (two effects on two stations or places), "messy" (one at full strength, every other at a
+    kind: "single", "none", "pair" (two effects of different families), "messy" (one at full strength, every other at a
     tenth), "outside" (not in the vocabulary), "weak" (noisier, shorter, 40 % of the strength). effect: the main effect
     instead of a drawn one; strength: instead of one drawn between 1 and 1.6. Raises HandModelError for unknown names.
     """
@@ -94,5 +107,6 @@ def _draw_names(rng: np.random.Generator, kind: str, effect: str | None) -> list
     if kind == "messy":
         return [main, *(name for name in mixed if name != main)]
     if kind == "pair":
-        return [main, str(rng.choice([name for name in mixed if name != main]))]
+        like = next((family for family in FAMILIES if main in family), (main,))
+        return [main, str(rng.choice([name for name in mixed if name not in like]))]
     return [main]

@@ -148,7 +148,7 @@ def probe_markers(truth: HandTruth, trial: TrialPlan, time_s: Array, seed: int) 
         tip, direction = probe_target(truth, trial, time_s)
         tilt = 0.0 if steady else 0.12
     if trial.kind in ("landmark", "joint_probe"):
-        tip = tip + truth.mocap.probe_m * rng.normal(size=3)
+        tip = tip + (truth.mocap.landmark_m if trial.kind == "landmark" else truth.mocap.probe_m) * rng.normal(size=3)
         if trial.kind == "joint_probe" and rng.uniform() < truth.mocap.blunder_share:
             tip = tip + truth.mocap.blunder_m * unit(rng.normal(size=3))
     elif trial.kind == "surface":

@@ -77,8 +77,8 @@ class MocapNoise:
     """The motion capture's dirt. noise_m: standard deviation per coordinate [m]. gaps_per_minute: occlusions per marker.
 
     ghosts_per_minute: unlabelled trajectories per trial; ghost_label_share: share of ghosts that steal a marker's label;
-    swaps_per_minute: short label swaps. drift_*: slow motion of the palm; shake_*: its trembling. probe_m: placing error of
-    the tip on landmarks and screw heads [m]; blunder_share: joint trials in which it misses the screw head by blunder_m.
+    swaps_per_minute: short label swaps. drift_*: slow motion of the palm; shake_*: its trembling. landmark_m,
+    probe_m: placing error of the tip on landmarks and on screw heads [m]; blunder_share: joint trials in which it misses the screw head by blunder_m.
     start_skew_s: the mocap starts up to that much after the trial does. unit: "mm" or "m" in the files.
     """
 
@@ -93,6 +93,7 @@ class MocapNoise:
     drift_m: float = 0.004
     shake_rad: float = 0.003
     shake_m: float = 2e-4
+    landmark_m: float = 1e-4
     probe_m: float = 2e-4
     blunder_share: float = 0.0
     blunder_m: float = 0.006
@@ -154,7 +155,8 @@ class HandTruth:
     def quiet(self) -> HandTruth:
         """The same hand in a laboratory without dirt: no noise, gaps, quantisation, palm motion or placing error."""
         mocap = MocapNoise(
-            rate_hz=self.mocap.rate_hz, noise_m=0, gaps_per_minute=0, drift_rad=0, drift_m=0, shake_rad=0, shake_m=0, probe_m=0
+            rate_hz=self.mocap.rate_hz, noise_m=0, gaps_per_minute=0, drift_rad=0, drift_m=0, shake_rad=0, shake_m=0,
+            landmark_m=0, probe_m=0,
         )
         log = LogNoise(
             interval_s=self.log.interval_s, jitter_s=self.log.jitter_s, lost_share=0, encoder_counts=0, current_raw=0,

@@ -87,8 +87,8 @@ def distal_stop(draw: Draw) -> Influence:
 @effect("spring_decoupling", "transmission", "markers", ("push", "hold"), joint="proximal")
 def spring_decoupling(draw: Draw) -> Influence:
     """Somebody flexes the finger now and then: it leaves its one-way drive, which then carries no spring."""
-    lift = draw.size("lift_rad", 0.10, 0.20)
-    length = draw.uniform("length_s", 1.0, 1.6) * (2.0 if draw.form == "hold" else 1.0)
+    lift = draw.size("lift_rad", 0.06, 0.12)
+    length = draw.uniform("length_s", 0.5, 0.8) * (1.6 if draw.form == "hold" else 1.0)
     windows = []
     for trial in (t for t in draw.schedule if t.kind == "flexion" and t.finger == draw.finger.name):
         shares = (0.15 + 0.7 * (np.arange(3) + 0.4 * draw.rng.uniform(size=3)) / 3.0).tolist()
