@@ -3,8 +3,12 @@
 Plant: inertia a = u - viscous v - F - stiffness p - preload, with the friction of LuGre (Canudas de Wit et al. 1995),
     F = f + bristle f',  f' = (level(v) - f sign(v)) v / distance,  level(v) = coulomb (1 + (ratio - 1) exp(-|v / stribeck|^exponent)),
 which sticks (any f within its bounds at v = 0) and becomes Coulomb's as the presliding distance goes to zero.
-Controller: u = gain (r - p) + damping (r' - v), within the current limit; r is a trapezoidal velocity profile from the old to the
-new setpoint. Integrated by the implicit midpoint rule, linear within a step.
+Controller: u = gain (r - p) + damping (r' - v), within the current limit. Two kinds make the reference r:
+    "profile": a trapezoidal velocity profile from the old to the new setpoint (a ramp where rise and fall take no time);
+    "cascade": r' follows position_gain (setpoint - p) within the speed limit and a slew rate, and holds within a deadband; as r is
+    the integral of the wanted speed, this is a position loop round a speed loop with proportional and integral action.
+A loop that samples acts late: p and v reach the controller `delay` seconds old, to first order (p - delay v, v - delay a).
+Integrated by the implicit midpoint rule, linear within a step.
 """
 
 from __future__ import annotations
@@ -18,15 +22,16 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 STEP_S = 2e-3
-PLANT = ("inertia", "viscous", "coulomb", "stiffness", "preload", "presliding", "bristle")
+SHARED = ("inertia", "viscous", "coulomb", "stiffness", "preload", "presliding", "bristle", "speed_full", "rise", "gain", "damping", "delay")
+CONTROLLERS = {"profile": (*SHARED, "fall"), "cascade": (*SHARED, "position_gain", "deadband")}
 STRIBECK = ("static_ratio", "stribeck_speed")
-CONTROLLER = ("speed_full", "acceleration", "deceleration", "gain", "damping")
+EDGE = 0.05  # [%]: width over which the deadband sets in
 
 
 @dataclass(frozen=True)
 class Moves:
     """Moves from rest, one per entry (B,): start_s of the command after the move's own zero [s], origin and target [%],
-    speed [share of full], limit [raw], position at rest [%], duration_s [s]; sorted by falling duration for `simulate`."""
+    speed [share of full], limit [raw], position [%] and current hold [raw] at rest, duration_s [s]; by falling duration for `simulate`."""
 
     start_s: Array
     origin: Array
@@ -34,13 +39,14 @@ class Moves:
     speed: Array
     limit: Array
     position: Array
+    hold: Array
     duration_s: Array
 
 
 def profile(time_s: Array, moves: Moves, q: Mapping[str, Array]) -> tuple[Array, Array]:
     """Reference [%] and its velocity [%/s], (n, B), of trapezoidal moves at times (n,) [s]."""
     distance, sign = np.abs(moves.target - moves.origin), np.sign(moves.target - moves.origin)
-    up, down = q["acceleration"], q["deceleration"]
+    up, down = q["speed_full"] / np.maximum(q["rise"], 1e-4), q["speed_full"] / np.maximum(q["fall"], 1e-4)
     top = np.minimum(q["speed_full"] * moves.speed, np.sqrt(2 * distance * up * down / (up + down)))
     top = np.maximum(top, 1e-9)
     t_up, t_down = top / up, top / down
@@ -53,7 +59,7 @@ def profile(time_s: Array, moves: Moves, q: Mapping[str, Array]) -> tuple[Array,
     return moves.origin + sign * reference, sign * (up * a - down * c)
 
 
-def simulate(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S) -> tuple[Array, Array, Array]:
+def simulate(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, controller: str = "profile") -> tuple[Array, Array, Array]:
     """Time (n,) [s], position (n, B) [%] and current (n, B) [raw] of B moves under B parameter sets (each (B,)).
 
     Every move starts at rest in balance, so its friction there is what the controller pushes less the spring.
@@ -61,7 +67,8 @@ def simulate(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S) -> tu
     """
     n = int(np.ceil(moves.duration_s.max() / step_s)) + 2
     time_s = np.arange(n) * step_s
-    r, w = profile(time_s, moves, q)
+    cascade = controller == "cascade"
+    r, w = (None, None) if cascade else profile(time_s, moves, q)
     active = np.searchsorted(-moves.duration_s, -(time_s - 2 * step_s), side="right")
     gain, damping, limit = q["gain"], q["damping"], moves.limit
     spring, preload, viscous = q["stiffness"], q["preload"], q["viscous"]
@@ -73,18 +80,35 @@ def simulate(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S) -> tu
     mass = q["inertia"] / half
     position, current = np.empty((n, len(moves.target))), np.empty((n, len(moves.target)))
     p, v = moves.position.copy(), np.zeros(len(moves.target))
-    u = np.clip(gain * (r[0] - p), -limit, limit)
+    u = np.clip(moves.hold if cascade else gain * (r[0] - p), -limit, limit)
+    if cascade:
+        r_now, w_now = p + u / gain, np.zeros(len(p))
+        slew, top_speed = step_s * q["speed_full"] / np.maximum(q["rise"], 1e-4), q["speed_full"] * moves.speed
+        started = moves.start_s
     top = coulomb * (1.0 + ratio)
     f = np.clip(u - spring * p - preload, -top, top)
     linear = mass + viscous + half * spring
-    closed = gain * half + damping
+    delay = np.minimum(q["delay"], 0.8 * q["inertia"] / np.maximum(damping, 1e-9))
+    closed = gain * (half - delay) + damping * (1.0 - delay / half)
+    a = np.zeros(len(p))
     for i in range(n):
         k = active[i]
         if k == 0:
             break
         if k < len(p):
-            p, v, f = p[:k], v[:k], f[:k]
-        u = gain[:k] * (r[i, :k] - p) + damping[:k] * (w[i, :k] - v)
+            p, v, f, a = p[:k], v[:k], f[:k], a[:k]
+        if cascade:
+            r_now, w_now = r_now[:k], w_now[:k]
+            error = np.where(time_s[i] < started[:k], moves.origin[:k], moves.target[:k]) - p
+            share = np.minimum(np.maximum((np.abs(error) - q["deadband"][:k]) / EDGE, 0.0), 1.0)
+            wanted = share * np.clip(q["position_gain"][:k] * error, -top_speed[:k], top_speed[:k])
+            w_next = w_now + np.clip(wanted - w_now, -slew[:k], slew[:k])
+            r_next = r_now + 0.5 * step_s * (w_now + w_next)
+        else:
+            r_now, w_now = r[i, :k], w[i, :k]
+            r_next, w_next = (r[i + 1, :k], w[i + 1, :k]) if i + 1 < n else (r_now, w_now)
+        late = delay[:k]
+        u = gain[:k] * (r_now - p + late * v) + damping[:k] * (w_now - v + late * a)
         position[i, :k] = p
         current[i, :k] = np.minimum(np.maximum(u, -limit[:k]), limit[:k])
         if i + 1 == n:
@@ -92,8 +116,9 @@ def simulate(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S) -> tu
         level = coulomb[:k]
         if has_stribeck:
             level = level * (1.0 + ratio[:k] * np.exp(-(np.abs(v * per_speed[:k]) ** exponent[:k])))
-        ahead = gain[:k] * (0.5 * (r[i, :k] + r[i + 1, :k]) - p) + damping[:k] * 0.5 * (w[i, :k] + w[i + 1, :k])
+        ahead = gain[:k] * (0.5 * (r_now + r_next) - p) + damping[:k] * 0.5 * (w_now + w_next)
         rest = mass[:k] * v - spring[:k] * p - preload[:k] - f
+        ahead = ahead - damping[:k] * late * v / half
         push = rest + ahead
         way = np.sign(push)
         travel = np.maximum(step_s * np.abs(v), 1e-6 * distance[:k])
@@ -104,7 +129,11 @@ def simulate(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S) -> tu
         over = np.abs(u_middle) > limit[:k]
         if over.any():
             middle = np.where(over, (rest + np.sign(u_middle) * limit[:k]) / inner, middle)
+        if cascade:  # within the deadband the integral holds: the reference goes with the drive
+            r_now = share * r_next + (1 - share) * (r_now + step_s * middle)
+            w_now = w_next
         p = p + step_s * middle
+        a = (middle - v) / half
         v = 2.0 * middle - v
         limit_f = np.sign(middle) * level
         f = limit_f + (f - limit_f) * np.exp(-step_s * np.abs(middle) / distance[:k])

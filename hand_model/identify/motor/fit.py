@@ -14,6 +14,7 @@ from ...hand import Estimate, Motor
 from ...session import Session
 from . import output_error
 from .corrected import NAMES, Regression, fit_regression
+from .drive import CONTROLLERS, STRIBECK
 from .output_error import MoveData, OutputErrorFit, moves_from_rest
 from .published import PublishedFit, fit_published, smear_share
 from .recording import MotorTrial, Scale, actuator_trials, check_trials, motor_trial, trial_scale
@@ -32,10 +33,13 @@ UNITS = {
     "stribeck_speed": "%/s",
     "stribeck_exponent": "1",
     "speed_full": "%/s",
-    "acceleration": "%/s^2",
-    "deceleration": "%/s^2",
+    "rise": "s",
+    "fall": "s",
+    "position_gain": "1/s",
+    "deadband": "%",
     "gain": "raw/%",
     "damping": "raw s/%",
+    "delay": "s",
 }
 BOUNDS = {
     "inertia": (1e-5, 1e3),
@@ -44,15 +48,16 @@ BOUNDS = {
     "presliding": (0.03, 10.0),
     "bristle": (0.0, 0.2),
     "speed_full": (1.0, 1e4),
-    "acceleration": (20.0, 2e5),
-    "deceleration": (20.0, 2e5),
+    "rise": (0.0, 3.0),
+    "fall": (0.0, 3.0),
+    "position_gain": (0.5, 200.0),
+    "deadband": (0.0, 10.0),
     "gain": (1e-2, 1e4),
     "damping": (0.0, 1e3),
+    "delay": (-0.002, 0.02),
     "static_ratio": (1.0, 8.0),
     "stribeck_speed": (1.5, 100.0),
 }
-FITTED = tuple(n for n in BOUNDS if n not in ("static_ratio", "stribeck_speed")) + ("stiffness", "preload")
-STRIBECK = ("static_ratio", "stribeck_speed")
 LACK_OF_FIT = 1.35  # residual variance over the noise's, above which output error does not describe the recording
 EVIDENCE = 16.0  # fall of the misfit (in variances, two parameters and two shapes tried): once in about a thousand by chance
 
@@ -143,7 +148,7 @@ def fit_motor(trials: Sequence[MotorTrial], scale: Scale, actuator: str = "motor
     plain = fit_regression(trials, sigma_p)
     curved = fit_regression(trials, sigma_p, stribeck=True)
     published, alike, smear = fit_published(trials), fit_published(trials, both_sides=True), smear_share(trials)
-    moves = [m for t in trials for m in moves_from_rest(t, sigma_p, scale.speed_full)]
+    moves = [m for t in trials for m in moves_from_rest(t, (sigma_p, sigma_u), scale.speed_full)]
     best, evidence = None, 0.0
     if len(moves) >= 4:
         best, evidence = _fit_output_error(moves, plain, curved, (sigma_p, sigma_u))
@@ -198,7 +203,7 @@ def _start(moves: Sequence[MoveData], plain: Regression) -> dict[str, float]:
     speed = float(np.median(ratio)) * 1.02 if ratio else 100.0
     return {
         **plant, "presliding": 0.5, "bristle": 0.004, "static_ratio": 1.0, "stribeck_speed": 20.0, "stribeck_exponent": 1.0,
-        "speed_full": speed, "acceleration": 9 * speed, "deceleration": 9 * speed, "gain": gain,
+        "speed_full": speed, "rise": 0.1, "fall": 0.1, "delay": 0.0, "position_gain": 12.0, "deadband": float(np.median(np.abs(error))), "gain": gain,
         "damping": 2 * np.sqrt(gain * plant["inertia"]),
     }  # fmt: skip
 
@@ -206,7 +211,8 @@ def _start(moves: Sequence[MoveData], plain: Regression) -> dict[str, float]:
 def _fit_output_error(
     moves: Sequence[MoveData], plain: Regression, curved: Regression, sigma: tuple[float, float]
 ) -> tuple[OutputErrorFit, float]:
-    base = output_error.fit(moves, _start(moves, plain), FITTED, sigma, BOUNDS)
+    base = _fit_controller(moves, _start(moves, plain), sigma)
+    fitted = CONTROLLERS[base.controller]
     # a Stribeck rise is tried where either the regression or the misfit leaves room for one
     if max(base.chi2) > 4.0 or (curved.excess_z < 2.0 and max(base.chi2) < 1.15):
         return base, 0.0
@@ -214,7 +220,7 @@ def _fit_output_error(
     fits = []
     for exponent in (1.0, 2.0):
         start = {**base.values, "static_ratio": ratio, "stribeck_speed": 20.0, "stribeck_exponent": exponent}
-        fits.append(output_error.fit(moves, start, (*FITTED, *STRIBECK), sigma, BOUNDS, own=base.own))
+        fits.append(output_error.fit(moves, start, (*fitted, *STRIBECK), sigma, BOUNDS, base.controller, own=base.own))
     best, other = sorted(fits, key=lambda f: f.cost)
     evidence = (base.cost - best.cost) / max(1.0, *best.chi2)
     if evidence < EVIDENCE or _is_at_bound(best):
@@ -222,6 +228,25 @@ def _fit_output_error(
     if other.cost - best.cost < EVIDENCE:
         best = _either_shape(*fits)
     return best, evidence
+
+
+def _fit_controller(moves: Sequence[MoveData], start: Mapping[str, float], sigma: tuple[float, float]) -> OutputErrorFit:
+    """The kind of controller that explains the motion, each kind from two starts; the first that reaches the noise ends the search."""
+    starts = (
+        ("profile", {**start, "rise": 0.1, "fall": 0.1}),
+        ("profile", {**start, "rise": 0.01, "fall": 0.01, "damping": 0.3 * start["damping"]}),
+        ("cascade", {**start, "rise": 0.08, "gain": 12.0, "damping": 2.5}),
+    )
+    first = [output_error.first_cost(moves, values, CONTROLLERS[kind], sigma, BOUNDS, kind) for kind, values in starts]
+    best = None
+    for i in np.argsort(first):
+        kind, values = starts[i]
+        fit = output_error.fit(moves, values, CONTROLLERS[kind], sigma, BOUNDS, kind)
+        if best is None or fit.cost < best.cost:
+            best = fit
+        if max(best.chi2) < LACK_OF_FIT:
+            break
+    return best
 
 
 def _either_shape(first: OutputErrorFit, second: OutputErrorFit) -> OutputErrorFit:

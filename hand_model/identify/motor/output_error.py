@@ -7,7 +7,7 @@ drive rested. Shared: plant, friction and controller. Gauss-Newton on whitened r
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +18,9 @@ from .recording import MotorTrial
 Array = NDArray[np.float64]
 
 COARSE_S = 5e-3
-ABSOLUTE_REACH = {"preload": 20.0, "viscous": 0.1, "stiffness": 0.2, "coulomb": 10.0, "bristle": 0.01, "damping": 2.0}
-OWN_STEP = (5e-4, 2e-3, 2e-4)
-OWN_REACH = np.array([0.01, 0.3, 0.01])  # of one step
+ABSOLUTE_REACH = {"preload": 20.0, "viscous": 0.1, "stiffness": 0.2, "coulomb": 10.0, "bristle": 0.01, "damping": 2.0, "rise": 0.02, "fall": 0.02, "deadband": 0.2, "delay": 0.002}
+OWN_STEP = (5e-4, 2e-3, 2e-4, 0.1)
+OWN_REACH = np.array([0.01, 0.3, 0.01, 10.0])  # of one step
 SETTLED = 0.6  # [%]: movement allowed over the samples before a move that starts from rest
 BEFORE = 12  # samples at rest that a move looks back to
 
@@ -30,7 +30,8 @@ class MoveData:
     """One move from rest: its samples, and what the command says.
 
     Known only so well, and estimated with the fit: own = when the command took effect (within one sample of the log) [s], where
-    the drive rested [%], and the speed [share of full] (logged in whole raw units). own_sd: (3,) standard deviations.
+    the drive rested [%], the speed [share of full] (logged in whole raw units), and the current that held it at rest [raw].
+    own_sd: (4,) standard deviations.
     """
 
     trial: str
@@ -48,7 +49,8 @@ class MoveData:
 @dataclass(frozen=True)
 class OutputErrorFit:
     """values: parameter -> value; names: fitted, in the order of covariance (k, k), a sandwich over moves. sigma: noise of
-    position [%] and current [raw]; residual: per move (n, 2), in these units. own: (moves, 3), see MoveData. chi2: mean squared whitened residual per channel."""
+    position [%] and current [raw]; residual: per move (n, 2), in these units. own: (moves, 4), see MoveData. chi2: mean squared whitened residual per channel.
+    controller: kind of the reference, see `drive`."""
 
     values: Mapping[str, float]
     names: tuple[str, ...]
@@ -59,14 +61,17 @@ class OutputErrorFit:
     own: Array
     cost: float
     chi2: tuple[float, float]
-    notes: tuple[str, ...] = field(default=())
+    controller: str = "profile"
 
 
-def moves_from_rest(trial: MotorTrial, sigma_position: float, speed_full: float) -> tuple[MoveData, ...]:
-    """The commanded moves of a log that start with the drive at rest; empty where no setpoint is logged."""
+def moves_from_rest(trial: MotorTrial, sigma: tuple[float, float], speed_full: float) -> tuple[MoveData, ...]:
+    """The commanded moves of a log that start with the drive at rest; empty where no setpoint is logged.
+
+    sigma: noise of position [%] and current [raw]. speed_full: raw full scale of the speed column.
+    """
     if trial.setpoint is None:
         return ()
-    t, p = trial.time_s, trial.position
+    t, p, sigma_position = trial.time_s, trial.position, sigma[0]
     whole = trial.speed is not None and speed_full > 1 and np.allclose(trial.speed * speed_full, np.round(trial.speed * speed_full))
     speed_sd = 1 / (np.sqrt(12) * speed_full) if whole else 1e-4
     change = np.flatnonzero(np.diff(trial.setpoint) != 0)
@@ -78,6 +83,7 @@ def moves_from_rest(trial: MotorTrial, sigma_position: float, speed_full: float)
         drift = abs(before[len(before) // 2 :].mean() - before[: len(before) // 2].mean()) if len(before) >= 4 else np.inf
         if not settled or drift > 3 * sigma_position or j - i < 8 or trial.setpoint[i + 1] == trial.setpoint[i]:
             continue
+        held = trial.current[max(0, i - BEFORE + 1) : i + 1]
         speed = 1.0 if trial.speed is None else float(trial.speed[i + 1])
         limit = np.inf if trial.limit is None else float(trial.limit[i + 1])
         gap = float(t[i + 1] - t[i])
@@ -85,8 +91,8 @@ def moves_from_rest(trial: MotorTrial, sigma_position: float, speed_full: float)
         found.append(
             MoveData(
                 trial.name, int(i), t[k] - t[i], p[k], trial.current[k], float(trial.setpoint[i]), float(trial.setpoint[i + 1]),
-                limit, np.array([0.5 * gap, before.mean(), speed]),
-                np.array([max(gap / np.sqrt(12), 5e-3), sigma_position / np.sqrt(len(before)), speed_sd]),
+                limit, np.array([0.5 * gap, before.mean(), speed, held.mean()]),
+                np.array([max(gap / np.sqrt(12), 5e-3), sigma_position / np.sqrt(len(before)), speed_sd, sigma[1] / np.sqrt(len(held))]),
             )
         )  # fmt: skip
     return tuple(found)
@@ -98,16 +104,16 @@ def _arrays(data: Sequence[MoveData], own: Array, repeat: int) -> Moves:
 
     return Moves(
         own[:, 0], tile([m.origin for m in data]), tile([m.target for m in data]), own[:, 2],
-        tile([m.limit for m in data]), own[:, 1], tile([m.time_s[-1] for m in data]),
+        tile([m.limit for m in data]), own[:, 1], own[:, 3], tile([m.time_s[-1] for m in data]),
     )  # fmt: skip
 
 
-def simulate_moves(data: Sequence[MoveData], q: Mapping[str, float], own: Array, step_s: float = STEP_S) -> list[Array]:
+def simulate_moves(data: Sequence[MoveData], q: Mapping[str, float], own: Array, controller: str, step_s: float = STEP_S) -> list[Array]:
     """Simulated position [%] and current [raw], (n, 2) per move."""
     order = np.argsort([-m.time_s[-1] for m in data], kind="stable")
     sorted_data = [data[i] for i in order]
     full = {k: np.full(len(data), v) for k, v in q.items()}
-    t, p, u = simulate(_arrays(sorted_data, own[order], 1), full, step_s)
+    t, p, u = simulate(_arrays(sorted_data, own[order], 1), full, step_s, controller)
     out: list[Array] = [np.empty(0)] * len(data)
     for column, i in enumerate(order):
         out[i] = _sample(t, p[:, column], u[:, column], data[i].time_s)
@@ -125,16 +131,16 @@ def _sample(t: Array, p: Array, u: Array, at: Array) -> Array:
 
 
 def _steps(values: Mapping[str, float], names: Sequence[str]) -> Array:
-    floor = {"preload": 1.0, "viscous": 0.02, "damping": 0.1, "bristle": 0.01, "stiffness": 0.02, "coulomb": 1.0}
+    floor = {"preload": 1.0, "viscous": 0.02, "damping": 0.1, "bristle": 0.01, "rise": 0.01, "fall": 0.01, "deadband": 0.1, "delay": 0.01, "stiffness": 0.02, "coulomb": 1.0}
     return np.array([1e-3 * max(abs(values[n]), floor.get(n, 0.0)) for n in names])
 
 
 def _linearise(
-    data: Sequence[MoveData], q: Mapping[str, float], names: Sequence[str], own: Array, sigma: tuple[float, float], step_s: float
+    data: Sequence[MoveData], q: Mapping[str, float], names: Sequence[str], own: Array, sigma: tuple[float, float], controller: str, step_s: float
 ) -> tuple[list[Array], list[Array], list[Array]]:
-    """Whitened residuals (2n,), shared (2n, k) and own (2n, 3) Jacobian of every move, one batch of simulations."""
+    """Whitened residuals (2n,), shared (2n, k) and own (2n, 4) Jacobian of every move, one batch of simulations."""
     k = len(names)
-    width = k + 4
+    width = k + 1 + len(OWN_STEP)
     steps = _steps(q, names)
     order = np.argsort([-m.time_s[-1] for m in data], kind="stable")
     ordered = [data[i] for i in order]
@@ -146,7 +152,7 @@ def _linearise(
     owns = np.repeat(own[order], width, axis=0)
     for i, small in enumerate(OWN_STEP):
         owns[k + 1 + i :: width, i] += small
-    t, p, u = simulate(_arrays(ordered, owns, width), values, step_s)
+    t, p, u = simulate(_arrays(ordered, owns, width), values, step_s, controller)
     out_r: list = [None] * len(data)
     out_g: list = [None] * len(data)
     out_l: list = [None] * len(data)
@@ -161,9 +167,9 @@ def _linearise(
     return out_r, out_g, out_l
 
 
-def _cost(data: Sequence[MoveData], q: Mapping[str, float], own: Array, sigma: tuple[float, float], step_s: float) -> float:
+def _cost(data: Sequence[MoveData], q: Mapping[str, float], own: Array, sigma: tuple[float, float], controller: str, step_s: float) -> float:
     total = 0.0
-    for m, y, x in zip(data, simulate_moves(data, q, own, step_s), own, strict=True):
+    for m, y, x in zip(data, simulate_moves(data, q, own, controller, step_s), own, strict=True):
         e = (np.stack([m.position, m.current], axis=1) - y) / np.asarray(sigma)
         total += float(np.sum(e * e) + np.sum(((m.own - x) / m.own_sd) ** 2))
     return total if np.isfinite(total) else np.inf
@@ -175,28 +181,52 @@ def fit(
     names: Sequence[str],
     sigma: tuple[float, float],
     bounds: Mapping[str, tuple[float, float]],
+    controller: str = "profile",
     iterations: int = 12,
     own: Array | None = None,
 ) -> OutputErrorFit:
     """Fit the named parameters to the moves by damped Gauss-Newton; the others stay at `start_values`.
 
-    sigma: noise of position [%] and current [raw]. bounds: parameter -> (low, high). own: (moves, 3) to start from.
+    sigma: noise of position [%] and current [raw]. bounds: parameter -> (low, high). own: (moves, 4) to start from.
     A few iterations at a coarse step come first; a fit that stays far from the noise is given up early.
     """
     q, own = dict(start_values), np.array([m.own for m in data]) if own is None else own.copy()
     samples = 2 * sum(len(m.time_s) for m in data)
     for step_s, rounds, enough in ((COARSE_S, 5, 2.0), (STEP_S, iterations, 0.1)):
-        damping, cost = 1e-3, _cost(data, q, own, sigma, step_s)
+        damping, cost = 1e-3, _cost(data, q, own, sigma, controller, step_s)
         for i in range(rounds):
-            linear = _linearise(data, q, names, own, sigma, step_s)
+            linear = _linearise(data, q, names, own, sigma, controller, step_s)
             normal, gradient, blocks, _ = _normal(data, *linear, own)
             if (expected := _expected(normal, gradient, blocks)) < enough or (i > 3 and cost > 20 * samples and expected > 0.5 * cost):
                 break
-            moved = _step(data, q, names, own, sigma, bounds, (normal, gradient, blocks), cost, damping, step_s)
+            moved = _step(data, q, names, own, sigma, bounds, (normal, gradient, blocks), cost, damping, controller, step_s)
             if moved is None:
                 break
             q, own, cost, damping = moved
-    return _finish(data, linear, q, names, sigma, own, cost)
+    return _finish(data, linear, q, names, sigma, own, cost, controller)
+
+
+def first_cost(
+    data: Sequence[MoveData],
+    values: Mapping[str, float],
+    names: Sequence[str],
+    sigma: tuple[float, float],
+    bounds: Mapping[str, tuple[float, float]],
+    controller: str,
+    share: int = 4,
+) -> float:
+    """Misfit that two coarse steps reach on every `share`-th move: to choose where a fit starts."""
+    some = tuple(sorted(data, key=lambda m: m.time_s[-1])[: max(6, len(data) // 2) : max(1, len(data) // (2 * share))])
+    q, own = dict(values), np.array([m.own for m in some])
+    damping, cost = 1e-3, _cost(some, q, own, sigma, controller, COARSE_S)
+    for _ in range(3):
+        linear = _linearise(some, q, names, own, sigma, controller, COARSE_S)
+        normal, gradient, blocks, _ = _normal(some, *linear, own)
+        moved = _step(some, q, names, own, sigma, bounds, (normal, gradient, blocks), cost, damping, controller, COARSE_S)
+        if moved is None:
+            break
+        q, own, cost, damping = moved
+    return cost
 
 
 def _expected(normal: Array, gradient: Array, blocks: list[tuple[Array, Array, Array]]) -> float:
@@ -216,6 +246,7 @@ def _step(
     system: tuple[Array, Array, list[tuple[Array, Array, Array]]],
     cost: float,
     damping: float,
+    controller: str,
     step_s: float,
 ) -> tuple[dict[str, float], Array, float, float] | None:
     """One Levenberg-Marquardt step: new values, own unknowns, cost and damping; None where nothing improves."""
@@ -231,7 +262,7 @@ def _step(
         actual = np.array([new_q[n] - q[n] for n in names])
         local = np.array([inverse @ (b - c @ actual) for inverse, b, c in blocks])
         new_own = own + np.clip(local, -OWN_REACH, OWN_REACH)
-        new = _cost(data, new_q, new_own, sigma, step_s)
+        new = _cost(data, new_q, new_own, sigma, controller, step_s)
         if new < cost:
             return new_q, new_own, new, max(damping / 10, 1e-9)
         damping = max(damping, 1e-4) * 10
@@ -255,7 +286,8 @@ def _normal(
 
 
 def _finish(
-    data: Sequence[MoveData], linear: tuple[list[Array], ...], q: Mapping[str, float], names: Sequence[str], sigma: tuple[float, float], own: Array, cost: float
+    data: Sequence[MoveData], linear: tuple[list[Array], ...], q: Mapping[str, float], names: Sequence[str], sigma: tuple[float, float], own: Array, cost: float,
+    controller: str,
 ) -> OutputErrorFit:
     r, g, local = linear
     normal, _, _, score = _normal(data, r, g, local, own)
@@ -268,7 +300,7 @@ def _finish(
     chi2 = squared / (n - 0.5 * (k + 3 * len(data)))
     covariance = _conservative(bread * max(1.0, float(chi2.max())), bread @ meat @ bread)
     return OutputErrorFit(
-        dict(q), tuple(names), covariance, sigma, residual, tuple(data), own, cost, (float(chi2[0]), float(chi2[1]))
+        dict(q), tuple(names), covariance, sigma, residual, tuple(data), own, cost, (float(chi2[0]), float(chi2[1])), controller
     )
 
 
