@@ -58,7 +58,7 @@ def drive_state(rig: RigModel, row: Rows, theta: Array) -> DriveState:
 
 def candidates(rig: RigModel, fit: DeclaredFit, joint: str) -> tuple[Candidate, ...]:
     """All candidates at one joint, from the catalogue and from the rig itself."""
-    rows = [r for r in fit.rows if r.joint == joint and not r.validate and r.trial not in fit.outliers]
+    rows = [r for r in fit.rows if r.joint == joint and not r.validate]
     if not rows:
         return ()
     states = {r.trial: drive_state(rig, r, fit.theta) for r in fit.rows if r.joint == joint}

@@ -49,6 +49,7 @@ class Step:
     probability: float
     rivals: tuple[tuple[str, float], ...]
     gain: float
+    equals: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -61,9 +62,10 @@ class Problem:
     fold: Array
 
 
-def pose(fit: DeclaredFit) -> Problem:
-    """Cut the training recordings into at least a dozen blocks; neighbours in one recording go to different folds."""
-    rows = tuple(r for r in fit.rows if not r.validate and r.trial not in fit.outliers and r.moving.sum() > 10)
+def pose(fit: DeclaredFit, joint: str | None = None) -> Problem:
+    """Cut the training recordings (of one joint, or all) into at least a dozen blocks; where there are few recordings,
+    neighbouring blocks go to different folds, else whole recordings do."""
+    rows = tuple(r for r in fit.rows if not r.validate and joint in (None, r.joint) and r.moving.sum() > 10)
     trials = list(dict.fromkeys(r.trial for r in rows))
     each = int(np.clip(np.ceil(18 / max(len(trials), 1)), 2, 18))
     block, first = [], {t: k * each for k, t in enumerate(trials)}
@@ -228,7 +230,14 @@ def _judge(none: Array, scores: Sequence[Score]) -> Step | None:
     probability = float(np.mean(resampled[best] < none[draw].sum(1)))
     if gain < LEAST_GAIN or probability < LEAST_PROBABILITY:
         return None
+    # of those that cannot be told from the best, the one with fewest parameters (Occam)
+    close = [k for k in range(len(scores)) if np.mean(resampled[best] < resampled[k]) < LEAST_PROBABILITY]
+    close.sort(key=lambda k: errors[k].sum())
+    size = {k: len(scores[k].term.shape) + len(scores[k].term.candidate.amplitudes) for k in close}
+    chosen = min(close, key=lambda k: (size[k], errors[k].sum()))
     wins = np.bincount(np.argmin(resampled, 0), minlength=len(scores)) / RESAMPLES
     order = np.argsort(-wins)
     rivals = tuple((scores[i].term.candidate.key, float(wins[i])) for i in order if wins[i] > 0.005)
-    return Step(scores[best], probability, rivals, float(gain))
+    equals = tuple(dict.fromkeys(scores[k].term.candidate.effect for k in close))
+    gain = 1.0 - errors[chosen].sum() / max(none.sum(), 1e-300)
+    return Step(scores[chosen], probability, rivals, float(gain), equals)

@@ -24,7 +24,7 @@ CUTOFFS = (2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 35.0, 60.0)
 class DeclaredFit:
     """Declared parameters after the fit. columns and theta (P,) correspond; scale: joint -> residual rms [effort unit];
     rows: every trial's balance at the chosen cut-off; quality: (trial, joint) -> share of the effort left unexplained
-    (residual rms / effort rms); outliers: trials left out because their effort does not explain their motion."""
+    (residual rms / effort rms)."""
 
     columns: tuple[Column, ...]
     theta: Array
@@ -32,7 +32,6 @@ class DeclaredFit:
     rows: tuple[Rows, ...]
     cutoff_hz: float
     quality: dict[tuple[str, str], float]
-    outliers: tuple[str, ...]
 
     def residual(self, row: Rows) -> Array:
         """Effort that the declared model leaves (m,), on the thinned grid."""
@@ -105,7 +104,7 @@ def _unexplained(fit: DeclaredFit) -> float:
     """Mean over joints of the log share of training effort left."""
     shares: dict[str, list[float]] = {}
     for row in fit.rows:
-        if not row.validate and row.trial not in fit.outliers:
+        if not row.validate:
             shares.setdefault(row.joint, []).append(fit.quality[row.trial, row.joint])
     return float(np.exp(np.mean([np.log(np.sqrt(np.mean(np.square(s))) + 1e-12) for s in shares.values()])))
 
@@ -131,7 +130,7 @@ def _robust_fit(columns: tuple[Column, ...], rows: tuple[Rows, ...], cutoff: flo
     for r in rows:
         m = r.moving
         quality[r.trial, r.joint] = _rms((r.effort - r.columns @ theta)[m]) / (_rms(_known(r, columns)[m]) + 1e-300)
-    return DeclaredFit(columns, theta, scale, rows, cutoff, quality, ())
+    return DeclaredFit(columns, theta, scale, rows, cutoff, quality)
 
 
 def _known(row: Rows, columns: Sequence[Column]) -> Array:

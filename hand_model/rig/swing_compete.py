@@ -43,6 +43,7 @@ class Round:
     gain: float
     rivals: tuple[tuple[str, float], ...]
     equals: tuple[str, ...]
+    fit: Fitted | None = None
 
 
 def variants(swing: Swing) -> tuple[Variant, ...]:
@@ -112,7 +113,7 @@ def compete_swing(swing: Swing, declared: Fitted) -> tuple[tuple[Variant, ...], 
         best, round_ = found
         taken = (*taken, rivals[order[best]])
         current = polish(swing, Task(_free(swing, taken), fits[order[best]].theta, train))
-        rounds.append(round_)
+        rounds.append(replace(round_, fit=current))
     return taken, current, tuple(rounds)
 
 

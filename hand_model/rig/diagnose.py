@@ -1,0 +1,338 @@
+"""What a rig's declared model lacks: channels first, then couplings, then every joint; each claim on held-out trials."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..session import Session
+from .candidates import candidates
+from .channels import ChannelIssue, check_balance, check_channels
+from .compete import Step, Term, compete, design, pose, solution
+from .declared import DeclaredFit, fit_declared
+from .findings import Finding, Findings
+from .model import RigModel, load_rig
+from .patch import write_declared, write_effects
+from .replay import replay_rig
+from .states import noise_std
+from .swing import Fitted, Swing, Task, vector
+from .swing_build import build_swing, can_swing
+from .swing_compete import Round, Variant, compete_swing, free_declared, polish
+from .swing_patch import write_swing
+from .transmission import coupling_candidates, fit_coupling
+
+Array = NDArray[np.float64]
+SEARCH_STEP_S = 4e-3
+RESAMPLES = 500
+
+
+def diagnose_rig(session: Session, output: str | Path | None = None,
+                 progress: Callable[[str], None] | None = None) -> Findings:  # fmt: skip
+    """Diagnose a rig session; with `output`, also write findings.json and the improved rig.xml there.
+
+    Raises SessionError or DescriptionError where the session or its MJCF cannot be read.
+    """
+    say = progress or (lambda _: None)
+    rig = load_rig(session)
+    fit, issues = trusted_fit(rig)
+    found = [_channel_finding(i) for i in issues]
+    refused = {(t, i.joint) for i in issues if i.refuse for t in i.trials}
+    say(f"{rig.name}: declared model fitted, {len(issues)} channel issues")
+    if can_swing(rig) and not refused:
+        result = _diagnose_swing(rig, session, fit, say)
+    else:
+        result = _diagnose_balance(rig, fit, say)
+    parts, rejected, lack, xml, declared_xml = result
+    found += parts
+    for coupling in rig.couplings:
+        more, said = _diagnose_coupling(rig, coupling)
+        found += more
+        rejected = [*rejected, *said]
+        say(f"{rig.name}: coupling {coupling.name}")
+    lack = dict(lack)
+    unexplained = _unexplained(lack, found)
+    findings = Findings(
+        session=rig.name,
+        verdict=_verdict(found, lack),
+        lack_of_fit=lack,
+        protocol={"repeats": len(rig.select(False)), "rate_hz": _rate(rig), "held_out": [t.name for t in rig.select(True)],
+                  "not_isolable": [list(f.members) for f in found if len(f.members) > 1]},
+        findings=tuple(sorted(found, key=lambda f: (f.model is not None, -float(f.where.get("share_of_mismatch") or 0.0)))),
+        rejected=tuple(rejected),
+        unexplained=unexplained,
+        next_experiment=_next(found, issues),
+        declared={c.label: float(t) for c, t in zip(fit.columns, fit.theta, strict=True)},
+        xml=xml,
+        declared_xml=declared_xml,
+    )  # fmt: skip
+    if output is not None:
+        findings.write(output)
+    return findings
+
+
+def trusted_fit(rig: RigModel) -> tuple[DeclaredFit, tuple[ChannelIssue, ...]]:
+    """The declared fit to the channels that can be trusted, and what is wrong with the others."""
+    issues = list(check_channels(rig))
+    cutoff = None
+    while True:
+        refused = {(t, i.joint) for i in issues if i.refuse for t in i.trials}
+        fit = fit_declared(rig, refused, cutoff)
+        more = check_balance(rig, fit) if fit.rows else ()
+        if not more:
+            return fit, tuple(issues)
+        issues += more
+
+
+def _rate(rig: RigModel) -> float:
+    return float(1.0 / np.median(np.concatenate([np.diff(t.time_s) for t in rig.trials])))
+
+
+def _channel_finding(issue: ChannelIssue) -> Finding:
+    action = "it is refused, nothing is fitted to it" if issue.refuse else "samples there say only that it is at least that"
+    return Finding(
+        issue.kind, (issue.kind,), 1.0, (), {"joint": issue.joint, "signal": issue.channel, "trials": list(issue.trials)},
+        f"{issue.reason}: {action}.", {"share_left": {"value": issue.share, "unit": "1"}}, {}, None,
+        "channel refused" if issue.refuse else "channel clipped",
+    )  # fmt: skip
+
+
+# --- joints by the balance of effort ---------------------------------------------------------------------------------
+
+
+def _diagnose_balance(rig: RigModel, fit: DeclaredFit, say: Callable[[str], None]) -> tuple:
+    """Findings, rejections, lack of fit, patched and declared MJCF of a rig whose efforts are recorded."""
+    terms: list[Term] = []
+    stories: list[tuple[Step, Term]] = []
+    rejected: list[dict[str, Any]] = []
+    joints = [j for j in rig.joints if any(r.joint == j for r in fit.rows)]
+    if not fit.rows:
+        return [], [], {"metric": None, "before": None, "after": None}, rig.xml, rig.xml
+    for joint in joints:
+        taken, steps, scores = compete(pose(fit, joint), candidates(rig, fit, joint))
+        terms += taken
+        stories += zip(steps, taken, strict=True)
+        rejected += [{"effect": s.term.candidate.key, "reason": "held-out error does not fall enough"} for s in scores]
+        say(f"{rig.name}: {joint}: {', '.join(t.candidate.key for t in taken) or 'nothing'}")
+    problem = pose(fit)
+    found: list[Finding] = []
+    kept: list[Term] = []
+    for step, term in stories:
+        before = solution(problem, kept)
+        after = solution(problem, [*kept, term])
+        proof = _proof(rig, fit, kept, before, [*kept, term], after, term.candidate.joint)
+        if proof["ci95_reduction"][0] <= 0:
+            rejected.append({"effect": term.candidate.key, "reason": "error on validation trials does not fall"})
+            continue
+        kept.append(term)
+        found.append(_joint_finding(rig, fit, step, term, after[len(after) - len(term.candidate.amplitudes):], proof))
+    theta = solution(problem, kept)
+    base = solution(problem, [])
+    lack = {"metric": "effort_rmse", "unit": "share of the declared model's",
+            "before": 1.0, "after": _ratio(fit, base, kept, theta), "one_effect": _ratio(fit, base, kept[:1], solution(problem, kept[:1])),
+            "joints": {j: _proof(rig, fit, [], base, kept, theta, j) for j in joints}}  # fmt: skip
+    declared_xml = write_declared(rig, fit.columns, base)
+    p = len(fit.columns)
+    records = _records(kept, theta[p:])
+    xml = write_effects(write_declared(rig, fit.columns, theta[:p]), records)
+    return _shares(found), rejected, lack, xml, declared_xml
+
+
+def _records(kept: Sequence[Term], amplitude: Array) -> list[dict[str, Any]]:
+    """Effects as custom/text keeps them."""
+    out, at = [], 0
+    for t in kept:
+        names = [a[0] for a in t.candidate.amplitudes]
+        values = amplitude[at : at + len(names)]
+        at += len(names)
+        out.append({"effect": t.candidate.effect, "variant": t.candidate.variant, "joint": t.candidate.joint,
+                    "shape": {k: float(v) for k, v in t.shape.items()},
+                    "amplitude": {n: float(v) for n, v in zip(names, values, strict=True)}})  # fmt: skip
+    return out
+
+
+def _residuals(fit: DeclaredFit, terms: Sequence[Term], theta: Array, joint: str) -> list[tuple[str, Array]]:
+    """Residual effort of the moving samples of every validation trial (training ones where none validates)."""
+    rows = [r for r in fit.rows if r.joint == joint and r.moving.sum() > 10]
+    chosen = [r for r in rows if r.validate] or rows
+    return [(r.trial, (r.effort - design(r, terms) @ theta)[r.moving]) for r in chosen]
+
+
+def _proof(rig: RigModel, fit: DeclaredFit, few: Sequence[Term], before: Array, many: Sequence[Term], after: Array,
+           joint: str) -> dict[str, Any]:  # fmt: skip
+    """Held-out effort error before and after, with an interval of its fall from resampled blocks."""
+    a, b = _residuals(fit, few, before, joint), _residuals(fit, many, after, joint)
+    squares = np.array([[np.sum(p**2) for _, e in side for p in np.array_split(e, max(2, 24 // len(side)))] for side in (a, b)])
+    count = np.array([len(p) for _, e in a for p in np.array_split(e, max(2, 24 // len(a)))])
+    draw = np.random.default_rng(0).integers(0, len(count), (RESAMPLES, len(count)))
+    rms = np.sqrt(squares[:, draw].sum(2) / count[draw].sum(1))
+    fall = np.percentile(rms[0] - rms[1], [2.5, 97.5])
+    whole = np.sqrt(squares.sum(1) / count.sum())
+    floor = [noise_std(r.extra["effort"]) * np.sqrt(min(1.0, 2 * r.cutoff_hz / r.rate_hz)) for r in fit.rows if r.joint == joint]
+    return {"metric": "effort_rmse", "unit": rig.effort_unit(joint), "before": float(whole[0]), "after": float(whole[1]),
+            "noise_floor": float(np.median(floor)), "ci95_reduction": [float(fall[0]), float(fall[1])],
+            "held_out": [t for t, _ in a], "engine": "mujoco"}  # fmt: skip
+
+
+def _ratio(fit: DeclaredFit, base: Array, kept: Sequence[Term], theta: Array) -> float:
+    """Root mean over joints of the squared ratio of held-out errors."""
+    ratios = []
+    for joint in {r.joint for r in fit.rows}:
+        before = np.concatenate([e for _, e in _residuals(fit, [], base, joint)])
+        after = np.concatenate([e for _, e in _residuals(fit, kept, theta, joint)])
+        ratios.append(np.sum(after**2) / max(np.sum(before**2), 1e-300))
+    return float(np.sqrt(np.mean(ratios)))
+
+
+def _joint_finding(rig: RigModel, fit: DeclaredFit, step: Step, term: Term, amplitude: Array, proof: dict) -> Finding:
+    c = term.candidate
+    parameters = {n: {"value": float(v), "unit": u} for (n, u, _, _), v in zip(c.amplitudes, amplitude, strict=True)}
+    parameters |= {k: {"value": float(v), "unit": ""} for k, v in term.shape.items()}
+    drive = rig.drive(c.joint)
+    rivals = [(key, p) for key, p in step.rivals if not key.startswith(c.effect)]
+    where = {"finger": None, "joint": c.joint, "actuator": drive.name if drive else None, "signal": "effort", "marker": None,
+             "trials": proof["held_out"], "share_of_mismatch": max(proof["before"] ** 2 - proof["after"] ** 2, 0.0)}  # fmt: skip
+    return Finding(
+        c.effect, (c.effect, *(e for e in step.equals if e != c.effect)), step.probability,
+        tuple({"effect": k.split("@")[0], "probability": p} for k, p in rivals), where,
+        statement(c.effect, c.variant, c.joint, {k: v["value"] for k, v in parameters.items()}, proof), parameters, proof,
+        {"native": False, "mjcf": 'custom/text[@name="hand_model"]', "urdf": "not expressible: kept in rig.xml"},
+    )  # fmt: skip
+
+
+def _shares(found: list[Finding]) -> list[Finding]:
+    """share_of_mismatch as a part of what all findings of the same joint explain."""
+    total: dict[str, float] = {}
+    for f in found:
+        total[f.where["joint"]] = total.get(f.where["joint"], 0.0) + f.where["share_of_mismatch"]
+    return [replace(f, where={**f.where, "share_of_mismatch": f.where["share_of_mismatch"] / max(total[f.where["joint"]], 1e-300)})
+            for f in found]  # fmt: skip
+
+
+# --- a joint by its simulated motion ---------------------------------------------------------------------------------
+
+
+def _diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Callable[[str], None]) -> tuple:
+    """The same for one joint driven by a voltage or by nothing: MuJoCo's motion in open loop is what is compared."""
+    swing = build_swing(rig, fit, SEARCH_STEP_S)
+    train = tuple(int(i) for i in swing.train())
+    declared = polish(swing, Task(free_declared(swing), vector(swing.initial), train))
+    taken, _, rounds = compete_swing(swing, declared)
+    say(f"{rig.name}: {', '.join(v.key for v in taken) or 'nothing'}")
+    files = [write_swing(rig, swing, f.theta) for f in (declared, *(r.fit for r in rounds))]
+    replays = [replay_rig(session, load_rig(session, x)) for x in files]
+    figures = [r.figure("position_rmse", True) for r in replays]
+    means = [r.figure("position_mae", True) for r in replays]
+    found = []
+    for k, (variant, round_) in enumerate(zip(taken, rounds, strict=True)):
+        proof = {"metric": "position_rmse", "unit": rig.unit(rig.joints[0]), "before": figures[k], "after": figures[k + 1],
+                 "noise_floor": _resolution(rig), "ci95_reduction": _fall(replays[k], replays[k + 1]),
+                 "held_out": [t.name for t in rig.select(True)], "engine": "mujoco"}  # fmt: skip
+        found.append(_swing_finding(rig, variant, round_, swing, proof))
+    lack = {"metric": "position_rmse", "unit": rig.unit(rig.joints[0]), "before": figures[0], "after": figures[-1],
+            "one_effect": figures[min(1, len(figures) - 1)], "mae_before": means[0], "mae_after": means[-1],
+            "noise_floor": _resolution(rig)}  # fmt: skip
+    return _shares(found), [], lack, files[-1], files[0]
+
+
+def _resolution(rig: RigModel) -> float:
+    return float(np.median([noise_std(t.position[rig.joints[0]]) for t in rig.trials]))
+
+
+def _fall(before: Any, after: Any) -> list[float]:
+    """95 % interval of the fall of the held-out rmse, recordings resampled."""
+    a = np.array([r.position_rmse**2 for r in before.joints if r.validate])
+    b = np.array([r.position_rmse**2 for r in after.joints if r.validate])
+    draw = np.random.default_rng(0).integers(0, len(a), (RESAMPLES, len(a)))
+    fall = np.sqrt(a[draw].mean(1)) - np.sqrt(b[draw].mean(1))
+    return [float(x) for x in np.percentile(fall, [2.5, 97.5])]
+
+
+def _swing_finding(rig: RigModel, variant: Variant, round_: Round, swing: Swing, proof: dict) -> Finding:
+    from .swing import INDEX
+
+    joint = rig.joints[0]
+    parameters = {n: {"value": float(round_.fit.theta[INDEX[n]]), "unit": ""} for n in variant.start}
+    where = {"finger": None, "joint": joint, "actuator": (rig.drive(joint).name if rig.drive(joint) else None),
+             "signal": "position", "marker": None, "trials": proof["held_out"],
+             "share_of_mismatch": max(proof["before"] ** 2 - proof["after"] ** 2, 0.0)}  # fmt: skip
+    native = set(variant.start) <= {"drag"}
+    return Finding(
+        variant.effect, (variant.effect, *(e for e in round_.equals if e != variant.effect)), round_.probability,
+        tuple({"effect": k, "probability": p} for k, p in round_.rivals if k != variant.key), where,
+        statement(variant.effect, variant.name, joint, {k: v["value"] for k, v in parameters.items()}, proof), parameters, proof,
+        {"native": native, "mjcf": f"joint[@name='{joint}']/@damping" if native else 'custom/text[@name="hand_model"]',
+         "urdf": "not expressible: kept in rig.xml"},
+    )  # fmt: skip
+
+
+# --- couplings -------------------------------------------------------------------------------------------------------
+
+
+def _diagnose_coupling(rig: RigModel, coupling: Any) -> tuple[list[Finding], list[dict[str, Any]]]:
+    fit = fit_coupling(rig, coupling)
+    if fit is None:
+        return [], []
+    problem = pose(fit)
+    taken, steps, scores = compete(problem, coupling_candidates(fit, coupling))
+    found, kept = [], []
+    rejected = [{"effect": s.term.candidate.key, "reason": "held-out error does not fall enough"} for s in scores]
+    for step, term in zip(steps, taken, strict=True):
+        before, after = solution(problem, kept), solution(problem, [*kept, term])
+        proof = _proof(rig, fit, kept, before, [*kept, term], after, coupling.dependent)
+        proof |= {"metric": "angle_rmse", "unit": rig.unit(coupling.dependent)}
+        if proof["ci95_reduction"][0] <= 0:
+            rejected.append({"effect": term.candidate.key, "reason": "error on validation trials does not fall"})
+            continue
+        kept.append(term)
+        finding = _joint_finding(rig, fit, step, term, after[len(after) - len(term.candidate.amplitudes):], proof)
+        where = {**finding.where, "actuator": None, "signal": "position", "joint": coupling.dependent, "coupling": coupling.name}
+        found.append(replace(finding, where=where))
+    return _shares(found), rejected
+
+
+# --- words -----------------------------------------------------------------------------------------------------------
+
+
+def statement(effect: str, variant: str, joint: str, parameters: Mapping[str, float], proof: Mapping[str, Any]) -> str:
+    """One plain sentence: what, where, how much, and what it is worth on recordings held out."""
+    listed = ", ".join(f"{k.replace('_', ' ')} {v:.4g}" for k, v in parameters.items())
+    return (f"{joint}: {effect.replace('_', ' ')}{f' ({variant})' if variant else ''}: {listed}; held-out "
+            f"{proof['metric'].replace('_', ' ')} falls from {proof['before']:.4g} to {proof['after']:.4g} {proof['unit']}.")  # fmt: skip
+
+
+def _verdict(found: Sequence[Finding], lack: Mapping[str, Any]) -> str:
+    if any(f.model is not None for f in found):
+        return "mismatch"
+    if lack.get("before") is None:
+        return "unexplained"
+    joints = lack.get("joints", {"": lack})
+    beyond = any(p["after"] > 2 * (p.get("noise_floor") or 0.0) for p in joints.values())
+    return "unexplained" if beyond else "consistent"
+
+
+def _unexplained(lack: Mapping[str, Any], found: Sequence[Finding]) -> tuple[Mapping[str, Any], ...]:
+    out = []
+    for joint, p in lack.get("joints", {} if lack.get("before") is None else {"": lack}).items():
+        floor = p.get("noise_floor") or 0.0
+        excess, whole = p["after"] ** 2 - floor**2, p["before"] ** 2 - floor**2
+        if whole > 0 and excess > 0.02 * whole and p["after"] > 2 * floor:
+            out.append({"where": {"joint": joint or None}, "share_of_mismatch": float(min(excess / whole, 1.0)),
+                        "shape": "what no effect known here lowers on recordings held out"})  # fmt: skip
+    return tuple(out)
+
+
+def _next(found: Sequence[Finding], issues: Sequence[ChannelIssue]) -> str:
+    if any(i.refuse for i in issues):
+        return "record the torque that the drive measures (phase current), not the one that it is asked for"
+    for f in found:
+        if len(f.members) > 1:
+            return f"repeat the motion at other speeds and loads: that separates {' from '.join(f.members)}"
+    return "repeat one trial three times unchanged: that shows the noise floor"
+
+
+__all__ = ["Fitted", "diagnose_rig", "trusted_fit"]

@@ -1,0 +1,87 @@
+"""Two encoders along one transmission: what one angle leaves of the other, as a balance in which effects compete."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..effects.path import jenkins
+from .balance import Column, Rows
+from .candidates import Candidate, direction
+from .declared import DeclaredFit, _robust_fit
+from .model import Coupling, RigModel, RigTrial
+from .states import choose_cutoff, differentiate, fill_gaps, low_pass, uniform_time, velocity_noise
+
+Array = NDArray[np.float64]
+RATE_HZ = 100.0
+
+
+def coupling_columns(coupling: Coupling) -> tuple[Column, ...]:
+    """The declared polynomial: as many powers as the format allows (quartic)."""
+    return tuple(Column("polycoef", coupling.name, str(k), float(coupling.polycoef[k])) for k in range(5))
+
+
+def fit_coupling(rig: RigModel, coupling: Coupling) -> DeclaredFit | None:
+    """The coupling's polynomial fitted to the training recordings; None where an encoder of the two is missing."""
+    columns = coupling_columns(coupling)
+    rows = tuple(r for t in rig.trials if (r := _rows(rig, coupling, columns, t)) is not None)
+    if not any(not r.validate for r in rows):
+        return None
+    return _robust_fit(columns, rows, rows[0].cutoff_hz)
+
+
+def _rows(rig: RigModel, coupling: Coupling, columns: tuple[Column, ...], trial: RigTrial) -> Rows | None:
+    if coupling.dependent not in trial.position or coupling.independent not in trial.position:
+        return None
+    grid = uniform_time(trial.time_s)
+    rate = 1.0 / (grid[1] - grid[0])
+
+    def even(values: Array) -> Array:
+        return np.interp(grid, trial.time_s, fill_gaps(trial.time_s, values))
+
+    raw = even(trial.position[coupling.independent])
+    cutoff = min(choose_cutoff(raw, rate), 0.2 * RATE_HZ)
+    q = low_pass(raw, rate, cutoff)
+    v = differentiate(q, rate)
+    rest = max(3 * velocity_noise(raw, rate, cutoff), 1e-3 * float(np.std(v)))
+    out = low_pass(even(trial.position[coupling.dependent]), rate, cutoff)
+    load = {f"effort:{j}": low_pass(even(e), rate, cutoff) for j, e in trial.effort.items()}
+    extra = {k: even(c) for k, c in trial.extra.items()} | load
+    skip = max(1, int(rate / RATE_HZ))
+    s = slice(None, None, skip)
+    powers = np.stack([q[s] ** k for k in range(5)], 1)
+    a = differentiate(v, rate)
+    moving = np.ones(len(q[s]), bool)
+    moving[: int(0.5 * rate / skip)] = False  # the first half second: the transmission is not yet wound up
+    return Rows(trial.name, coupling.dependent, trial.validate, grid[s], q[s], v[s], a[s], out[s], powers, moving, rest,
+                cutoff, rate / skip, {"effort": out[s], **{k: c[s] for k, c in extra.items()}},
+                np.zeros_like(powers), np.zeros(len(q[s])), 1)  # fmt: skip
+
+
+def coupling_candidates(fit: DeclaredFit, coupling: Coupling) -> tuple[Candidate, ...]:
+    """Lost motion (a play that is crossed at every reversal) and stretch by each recorded effort."""
+    joint = coupling.dependent
+    train = [r for r in fit.rows if not r.validate]
+    span = max(float(np.ptp(r.position)) for r in train)
+    free = (-np.inf, np.inf)
+    gaps = tuple({"gap": float(g)} for g in span * np.geomspace(0.003, 0.3, 8))
+    out = [Candidate("drive_backlash", "", joint, (("half_gap", "rad", *free),), gaps,
+                     lambda r, s: jenkins(r.position, s["gap"])[:, None])]  # fmt: skip
+    for channel in sorted({k for r in train for k in r.extra if k.startswith("effort:")}):
+        name = channel.split(":")[1]
+        out.append(Candidate("series_elasticity", f"load at {name}", joint, (("compliance", "rad/effort", *free),), ({},),
+                             lambda r, s, c=channel: _load(r, c)[:, None]))  # fmt: skip
+        out.append(Candidate("series_elasticity", f"stiffening with load at {name}", joint,
+                             (("compliance", "rad/effort", *free), ("stiffening", "rad/effort^2", *free)), ({},),
+                             lambda r, s, c=channel: np.stack([_load(r, c), _load(r, c) * np.abs(_load(r, c))], 1)))  # fmt: skip
+    delays = tuple({"lag": k * 1.0} for k in (1.0,))
+    out.append(Candidate("clock_drift", "channels sampled apart", joint, (("lag", "s", *free),), delays,
+                         lambda r, s: r.velocity[:, None]))  # fmt: skip
+    return tuple(out)
+
+
+def _load(row: Rows, channel: str) -> Array:
+    return row.extra.get(channel, np.zeros(len(row.time_s)))
+
+
+__all__ = ["coupling_candidates", "coupling_columns", "direction", "fit_coupling"]
