@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..checks import JointRow, mirror, parallelism, repeatability
 from ..hand import Hand
-from .page import Cell, Section, note, table
+from .page import Cell, Section, note, page, table
 from .words import count, number
 
 COLUMNS = ("finger", "joint", "angle", "noise alone", "95 % interval", "thesis", "distance", "noise alone", "95 % interval")
@@ -46,7 +47,28 @@ def angle_words(rows: Sequence[JointRow], agree: str) -> str:
     return words + (f"; thesis: median {number(float(np.median(known)))} deg, largest {number(max(known))} deg." if known else ".")
 
 
-def comparison_sections(a: Hand, b: Hand) -> tuple[Section, ...]:
+@dataclass(frozen=True)
+class Check:
+    """One of the three checks. words: its sentence. meaning: what is compared. caption: of its table."""
+
+    name: str
+    title: str
+    words: str
+    meaning: str
+    caption: str
+    rows: tuple[JointRow, ...]
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Headings of the table."""
+        return COLUMNS if self.rows[0].distance else COLUMNS[:6]
+
+    def cells(self) -> list[list[str | Cell]]:
+        """Rows of the table."""
+        return [[r.finger, r.joint, *angle_cells(r), *distance_cells(r)] for r in self.rows]
+
+
+def checks(a: Hand, b: Hand) -> tuple[Check, ...]:
     """Repeatability (same side) or mirror relation (both sides) of two hands, then the parallelism of each."""
     if a.side == b.side:
         rows, number_, agree = repeatability(a, b), "4.9", "repeat within their uncertainty"
@@ -60,12 +82,27 @@ def comparison_sections(a: Hand, b: Hand) -> tuple[Section, ...]:
     words = angle_words(rows, agree) + f" {sum(not d.real for d in far)} of {count(len(far), 'centre')} agree within their uncertainty; "
     words += f"median distance {number(1e3 * float(np.median([d.value for d in far])))} mm, largest {number(1e3 * max(d.value for d in far))} mm."
     caption = f"Degrees and millimetres, in the form of table {number_}; bold: more than the uncertainty explains"
-    body = table(COLUMNS, [[r.finger, r.joint, *angle_cells(r), *distance_cells(r)] for r in rows], caption, text_columns=2)
-    sections = [Section(name, title, words, (body, note(meaning)))]
+    found = [Check(name, title, words, meaning, caption, rows)]
     for hand, label in ((a, "first"), (b, "second")):
         rows = parallelism(hand)
         if rows:
-            body = table(COLUMNS[:6], [[r.finger, r.joint, *angle_cells(r)] for r in rows], "Degrees, in the form of table 4.11", text_columns=2)
+            title = f"Parallelism, {label} hand ({hand.name}, {hand.side})"
             words = angle_words(rows, "are parallel within their uncertainty")
-            sections.append(Section(f"parallelism-{label}", f"Parallelism, {label} hand ({hand.name}, {hand.side})", words, (body,)))
-    return tuple(sections)
+            meaning = "Angle between the axes of one finger; what both share, the landmarks, counts twice, so the interval is too wide rather than too narrow."
+            found.append(Check(f"parallelism-{label}", title, words, meaning, "Degrees, in the form of table 4.11", rows))
+    return tuple(found)
+
+
+def comparison_page(a: Hand, b: Hand) -> bytes:
+    """The checks as a page."""
+    sections = [
+        Section(c.name, c.title, c.words, (table(c.columns, c.cells(), c.caption, text_columns=2), note(c.meaning))) for c in checks(a, b)
+    ]
+    return page(f"{a.name} ({a.side}) and {b.name} ({b.side})", "The thesis's checks of identified hands, each with its uncertainty.", (), sections)
+
+
+def comparison_text(a: Hand, b: Hand) -> str:
+    """The checks for a terminal."""
+    from .text import columns
+
+    return "\n\n".join(f"{c.title}\n{c.words}\n\n{columns(c.columns, c.cells(), 2)}" for c in checks(a, b))

@@ -16,6 +16,7 @@ from .replayed import best_mode, by_finger, clock_section, distances_mm, engines
 from .words import count, number
 
 PAGE, FIGURES = "report.html", "figures.json"
+OUTPUTS = (PAGE, FIGURES)
 FORMAT = "hand-report/1"
 
 
@@ -24,7 +25,7 @@ def write_report(residuals: Residuals, folder: str | Path) -> Path:
 
     The same residuals give the same bytes. Raises HandModelError where the folder holds anything else.
     """
-    with new_folder(folder, (PAGE, FIGURES)) as staging:
+    with new_folder(folder, OUTPUTS) as staging:
         (staging / PAGE).write_bytes(replay_page(residuals))
         (staging / FIGURES).write_text(json.dumps(replay_figures(residuals), indent=1, allow_nan=False) + "\n")
     return Path(folder) / PAGE

@@ -1,0 +1,34 @@
+"""`hand-model diagnose SESSION [--model DIR] --output DIR`"""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
+
+SUMMARY = "say what physics is missing: where recording and declared model differ, what was left out, how sure that is"
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("session", metavar="SESSION", help="folder with a session.toml, of a hand or a rig")
+    parser.add_argument("--model", metavar="DIR", help="a compiled hand or a .hand file")
+    parser.add_argument("--output", required=True, metavar="DIR", help="folder for findings.json")
+
+
+def run(options: Namespace, say: Callable[[str], None]) -> int:
+    """Diagnose and print the findings."""
+    from ..diagnose import diagnose
+    from ..session import read_session
+
+    session = read_session(options.session)
+    if session.rig is not None:
+        from ..rig.diagnose import diagnose_rig
+
+        findings = diagnose_rig(session, options.output, say)
+    else:
+        findings = diagnose(session, options.model, options.output, say)
+    print(f"verdict: {findings.verdict}")
+    for finding in findings.findings:
+        print(f"- {finding.statement}")
+    print(f"\n{options.output}/findings.json")
+    return 0
