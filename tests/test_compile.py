@@ -17,8 +17,8 @@ from hand_model.compile.names import named, sanitised
 from hand_model.compile.shape import Capsule, capsule_inertia, segment_distance, with_tips
 from hand_model.description import load, read_description
 from hand_model.errors import DescriptionError, HandFileError
-from hand_model.hand import Hand, Joint, load_hand
 from hand_model.hand import Finger as HandFinger
+from hand_model.hand import Hand, Joint, load_hand
 
 
 def _bytes(folder):
@@ -103,11 +103,25 @@ def test_names_are_sanitised_and_unique(tmp_path):
     hand = dataclasses.replace(hand, name="my hand", fingers=fingers, palm_markers_palm=palm)
     description = compile(hand, tmp_path / "out")
     assert description.models[0].stem == "my_hand_left"
-    assert [f.sentence for f in check(description.folder) if not f.passed] == []
+    assert [f.sentence for f in check(description.folder, items=("names", "digits", "engines agree")) if not f.passed] == []
     names = named(hand)
     used = [n for table in dataclasses.astuple(names) for n in table.values()]
     assert len(used) == len(set(used)) and all(n == sanitised(n) for n in used)
     assert names.marker["", "P-1"] == "marker_P_1" and names.marker["", "P_1"] == "marker_P_1_2"
+
+
+def test_both_thumb_positions_may_carry_the_same_markers(tmp_path):
+    hand = synthetic_hand(5, fingers=("thumb_0", "thumb_1"))
+    joints = [
+        tuple(dataclasses.replace(j, markers_palm={f"TH{k}{i}": p for i, p in enumerate(j.markers_palm.values())}) for k, j in enumerate(f.joints))
+        for f in hand.fingers
+    ]
+    fingers = tuple(dataclasses.replace(f, joints=j) for f, j in zip(hand.fingers, joints, strict=True))
+    description = compile(dataclasses.replace(hand, fingers=fingers), tmp_path / "out")
+    for model in description.models:
+        loaded = mujoco.MjModel.from_xml_path(str(model.mjcf))
+        assert {"marker_TH00", "marker_TH12"} <= {loaded.site(i).name for i in range(loaded.nsite)}
+    assert [f.sentence for f in check(description.folder, items=("names", "engines agree")) if not f.passed] == []
 
 
 def test_two_fingers_on_one_actuator_both_move(tmp_path):
@@ -173,7 +187,7 @@ def test_grips_become_keyframes_of_the_files_that_have_their_fingers(tmp_path):
     description = compile(hand, tmp_path / "out")
     keys = [[e.get("name") for e in etree.parse(str(m.mjcf)).iter("key")] for m in description.models]
     assert keys == [["open", "close", "power"], ["open", "close", "power", "key"]]
-    assert [f.sentence for f in check(description.folder) if not f.passed] == []
+    assert [f.sentence for f in check(description.folder, items=("keyframes", "contact", "names")) if not f.passed] == []
     with pytest.raises(HandFileError, match='did you mean "index"'):
         compile(dataclasses.replace(hand, extra={"grips": {"power": {"indx": 0.8}}}), tmp_path / "bad")
 
@@ -192,6 +206,7 @@ def _with(finger, **changes):
         (lambda h: _coupling(h, coefficients=np.ones(6)), "one to five"),
         (lambda h: _coupling(h, driver="s1"), "circle"),
         (lambda h: _joint(h, centre_palm=np.array([np.nan, 0, 0])), "not finite"),
+        (lambda h: _joint(h, covariance=np.full((6, 6), np.inf)), "not finite"),
     ],
 )
 def test_hands_that_cannot_be_compiled_are_refused(tmp_path, breakage, message):

@@ -25,7 +25,7 @@ def test_all_engines_agree_with_our_kinematics(tmp_path, side, joints):
         pairs = ((mujoco, model.mjcf), (mujoco, model.scene), (mujoco, model.urdf), (pinocchio, model.urdf), (yourdfpy, model.urdf))
         for engine, path in pairs:
             loaded = engine.load(path)
-            there, frames = engine.positions(loaded, angles), engine.poses(loaded, angles)
+            frames, there = engine.kinematics(loaded, angles)
             for name, expected in points.items():
                 assert np.abs(there[name] - expected).max() < 1e-9, (engine.__name__, path.name, name)
             for name, expected in links.items():

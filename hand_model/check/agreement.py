@@ -21,7 +21,7 @@ def agreement(description: Description, model: Model) -> Finding:
     own = ours.load(model.mjcf)
     random = np.random.default_rng(0)
     angles = {joint: random.uniform(-1.5, 1.5, POSES) for joint in own.joints}
-    points, links = ours.positions(own, angles), ours.poses(own, angles)
+    links, points = ours.kinematics(own, angles)
     engines = (
         (mujoco, model.mjcf),
         (mujoco, model.scene),
@@ -38,7 +38,7 @@ def agreement(description: Description, model: Model) -> Finding:
         if absent:
             problems.append(f"{label} has no joint {', '.join(absent)}")
             continue
-        there, frames = engine.positions(loaded, angles), engine.poses(loaded, angles)
+        frames, there = engine.kinematics(loaded, angles)
         lost = [n for n in (*points, *links) if n not in there and n not in frames]
         if lost and not (engine is pinocchio and path == model.mjcf and all((links["palm"] == np.eye(4)).all() and _palm(own, n) for n in lost)):
             problems.append(f"{label} has no {', '.join(lost[:5])}")

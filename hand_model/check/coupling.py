@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 TRACKING = np.radians(0.1)
 STIFFNESS = np.radians(0.05)
 FORCE = 1.0  # N at the tip
-PUSH_S = 0.3
+PUSH_S = 0.2
 
 
 def direction(description: Description, model: Model) -> Finding:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..description import Description, read_description
-from ..errors import DescriptionError
+from ..errors import DescriptionError, HandFileError
 from ..hand import Hand
 from .mesh import capsule_mesh, joined, stl
 from .mjcf import mjcf
@@ -62,7 +62,10 @@ def _write(folder: Path, hand: Hand, plans: tuple[Plan, ...]) -> None:
         for link in plan.links:
             mesh = joined([capsule_mesh(shape) for shape in link.solid])
             (folder / "assets" / f"{link.mesh}.stl").write_bytes(stl(*mesh))
-    hand.save(folder / "hand.json")
+    try:
+        hand.save(folder / "hand.json")
+    except ValueError as error:
+        raise HandFileError(f'hand "{hand.name}" holds a figure that is not finite, which hand.json cannot keep ({error})') from None
     table = json.loads((folder / "hand.json").read_text())
     table["description"] = _table(hand, plans)
     (folder / "hand.json").write_text(json.dumps(table, indent=1, allow_nan=False) + "\n")

@@ -67,15 +67,20 @@ def wrap(mj: Any) -> Model:
 
 def positions(model: Model, joint_angles: Mapping[str, ArrayLike]) -> Mapping[str, Array]:
     """Positions (n, 3) [m] of sites and of bodies without joints; joint_angles: joint -> (n,) [rad]."""
-    return _kinematics(model, columns(model.joints, joint_angles))[1]
+    return _kinematics(model, columns(model.joints, joint_angles), rotations=False)[1]
 
 
 def poses(model: Model, joint_angles: Mapping[str, ArrayLike]) -> Mapping[str, Array]:
     """Body poses (n, 4, 4); joint_angles: joint -> (n,) [rad]."""
-    return _kinematics(model, columns(model.joints, joint_angles), rotations=True)[0]
+    return kinematics(model, joint_angles)[0]
 
 
-def _kinematics(model: Model, angles: Array, rotations: bool = False) -> tuple[dict[str, Array], dict[str, Array]]:
+def kinematics(model: Model, joint_angles: Mapping[str, ArrayLike]) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Body poses (n, 4, 4) and positions (n, 3) [m]; joint_angles: joint -> (n,) [rad]."""
+    return _kinematics(model, columns(model.joints, joint_angles), rotations=True)
+
+
+def _kinematics(model: Model, angles: Array, rotations: bool) -> tuple[dict[str, Array], dict[str, Array]]:
     import mujoco
 
     mj = model.mj

@@ -50,9 +50,20 @@ def of_hand(hand: Hand) -> Model:
 
 def positions(model: Model, joint_angles: Mapping[str, ArrayLike]) -> Mapping[str, Array]:
     """Positions (n, 3) [m] of markers, tips and attachment in the palm frame; joint_angles: joint -> (n,) [rad]."""
+    return kinematics(model, joint_angles)[1]
+
+
+def poses(model: Model, joint_angles: Mapping[str, ArrayLike]) -> Mapping[str, Array]:
+    """Link poses (n, 4, 4) in the palm frame; joint_angles: joint -> (n,) [rad]."""
+    return kinematics(model, joint_angles)[0]
+
+
+def kinematics(model: Model, joint_angles: Mapping[str, ArrayLike]) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Link poses (n, 4, 4) and positions (n, 3) [m] in the palm frame; joint_angles: joint -> (n,) [rad]."""
     angles = columns(model.joints, joint_angles)
     fixed = {model.names.marker["", label]: p for label, p in model.hand.palm_markers_palm.items()} | {"attachment": np.zeros(3)}
-    out = {name: np.tile(np.asarray(p, float), (len(angles), 1)) for name, p in fixed.items()}
+    points = {name: np.tile(np.asarray(p, float), (len(angles), 1)) for name, p in fixed.items()}
+    links = {"palm": np.tile(np.eye(4), (len(angles), 1, 1))}
     start = 0
     for finger in model.hand.fingers:
         motion = displace(finger, angles[:, start : start + len(finger.joints)])
@@ -61,21 +72,7 @@ def positions(model: Model, joint_angles: Mapping[str, ArrayLike]) -> Mapping[st
             rest = {model.names.marker[finger.name, label]: p for label, p in joint.markers_palm.items()}
             if joint.tip_palm is not None:
                 rest[model.names.tip[finger.name]] = joint.tip_palm
-            if rest:
-                moved = motion.points(i, list(rest.values()))
-                out.update({name: moved[:, j] for j, name in enumerate(rest)})
-    return out
-
-
-def poses(model: Model, joint_angles: Mapping[str, ArrayLike]) -> Mapping[str, Array]:
-    """Link poses (n, 4, 4) in the palm frame; joint_angles: joint -> (n,) [rad]."""
-    angles = columns(model.joints, joint_angles)
-    out = {"palm": np.tile(np.eye(4), (len(angles), 1, 1))}
-    start = 0
-    for finger in model.hand.fingers:
-        motion = displace(finger, angles[:, start : start + len(finger.joints)])
-        start += len(finger.joints)
-        for i, joint in enumerate(finger.joints):
-            origin = motion.points(i, joint.centre_palm)[:, 0]
-            out[model.names.link[finger.name, joint.name]] = homogeneous(motion.rotation[:, i], origin)
-    return out
+            moved = motion.points(i, [joint.centre_palm, *rest.values()])
+            links[model.names.link[finger.name, joint.name]] = homogeneous(motion.rotation[:, i], moved[:, 0])
+            points.update({name: moved[:, j] for j, name in enumerate(rest, 1)})
+    return links, points

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DescriptionError
-from .common import columns, homogeneous, relative
+from .common import ROOT, columns, homogeneous, relative
 
 Array = NDArray[np.float64]
 
@@ -56,18 +56,30 @@ def _first(bodies: list[Any], frame: Any) -> bool:
 def positions(model: Model, joint_angles: Mapping[str, ArrayLike]) -> Mapping[str, Array]:
     """Positions (n, 3) [m] of sites and of links on fixed joints; joint_angles: joint -> (n,) [rad]."""
     carried = _joint_poses(model, columns(model.joints, joint_angles))
-    points = {}
-    for name in model.points:
-        parent, placement = model.frames[name]
-        points[name] = carried[parent][:, :3, :3] @ placement[:3, 3] + carried[parent][:, :3, 3]
-    base = {"palm": carried[model.frames["palm"][0]] @ model.frames["palm"][1]} if "palm" in model.frames else {}
-    return relative(base, points)[1]
+    return relative(_frames(model, carried, [name for name in model.links if name == ROOT]), _points(model, carried))[1]
 
 
 def poses(model: Model, joint_angles: Mapping[str, ArrayLike]) -> Mapping[str, Array]:
     """Link poses (n, 4, 4); joint_angles: joint -> (n,) [rad]."""
+    return kinematics(model, joint_angles)[0]
+
+
+def kinematics(model: Model, joint_angles: Mapping[str, ArrayLike]) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Link poses (n, 4, 4) and positions (n, 3) [m]; joint_angles: joint -> (n,) [rad]."""
     carried = _joint_poses(model, columns(model.joints, joint_angles))
-    return relative({name: carried[model.frames[name][0]] @ model.frames[name][1] for name in model.links}, {})[0]
+    return relative(_frames(model, carried, model.links), _points(model, carried))
+
+
+def _frames(model: Model, carried: list[Array], names: Iterable[str]) -> dict[str, Array]:
+    return {name: carried[model.frames[name][0]] @ model.frames[name][1] for name in names}
+
+
+def _points(model: Model, carried: list[Array]) -> dict[str, Array]:
+    points = {}
+    for name in model.points:
+        parent, placement = model.frames[name]
+        points[name] = carried[parent][:, :3, :3] @ placement[:3, 3] + carried[parent][:, :3, 3]
+    return points
 
 
 def _joint_poses(model: Model, angles: Array) -> list[Array]:

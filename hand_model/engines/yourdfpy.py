@@ -56,15 +56,19 @@ def load(file: str | Path) -> Model:
 
 def positions(model: Model, joint_angles: Mapping[str, ArrayLike]) -> Mapping[str, Array]:
     """Positions (n, 3) [m] of links on fixed joints; joint_angles: joint -> (n,) [rad]."""
-    frames = _moving(model, columns(model.joints, joint_angles))
-    points = {name: (frames[base] @ placement)[:, :3, 3] for name, (base, placement) in model.fixed.items()}
-    return relative(frames, points)[1]
+    return kinematics(model, joint_angles)[1]
 
 
 def poses(model: Model, joint_angles: Mapping[str, ArrayLike]) -> Mapping[str, Array]:
     """Link poses (n, 4, 4); joint_angles: joint -> (n,) [rad]."""
+    return kinematics(model, joint_angles)[0]
+
+
+def kinematics(model: Model, joint_angles: Mapping[str, ArrayLike]) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Link poses (n, 4, 4) and positions (n, 3) [m]; joint_angles: joint -> (n,) [rad]."""
     frames = _moving(model, columns(model.joints, joint_angles))
-    return relative(frames | {name: frames[base] @ placement for name, (base, placement) in model.fixed.items()}, {})[0]
+    fixed = {name: frames[base] @ placement for name, (base, placement) in model.fixed.items()}
+    return relative(frames | fixed, {name: frame[:, :3, 3] for name, frame in fixed.items()})
 
 
 def _moving(model: Model, angles: Array) -> dict[str, Array]:
