@@ -326,3 +326,16 @@ def test_refusals_name_what_would_be_right(tmp_path):
     with pytest.raises(HandModelError, match="empty folder"):
         record(truth, tmp_path / "full", 1, plan=SHORT)
     assert (tmp_path / "full" / "note.txt").read_text() == "mine"
+
+
+def test_unrest_makes_repeated_cycles_differ(tmp_path):
+    calm = bebionic("left", None, ["index"]).quiet()
+    motor = replace(calm.motors["index"], unrest=1.0)
+    restless = replace(calm, motors={"index": motor})
+    a, b = (record(hand, tmp_path / name, 1, plan=SHORT) for name, hand in (("a", calm), ("b", restless)))
+    first, second = (x.trials["flexion_index"].motion for x in (a, b))
+    extra = second.load - motor.stiffness * second.position - motor.preload
+    assert abs(extra.std() - 1.0) < 0.3
+    assert np.abs(first.load - motor.stiffness * first.position - motor.preload).max() < 1e-9
+    lag = np.corrcoef(extra[:-150], extra[150:])[0, 1]
+    assert 0.15 < lag < 0.6

@@ -124,6 +124,7 @@ def _motor(actuator: str, seed: int | None) -> MotorTruth:
         coulomb=34.0 * rng.uniform(0.7, 1.2),
         stiffness=0.23 * rng.uniform(0.8, 1.25),
         preload=9.0 * rng.uniform(0.7, 1.4),
+        unrest=float(shared.choice([0.0, 0.0, 0.8])),
         controller=controller,
     )
 

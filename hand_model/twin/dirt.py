@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
-from .motor import Motion
+from .motor import STEP_S, DriveTerms, Motion
 from .program import commands
 from .schedule import TrialPlan
 from .streams import stream
@@ -77,6 +78,16 @@ def log_columns(
     for name in ("position", "current"):
         columns[name] = np.where(rng.uniform(size=len(time_s)) < noise.empty_share, np.nan, columns[name])
     return columns
+
+
+def unrest_terms(motor: MotorTruth, trial: TrialPlan, seed: int, memory_s: float = 0.15) -> DriveTerms:
+    """A random load on the drive with a memory of `memory_s` [s] (Ornstein-Uhlenbeck), drawn per trial."""
+    n = round(trial.duration_s / STEP_S) + 2
+    keep = np.exp(-STEP_S / memory_s)
+    fresh = motor.unrest * stream(seed, "unrest", trial.name).normal(size=n)
+    fresh[1:] *= np.sqrt(1.0 - keep**2)
+    values = lfilter([1.0], [1.0, -keep], fresh).tolist()
+    return DriveTerms(load=(lambda now: values[round(now.time_s / STEP_S)],))
 
 
 def sample_times(noise: LogNoise, trial: TrialPlan, seed: int) -> Array:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..errors import HandModelError
 from .answer import answer_table
-from .dirt import dirty_markers, log_columns, sample_times
+from .dirt import dirty_markers, log_columns, sample_times, unrest_terms
 from .files import write_log, write_markers
 from .geometry import rotate
 from .influence import Active, Hidden, Influence, activate, merge_terms
@@ -157,6 +157,8 @@ def _move(truth: HandTruth, trial: TrialPlan, influences: Sequence[Influence], p
         if influence.start:
             influence.start(trial)
     parts = [i.terms for i in influences if i.terms is not None]
+    if motor.unrest > 0:
+        parts.append(unrest_terms(motor, trial, seed))
     met = contact_percent(trial, seed)
     if met is not None:
         parts.append(grasp_terms(trial, met))

@@ -55,7 +55,10 @@ class Controller:
 
 @dataclass(frozen=True)
 class MotorTruth:
-    """A drive in raw units: current = inertia a + viscous v + coulomb sign(v) + stiffness p + preload, p in percent of the range."""
+    """A drive in raw units: current = inertia a + viscous v + coulomb sign(v) + stiffness p + preload, p in percent of the range.
+
+    unrest: standard deviation [raw] of a slow random load, so that repeated cycles differ by more than measurement noise.
+    """
 
     actuator: str
     counts_open: float = 12100.0
@@ -65,6 +68,7 @@ class MotorTruth:
     coulomb: float = 34.0
     stiffness: float = 0.23
     preload: float = 9.0
+    unrest: float = 0.0
     controller: Controller = field(default_factory=Controller)
 
     def counts(self, percent: Array) -> Array:
@@ -162,4 +166,5 @@ class HandTruth:
             interval_s=self.log.interval_s, jitter_s=self.log.jitter_s, lost_share=0, encoder_counts=0, current_raw=0,
             clock_offset_s=self.log.clock_offset_s, quantised=False,
         )  # fmt: skip
-        return replace(self, mocap=mocap, log=log)
+        motors = {name: replace(motor, unrest=0.0) for name, motor in self.motors.items()}
+        return replace(self, mocap=mocap, log=log, motors=motors)
