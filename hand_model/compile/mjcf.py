@@ -10,7 +10,7 @@ import numpy as np
 from ..effects import effect
 from ..hand import Hand
 from .drive import Drive, nominal_drives
-from .plan import Link, Plan
+from .plan import Link, Plan, in_file_names
 from .xml import child, comment, number, vector
 
 # Equality as stiff as MuJoCo keeps stable at its default step: time constant of two steps, impedance at MuJoCo's upper limit.
@@ -40,8 +40,8 @@ def mjcf(plan: Plan) -> Any:
             child(contact, "exclude", body1=one, body2=other)
     _equalities(root, plan)
     _actuators(root, plan, drives)
-    _physics(root, plan.hand)
     _keyframes(root, plan)
+    _physics(root, in_file_names(plan))
     return root
 
 
@@ -113,16 +113,11 @@ def _actuators(root: Any, plan: Plan, drives: dict[str, Drive]) -> None:
 
 
 def _physics(root: Any, hand: Hand) -> None:
-    """Identified motors and effects, as far as MJCF can hold them."""
+    """Identified motors and effects, as far as MJCF can hold them; they complete the keyframes by what they add."""
     if hand.motors and find_spec("hand_model.compile.motor"):
         from .motor import write_motors
 
-        nominal = root.findall("actuator/position")
         write_motors(root, hand)
-        names = [a.get("name") for a in root.findall("actuator/*")]
-        for element in nominal:  # an identified drive takes the nominal one's place
-            if names.count(element.get("name")) > 1:
-                element.getparent().remove(element)
     fingers = {f.name for f in hand.fingers} | {None}
     for found in hand.effects:
         if found.where.get("finger") in fingers:
@@ -131,12 +126,10 @@ def _physics(root: Any, hand: Hand) -> None:
 
 
 def _keyframes(root: Any, plan: Plan) -> None:
-    """Every joint of the tree at its angle; joints that a motor or an effect brought in rest at zero, as do controls that are no angle."""
     keyframe = child(root, "keyframe")
-    joints = [e.get("name") for e in root.find("worldbody").iter("joint")]
-    actuators = root.findall("actuator/*")
+    joints = [link.joint for link in plan.links if link.joint]
+    targets = [a.get("joint") for a in root.iterfind("actuator/position")]
     for name, angles in plan.keyframes.items():
-        key = child(keyframe, "key", name=name, qpos=[angles.get(joint, 0.0) for joint in joints])
-        targets = [angles.get(a.get("joint"), 0.0) if a.tag == "position" else 0.0 for a in actuators]
-        if any(a.tag == "position" for a in actuators):
-            key.set("ctrl", vector(targets))
+        key = child(keyframe, "key", name=name, qpos=[angles[joint] for joint in joints])
+        if targets:
+            key.set("ctrl", vector([angles[joint] for joint in targets]))
