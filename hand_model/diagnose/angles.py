@@ -26,16 +26,14 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True)
 class FlexionAngles:
     """One flexion recording of one finger. angle_rad: (n, k), nan in frames that do not tell. swaps: labels put right.
-    chain, data, pose, weight: what the angles were read from."""
+    data: markers as recorded, labels put right. pose: of every frame, by the identified chain."""
 
     trial: Trial
     mocap: Mocap
     angle_rad: Array
     swaps: tuple[Swap, ...]
-    chain: Chain
     data: ChainData
     pose: Pose
-    weight: Array
 
 
 @dataclass(frozen=True)
@@ -52,32 +50,32 @@ def finger_angles(session: Session, finger: Finger, shape: Array | None = None) 
     fit = identify_finger(session, finger, palm_shape(session) if shape is None else shape)
     records = []
     for record in fit.records:
-        frames = record.frames
-        data = fit.fit.data.take(np.arange(frames.start, frames.stop))
-        pose = Pose(fit.fit.pose.rotation[frames], fit.fit.pose.translation[frames], fit.fit.pose.angle_rad[frames])
-        records.append(_record(record.trial, record.mocap, record.swaps, fit.fit.chain, data, pose, fit.fit.weight[frames]))
+        frames = np.arange(record.frames.start, record.frames.stop)
+        good = sound_frames(fit.fit.data.take(frames), fit.fit.weight[frames])
+        data, swaps = observations(session, finger, record.mocap)  # as recorded: the fit may have split or dropped a marker
+        pose = fit.fit.pose.take(frames)
+        angle = np.where(good[:, None], pose.angle_rad, np.nan)
+        records.append(FlexionAngles(record.trial, record.mocap, angle, swaps, data, pose))
     for trial in session.select("flexion", finger.name, validate=True):
         if trial.mocap_path is None:
             continue
         mocap = trial.mocap()
         data, swaps = observations(session, finger, mocap)
-        chain = _latest(fit, data)
+        chain = plain_chain(fit, data.labels, latest=True)
         pose, weight = fit_poses(data, chain, fit.fit.noise_m)
-        records.append(_record(trial, mocap, swaps, chain, data, pose, weight))
+        angle = np.where(sound_frames(data, weight)[:, None], pose.angle_rad, np.nan)
+        records.append(FlexionAngles(trial, mocap, angle, swaps, data, pose))
     return FingerAngles(finger, fit, tuple(records))
 
 
-def _latest(fit: FingerFit, data: ChainData) -> Chain:
-    """The chain with one column per label: a marker that slipped where it was last."""
-    last = {label: j for j, label in enumerate(fit.fit.data.labels)}
-    chain = fit.fit.chain
-    return Chain(chain.marker_palm[[last[label] for label in data.labels]], chain.axis_palm, chain.centre_palm)
-
-
-def _record(trial: Trial, mocap: Mocap, swaps: tuple[Swap, ...], chain: Chain, data: ChainData, pose: Pose,
-            weight: Array) -> FlexionAngles:
-    angle = np.where(sound_frames(data, weight)[:, None], pose.angle_rad, np.nan)
-    return FlexionAngles(trial, mocap, angle, swaps, chain, data, pose, weight)
+def plain_chain(fit: FingerFit, labels: tuple[str, ...], latest: bool = False) -> Chain:
+    """The chain with one column per label: a marker that slipped where it was seen most often (or last)."""
+    seen = np.isfinite(fit.fit.data.position_world[..., 0]).sum(0)
+    pick = []
+    for label in labels:
+        epochs = [j for j, name in enumerate(fit.fit.data.labels) if name == label and seen[j] > 0]
+        pick.append(epochs[-1] if latest else max(epochs, key=lambda j: seen[j]))
+    return Chain(fit.fit.chain.marker_palm[pick], fit.fit.chain.axis_palm, fit.fit.chain.centre_palm)
 
 
 def linkage_states(angles: FingerAngles, joint: int = 1) -> tuple[DriveState, ...]:
