@@ -15,7 +15,9 @@ from pathlib import Path
 from hand_model.twin import HandTruth, Plan, bebionic, record
 
 # Short enough for a repository, yet with replicate cycles at two speeds and a held-out trial of every kind.
-LEFT = Plan(flexion=("full", "half", "low", "full", "half"), validation=("half", "full", "low"), excitations=3, still_s=0.5)
+LEFT = Plan(
+    flexion=("full", "half", "low", "full", "half"), validation=("half", "full", "low"), excitations=3, still_s=0.5
+)
 RIGHT = Plan(flexion=("full", "half", "full", "half"), validation=("half", "full"), excitations=2, still_s=0.3)
 
 

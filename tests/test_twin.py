@@ -30,7 +30,9 @@ def markers(path: Path) -> dict[str, np.ndarray]:
     file = ezc3d.c3d(str(path))
     points = file["data"]["points"][:3].transpose(1, 2, 0)
     gap = file["data"]["meta_points"]["residuals"][0] < 0
-    return dict(zip(file["parameters"]["POINT"]["LABELS"]["value"], np.where(gap[..., None], np.nan, points), strict=True))
+    return dict(
+        zip(file["parameters"]["POINT"]["LABELS"]["value"], np.where(gap[..., None], np.nan, points), strict=True)
+    )
 
 
 def log(path: Path) -> np.ndarray:
@@ -84,7 +86,9 @@ def test_markers_are_rigid_without_noise(quiet):
 
 
 def test_angles_and_coupling_are_in_the_marker_file(quiet):
-    """Joint angles computed from the file by an independent method are the truth's polynomials of the drive's position."""
+    """Joint angles computed from the file by an independent method are the truth's polynomials of the drive's
+    position.
+    """
     truth, answer = quiet
     for finger in truth.fingers:
         trial = answer.trials[f"flexion_{finger.name}"]
@@ -148,7 +152,9 @@ def test_log_holds_the_motion_on_its_own_clock(quiet):
 
 @pytest.mark.parametrize("seed", [None, 1, 2])
 def test_balance_holds_along_the_motion(seed):
-    """inertia a + viscous v + friction + spring = current at every step that is no stop; sticking stays within its bounds."""
+    """inertia a + viscous v + friction + spring = current at every step that is no stop; sticking stays within its
+    bounds.
+    """
     motor = bebionic("left", seed, ["ring"]).motors["ring"]
     motion = simulate(motor, excitation(motor.controller))
     v, new = motion.velocity[:-1], motion.velocity[1:]

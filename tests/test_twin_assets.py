@@ -36,11 +36,15 @@ def test_the_script_remakes_them_byte_by_byte(tmp_path):
     want = ROOT / "assets" / "sessions"
     for name in ("left", "right"):
         assert files(tmp_path / name) == files(want / name)
-        assert json.loads((tmp_path / f"{name}.answer.json").read_text()) == json.loads((want / f"{name}.answer.json").read_text())
+        assert json.loads((tmp_path / f"{name}.answer.json").read_text()) == json.loads(
+            (want / f"{name}.answer.json").read_text()
+        )
 
 
 def test_every_package_is_in_the_wheel():
-    """The list in pyproject.toml is by hand because assets/ is mapped into the package: nothing may be missing from it."""
+    """The list in pyproject.toml is by hand because assets/ is mapped into the package: nothing may be missing from
+    it.
+    """
     listed = set(tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"])
     found = {str(p.parent.relative_to(ROOT)).replace("/", ".") for p in (ROOT / "hand_model").rglob("__init__.py")}
     assert listed == found | {"hand_model.assets"}

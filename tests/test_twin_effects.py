@@ -22,7 +22,44 @@ from hand_model.twin.schedule import schedule
 PLAN = Plan(flexion=("full", "half"), validation=("full",), excitations=0, still_s=0.2)
 SEED = 3
 # The vocabulary of hand-findings/1.
-TABLE = ["stribeck_friction", "asymmetric_viscous_friction", "asymmetric_friction", "load_dependent_friction", "position_dependent_friction", "detent_load", "nonlinear_spring", "gravity_load", "torque_ripple", "quadratic_damping", "elastoplastic_hysteresis", "viscoelastic_spring", "presliding_friction", "end_stop_contact", "thermal_friction_drift", "drive_backlash", "series_elasticity", "linkage_backlash", "linkage_compliance", "coupling_deadband", "distal_stop", "spring_decoupling", "external_contact", "joint_wobble", "moving_centre", "encoder_periodic_error", "drive_sag", "command_delay", "current_saturation", "current_channel_delay", "command_as_measurement", "clock_drift", "marker_slip", "support_slip", "palm_marker_slip", "marker_swap"]
+TABLE = [
+    "stribeck_friction",
+    "asymmetric_viscous_friction",
+    "asymmetric_friction",
+    "load_dependent_friction",
+    "position_dependent_friction",
+    "detent_load",
+    "nonlinear_spring",
+    "gravity_load",
+    "torque_ripple",
+    "quadratic_damping",
+    "elastoplastic_hysteresis",
+    "viscoelastic_spring",
+    "presliding_friction",
+    "end_stop_contact",
+    "thermal_friction_drift",
+    "drive_backlash",
+    "series_elasticity",
+    "linkage_backlash",
+    "linkage_compliance",
+    "coupling_deadband",
+    "distal_stop",
+    "spring_decoupling",
+    "external_contact",
+    "joint_wobble",
+    "moving_centre",
+    "encoder_periodic_error",
+    "drive_sag",
+    "command_delay",
+    "current_saturation",
+    "current_channel_delay",
+    "command_as_measurement",
+    "clock_drift",
+    "marker_slip",
+    "support_slip",
+    "palm_marker_slip",
+    "marker_swap",
+]
 
 
 @cache
@@ -37,7 +74,11 @@ def plain(tmp_path_factory):
 
 def changed(first: Path, second: Path) -> set[str]:
     def digest(folder: Path) -> dict[str, str]:
-        return {str(p.relative_to(folder)): hashlib.sha256(p.read_bytes()).hexdigest() for p in folder.rglob("*") if p.is_file()}
+        return {
+            str(p.relative_to(folder)): hashlib.sha256(p.read_bytes()).hexdigest()
+            for p in folder.rglob("*")
+            if p.is_file()
+        }
 
     a, b = digest(first), digest(second)
     assert a.keys() == b.keys()
@@ -91,7 +132,9 @@ def test_an_effect_changes_its_own_files_only(name, plain, tmp_path):
         trial = answer.trials["flexion_index"]
         frame = int((told["parameters"]["moment_s"] - trial.plan.start_s) * 100)
         a, b = points(plain.path / "mocap/flexion_index.c3d"), points(answer.path / "mocap/flexion_index.c3d")
-        touched = {label for label in a if not np.array_equal(a[label][frame + 2 :], b[label][frame + 2 :], equal_nan=True)}
+        touched = {
+            label for label in a if not np.array_equal(a[label][frame + 2 :], b[label][frame + 2 :], equal_nan=True)
+        }
         assert all(np.array_equal(a[label][:frame], b[label][:frame], equal_nan=True) for label in a)
         assert touched == ({told["marker"]} if "marker" in told else set(told["markers"]))
 
@@ -103,7 +146,10 @@ def test_every_form_of_an_effect_acts(name, plain, tmp_path):
     for form in CATALOGUE[name].forms:
         active = activate(Hidden(name, "index", 1.0, form), truth(), trials, SEED)
         influence = active.influence
-        hooks = [getattr(influence, hook) for hook in ("drive", "proximal", "linkage", "distal", "pose", "encoder", "current", "log")]
+        hooks = [
+            getattr(influence, hook)
+            for hook in ("drive", "proximal", "linkage", "distal", "pose", "encoder", "current", "log")
+        ]
         acts = influence.terms is not None or any(hooks) or influence.world is not None or influence.clock_rate != 1.0
         assert acts, form
         assert all(np.isfinite(v) for v in active.answer["parameters"].values())
@@ -147,7 +193,10 @@ def friction_at(name: str, form: str, position: float, velocity: float, **parame
 
 def test_physics_of_the_forms():
     for form in CATALOGUE["stribeck_friction"].forms:  # falls with speed, both ways alike
-        level = [friction_at("stribeck_friction", form, 50, v, static_excess_raw=20.0, stribeck_speed=20.0) for v in (0.01, 10, 40, 100)]
+        level = [
+            friction_at("stribeck_friction", form, 50, v, static_excess_raw=20.0, stribeck_speed=20.0)
+            for v in (0.01, 10, 40, 100)
+        ]
         assert abs(level[0] - 20.0) < 0.05 and all(np.diff(level) < 0) and level[-1] < 1.5
         assert friction_at("stribeck_friction", form, 50, -40, static_excess_raw=20.0, stribeck_speed=20.0) == -level[2]
     for form in CATALOGUE["position_dependent_friction"].forms:  # odd in the direction
@@ -160,13 +209,19 @@ def test_physics_of_the_forms():
     for form in CATALOGUE["asymmetric_viscous_friction"].forms:
         for sign in (1.0, -1.0):
             flexing = friction_at("asymmetric_viscous_friction", form, 50, 80, sign=sign)
-            extending = -friction_at("asymmetric_viscous_friction", form, 50, -80, sign=sign)  # resistance while extending
+            extending = -friction_at(
+                "asymmetric_viscous_friction", form, 50, -80, sign=sign
+            )  # resistance while extending
             assert sign * (flexing - extending) > 0
     ripple = [friction_at("torque_ripple", "sine", p, 30, amplitude_raw=3.0, period_percent=8.0) for p in (20, 28, 24)]
     assert np.isclose(ripple[0], ripple[1]) and np.isclose(ripple[0], -ripple[2])
     assert np.isclose(friction_at("quadratic_damping", "square", 50, 100, drag_at_100_raw=16.0), 16.0)
     assert np.isclose(friction_at("quadratic_damping", "square", 50, -50, drag_at_100_raw=16.0), -4.0)
-    assert friction_at("load_dependent_friction", "transmitted", 90, 30) > friction_at("load_dependent_friction", "transmitted", 10, 30) > 0
+    assert (
+        friction_at("load_dependent_friction", "transmitted", 90, 30)
+        > friction_at("load_dependent_friction", "transmitted", 10, 30)
+        > 0
+    )
 
 
 def test_play_is_backlash():
@@ -177,7 +232,11 @@ def test_play_is_backlash():
 
 def test_backlash_and_couplings_in_the_true_angles(plain, tmp_path):
     """Lost motion lags by direction; what moves the distal segment leaves the proximal one alone."""
-    for name, joint, form in (("drive_backlash", 0, "play"), ("linkage_backlash", 1, "play"), ("distal_stop", 1, "hard")):
+    for name, joint, form in (
+        ("drive_backlash", 0, "play"),
+        ("linkage_backlash", 1, "play"),
+        ("distal_stop", 1, "hard"),
+    ):
         answer = record(truth(), tmp_path / name, SEED, [Hidden(name, "index", form=form)], PLAN)
         angle, before = (x.trials["flexion_index"].angle_rad for x in (answer, plain))
         assert np.abs(angle[:, joint] - before[:, joint]).max() > 0.01

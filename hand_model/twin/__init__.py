@@ -1,4 +1,4 @@
-"""The twin: a recorder of hands with something hidden in them. Shares no code with identification, compilation or diagnosis."""
+"""The twin: a recorder of hands with something hidden in them. Shares no code with what it is meant to test."""
 
 from . import effects as _effects  # noqa: F401  (fills the catalogue)
 from .bebionic import bebionic

@@ -30,9 +30,9 @@ SEGMENTS = ("proximal", "distal")
 def bebionic(side: str, seed: int | None = None, fingers: Iterable[str] | None = None) -> HandTruth:
     """A BeBionic hand of one side with the published geometry and typical motors.
 
-    seed: perturbs geometry by a few degrees and millimetres, couplings, motors, controller, encoder range and the noise of
-    the laboratory; None leaves every value at its nominal figure. fingers: any of thumb_0, thumb_1, index, middle, ring,
-    little (default: all). Raises HandModelError for names that were not published.
+    seed: perturbs geometry by a few degrees and millimetres, couplings, motors, controller, encoder range and the
+    noise of the laboratory; None leaves every value at its nominal figure. fingers: any of thumb_0, thumb_1, index,
+    middle, ring, little (default: all). Raises HandModelError for names that were not published.
     """
     names = tuple(fingers) if fingers is not None else FINGERS
     sign = 1.0 if side == "left" else -1.0
@@ -113,7 +113,12 @@ def _motor(actuator: str, seed: int | None) -> MotorTruth:
     kind = "ramp" if shared.uniform() < 0.6 else "cascade"
     gain = shared.uniform(16, 30) if kind == "ramp" else shared.uniform(1.6, 3.0)
     controller = Controller(
-        kind, gain, shared.uniform(0.45, 0.8), shared.uniform(9, 16), shared.uniform(85, 140), float(shared.choice([255, 255, 100]))
+        kind,
+        gain,
+        shared.uniform(0.45, 0.8),
+        shared.uniform(9, 16),
+        shared.uniform(85, 140),
+        float(shared.choice([255, 255, 100])),
     )
     return MotorTruth(
         actuator,

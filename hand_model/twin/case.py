@@ -18,7 +18,7 @@ from .truth import HandTruth
 KINDS = ("single", "none", "pair", "messy", "outside", "weak")
 BACKGROUND = 0.1  # strength of every other effect in a messy case
 WEAK = 0.4
-# A refused channel hides whatever else is in the recording, and an asymmetric Coulomb friction is a preload by definition.
+# A refused channel hides whatever else is recorded, and an asymmetric Coulomb friction is a preload by definition.
 ALONE = ("command_as_measurement", "asymmetric_friction")
 
 # Effects that imitate each other closely enough that a pair of them would be a riddle rather than a test.
@@ -86,7 +86,9 @@ def draw_case(seed: int, kind: str = "single", effect: str | None = None, streng
 
 def _laboratory(rng: np.random.Generator, seed: int, kind: str) -> tuple[HandTruth, Plan]:
     side = str(rng.choice(["left", "right"]))
-    actuators = rng.choice(["thumb", "index", "middle", "ring", "little"], 2, replace=False, p=[0.12, 0.22, 0.22, 0.22, 0.22])
+    actuators = rng.choice(
+        ["thumb", "index", "middle", "ring", "little"], 2, replace=False, p=[0.12, 0.22, 0.22, 0.22, 0.22]
+    )
     fingers = [str(rng.choice(["thumb_0", "thumb_1"])) if a == "thumb" else str(a) for a in actuators]
     truth = bebionic(side, seed, fingers)
     plan = Plan(middle_percent=float(round(rng.uniform(40, 60))))

@@ -33,7 +33,11 @@ def dirty_markers(world: dict[str, Array], noise: MocapNoise, seed: int, trial: 
     rng = stream(seed, "ghosts", trial.name)
     for i, span in enumerate(_spans(rng, n, rng.poisson(noise.ghosts_per_minute * minutes), 0.6 * noise.rate_hz)):
         near = str(rng.choice(labels))
-        ghost = world[near][span] + rng.normal(0, 0.04, 3) + np.cumsum(rng.normal(0, 2e-4, (span.stop - span.start, 3)), axis=0)
+        ghost = (
+            world[near][span]
+            + rng.normal(0, 0.04, 3)
+            + np.cumsum(rng.normal(0, 2e-4, (span.stop - span.start, 3)), axis=0)
+        )
         if rng.uniform() < noise.ghost_label_share:
             out[near][span] = ghost
         else:
@@ -53,7 +57,14 @@ def _spans(rng: np.random.Generator, n: int, count: int, mean: float) -> list[sl
 
 
 def log_columns(
-    truth: HandTruth, motor: MotorTruth, trial: TrialPlan, motion: Motion, percent: Array, current: Array, seed: int, rate: float
+    truth: HandTruth,
+    motor: MotorTruth,
+    trial: TrialPlan,
+    motion: Motion,
+    percent: Array,
+    current: Array,
+    seed: int,
+    rate: float,
 ) -> dict[str, Array]:
     """Columns of the log (k,): time on its own clock, then what the hand reports; nan where a sample was lost.
 
@@ -61,7 +72,9 @@ def log_columns(
     """
     noise, rng = truth.log, stream(seed, "log", trial.name)
     time_s = sample_times(noise, trial, seed)
-    counts = motor.counts(np.interp(time_s, motion.time_s, percent)) + noise.encoder_counts * rng.normal(size=len(time_s))
+    counts = motor.counts(np.interp(time_s, motion.time_s, percent)) + noise.encoder_counts * rng.normal(
+        size=len(time_s)
+    )
     measured = np.interp(time_s, motion.time_s, current) + _coloured(noise, time_s, stream(seed, "current", trial.name))
     setpoint, speed, limit = commands(trial.program, time_s)
     columns = {
@@ -91,7 +104,9 @@ def unrest_terms(motor: MotorTruth, trial: TrialPlan, seed: int, memory_s: float
 
 
 def sample_times(noise: LogNoise, trial: TrialPlan, seed: int) -> Array:
-    """Times (k,) [s] of the trial at which the log holds a sample: jittering, some lost, the window not that of the mocap."""
+    """Times (k,) [s] of the trial at which the log holds a sample: jittering, some lost, the window not that of the
+    mocap.
+    """
     rng = stream(seed, "sampling", trial.name)
     begin, end = rng.uniform(0.0, 0.08, 2)
     count = int((trial.duration_s + 1.0) / max(noise.interval_s - noise.jitter_s, 1e-4)) + 2

@@ -26,14 +26,14 @@ Array = NDArray[np.float64]
 class Influence:
     """Hooks, all optional; each changes one station and leaves what lies upstream of it alone.
 
-    start: called before each trial of the finger. terms: in the drive's balance.
-    drive: (motion, percent) -> percent that reaches the proximal segment. proximal: (motion, angle) -> angle.
-    linkage: (motion, angle) -> proximal angle that reaches the linkage. distal: (motion, angle) -> angle. Angles (n,) [rad].
-    pose: (joint index, angle) -> quaternions (n, 4) and shifts (n, 3) [m], applied after the hinge in the parent's frame.
-    encoder: (motion, percent) -> percent as read. current: (motion, raw) -> raw as measured. log: edits the columns.
-    clock_rate: factor on the log's clock.
-    segment: (trial, time_s, segment, markers (n, k, 3)) -> the same, in the segment's frame, hand open [m].
-    palm: (trial, time_s, markers (n, 3, 3)) -> the same, palm frame. world: (trial, time_s, label -> (n, 3)) -> the same.
+    start: called before each trial of the finger. terms: in the drive's balance. drive: (motion, percent) -> percent
+    that reaches the proximal segment. proximal: (motion, angle) -> angle. linkage: (motion, angle) -> proximal angle
+    that reaches the linkage. distal: (motion, angle) -> angle. Angles (n,) [rad]. pose: (joint index, angle) ->
+    quaternions (n, 4) and shifts (n, 3) [m], applied after the hinge in the parent's frame. encoder: (motion,
+    percent) -> percent as read. current: (motion, raw) -> raw as measured. log: edits the columns. clock_rate: factor
+    on the log's clock. segment: (trial, time_s, segment, markers (n, k, 3)) -> the same, in the segment's frame, hand
+    open [m]. palm: (trial, time_s, markers (n, 3, 3)) -> the same, palm frame. world: (trial, time_s, label -> (n,
+    3)) -> the same.
     """
 
     start: Callable[[TrialPlan], None] | None = None
@@ -55,7 +55,8 @@ class Influence:
 
 @dataclass(frozen=True)
 class Hidden:
-    """An effect to hide. strength: 1 is the default size. form: one of the effect's physical forms; parameters: fixed values.
+    """An effect to hide. strength: 1 is the default size. form: one of the effect's physical forms; parameters: fixed
+    values.
 
     What is None or absent is drawn from the session's seed.
     """
@@ -118,7 +119,9 @@ class Draw:
 
 @dataclass(frozen=True)
 class Declared:
-    """An entry of the twin's catalogue. station: "drive", "transmission", "kinematics", "channel", "recording" or "outside"."""
+    """An entry of the twin's catalogue. station: "drive", "transmission", "kinematics", "channel", "recording" or
+    "outside".
+    """
 
     name: str
     station: str
@@ -131,7 +134,9 @@ class Declared:
 CATALOGUE: dict[str, Declared] = {}
 
 
-def effect(name: str, station: str, signal: str, forms: tuple[str, ...] = ("plain",), joint: str | None = None) -> Callable:
+def effect(
+    name: str, station: str, signal: str, forms: tuple[str, ...] = ("plain",), joint: str | None = None
+) -> Callable:
     """Declare an effect of the twin: the decorated function draws parameters and returns its Influence."""
 
     def enter(build: Callable[[Draw], Influence]) -> Callable[[Draw], Influence]:
@@ -155,7 +160,9 @@ def activate(hidden: Hidden, truth: HandTruth, schedule: Sequence[TrialPlan], se
     if hidden.effect not in CATALOGUE:
         raise HandModelError(f'the twin has no effect "{hidden.effect}"; {did_you_mean(hidden.effect, CATALOGUE)}')
     if not (math.isfinite(hidden.strength) and hidden.strength >= 0):
-        raise HandModelError(f'effect "{hidden.effect}" has strength {hidden.strength}; a number of zero or more is needed')
+        raise HandModelError(
+            f'effect "{hidden.effect}" has strength {hidden.strength}; a number of zero or more is needed'
+        )
     declared = CATALOGUE[hidden.effect]
     finger = truth.finger(hidden.finger) if hidden.finger else truth.fingers[0]
     rng = stream(seed, "effect", hidden.effect, finger.name)

@@ -45,7 +45,9 @@ def segment_markers(
     out: dict[str, Array] = {}
     for depth, joint in enumerate(finger.joints):
         labels = list(joint.markers_palm)
-        points = np.broadcast_to(np.stack([joint.markers_palm[label] for label in labels]), (len(time_s), len(labels), 3))
+        points = np.broadcast_to(
+            np.stack([joint.markers_palm[label] for label in labels]), (len(time_s), len(labels), 3)
+        )
         for influence in influences:
             points = influence.segment(trial, time_s, joint.name, points) if influence.segment else points
         for i in range(depth, -1, -1):
@@ -62,7 +64,9 @@ def segment_markers(
 
 @dataclass(frozen=True)
 class PalmPose:
-    """The palm in the world: a base pose, slow drift and trembling as sums of sinusoids, and a large turn where asked."""
+    """The palm in the world: a base pose, slow drift and trembling as sums of sinusoids, and a large turn where
+    asked.
+    """
 
     base: Array
     position_m: Array
@@ -142,7 +146,10 @@ def probe_markers(truth: HandTruth, trial: TrialPlan, time_s: Array, seed: int) 
     rng = stream(seed, "probe", trial.name)
     steady = truth.mocap.drift_rad == 0 and truth.mocap.shake_rad == 0
     if trial.kind == "pivot":
-        tip, direction = np.broadcast_to([0.06, 0.0, 0.08], (len(time_s), 3)), np.broadcast_to([0.0, 0.0, 1.0], (len(time_s), 3))
+        tip, direction = (
+            np.broadcast_to([0.06, 0.0, 0.08], (len(time_s), 3)),
+            np.broadcast_to([0.0, 0.0, 1.0], (len(time_s), 3)),
+        )
         tilt = 0.6
     else:
         tip, direction = probe_target(truth, trial, time_s)

@@ -38,7 +38,13 @@ def _table(head: str, values: dict[str, Any]) -> list[str]:
 
 def _trial(trial: TrialPlan, mocap_format: str) -> dict[str, Any]:
     out: dict[str, Any] = {"kind": trial.kind}
-    named = {"finger": trial.finger, "name": trial.landmark, "joint": trial.joint, "side": trial.side, "segment": trial.segment}
+    named = {
+        "finger": trial.finger,
+        "name": trial.landmark,
+        "joint": trial.joint,
+        "side": trial.side,
+        "segment": trial.segment,
+    }
     out |= {key: value for key, value in named.items() if value is not None}
     if trial.object is not None:
         out["object"] = trial.object

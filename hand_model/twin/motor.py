@@ -1,7 +1,8 @@
 """The drive in raw units: a mass with friction that truly sticks, under a position controller.
 
-inertia a = u - load(p, v, ...) - viscous v - friction, with |friction| <= level while it sticks and friction = level sign(v)
-while it slides. Viscous friction is integrated implicitly, the stop at a velocity reversal is an event of its own.
+inertia a = u - load(p, v, ...) - viscous v - friction, with |friction| <= level while it sticks and friction = level
+sign(v) while it slides. Viscous friction is integrated implicitly, the stop at a velocity reversal is an event of its
+own.
 """
 
 from __future__ import annotations
@@ -23,10 +24,11 @@ SLEW = 1500.0  # of the cascade's wanted velocity [%/s^2]
 
 @dataclass
 class DriveNow:
-    """The running state that influences see: time [s] of trial and session, position [%], velocity [%/s], current [raw].
+    """The running state that influences see: time [s] of trial and session, position [%], velocity [%/s], current
+    [raw].
 
-    direction: of the motion, or of the push while sticking. transmitted: load behind the gearbox [raw]. gravity_palm: unit
-    vector of gravity in the palm frame.
+    direction: of the motion, or of the push while sticking. transmitted: load behind the gearbox [raw]. gravity_palm:
+    unit vector of gravity in the palm frame.
     """
 
     time_s: float = 0.0
@@ -49,9 +51,10 @@ class DriveTerms:
     """What acts on one drive beyond the declared model.
 
     load: [raw] against flexion whatever the direction. friction: [raw] added to the Coulomb level, opposing motion.
-    advance: called once per step, after the motion. deliver: torque in current units delivered for a current (raw -> raw).
-    speed_factor: share of the commanded speed that the drive reaches. sense: position [%] that the encoder tells the
-    controller. current_limit: the drive's own clip [raw]. replace_coulomb: a bristle carries the Coulomb friction instead.
+    advance: called once per step, after the motion. deliver: torque in current units delivered for a current (raw ->
+    raw). speed_factor: share of the commanded speed that the drive reaches. sense: position [%] that the encoder
+    tells the controller. current_limit: the drive's own clip [raw]. replace_coulomb: a bristle carries the Coulomb
+    friction instead.
     """
 
     load: tuple[Term, ...] = ()
@@ -68,7 +71,9 @@ class DriveTerms:
 @dataclass(frozen=True)
 class Motion:
     """One simulated trial at STEP_S: time [s], position [%], velocity [%/s], acceleration [%/s^2], current [raw],
-    load (spring and all further loads) [raw], friction [raw], each (n,); setpoint [%], speed and current_limit [raw]."""
+    load (spring and all further loads) [raw], friction [raw], each (n,); setpoint [%], speed and current_limit
+    [raw].
+    """
 
     time_s: Array
     position: Array
@@ -117,7 +122,8 @@ def simulate(
 ) -> Motion:
     """Simulate one program from rest at `start_percent` [%].
 
-    gravity_palm: (n, 3) unit vectors per step, for terms that need them. start_s: session time of the trial's start [s].
+    gravity_palm: (n, 3) unit vectors per step, for terms that need them. start_s: session time of the trial's start
+    [s].
     """
     n = round(program.duration_s / step_s) + 1
     time_s = np.arange(n) * step_s
@@ -132,14 +138,27 @@ def simulate(
         now.session_s = start_s + now.time_s
         if gravity is not None:
             now.gravity_palm = gravity[i]
-        rows.append(_step(motor, terms, control, now, target[i], speed[i] * to_speed, min(limit[i], terms.current_limit), step_s))
+        rows.append(
+            _step(
+                motor, terms, control, now, target[i], speed[i] * to_speed, min(limit[i], terms.current_limit), step_s
+            )
+        )
     position, velocity, acceleration, current, load, friction = np.array(rows).T
     setpoint, speed_raw, limit_raw = commands(program, time_s)
-    return Motion(time_s, position, velocity, acceleration, current, load, friction, setpoint, speed_raw, limit_raw, start_s)
+    return Motion(
+        time_s, position, velocity, acceleration, current, load, friction, setpoint, speed_raw, limit_raw, start_s
+    )
 
 
 def _step(
-    motor: MotorTruth, terms: DriveTerms, control: Callable, now: DriveNow, target: float, speed: float, limit: float, step_s: float
+    motor: MotorTruth,
+    terms: DriveTerms,
+    control: Callable,
+    now: DriveNow,
+    target: float,
+    speed: float,
+    limit: float,
+    step_s: float,
 ) -> tuple[float, ...]:
     """Advance `now` by one step; returns position, velocity, acceleration, current, load, friction at its start."""
     p, v = now.position, now.velocity

@@ -30,7 +30,9 @@ class Program:
     duration_s: float
 
 
-def _program(targets: list[tuple[float, str]], controller: Controller, limit: float = 255.0, settle_s: float = 0.45) -> Program:
+def _program(
+    targets: list[tuple[float, str]], controller: Controller, limit: float = 255.0, settle_s: float = 0.45
+) -> Program:
     time_s, at, moves = REST_S, 0.0, []
     for target, speed in targets:
         raw = float(round(SPEED_SHARE[speed] * controller.speed_raw_full))
@@ -40,7 +42,10 @@ def _program(targets: list[tuple[float, str]], controller: Controller, limit: fl
     return Program(tuple(moves), time_s)
 
 
-def flexion(controller: Controller, cycles: tuple[str, ...] = ("full", "medium", "slow", "fast", "low", "full", "medium", "slow")) -> Program:
+def flexion(
+    controller: Controller,
+    cycles: tuple[str, ...] = ("full", "medium", "slow", "fast", "low", "full", "medium", "slow"),
+) -> Program:
     """Full cycles open-close-open, one per named speed; the defaults replay the first three."""
     return _program([(target, speed) for speed in cycles for target in (100.0, 0.0)], controller)
 

@@ -23,7 +23,8 @@ def _tables() -> dict:
 
 
 def published_joint(side: str, finger: str) -> tuple[Array, Array]:
-    """Axes (2, 3) [unit] and centres (2, 3) [m] of a finger, proximal then distal, in the landmark frame (thesis, tables 4.1 to 4.4).
+    """Axes (2, 3) [unit] and centres (2, 3) [m] of a finger, proximal then distal, in the landmark frame (thesis,
+    tables 4.1 to 4.4).
 
     Raises HandModelError for a side or finger that was not published.
     """

@@ -31,8 +31,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class TrialTruth:
-    """What truly happened in a trial. mocap_time_s (n,), angle_rad (n, 2), palm pose: rotation (n, 4) and position (n, 3) [m] in
-    the world at the mocap's frames; log_time_s (k,) on the trial's time; motion: the drive at the simulation's steps."""
+    """What truly happened in a trial. mocap_time_s (n,), angle_rad (n, 2), palm pose: rotation (n, 4) and position
+    (n, 3) [m] in the world at the mocap's frames; log_time_s (k,) on the trial's time; motion: the drive at the
+    simulation's steps.
+    """
 
     plan: TrialPlan
     mocap_time_s: Array
@@ -66,8 +68,8 @@ def record(
 ) -> Answer:
     """Write a session of `truth` into `folder` (created; refused where it holds anything) and return its answer.
 
-    effects: what to hide, by name or as Hidden. mocap_format: "c3d", "tsv", "trc" or "csv". The same arguments give the same
-    bytes. Nothing of the answer is written. Raises HandModelError for what cannot be recorded.
+    effects: what to hide, by name or as Hidden. mocap_format: "c3d", "tsv", "trc" or "csv". The same arguments give
+    the same bytes. Nothing of the answer is written. Raises HandModelError for what cannot be recorded.
     """
     target, plan = Path(folder), plan or Plan()
     if target.exists() and (not target.is_dir() or any(target.iterdir())):
@@ -98,7 +100,12 @@ def _contacts(trials: Mapping[str, TrialTruth], seed: int) -> dict[str, dict[str
         if met is not None:
             touched = np.flatnonzero(trial.motion.position > met)
             when = float(trial.motion.time_s[touched[0]]) if len(touched) else None
-            out[name] = {"object": trial.plan.object, "stiffness": trial.plan.stiffness, "at_percent": met, "contact_s": when}
+            out[name] = {
+                "object": trial.plan.object,
+                "stiffness": trial.plan.stiffness,
+                "at_percent": met,
+                "contact_s": when,
+            }
     return out
 
 
@@ -150,7 +157,9 @@ def _record_trial(
     return TrialTruth(trial, time_s, angle_rad, rotation, position, log_time, motion)
 
 
-def _move(truth: HandTruth, trial: TrialPlan, influences: Sequence[Influence], pose: PalmPose, seed: int) -> tuple[Motion, Array]:
+def _move(
+    truth: HandTruth, trial: TrialPlan, influences: Sequence[Influence], pose: PalmPose, seed: int
+) -> tuple[Motion, Array]:
     """Drive and angles (n, 2) [rad] at the simulation's steps."""
     motor = truth.motors[truth.finger(trial.finger).actuator]
     for influence in influences:
@@ -186,7 +195,13 @@ def grasp_terms(trial: TrialPlan, at_percent: float) -> DriveTerms:
 
 
 def _write_log(
-    truth: HandTruth, trial: TrialPlan, motion: Motion, own: Sequence[Influence], active: Sequence[Active], root: Path, seed: int
+    truth: HandTruth,
+    trial: TrialPlan,
+    motion: Motion,
+    own: Sequence[Influence],
+    active: Sequence[Active],
+    root: Path,
+    seed: int,
 ) -> None:
     motor = truth.motors[truth.finger(trial.finger).actuator]
     percent, current = motion.position, motion.current

@@ -16,7 +16,8 @@ SPEEDS = ("full", "fast", "half", "medium", "low", "slow")
 
 @dataclass(frozen=True)
 class Plan:
-    """What to record. flexion, validation: speeds of their cycles. excitations: programmed trials per finger, the last validates.
+    """What to record. flexion, validation: speeds of their cycles. excitations: programmed trials per finger, the
+    last validates.
 
     grasps: object name -> contact stiffness [raw/%]. surfaces: segments to sweep; "all" for every one. pivot: a probe
     calibration, the manifest's probe then has no known tip. mocap_excitation: markers are recorded there as well.
@@ -38,7 +39,9 @@ class Plan:
 
 @dataclass(frozen=True)
 class TrialPlan:
-    """One trial of the schedule. name: the stem of its files. start_s: session time [s]. program: None for probe trials."""
+    """One trial of the schedule. name: the stem of its files. start_s: session time [s]. program: None for probe
+    trials.
+    """
 
     name: str
     kind: str
@@ -86,7 +89,10 @@ def schedule(truth: HandTruth, plan: Plan) -> tuple[TrialPlan, ...]:
 
 def _add_motions(add: object, truth: HandTruth, finger: str, plan: Plan) -> None:
     controller = truth.motors[truth.finger(finger).actuator].controller
-    for name, cycles, validate in ((f"flexion_{finger}", plan.flexion, False), (f"flexion_{finger}_b", plan.validation, True)):
+    for name, cycles, validate in (
+        (f"flexion_{finger}", plan.flexion, False),
+        (f"flexion_{finger}_b", plan.validation, True),
+    ):
         if cycles:
             program = flexion(controller, cycles)
             add(name, "flexion", program.duration_s, finger=finger, program=program, validate=validate)

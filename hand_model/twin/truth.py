@@ -15,7 +15,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class JointTruth:
-    """A hinge of the open hand: axis_palm (3,) unit, flexion positive; centre_palm (3,) [m]; markers_palm: label -> (3,) [m]."""
+    """A hinge of the open hand: axis_palm (3,) unit, flexion positive; centre_palm (3,) [m]; markers_palm: label ->
+    (3,) [m].
+    """
 
     name: str
     axis_palm: Array
@@ -25,7 +27,8 @@ class JointTruth:
 
 @dataclass(frozen=True)
 class FingerTruth:
-    """A finger. proximal_rad: coefficients over u = percent / 100; distal_rad: coefficients over the proximal angle [rad].
+    """A finger. proximal_rad: coefficients over u = percent / 100; distal_rad: coefficients over the proximal angle
+    [rad].
 
     Both polynomials are in ascending order and start at zero: the open hand defines the zero of every angle.
     """
@@ -39,10 +42,11 @@ class FingerTruth:
 
 @dataclass(frozen=True)
 class Controller:
-    """Position controller of a drive. kind: "ramp" (PD on a reference of limited speed) or "cascade" (position, speed with integral).
+    """Position controller of a drive. kind: "ramp" (PD on a reference of limited speed) or "cascade" (position, speed
+    with integral).
 
-    gain [raw/%] and damping [raw s/%] of the ramp, or of the speed loop [raw s/%] with integral [raw/%];
-    speed_full: speed [%/s] at the raw speed 255.
+    gain [raw/%] and damping [raw s/%] of the ramp, or of the speed loop [raw s/%] with integral [raw/%]; speed_full:
+    speed [%/s] at the raw speed 255.
     """
 
     kind: str = "ramp"
@@ -55,9 +59,11 @@ class Controller:
 
 @dataclass(frozen=True)
 class MotorTruth:
-    """A drive in raw units: current = inertia a + viscous v + coulomb sign(v) + stiffness p + preload, p in percent of the range.
+    """A drive in raw units: current = inertia a + viscous v + coulomb sign(v) + stiffness p + preload, p in percent
+    of the range.
 
-    unrest: standard deviation [raw] of a slow random load, so that repeated cycles differ by more than measurement noise.
+    unrest: standard deviation [raw] of a slow random load, so that repeated cycles differ by more than measurement
+    noise.
     """
 
     actuator: str
@@ -78,12 +84,14 @@ class MotorTruth:
 
 @dataclass(frozen=True)
 class MocapNoise:
-    """The motion capture's dirt. noise_m: standard deviation per coordinate [m]. gaps_per_minute: occlusions per marker.
+    """The motion capture's dirt. noise_m: standard deviation per coordinate [m]. gaps_per_minute: occlusions per
+    marker.
 
-    ghosts_per_minute: unlabelled trajectories per trial; ghost_label_share: share of ghosts that steal a marker's label;
-    swaps_per_minute: short label swaps. drift_*: slow motion of the palm; shake_*: its trembling. landmark_m,
-    probe_m: placing error of the tip on landmarks and on screw heads [m]; blunder_share: joint trials in which it misses the screw head by blunder_m.
-    start_skew_s: the mocap starts up to that much after the trial does. unit: "mm" or "m" in the files.
+    ghosts_per_minute: unlabelled trajectories per trial; ghost_label_share: share of ghosts that steal a marker's
+    label; swaps_per_minute: short label swaps. drift_*: slow motion of the palm; shake_*: its trembling. landmark_m,
+    probe_m: placing error of the tip on landmarks and on screw heads [m]; blunder_share: joint trials in which it
+    misses the screw head by blunder_m. start_skew_s: the mocap starts up to that much after the trial does. unit:
+    "mm" or "m" in the files.
     """
 
     rate_hz: float = 100.0
@@ -108,8 +116,10 @@ class MocapNoise:
 @dataclass(frozen=True)
 class LogNoise:
     """The log's dirt. interval_s, jitter_s: mean and half width of the sampling interval; lost_share: rows lost;
-    empty_share: cells lost; encoder_counts, current_raw: standard deviations; current_memory_s: correlation time of the
-    current noise (0: white); clock_offset_s, clock_rate: log time = offset + rate * session time; quantised: whole counts."""
+    empty_share: cells lost; encoder_counts, current_raw: standard deviations; current_memory_s: correlation time
+    of the current noise (0: white); clock_offset_s, clock_rate: log time = offset + rate * session time;
+    quantised: whole counts.
+    """
 
     interval_s: float = 0.018
     jitter_s: float = 0.0065
@@ -125,7 +135,9 @@ class LogNoise:
 
 @dataclass(frozen=True)
 class SurfaceTruth:
-    """A contact surface in the palm frame, hand open: an ellipsoid with centre_palm (3,) [m], axes_palm (3, 3) rows, radii_m (3,) [m]."""
+    """A contact surface in the palm frame, hand open: an ellipsoid with centre_palm (3,) [m], axes_palm (3, 3) rows,
+    radii_m (3,) [m].
+    """
 
     segment: str
     centre_palm: Array
@@ -135,7 +147,9 @@ class SurfaceTruth:
 
 @dataclass(frozen=True)
 class HandTruth:
-    """A whole hand and its laboratory. landmarks_palm, palm_markers_palm: name or label -> (3,) [m]; probe: label -> (3,) [m], tip at zero."""
+    """A whole hand and its laboratory. landmarks_palm, palm_markers_palm: name or label -> (3,) [m]; probe: label ->
+    (3,) [m], tip at zero.
+    """
 
     name: str
     side: str
@@ -159,8 +173,15 @@ class HandTruth:
     def quiet(self) -> HandTruth:
         """The same hand in a laboratory without dirt: no noise, gaps, quantisation, palm motion or placing error."""
         mocap = MocapNoise(
-            rate_hz=self.mocap.rate_hz, noise_m=0, gaps_per_minute=0, drift_rad=0, drift_m=0, shake_rad=0, shake_m=0,
-            landmark_m=0, probe_m=0,
+            rate_hz=self.mocap.rate_hz,
+            noise_m=0,
+            gaps_per_minute=0,
+            drift_rad=0,
+            drift_m=0,
+            shake_rad=0,
+            shake_m=0,
+            landmark_m=0,
+            probe_m=0,
         )
         log = LogNoise(
             interval_s=self.log.interval_s, jitter_s=self.log.jitter_s, lost_share=0, encoder_counts=0, current_raw=0,

@@ -41,7 +41,9 @@ def encoder_periodic(draw: Draw) -> Influence:
 
 @effect("drive_sag", "channel", "current", ("speed", "supply", "torque"))
 def drive_sag(draw: Draw) -> Influence:
-    """The drive delivers less per command as it is loaded: less speed (at once, or as its supply droops), or less torque."""
+    """The drive delivers less per command as it is loaded: less speed (at once, or as its supply droops), or less
+    torque.
+    """
     share = draw.size("share_per_100_raw", 0.14, 0.24)
     droop = [0.0]
 
@@ -53,7 +55,9 @@ def drive_sag(draw: Draw) -> Influence:
         droop[0] += step_s / time_s * (abs(now.current) / 100.0 - droop[0])
 
     if draw.form == "torque":
-        return Influence(terms=DriveTerms(deliver=(lambda now, drive: drive * (1.0 - min(0.6, share * abs(drive) / 100.0)),)))
+        return Influence(
+            terms=DriveTerms(deliver=(lambda now, drive: drive * (1.0 - min(0.6, share * abs(drive) / 100.0)),))
+        )
     return Influence(
         start=start, terms=DriveTerms(speed_factor=(lambda now: max(0.3, 1.0 - share * droop[0]),), advance=(advance,))
     )
@@ -79,7 +83,11 @@ def current_saturation(draw: Draw) -> Influence:
     if draw.form == "reading":
         return Influence(current=lambda motion, raw: np.clip(raw, -level, level))
     knee = 0.12 * level
-    return Influence(current=lambda motion, raw: np.where(raw < level - knee, raw, level - knee * np.exp(-(raw - level + knee) / knee)))
+    return Influence(
+        current=lambda motion, raw: np.where(
+            raw < level - knee, raw, level - knee * np.exp(-(raw - level + knee) / knee)
+        )
+    )
 
 
 @effect("current_channel_delay", "channel", "current", ("delay", "lag"))

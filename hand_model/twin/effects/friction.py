@@ -59,7 +59,9 @@ def load_dependent(draw: Draw) -> Influence:
     back = 1.0 if draw.form == "transmitted" else 0.6
     return Influence(
         terms=DriveTerms(
-            friction=(lambda now: share * abs(now.transmitted) * (1.0 if now.direction * now.transmitted > 0 else back),)
+            friction=(
+                lambda now: share * abs(now.transmitted) * (1.0 if now.direction * now.transmitted > 0 else back),
+            )
         )
     )
 

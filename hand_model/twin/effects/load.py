@@ -20,7 +20,9 @@ def detent(draw: Draw) -> Influence:
     centre, width = draw.uniform("centre_percent", 22.0, 78.0), draw.uniform("width_percent", 5.0, 9.0)
     if draw.form == "notch":
         shape = bump("gaussian", centre, width)
-        return Influence(terms=DriveTerms(load=(lambda now: height * (now.position - centre) / width * shape(now.position),)))
+        return Influence(
+            terms=DriveTerms(load=(lambda now: height * (now.position - centre) / width * shape(now.position),))
+        )
     shape = bump(draw.form, centre, width)
     return Influence(terms=DriveTerms(load=(lambda now: height * shape(now.position),)))
 
@@ -94,7 +96,8 @@ def hysteresis(draw: Draw) -> Influence:
 
     if draw.form == "two_scales":
         return Influence(
-            start=start, terms=DriveTerms(load=(lambda now: level * (0.5 * state[0] + 0.5 * state[1]),), advance=(advance,))
+            start=start,
+            terms=DriveTerms(load=(lambda now: level * (0.5 * state[0] + 0.5 * state[1]),), advance=(advance,)),
         )
     return Influence(start=start, terms=DriveTerms(load=(lambda now: level * state[0],), advance=(advance,)))
 
@@ -117,7 +120,9 @@ def viscoelastic(draw: Draw) -> Influence:
     second = 0.3 if draw.form == "two_times" else 0.0
     return Influence(
         start=start,
-        terms=DriveTerms(load=(lambda now: stiffness * ((1 - second) * stretch[0] + second * stretch[1]),), advance=(advance,)),
+        terms=DriveTerms(
+            load=(lambda now: stiffness * ((1 - second) * stretch[0] + second * stretch[1]),), advance=(advance,)
+        ),
     )
 
 

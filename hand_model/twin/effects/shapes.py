@@ -15,7 +15,9 @@ WAVES = ("sine", "triangle", "harmonic")
 
 
 def bump(form: str, centre: float, width: float) -> Callable[[float], float]:
-    """A bump of height one; width: the standard deviation of the Gaussian, and half the base's half width of the others."""
+    """A bump of height one; width: the standard deviation of the Gaussian, and half the base's half width of the
+    others.
+    """
 
     def gaussian(x: float) -> float:
         return math.exp(-0.5 * ((x - centre) / width) ** 2)
@@ -46,7 +48,9 @@ def wave(form: str, phase_rad: float) -> Callable[[float], float]:
 
 
 def play(path: Array, gap: float) -> Array:
-    """Lost motion: follows a path (n,) upwards `gap` late and downwards at once; the gap starts closed on the lower side."""
+    """Lost motion: follows a path (n,) upwards `gap` late and downwards at once; the gap starts closed on the lower
+    side.
+    """
     out = np.empty_like(path)
     at = float(path[0])
     for i, x in enumerate(path.tolist()):

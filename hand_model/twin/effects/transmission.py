@@ -99,7 +99,11 @@ def spring_decoupling(draw: Draw) -> Influence:
     def lifted(session_s: Array | float) -> Array:
         phase = (np.asarray(session_s)[..., None] - np.array(windows)) / length
         inside = (phase > 0) & (phase < 1)
-        bell = np.minimum(1.0, 2.5 * np.sin(np.pi * np.clip(phase, 0, 1)) ** 2) if draw.form == "hold" else np.sin(np.pi * phase) ** 2
+        bell = (
+            np.minimum(1.0, 2.5 * np.sin(np.pi * np.clip(phase, 0, 1)) ** 2)
+            if draw.form == "hold"
+            else np.sin(np.pi * phase) ** 2
+        )
         return (inside * bell).sum(-1)
 
     def load(now: DriveNow) -> float:
