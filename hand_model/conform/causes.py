@@ -20,15 +20,6 @@ def geometry_findings(
 ) -> list[Finding]:
     """Name what differs in the lines, zeros and points. given: the pairing asked for; settled: after exchanges."""
     exchanged = _exchanged(a, b, given, settled)
-    roots = f.children.get(-1, [])
-    off = [k for k in roots if _size(f, k, at.fits[k]) > 1e-4]
-    if len(roots) > 1 and 2 * len(off) >= len(roots) or len(at.fits) < 5 * len(off):
-        other = align(mirrored(f))
-        lines = _cost(f, at), _cost(f, other)
-        if lines[1] < 0.5 * lines[0] and lines[0] - lines[1] > 20:
-            text = f"{b.path.name} fits {a.path.name} only as its mirror image: one is a left hand, the other a right"
-            worst = max(_size(f, k, fit) for k, fit in enumerate(at.fits)) * 1e3
-            return [Finding("mirrored", 3, tuple(x for x, _ in f.names), text, {"unmirrored_mm": worst})]
     wrong = [k for k, fit in enumerate(at.fits) if not _passes(f, k, fit, tolerance_m)]
     rounded = _rounding(a, b, f, at, wrong)
     out = [*exchanged, *_order(a, b, f)]
@@ -45,6 +36,19 @@ def geometry_findings(
     skipped = set() if rounded is None else rounded[1]
     out += _points(a, b, f, at, tolerance_m, skipped)
     return out + _written_short(f, at, wrong, skipped)
+
+
+def mirror_finding(a: Tree, b: Tree, f: Features) -> Finding | None:
+    """A left hand against a right one: most axes lie elsewhere, and fall into place once b is reflected."""
+    at = align(f)
+    sizes = [_size(f, k, fit) for k, fit in enumerate(at.fits)]
+    if 3 * sum(s > 1e-4 for s in sizes) < len(sizes):
+        return None
+    plain, reflected = _cost(f, at), _cost(f, align(mirrored(f)))
+    if reflected > 0.5 * plain or plain - reflected < 20:
+        return None
+    text = f"{b.path.name} fits {a.path.name} only as its mirror image: one is a left hand, the other a right"
+    return Finding("mirrored", 3, tuple(x for x, _ in f.names), text, {"unmirrored_mm": max(sizes) * 1e3})
 
 
 def _cost(f: Features, at: Alignment) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import DescriptionError, HandModelError, did_you_mean
 from .align import Alignment, Features, align, exchange, features
-from .causes import geometry_findings
+from .causes import geometry_findings, mirror_finding
 from .mjcf import read_mjcf
 from .pairing import Pairing, pair_automatically, read_pair
 from .relations import relation_findings
@@ -62,11 +62,13 @@ def conform(
         raise DescriptionError(f"poses ({poses}) and tolerance_mm ({tolerance_mm}) should be positive")
     tree_a, tree_b = read(a), read(b)
     given = read_pair(pair, tree_a, tree_b) if pair is not None else pair_automatically(tree_a, tree_b)
-    settled, f, at = exchange(features(tree_a, tree_b, given), given, tree_a, tree_b)
+    f = features(tree_a, tree_b, given)
+    reflected = mirror_finding(tree_a, tree_b, f)
+    settled, f, at = (given, f, align(f)) if reflected else exchange(f, given, tree_a, tree_b)
     values = sample(tree_a, tree_b, given, poses, seed)
     links = link_rows(tree_a, tree_b, given, settled, f, at, values)
     findings = relation_findings(tree_a, tree_b, settled, f, at)
-    findings += geometry_findings(tree_a, tree_b, given, settled, f, at, tolerance_mm * 1e-3)
+    findings += [reflected] if reflected else geometry_findings(tree_a, tree_b, given, settled, f, at, tolerance_mm * 1e-3)
     findings = [replace(x, disagrees=False) if x.cause in accept else x for x in findings]
     ok = not any(x.disagrees for x in findings)
     explained = _explained(tree_a, tree_b, settled, f, at, values) if not ok else max((r.rest_mm for r in links), default=0.0)
