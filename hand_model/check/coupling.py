@@ -105,9 +105,7 @@ def _pushed(mj: Any, tip: str, joints: list[str], held: bool, sign: float) -> fl
     if held:
         mj.dof_armature[[mj.joint(j).dofadr[0] for j in joints if mj.joint(j).id not in coupled]] = 1e3
     data = mujoco.MjData(mj)
-    for j in range(mj.njnt):
-        data.qpos[mj.jnt_qposadr[j]] = mj.jnt_range[j].mean()
-    data.qpos[:] = engine.on_linkages(mj, data.qpos)
+    data.qpos[:] = engine.on_linkages(mj, 0.5 * (mj.key("open").qpos + mj.key("close").qpos))
     for i in range(mj.nu):  # servos hold where the push starts
         if mj.actuator_trntype[i] == int(mujoco.mjtTrn.mjTRN_JOINT):
             data.ctrl[i] = data.qpos[mj.jnt_qposadr[mj.actuator_trnid[i, 0]]]

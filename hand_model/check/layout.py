@@ -64,7 +64,7 @@ def inertias(description: Description, model: Model) -> Finding:
         if element is None:
             problems.append(f'"{name}" has no inertia')
             continue
-        xx, yy, zz, xy, xz, yz = (float(v) for v in element.get("fullinertia").split())
+        xx, yy, zz, xy, xz, yz = (float(v) for v in (element.get("fullinertia") or f"{element.get('diaginertia')} 0 0 0").split())
         tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         principal = np.linalg.eigvalsh(tensor)
         margin = (principal[0] + principal[1] - principal[2]) / principal[2] if principal[2] > 0 else -np.inf

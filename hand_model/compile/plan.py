@@ -155,6 +155,21 @@ def planned(stem: str, suffix: str, hand: Hand, guessed_tips: Mapping[str, str])
     )
 
 
+def in_file_names(plan: Plan) -> Hand:
+    """The plan's hand under the names that its file uses: `<finger>_<joint>` is the joint's name there, actuators are sanitised."""
+    fingers, actuators = [], {}
+    for finger in plan.hand.fingers:
+        prefix = sanitised(finger.name)
+        renamed = {j.name: plan.names.joint[finger.name, j.name].removeprefix(f"{prefix}_") for j in finger.joints}
+        joints = tuple(replace(j, name=renamed[j.name]) for j in finger.joints)
+        couplings = tuple(replace(c, driver=renamed[c.driver], follower=renamed[c.follower]) for c in finger.couplings)
+        actuator = plan.names.actuator.get(finger.name)
+        actuators.setdefault(finger.actuator, actuator)
+        fingers.append(replace(finger, name=prefix, actuator=actuator, joints=joints, couplings=couplings))
+    motors = tuple(replace(m, actuator=actuators.get(m.actuator) or sanitised(m.actuator)) for m in plan.hand.motors)
+    return replace(plan.hand, fingers=tuple(fingers), motors=motors)
+
+
 def _palm(hand: Hand, names: Names, solid: tuple[Capsule, ...], shapes: tuple[Capsule, ...], mesh: str) -> Link:
     sites = {names.marker["", label]: np.asarray(p, float) for label, p in hand.palm_markers_palm.items()}
     sites["attachment"] = np.zeros(3)
