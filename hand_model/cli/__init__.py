@@ -23,6 +23,8 @@ COMMANDS = {
     "record": "record",
     "blind-trial": "blind_trial",
 }
+# Matrices here are small: threads inside BLAS cost several times what they gain. Set before numpy loads; a user's own setting stays.
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 # Status where the input or the request is wrong; 1 is for a check that ran and found something.
 BAD_INPUT = 2
 
@@ -41,6 +43,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f'hand-model: no command "{words[0]}"; {did_you_mean(words[0], COMMANDS)}', file=sys.stderr)
         return BAD_INPUT
     options = _parser().parse_args(words)
+    for name in THREADS:
+        os.environ.setdefault(name, "1")
     try:
         status = options.run(options, _progress(options))
         sys.stdout.flush()
