@@ -9,9 +9,9 @@ import argparse
 import sys
 from pathlib import Path
 
+from hand_model.bebionic import SIDES, published_hand
 from hand_model.check import check, record, table
 from hand_model.compile import compile
-from hand_model.bebionic import SIDES, published_hand
 
 
 def main() -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from ..effects import effect
 from ..hand import Hand
 from .drive import Drive, nominal_drives
+from .motor import complete_keyframes, write_motors
 from .plan import Link, Plan, in_file_names
 from .xml import child, comment, number, vector
 
@@ -40,8 +40,8 @@ def mjcf(plan: Plan) -> Any:
             child(contact, "exclude", body1=one, body2=other)
     _equalities(root, plan)
     _actuators(root, plan, drives)
-    _keyframes(root, plan)
     _physics(root, in_file_names(plan))
+    _keyframes(root, plan)
     return root
 
 
@@ -113,11 +113,8 @@ def _actuators(root: Any, plan: Plan, drives: dict[str, Drive]) -> None:
 
 
 def _physics(root: Any, hand: Hand) -> None:
-    """Identified motors and effects, as far as MJCF can hold them; they complete the keyframes by what they add."""
-    if hand.motors and find_spec("hand_model.compile.motor"):
-        from .motor import write_motors
-
-        write_motors(root, hand)
+    """Identified motors and effects, as far as MJCF can hold them."""
+    write_motors(root, hand)
     fingers = {f.name for f in hand.fingers} | {None}
     for found in hand.effects:
         if found.where.get("finger") in fingers:
@@ -126,10 +123,12 @@ def _physics(root: Any, hand: Hand) -> None:
 
 
 def _keyframes(root: Any, plan: Plan) -> None:
+    """Every joint of the tree at its angle; what a motor or an effect brought in is at zero until it is completed."""
     keyframe = child(root, "keyframe")
-    joints = [link.joint for link in plan.links if link.joint]
-    targets = [a.get("joint") for a in root.iterfind("actuator/position")]
+    joints = [e.get("name") for e in root.find("worldbody").iter("joint")]
+    actuators = [a for a in root.iterfind("actuator/*") if isinstance(a.tag, str)]
     for name, angles in plan.keyframes.items():
-        key = child(keyframe, "key", name=name, qpos=[angles[joint] for joint in joints])
-        if targets:
-            key.set("ctrl", vector([angles[joint] for joint in targets]))
+        key = child(keyframe, "key", name=name, qpos=[angles.get(joint, 0.0) for joint in joints])
+        if actuators:
+            key.set("ctrl", vector([angles.get(a.get("joint"), 0.0) if a.tag == "position" else 0.0 for a in actuators]))
+    complete_keyframes(root, in_file_names(plan))
