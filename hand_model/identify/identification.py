@@ -87,6 +87,8 @@ def identify_all(session: Session | str | Path, say: Callable[[str], None] = lam
         notes=tuple(notes),
         extra={
             "placement_m": placement,
+            # Of the palm frame's own turn [rad] and shift [m], shared by every joint's covariance.
+            "frame_covariance": (np.kron(np.eye(2), rotation.T) @ frame[2] @ np.kron(np.eye(2), rotation)).tolist(),
             "clock": {r.trial.name: _clock(r.clock) for fit in fits for r in fit.records if r.clock is not None},
             "repairs": _repairs(fits),
             "published_method": published,
