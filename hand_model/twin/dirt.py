@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from .motor import STEP_S, DriveTerms, Motion
 from .program import commands
@@ -95,6 +94,8 @@ def log_columns(
 
 def unrest_terms(motor: MotorTruth, trial: TrialPlan, seed: int, memory_s: float = 0.15) -> DriveTerms:
     """A random load on the drive with a memory of `memory_s` [s] (Ornstein-Uhlenbeck), drawn per trial."""
+    from scipy.signal import lfilter
+
     n = round(trial.duration_s / STEP_S) + 2
     keep = np.exp(-STEP_S / memory_s)
     fresh = motor.unrest * stream(seed, "unrest", trial.name).normal(size=n)
