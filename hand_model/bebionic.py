@@ -1,7 +1,7 @@
 """The BeBionic hand as published: a Hand from the tables of the thesis, for whoever has no recording of their own.
 
-Source: "Modelling of Robotic Hands: Kinematic and Dynamic Parameter Identification", tables 4.1 to 4.4 and 4.9. What it does not give
-(ranges, linkages, fingertips) is nominal and says so.
+Source: "Modelling of Robotic Hands: Kinematic and Dynamic Parameter Identification", tables 4.1 to 4.4 and 4.9. What it
+does not give (ranges, linkages, fingertips) is nominal and says so.
 """
 
 from __future__ import annotations
@@ -34,10 +34,12 @@ FLEXION = MappingProxyType(
         "little": (1.30, 1.15),
     }
 )
-DISTAL_LENGTH = MappingProxyType({"thumb_0": 0.033, "thumb_1": 0.033, "index": 0.036, "middle": 0.040, "ring": 0.038, "little": 0.032})
+DISTAL_LENGTH = MappingProxyType(
+    {"thumb_0": 0.033, "thumb_1": 0.033, "index": 0.036, "middle": 0.040, "ring": 0.038, "little": 0.032}
+)
 STRAIGHT = 0.75  # slope of a finger's nominal linkage at rest, over its mean slope: the distal joint starts slowly
 
-# Fractions of the range: the grips of the BeBionic's manual that differ in the posture of the fingers. Fingers stop short of each other.
+# Fractions of the range: the grips of the BeBionic's manual that differ in the fingers' posture.
 GRIPS: Mapping[str, Mapping[str, float]] = MappingProxyType(
     {
         "power": {"thumb_0": 1.0, "index": 0.8, "middle": 0.8, "ring": 0.8, "little": 0.8},
@@ -58,8 +60,8 @@ GRIPS: Mapping[str, Mapping[str, float]] = MappingProxyType(
 
 NOTES = (
     "The thesis rounds axes to three digits and centres to a millimetre; axes are set to length one here.",
-    "Covariances are derived from the thesis's own tables: axes from two captures of the left hand, centres from left against right.",
-    "Ranges, linkages and fingertips are nominal: the thesis prints none. No marker, encoder map or motor is part of this hand.",
+    "Covariances come from the thesis's own tables: axes from two captures of the left hand, centres from left and right.",
+    "Ranges, linkages and fingertips are nominal: the thesis prints none. There is no marker, encoder map or motor.",
     "The tables orient every axis towards +y. The thumb closes against that sense, so its angles are negative.",
 )
 
@@ -67,8 +69,10 @@ NOTES = (
 def published_deviations() -> tuple[float, float]:
     """Standard deviations per coordinate across an axis [rad] and of a centre [m] that the thesis's own tables imply.
 
-    Axis: two captures of the left hand lie this far apart (table 4.9); two estimates, two directions: E[angle^2] = 4 sd^2.
-    Centre: left against mirrored right (tables 4.3, 4.4), as if both hands were made alike: E[d^2] = 2 sd^2 per coordinate.
+    Axis: two captures of the left hand lie this far apart (table 4.9); two estimates, two directions: E[angle^2] = 4
+    sd^2.
+    Centre: left against mirrored right (tables 4.3, 4.4), as if both hands were made alike: E[d^2] = 2 sd^2 per
+    coordinate.
     """
     angle = np.radians([axis_repeatability_deg(name) for name in FINGERS])
     centre = {side: np.array([published_joint(side, name)[1] for name in FINGERS]) for side in SIDES}
@@ -77,7 +81,8 @@ def published_deviations() -> tuple[float, float]:
 
 
 def published_hand(side: str) -> Hand:
-    """The left or right BeBionic hand of the thesis's tables, with both thumb positions and the grips as `extra["grips"]`.
+    """The left or right BeBionic hand of the thesis's tables, with both thumb positions and the grips as
+    `extra["grips"]`.
 
     Raises HandModelError for another side.
     """
@@ -94,7 +99,7 @@ def published_hand(side: str) -> Hand:
         provenance={"thesis, tables 4.1 to 4.4 and 4.9": hashlib.sha256(json.dumps(figures).encode()).hexdigest()},
         notes=NOTES,
         extra={
-            "origin": "Axes and centres are the thesis's (tables 4.1 to 4.4), not identified here; see the notes below.",
+            "origin": "Axes and centres are the thesis's (tables 4.1 to 4.4), not identified here.",
             "grips": {name: dict(fractions) for name, fractions in GRIPS.items()},
         },
     )
@@ -104,7 +109,7 @@ def _finger(side: str, name: str) -> Finger:
     axes, centres = published_joint(side, name)
     axis_sd, centre_sd = published_deviations()
     along = (centres[1] - centres[0]) / np.linalg.norm(centres[1] - centres[0])
-    # Fingers flex about +y, towards the palm (-z); the thumb lies on the palmar side and closes the other way, towards the fingers.
+    # Fingers flex about +y, towards the palm (-z); the thumb, on the palmar side, closes the other way, towards them.
     sign = -1.0 if name.startswith("thumb") else 1.0
     joints = []
     for i, segment in enumerate(SEGMENTS):

@@ -56,7 +56,9 @@ class Description:
         for model in self.models:
             if model.stem == stem:
                 return model
-        raise DescriptionError(f'{self.folder}: no variant "{stem}"; {did_you_mean(stem, [m.stem for m in self.models])}')
+        raise DescriptionError(
+            f'{self.folder}: no variant "{stem}"; {did_you_mean(stem, [m.stem for m in self.models])}'
+        )
 
 
 def read_description(folder: str | Path) -> Description:
@@ -69,7 +71,8 @@ def read_description(folder: str | Path) -> Description:
     try:
         table = json.loads(file.read_text())["description"]
         models = tuple(
-            Model(m["stem"], root / m["mjcf"], root / m["urdf"], root / m["scene"], tuple(m["fingers"])) for m in table["models"]
+            Model(m["stem"], root / m["mjcf"], root / m["urdf"], root / m["scene"], tuple(m["fingers"]))
+            for m in table["models"]
         )
     except (KeyError, TypeError) as error:
         raise DescriptionError(f"{file}: not written by compile (no {error})") from None

@@ -1,7 +1,8 @@
 """Forward kinematics of a Hand by products of rotations about fixed lines, vectorised over poses, with Jacobians.
 
-At rest every segment frame is the palm frame moved to its joint's centre, so that a segment's *displacement* (its motion
-from rest) and its *pose* share one rotation. Source: product of exponentials, Brockett 1984; Lynch & Park 2017, eq. 4.14.
+At rest every segment frame is the palm frame moved to its joint's centre, so that a segment's *displacement* (its
+motion from rest) and its *pose* share one rotation. Source: product of exponentials, Brockett 1984; Lynch & Park 2017,
+eq. 4.14.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ Array = NDArray[np.float64]
 class Displacement:
     """Motion of each segment of a finger away from rest, in the palm frame: x -> rotation x + translation.
 
-    rotation: (n, k, 3, 3). translation: (n, k, 3) [m]. axis_palm, centre_palm: (n, k, 3) of every joint as it is carried
-    by the segments before it [-], [m].
+    rotation: (n, k, 3, 3). translation: (n, k, 3) [m]. axis_palm, centre_palm: (n, k, 3) of every joint as it is
+    carried by the segments before it [-], [m].
     """
 
     rotation: Array
@@ -60,7 +61,9 @@ def displace(finger: Finger, angles_rad: ArrayLike) -> Displacement:
     angles = np.atleast_2d(np.asarray(angles_rad, float))
     k = len(finger.joints)
     if angles.ndim != 2 or angles.shape[1] != k:
-        raise HandModelError(f'finger "{finger.name}" has {k} joints; angles of shape (n, {k}) are needed, not {angles.shape}')
+        raise HandModelError(
+            f'finger "{finger.name}" has {k} joints; angles of shape (n, {k}) are needed, not {angles.shape}'
+        )
     n = len(angles)
     rotation, translation = np.broadcast_to(np.eye(3), (n, 3, 3)), np.zeros((n, 3))
     parts: tuple[list[Array], ...] = ([], [], [], [])
@@ -93,7 +96,8 @@ def joint_keys(hand: Hand) -> tuple[tuple[str, str], ...]:
 def hand_points(hand: Hand, angles_rad: ArrayLike) -> tuple[Mapping[tuple[str, str], Array], Mapping[str, Array]]:
     """Marker and tip positions of a whole hand in the palm frame.
 
-    angles_rad: (n, joints) [rad] in the order of `joint_keys`. Returns ({(finger, label): (n, 3)}, {finger: tip (n, 3)}) [m].
+    angles_rad: (n, joints) [rad] in the order of `joint_keys`. Returns ({(finger, label): (n, 3)}, {finger: tip (n,
+    3)}) [m].
     """
     angles = np.atleast_2d(np.asarray(angles_rad, float))
     if angles.shape[1] != len(joint_keys(hand)):

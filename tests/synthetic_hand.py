@@ -7,7 +7,13 @@ import numpy as np
 from hand_model.hand import Coupling, Finger, Hand, Joint
 
 
-def synthetic_hand(seed: int = 0, side: str = "left", joints: int = 2, fingers=("thumb_0", "thumb_1", "index", "ring"), tips: bool = True) -> Hand:
+def synthetic_hand(
+    seed: int = 0,
+    side: str = "left",
+    joints: int = 2,
+    fingers=("thumb_0", "thumb_1", "index", "ring"),
+    tips: bool = True,
+) -> Hand:
     """A hand of that many joints per finger, coupled in a chain (each joint follows the one before it)."""
     random = np.random.default_rng(seed)
     across = 1 if side == "left" else -1
@@ -29,6 +35,7 @@ def _finger(random, name, i, across, joints, tips):
         made.append(Joint(f"s{k}", axis / np.linalg.norm(axis), centre, 1e-6 * np.eye(6), (-0.02, high), markers, tip))
         centre = centre + [0.032, 0, 0.003] + random.normal(0, 0.001, 3)
     couplings = tuple(
-        Coupling(f"s{k}", f"s{k + 1}", np.array([0.0, random.uniform(0.4, 0.6), 0.25, 0.04, -0.03]), {}, {}) for k in range(joints - 1)
+        Coupling(f"s{k}", f"s{k + 1}", np.array([0.0, random.uniform(0.4, 0.6), 0.25, 0.04, -0.03]), {}, {})
+        for k in range(joints - 1)
     )
     return Finger(name, "thumb" if thumb else name, tuple(made), (), couplings)

@@ -1,4 +1,5 @@
-"""Mutation tests of the check: every planted fault is found under its item, and nothing is found on the hand as compiled."""
+"""Mutation tests of the check: every planted fault is found under its item, and nothing is found on the hand as
+compiled."""
 
 import dataclasses
 import json
@@ -131,7 +132,9 @@ def test_mirror_is_judged_by_the_stated_uncertainty(tmp_path):
                 axis = axis + [tilt, 0, 0]
                 markers = {k: p * [1, -1, 1] for k, p in joint.markers_palm.items()}
                 tip = None if joint.tip_palm is None else joint.tip_palm * [1, -1, 1]
-                joints.append(dataclasses.replace(joint, axis_palm=axis, centre_palm=centre, markers_palm=markers, tip_palm=tip))
+                joints.append(
+                    dataclasses.replace(joint, axis_palm=axis, centre_palm=centre, markers_palm=markers, tip_palm=tip)
+                )
             fingers.append(dataclasses.replace(finger, joints=tuple(joints)))
         return dataclasses.replace(left, side="right", fingers=tuple(fingers))
 

@@ -29,7 +29,15 @@ def test_folder_of_a_hand_with_both_thumbs(tmp_path):
     hand = synthetic_hand(1)
     description = compile(hand, tmp_path / "out")
     files = _bytes(description.folder)
-    for name in ("README.md", "LICENSE", "CHANGELOG.md", "hand.json", "synthetic_left.xml", "synthetic_left.urdf", "scene_left.xml"):
+    for name in (
+        "README.md",
+        "LICENSE",
+        "CHANGELOG.md",
+        "hand.json",
+        "synthetic_left.xml",
+        "synthetic_left.urdf",
+        "scene_left.xml",
+    ):
         assert name in files
     assert {"synthetic_left_thumb_1.xml", "synthetic_left_thumb_1.urdf"} <= set(files)
     for name in ("synthetic_left.xml", "synthetic_left.urdf"):
@@ -78,7 +86,9 @@ def test_hand_json_is_a_hand_file_and_compiles_to_itself(tmp_path):
     assert (tmp_path / "first/synthetic_left.xml").read_bytes() == (tmp_path / "second/synthetic_left.xml").read_bytes()
 
 
-@pytest.mark.parametrize(("side", "joints", "tips"), [("left", 1, True), ("right", 2, True), ("left", 2, False), ("right", 3, False)])
+@pytest.mark.parametrize(
+    ("side", "joints", "tips"), [("left", 1, True), ("right", 2, True), ("left", 2, False), ("right", 3, False)]
+)
 def test_every_item_of_the_conventions_holds(tmp_path, side, joints, tips):
     description = compile(synthetic_hand(20 + joints, side, joints, tips=tips), tmp_path / "out")
     assert [f.sentence for f in check(description.folder) if not f.passed] == []
@@ -103,7 +113,9 @@ def test_names_are_sanitised_and_unique(tmp_path):
     hand = dataclasses.replace(hand, name="my hand", fingers=fingers, palm_markers_palm=palm)
     description = compile(hand, tmp_path / "out")
     assert description.models[0].stem == "my_hand_left"
-    assert [f.sentence for f in check(description.folder, items=("names", "digits", "engines agree")) if not f.passed] == []
+    assert [
+        f.sentence for f in check(description.folder, items=("names", "digits", "engines agree")) if not f.passed
+    ] == []
     names = named(hand)
     used = [n for table in dataclasses.astuple(names) for n in table.values()]
     assert len(used) == len(set(used)) and all(n == sanitised(n) for n in used)
@@ -113,7 +125,10 @@ def test_names_are_sanitised_and_unique(tmp_path):
 def test_both_thumb_positions_may_carry_the_same_markers(tmp_path):
     hand = synthetic_hand(5, fingers=("thumb_0", "thumb_1"))
     joints = [
-        tuple(dataclasses.replace(j, markers_palm={f"TH{k}{i}": p for i, p in enumerate(j.markers_palm.values())}) for k, j in enumerate(f.joints))
+        tuple(
+            dataclasses.replace(j, markers_palm={f"TH{k}{i}": p for i, p in enumerate(j.markers_palm.values())})
+            for k, j in enumerate(f.joints)
+        )
         for f in hand.fingers
     ]
     fingers = tuple(dataclasses.replace(f, joints=j) for f, j in zip(hand.fingers, joints, strict=True))
@@ -143,7 +158,9 @@ def test_mimic_is_the_best_line_within_the_limits_and_its_loss_is_true():
     assert np.abs(exact - line).max() == pytest.approx(second.loss_rad, rel=1e-3)
     for nudge in ((1e-3, 0), (-1e-3, 0), (0, 1e-3), (0, -1e-3)):
         other = (second.multiplier + nudge[0]) * driver + second.offset + nudge[1]
-        inside = other.min() >= exact.min() - 1e-9 and other.max() <= max(exact.max(), finger.joints[2].range_rad[1]) + 1e-9
+        inside = (
+            other.min() >= exact.min() - 1e-9 and other.max() <= max(exact.max(), finger.joints[2].range_rad[1]) + 1e-9
+        )
         assert not inside or ((other - exact) ** 2).sum() > ((line - exact) ** 2).sum()
 
 
@@ -183,11 +200,15 @@ def test_segment_distance_against_sampling():
 
 
 def test_grips_become_keyframes_of_the_files_that_have_their_fingers(tmp_path):
-    hand = dataclasses.replace(synthetic_hand(7), extra={"grips": {"power": {"index": 0.8, "ring": 0.8}, "key": {"thumb_1": 0.5}}})
+    hand = dataclasses.replace(
+        synthetic_hand(7), extra={"grips": {"power": {"index": 0.8, "ring": 0.8}, "key": {"thumb_1": 0.5}}}
+    )
     description = compile(hand, tmp_path / "out")
     keys = [[e.get("name") for e in etree.parse(str(m.mjcf)).iter("key")] for m in description.models]
     assert keys == [["open", "close", "power"], ["open", "close", "power", "key"]]
-    assert [f.sentence for f in check(description.folder, items=("keyframes", "contact", "names")) if not f.passed] == []
+    assert [
+        f.sentence for f in check(description.folder, items=("keyframes", "contact", "names")) if not f.passed
+    ] == []
     with pytest.raises(HandFileError, match='did you mean "index"'):
         compile(dataclasses.replace(hand, extra={"grips": {"power": {"indx": 0.8}}}), tmp_path / "bad")
 

@@ -22,7 +22,13 @@ def test_all_engines_agree_with_our_kinematics(tmp_path, side, joints):
         own = ours.load(model.urdf)
         angles = {j: np.random.default_rng(0).uniform(-2, 2, POSES) for j in own.joints}
         points, links = ours.positions(own, angles), ours.poses(own, angles)
-        pairs = ((mujoco, model.mjcf), (mujoco, model.scene), (mujoco, model.urdf), (pinocchio, model.urdf), (yourdfpy, model.urdf))
+        pairs = (
+            (mujoco, model.mjcf),
+            (mujoco, model.scene),
+            (mujoco, model.urdf),
+            (pinocchio, model.urdf),
+            (yourdfpy, model.urdf),
+        )
         for engine, path in pairs:
             loaded = engine.load(path)
             frames, there = engine.kinematics(loaded, angles)

@@ -39,7 +39,11 @@ def test_jacobians_by_finite_differences(joints):
             ahead, behind = (displace(finger, angles + s * step * np.eye(joints)[j]) for s in (1, -1))
             numeric = (ahead.points(segment, points) - behind.points(segment, points)) / (2 * step)
             assert np.allclose(jacobian[..., j], numeric, atol=1e-9)
-            spin = (ahead.rotation[:, segment] - behind.rotation[:, segment]) / (2 * step) @ motion.rotation[:, segment].swapaxes(-1, -2)
+            spin = (
+                (ahead.rotation[:, segment] - behind.rotation[:, segment])
+                / (2 * step)
+                @ motion.rotation[:, segment].swapaxes(-1, -2)
+            )
             assert np.allclose(skew(turning[..., j]), spin, atol=1e-9)
 
 
@@ -91,6 +95,8 @@ def test_bad_input_is_refused():
     lengthless = dataclasses.replace(finger.joints[0], axis_palm=np.zeros(3))
     with pytest.raises(HandModelError, match="length above zero"):
         displace(dataclasses.replace(finger, joints=(lengthless, finger.joints[1])), np.zeros((1, 2)))
-    loop = tuple(dataclasses.replace(finger.couplings[0], driver=a, follower=b) for a, b in (("s0", "s1"), ("s1", "s0")))
+    loop = tuple(
+        dataclasses.replace(finger.couplings[0], driver=a, follower=b) for a, b in (("s0", "s1"), ("s1", "s0"))
+    )
     with pytest.raises(HandModelError, match="circle"):
         finger_angles(dataclasses.replace(finger, couplings=loop), {})

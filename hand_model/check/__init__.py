@@ -1,4 +1,5 @@
-"""Check a compiled folder against the conventions of descriptions: every item measured, none taken from the files' own words."""
+"""Check a compiled folder against the conventions of descriptions: every item measured, none taken from the files' own
+words."""
 
 from __future__ import annotations
 
@@ -38,10 +39,11 @@ ITEMS = ("files", *PER_MODEL, "mirror")
 
 
 def check(folder: str | Path, other: str | Path | None = None, items: Collection[str] = ITEMS) -> list[Finding]:
-    """Findings on every variant of a compiled hand; `other` is the compiled hand of the other side, for the mirror relation.
+    """Findings on every variant of a compiled hand; `other` is the compiled hand of the other side, for the mirror
+    relation.
 
-    items: which to measure. An item that cannot be measured has not passed. Raises DescriptionError where the folder is no compiled
-    hand, or an item has another name.
+    items: which to measure. An item that cannot be measured has not passed. Raises DescriptionError where the folder is
+    no compiled hand, or an item has another name.
     """
     for item in items:
         if item not in ITEMS:

@@ -16,7 +16,8 @@ ANGLE = 1e-7  # rad
 def agreement(description: Description, model: Model) -> Finding:
     """MuJoCo (both formats), Pinocchio (both) and yourdfpy against this project's own kinematics of hand.json.
 
-    Pinocchio's MJCF parser drops the sites of a root body without joint: what it has is compared, elsewhere all is demanded.
+    Pinocchio's MJCF parser drops the sites of a root body without joint: what it has is compared, elsewhere all is
+    demanded.
     """
     own = ours.load(model.mjcf)
     random = np.random.default_rng(0)
@@ -40,14 +41,21 @@ def agreement(description: Description, model: Model) -> Finding:
             continue
         frames, there = engine.kinematics(loaded, angles)
         lost = [n for n in (*points, *links) if n not in there and n not in frames]
-        if lost and not (engine is pinocchio and path == model.mjcf and all((links["palm"] == np.eye(4)).all() and _palm(own, n) for n in lost)):
+        if lost and not (
+            engine is pinocchio
+            and path == model.mjcf
+            and all((links["palm"] == np.eye(4)).all() and _palm(own, n) for n in lost)
+        ):
             problems.append(f"{label} has no {', '.join(lost[:5])}")
         gap = max(float(np.linalg.norm(points[n] - there[n], axis=1).max()) for n in points if n in there)
         turn = max(_angle(links[n], frames[n]) for n in links if n in frames)
         worst, turned = max(worst, gap), max(turned, turn)
         if gap > POSITION or turn > ANGLE:
             problems.append(f"{label} is off by {gap * 1e3:.3g} mm and {np.degrees(turn):.3g} deg")
-    said = "; ".join(problems[:5]) or f"{POSES} poses, {len(engines)} ways, {len(points)} points: at most {worst:.1g} m and {turned:.1g} rad"
+    said = (
+        "; ".join(problems[:5])
+        or f"{POSES} poses, {len(engines)} ways, {len(points)} points: at most {worst:.1g} m and {turned:.1g} rad"
+    )
     return Finding(f"engines agree: {model.stem}", not problems, worst, said)
 
 

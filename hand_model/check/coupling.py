@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 TRACKING = np.radians(0.1)
 STIFFNESS = np.radians(0.05)
 FORCE = 1.0  # N at the tip
-PUSH_S = 0.2
+PUSH_S = 0.3
 
 
 def direction(description: Description, model: Model) -> Finding:
@@ -66,7 +66,9 @@ def _roles(ours: Any, root: Any) -> list[str]:
                 continue
             roles = found[name].get("joint1"), found[name].get("joint2")
             if roles == (driver, follower):
-                problems.append(f'"{name}" has joint1 and joint2 reversed: the dependent joint "{follower}" must be joint1')
+                problems.append(
+                    f'"{name}" has joint1 and joint2 reversed: the dependent joint "{follower}" must be joint1'
+                )
             elif roles != (follower, driver):
                 problems.append(f'"{name}" couples {roles[0]} to {roles[1]} instead of {follower} to {driver}')
             if not (found[name].get("solref") and found[name].get("solimp")):
@@ -75,28 +77,34 @@ def _roles(ours: Any, root: Any) -> list[str]:
 
 
 def stiffness(description: Description, model: Model) -> Finding:
-    """Push each coupled finger's tip with 1 N, driver held and on its servo, both ways, and read the coupling's error."""
+    """Push each coupled finger's tip with 1 N, flexing and extending, and read the coupling's error.
+
+    With the driver held still the error counts from the first moment; with the driver on its own actuator the finger
+    may give way and move fast, so there it counts once the finger has settled, and its peak is stated.
+    """
     ours, item = load(model.mjcf), f"coupling stiffness: {model.stem}"
     mj = engine.load(model.mjcf).mj
-    worst, where = 0.0, ""
-    followers = engine.followers(mj)
-    if not followers:
+    if not engine.followers(mj):
         return Finding(item, not any(f.couplings for f in ours.hand.fingers), None, "the model has no linkage")
+    worst, where, moving = 0.0, "", 0.0
     for finger in ours.hand.fingers:
         if not finger.couplings:
             continue
         joints = [ours.names.joint[finger.name, j.name] for j in finger.joints]
         for held in (True, False):
             for sign in (1.0, -1.0):
-                gap = _pushed(copy.copy(mj), ours.names.tip[finger.name], joints, held, sign)
+                gaps = _pushed(copy.copy(mj), ours.names.tip[finger.name], joints, held, sign)
+                moving = max(moving, float(gaps.max()))
+                gap = float(gaps.max() if held else gaps[len(gaps) // 2 :].max())
                 if not gap <= worst:
                     worst, where = gap, finger.name
-    said = f"{FORCE:.0f} N at the tip moves a coupling by at most {np.degrees(worst):.2g} deg"
-    return Finding(item, bool(worst <= STIFFNESS), float(np.degrees(worst)), said + f" ({where})")
+    said = f"{FORCE:.0f} N at the tip: at most {np.degrees(worst):.2g} deg ({where}), {np.degrees(moving):.2g} deg while a finger gives way"
+    return Finding(item, bool(worst <= STIFFNESS), float(np.degrees(worst)), said)
 
 
-def _pushed(mj: Any, tip: str, joints: list[str], held: bool, sign: float) -> float:
-    """Largest coupling error [rad] of a finger under a force that turns with the tip; it flexes (sign 1) or extends the last joint."""
+def _pushed(mj: Any, tip: str, joints: list[str], held: bool, sign: float) -> Array:
+    """Coupling error (t,) [rad] of a finger under a force that turns with the tip; it flexes (sign 1) or extends the
+    last joint."""
     import mujoco
 
     mj.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
@@ -110,7 +118,7 @@ def _pushed(mj: Any, tip: str, joints: list[str], held: bool, sign: float) -> fl
         if mj.actuator_trntype[i] == int(mujoco.mjtTrn.mjTRN_JOINT):
             data.ctrl[i] = data.qpos[mj.jnt_qposadr[mj.actuator_trnid[i, 0]]]
     site, last = mj.site(tip).id, mj.joint(joints[-1]).id
-    worst = 0.0
+    gaps = []
     for _ in range(round(PUSH_S / mj.opt.timestep)):
         mujoco.mj_kinematics(mj, data)
         lever = data.site_xpos[site] - data.xanchor[last]
@@ -121,9 +129,8 @@ def _pushed(mj: Any, tip: str, joints: list[str], held: bool, sign: float) -> fl
         mujoco.mj_applyFT(mj, data, push, np.zeros(3), data.site_xpos[site], mj.site_bodyid[site], data.qfrc_applied)
         mujoco.mj_step(mj, data)
         wanted = engine.on_linkages(mj, data.qpos)
-        gaps = [abs(wanted[mj.jnt_qposadr[j]] - data.qpos[mj.jnt_qposadr[j]]) for j in coupled if j in mine]
-        worst = max([worst, *gaps]) if np.isfinite(data.qpos).all() else np.inf
-    return float(worst)
+        gaps.append(max(abs(wanted[mj.jnt_qposadr[j]] - data.qpos[mj.jnt_qposadr[j]]) for j in coupled if j in mine))
+    return np.nan_to_num(np.array(gaps), nan=np.inf)
 
 
 def mimic(description: Description, model: Model) -> Finding:
@@ -150,11 +157,16 @@ def mimic(description: Description, model: Model) -> Finding:
             if element is None:
                 problems.append(f'"{name}" mimics nothing')
                 continue
-            gap = abs(float(element.get("multiplier", "1")) - linkage.multiplier) + abs(float(element.get("offset", "0")) - linkage.offset)
+            gap = abs(float(element.get("multiplier", "1")) - linkage.multiplier) + abs(
+                float(element.get("offset", "0")) - linkage.offset
+            )
             if element.get("joint") != ours.names.joint[finger.name, linkage.source] or gap > 1e-6:
                 problems.append(f'"{name}" is not the best line through its polynomial')
             if abs(stated[equality]["mimic_loss_deg"] - np.degrees(linkage.loss_rad)) > 1e-6:
                 problems.append(f'the loss that hand.json states for "{equality}" is not that of its line')
     problems += [f'"{name}" mimics a joint, though nothing couples them' for name in dependent]
-    said = "; ".join(problems[:5]) or f"lines, unchained, declared in order; at worst {worst:.2g} deg from the polynomial, as stated"
+    said = (
+        "; ".join(problems[:5])
+        or f"lines, unchained, declared in order; at worst {worst:.2g} deg from the polynomial, as stated"
+    )
     return Finding(item, not problems, worst, said)

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Finding:
-    """item: what was checked, of which file. figure: what was measured, in the unit that the sentence names (None for yes or no)."""
+    """item: what was checked, of which file. figure: what was measured, in the unit that the sentence names (None for
+    yes or no)."""
 
     item: str
     passed: bool

@@ -100,9 +100,12 @@ def _in_urdf(root: Any) -> dict[tuple[str, str], Array]:
 
 
 def limits(description: Description, model: Model) -> Finding:
-    """Limits are the recorded ranges (a follower's widened to what its polynomial reaches), the same in both formats."""
+    """Limits are the recorded ranges (a follower's widened to what its polynomial reaches), the same in both
+    formats."""
     ours = load(model.mjcf)
-    mjcf = {e.get("name"): _floats(e.get("range")) for e in tree(model.mjcf).iter("joint") if e.getparent().tag == "body"}
+    mjcf = {
+        e.get("name"): _floats(e.get("range")) for e in tree(model.mjcf).iter("joint") if e.getparent().tag == "body"
+    }
     urdf = {}
     for joint in tree(model.urdf).findall("joint"):
         if joint.find("limit") is not None:

@@ -17,13 +17,14 @@ SIGMAS = 3.0
 
 
 def mirrored(axis_palm: Array, centre_palm: Array) -> tuple[Array, Array]:
-    """Axis and centre (3,) of the other hand's joint: a position is reflected, an axis (of a turn) reflected and reversed."""
+    """Axis and centre (3,) of the other hand's joint: a position is reflected, an axis (of a turn) reflected and
+    reversed."""
     return -ACROSS * axis_palm, ACROSS * centre_palm
 
 
 def mirror_differences(one: Hand, other: Hand) -> dict[tuple[str, str], tuple[float, float, float, float]]:
-    """(finger, joint) -> axis difference [rad], its standard deviation [rad], centre difference [m], its standard deviation [m],
-    for the joints that both hands have; deviations from both covariances."""
+    """(finger, joint) -> axis difference [rad], its standard deviation [rad], centre difference [m], its standard
+    deviation [m], for the joints that both hands have; deviations from both covariances."""
     out = {}
     fingers = {f.name: f for f in other.fingers}
     for finger in one.fingers:
@@ -34,15 +35,21 @@ def mirror_differences(one: Hand, other: Hand) -> dict[tuple[str, str], tuple[fl
                 axis, centre = mirrored(twin.axis_palm, twin.centre_palm)
                 variance = np.diagonal(joint.covariance) + np.diagonal(twin.covariance)
                 spread = np.sqrt(variance[:3].sum()), np.sqrt(variance[3:].sum())
-                turn, shift = float(angle_between(joint.axis_palm, axis)), float(np.linalg.norm(joint.centre_palm - centre))
+                turn, shift = (
+                    float(angle_between(joint.axis_palm, axis)),
+                    float(np.linalg.norm(joint.centre_palm - centre)),
+                )
                 out[finger.name, joint.name] = (turn, float(spread[0]), shift, float(spread[1]))
     return out
 
 
 def mirror(description: Description, other: Description) -> Finding:
-    """Every joint's axis and centre is the mirror image of the other side's, within three standard deviations of what both files state."""
+    """Every joint's axis and centre is the mirror image of the other side's, within three standard deviations of what
+    both files state."""
     if {description.side, other.side} != {"left", "right"}:
-        return Finding("mirror", False, None, f"a left and a right hand are needed, not {description.side} and {other.side}")
+        return Finding(
+            "mirror", False, None, f"a left and a right hand are needed, not {description.side} and {other.side}"
+        )
     differences = mirror_differences(description.hand, other.hand)
     if not differences:
         return Finding("mirror", False, None, "the two hands share no joint")

@@ -51,7 +51,8 @@ def contact_free(description: Description, model: Model) -> Finding:
 
 
 def quiet(description: Description, model: Model) -> Finding:
-    """Ten seconds of random controls (each held for a quarter of a second) raise no warning and leave no joint far outside its range."""
+    """Ten seconds of random controls (each held for a quarter of a second) raise no warning and leave no joint far
+    outside its range."""
     import mujoco
 
     mj = engine.load(model.mjcf).mj

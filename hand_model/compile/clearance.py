@@ -1,4 +1,5 @@
-"""Collision primitives that do not touch at any keyframe: shrunk where that is enough, excluded with a reason where not."""
+"""Collision primitives that do not touch at any keyframe: shrunk where that is enough, excluded with a reason where
+not."""
 
 from __future__ import annotations
 
@@ -67,12 +68,15 @@ def cleared(
             radius[one][i] *= share
             radius[other][j] *= share
     shrunk = {
-        key: tuple(replace(c, radius=float(r)) for c, r in zip(capsules, radius[key], strict=True)) for key, capsules in shapes.items()
+        key: tuple(replace(c, radius=float(r)) for c, r in zip(capsules, radius[key], strict=True))
+        for key, capsules in shapes.items()
     }
     return shrunk, excluded
 
 
-def _placed(hand: Hand, shapes: Mapping[Key, tuple[Capsule, ...]], angles: Mapping[Key, float]) -> dict[Key, tuple[Capsule, ...]]:
+def _placed(
+    hand: Hand, shapes: Mapping[Key, tuple[Capsule, ...]], angles: Mapping[Key, float]
+) -> dict[Key, tuple[Capsule, ...]]:
     out = {PALM: shapes[PALM]}
     for finger in hand.fingers:
         motion = displace(finger, [angles.get((finger.name, j.name), 0.0) for j in finger.joints])

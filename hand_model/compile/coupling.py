@@ -21,8 +21,8 @@ SAMPLES = 201
 class Linkage:
     """One linkage of a finger: follower = sum_i coefficients[i] driver^i [rad], and its line for URDF.
 
-    source: the independent joint that the line starts from (mimics are never chained). multiplier [-], offset [rad]: the
-    least-squares line over the source's range with both ends within the follower's range.
+    source: the independent joint that the line starts from (mimics are never chained). multiplier [-], offset [rad]:
+    the least-squares line over the source's range with both ends within the follower's range.
     loss_rad, loss_tip_m: largest departure of that line from the polynomial, in angle [rad] and at the fingertip [m].
     """
 
@@ -74,7 +74,8 @@ def source_of(finger: Finger, joint: str) -> str:
 
 
 def limits(finger: Finger) -> dict[str, tuple[float, float]]:
-    """Range (low, high) [rad] of every joint: as recorded, widened to what its polynomial reaches over its driver's range.
+    """Range (low, high) [rad] of every joint: as recorded, widened to what its polynomial reaches over its driver's
+    range.
 
     A range without width is opened by 1e-3 rad to both sides, since neither format accepts it.
     """

@@ -1,4 +1,5 @@
-"""Nominal joint dynamics and actuators, for hands or fingers whose motor was not identified. Nothing here was measured."""
+"""Nominal joint dynamics and actuators, for hands or fingers whose motor was not identified. Nothing here was
+measured."""
 
 from __future__ import annotations
 
@@ -17,8 +18,8 @@ LEAST_INERTIA = 1e-7  # kg m^2
 
 @dataclass(frozen=True)
 class Drive:
-    """Nominal drive of one independent joint: armature [kg m^2], damping [N m s/rad]; kp [N m/rad], kv [N m s/rad] and force [N m]
-    of the position actuator, None where the finger has no actuator on this joint."""
+    """Nominal drive of one independent joint: armature [kg m^2], damping [N m s/rad]; kp [N m/rad], kv [N m s/rad] and
+    force [N m] of the position actuator, None where the finger has no actuator on this joint."""
 
     armature: float
     damping: float
@@ -29,7 +30,8 @@ class Drive:
 
 
 def nominal_drives(plan: Plan) -> Mapping[str, Drive]:
-    """Joint name -> Drive of every independent joint: scaled to the inertia that it moves, so that any size of hand is stable.
+    """Joint name -> Drive of every independent joint: scaled to the inertia that it moves, so that any size of hand is
+    stable.
 
     The actuator sits on a finger's first joint; further independent joints are passive.
     """
@@ -59,4 +61,3 @@ def _moved_inertia(plan: Plan, finger: str, first: int) -> float:
         lever = np.cross(axis, origin + link.inertia.centre)
         total += float(axis @ link.inertia.tensor @ axis + link.inertia.mass * (lever @ lever))
     return total
-

@@ -28,14 +28,17 @@ from .xml import document
 
 
 def compile(hand: Hand, folder: str | Path) -> Description:
-    """Write a hand as URDF and MJCF, with scene, meshes, hand.json and README, one pair of files per position of the thumb.
+    """Write a hand as URDF and MJCF, with scene, meshes, hand.json and README, one pair of files per position of the
+    thumb.
 
     The folder appears (or replaces a compiled one) only when it is complete; the same hand gives the same bytes.
     Raises HandFileError where the hand cannot be compiled, DescriptionError where `folder` holds something else.
     """
     target = Path(folder)
     if target.exists() and not (target / "hand.json").is_file() and not (target.is_dir() and not any(target.iterdir())):
-        raise DescriptionError(f"{target}: exists and is not a compiled hand; name a new folder or an earlier one of this command")
+        raise DescriptionError(
+            f"{target}: exists and is not a compiled hand; name a new folder or an earlier one of this command"
+        )
     whole, guessed = complete(hand)
     plans = tuple(planned(stem, suffix, part, guessed) for (stem, suffix), part in variants(whole).items())
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -55,7 +58,10 @@ def _write(folder: Path, hand: Hand, plans: tuple[Plan, ...]) -> None:
         (folder / f"{plan.stem}.xml").write_bytes(document(mjcf(plan)))
         (folder / f"{plan.stem}.urdf").write_bytes(document(urdf(plan)))
         (folder / f"{scene_stem(plan)}.xml").write_bytes(document(scene(plan)))
-        extra = {f"{scene_stem(plan)}_cylinder.xml": cylinder_scene(plan), f"{plan.stem}.ros2_control.xacro": ros2_control(plan)}
+        extra = {
+            f"{scene_stem(plan)}_cylinder.xml": cylinder_scene(plan),
+            f"{plan.stem}.ros2_control.xacro": ros2_control(plan),
+        }
         for name, tree in extra.items():
             if tree is not None:
                 (folder / name).write_bytes(document(tree))
@@ -65,7 +71,9 @@ def _write(folder: Path, hand: Hand, plans: tuple[Plan, ...]) -> None:
     try:
         hand.save(folder / "hand.json")
     except ValueError as error:
-        raise HandFileError(f'hand "{hand.name}" holds a figure that is not finite, which hand.json cannot keep ({error})') from None
+        raise HandFileError(
+            f'hand "{hand.name}" holds a figure that is not finite, which hand.json cannot keep ({error})'
+        ) from None
     table = json.loads((folder / "hand.json").read_text())
     table["description"] = _table(hand, plans)
     (folder / "hand.json").write_text(json.dumps(table, indent=1, allow_nan=False) + "\n")
@@ -99,7 +107,11 @@ def _table(hand: Hand, plans: tuple[Plan, ...]) -> Mapping[str, Any]:
                         "driver": plan.names.joint[finger, k.driver],
                         "follower": plan.names.joint[finger, k.follower],
                         "polynomial": k.coefficients.tolist(),
-                        "mimic": {"joint": plan.names.joint[finger, k.source], "multiplier": k.multiplier, "offset": k.offset},
+                        "mimic": {
+                            "joint": plan.names.joint[finger, k.source],
+                            "multiplier": k.multiplier,
+                            "offset": k.offset,
+                        },
                         "mimic_loss_deg": float(np.degrees(k.loss_rad)),
                         "mimic_loss_tip_m": k.loss_tip_m,
                     }

@@ -1,4 +1,5 @@
-"""Triangle meshes: capsules as visuals until probed surfaces come, and binary STL with the same bytes for the same mesh."""
+"""Triangle meshes: capsules as visuals until probed surfaces come, and binary STL with the same bytes for the same
+mesh."""
 
 from __future__ import annotations
 
@@ -43,7 +44,9 @@ def capsule_mesh(capsule: Capsule) -> tuple[Array, NDArray[np.int64]]:
 def joined(meshes: list[tuple[Array, NDArray[np.int64]]]) -> tuple[Array, NDArray[np.int64]]:
     """Several meshes as one."""
     offsets = np.cumsum([0, *(len(v) for v, _ in meshes[:-1])])
-    return np.concatenate([v for v, _ in meshes]), np.concatenate([f + o for (_, f), o in zip(meshes, offsets, strict=True)])
+    return np.concatenate([v for v, _ in meshes]), np.concatenate(
+        [f + o for (_, f), o in zip(meshes, offsets, strict=True)]
+    )
 
 
 def stl(vertices: Array, faces: NDArray[np.int64]) -> bytes:

@@ -13,7 +13,7 @@ from .motor import complete_keyframes, write_motors
 from .plan import Link, Plan, in_file_names
 from .xml import child, comment, number, vector
 
-# Equality as stiff as MuJoCo keeps stable at its default step: time constant of two steps, impedance at MuJoCo's upper limit.
+# Equality as stiff as MuJoCo keeps stable at this step: time constant of two steps, impedance at MuJoCo's upper limit.
 TIMESTEP = 0.001
 SOLREF = (2 * TIMESTEP, 1.0)
 SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
@@ -50,7 +50,16 @@ def _defaults(root: Any) -> None:
     visual = child(default, "default", class_="visual")
     child(visual, "geom", group="2", contype="0", conaffinity="0", mass="0", rgba=(0.75, 0.75, 0.78, 1.0))
     collision = child(default, "default", class_="collision")
-    child(collision, "geom", type="capsule", group="3", mass="0", condim="4", friction=(0.9, 0.01, 1e-4), rgba=(0.2, 0.5, 0.9, 0.4))
+    child(
+        collision,
+        "geom",
+        type="capsule",
+        group="3",
+        mass="0",
+        condim="4",
+        friction=(0.9, 0.01, 1e-4),
+        rgba=(0.2, 0.5, 0.9, 0.4),
+    )
     marker = child(default, "default", class_="marker")
     child(marker, "site", size=0.0025, group="4", rgba=(0.9, 0.1, 0.1, 1.0))
 
@@ -63,7 +72,9 @@ def _body(parent: Any, asset: Any, link: Link, drives: dict[str, Drive]) -> Any:
     child(body, "inertial", pos=inertia.centre, mass=inertia.mass, fullinertia=full)
     if link.joint is not None:
         drive = drives.get(link.joint)
-        joint = child(body, "joint", name=link.joint, type="hinge", pos=(0, 0, 0), axis=link.axis, range=link.range_rad, ref="0")
+        joint = child(
+            body, "joint", name=link.joint, type="hinge", pos=(0, 0, 0), axis=link.axis, range=link.range_rad, ref="0"
+        )
         if drive is not None:
             joint.set("damping", number(drive.damping))
             if drive.armature:
@@ -108,7 +119,14 @@ def _actuators(root: Any, plan: Plan, drives: dict[str, Drive]) -> None:
     comment(actuator, "nominal, not measured: gains and forces are scaled to the fallback inertias (README)")
     for joint, d in driven.items():
         child(
-            actuator, "position", name=d.actuator, joint=joint, kp=d.kp, kv=d.kv, ctrlrange=ranges[joint], forcerange=(-d.force, d.force)
+            actuator,
+            "position",
+            name=d.actuator,
+            joint=joint,
+            kp=d.kp,
+            kv=d.kv,
+            ctrlrange=ranges[joint],
+            forcerange=(-d.force, d.force),
         )
 
 
@@ -130,5 +148,7 @@ def _keyframes(root: Any, plan: Plan) -> None:
     for name, angles in plan.keyframes.items():
         key = child(keyframe, "key", name=name, qpos=[angles.get(joint, 0.0) for joint in joints])
         if actuators:
-            key.set("ctrl", vector([angles.get(a.get("joint"), 0.0) if a.tag == "position" else 0.0 for a in actuators]))
+            key.set(
+                "ctrl", vector([angles.get(a.get("joint"), 0.0) if a.tag == "position" else 0.0 for a in actuators])
+            )
     complete_keyframes(root, in_file_names(plan))

@@ -1,4 +1,5 @@
-"""Names in a compiled file: sanitised, and unique across kinds, since some loaders trip on a name that two kinds share."""
+"""Names in a compiled file: sanitised, and unique across kinds, since some loaders trip on a name that two kinds
+share."""
 
 from __future__ import annotations
 
@@ -14,8 +15,8 @@ from ..hand import Hand
 class Names:
     """What everything of one file is called.
 
-    joint, link: (finger, joint) -> name. marker: (finger, label) -> site, finger "" for the palm. tip, collision: finger ->
-    name. linkage: (finger, follower joint) -> equality. actuator: finger -> name, for fingers that have one.
+    joint, link: (finger, joint) -> name. marker: (finger, label) -> site, finger "" for the palm. tip, collision:
+    finger -> name. linkage: (finger, follower joint) -> equality. actuator: finger -> name, for fingers that have one.
     """
 
     joint: Mapping[tuple[str, str], str]

@@ -49,7 +49,8 @@ class Link:
 class Plan:
     """One file to be: the hand that it holds, and everything that MJCF and URDF share.
 
-    stem: file name without ending; suffix: what tells it from the plain variant. linkages: equality name -> (finger, Linkage). keyframes: name -> {joint: angle [rad]}.
+    stem: file name without ending; suffix: what tells it from the plain variant. linkages: equality name -> (finger,
+    Linkage). keyframes: name -> {joint: angle [rad]}.
     reached: keyframe -> {finger: fraction closed}. excludes: (body, body, reason). guessed_tips: finger -> how.
     """
 
@@ -102,7 +103,8 @@ def variants(hand: Hand) -> dict[tuple[str, str], Hand]:
 def complete(hand: Hand) -> tuple[Hand, Mapping[str, str]]:
     """The hand ready to compile: checked, axes at unit length, a tip on every finger; and the guessed tips.
 
-    Raises HandFileError where it has no finger, a finger without joints, twice the same name, or figures that are not finite.
+    Raises HandFileError where it has no finger, a finger without joints, twice the same name, or figures that are not
+    finite.
     """
     if not hand.fingers:
         raise HandFileError(f'hand "{hand.name}" has no finger; at least one with one joint is needed')
@@ -114,11 +116,15 @@ def complete(hand: Hand) -> tuple[Hand, Mapping[str, str]]:
     for finger in hand.fingers:
         segments = [j.name for j in finger.joints]
         if not segments or len(set(segments)) < len(segments):
-            raise HandFileError(f'finger "{finger.name}" needs joints of different names; it has ({", ".join(segments) or "none"})')
+            raise HandFileError(
+                f'finger "{finger.name}" needs joints of different names; it has ({", ".join(segments) or "none"})'
+            )
         for joint in finger.joints:
             figures = [joint.axis_palm, joint.centre_palm, joint.range_rad, *joint.markers_palm.values()]
             if not all(np.isfinite(np.asarray(v, float)).all() for v in figures):
-                raise HandFileError(f'finger "{finger.name}", joint "{joint.name}": axis, centre, range or a marker is not finite')
+                raise HandFileError(
+                    f'finger "{finger.name}", joint "{joint.name}": axis, centre, range or a marker is not finite'
+                )
         joints = tuple(replace(j, axis_palm=unit(j.axis_palm)) for j in finger.joints)
         fingers.append(checked(replace(finger, joints=joints)))
     return with_tips(replace(hand, fingers=tuple(fingers)))
@@ -131,7 +137,12 @@ def planned(stem: str, suffix: str, hand: Hand, guessed_tips: Mapping[str, str])
     for finger in hand.fingers:
         for joint, capsule in zip(finger.joints, finger_capsules(hand, finger), strict=True):
             shapes[finger.name, joint.name] = (capsule,)
-    fist = {(f.name, j): a for f in hand.fingers if not f.name.startswith("thumb") for j, a in finger_posture(f, 1.0).items()}
+    fist = {
+        (f.name, j): a
+        for f in hand.fingers
+        if not f.name.startswith("thumb")
+        for j, a in finger_posture(f, 1.0).items()
+    }
     fitted, fitted_excluded = cleared(hand, shapes, {"close": fist})  # fingers side by side, before any grip
     postures, reached = {}, {}
     for name, fractions in grips_of(hand).items():
@@ -156,7 +167,8 @@ def planned(stem: str, suffix: str, hand: Hand, guessed_tips: Mapping[str, str])
 
 
 def in_file_names(plan: Plan) -> Hand:
-    """The plan's hand under the names that its file uses: `<finger>_<joint>` is the joint's name there, actuators are sanitised."""
+    """The plan's hand under the names that its file uses: `<finger>_<joint>` is the joint's name there, actuators are
+    sanitised."""
     fingers, actuators = [], {}
     for finger in plan.hand.fingers:
         prefix = sanitised(finger.name)
@@ -174,11 +186,17 @@ def _palm(hand: Hand, names: Names, solid: tuple[Capsule, ...], shapes: tuple[Ca
     sites = {names.marker["", label]: np.asarray(p, float) for label, p in hand.palm_markers_palm.items()}
     sites["attachment"] = np.zeros(3)
     inertia = combined(tuple(capsule_inertia(c) for c in solid))
-    return Link("palm", "", "palm", None, None, np.zeros(3), np.zeros(3), (0.0, 0.0), solid, shapes, inertia, sites, mesh)
+    return Link(
+        "palm", "", "palm", None, None, np.zeros(3), np.zeros(3), (0.0, 0.0), solid, shapes, inertia, sites, mesh
+    )
 
 
 def _finger_links(
-    hand: Hand, name: str, names: Names, solid: Mapping[Key, tuple[Capsule, ...]], shapes: Mapping[Key, tuple[Capsule, ...]]
+    hand: Hand,
+    name: str,
+    names: Names,
+    solid: Mapping[Key, tuple[Capsule, ...]],
+    shapes: Mapping[Key, tuple[Capsule, ...]],
 ) -> list[Link]:
     finger = hand.finger(name)
     bounds, links = limits(finger), []
@@ -188,12 +206,12 @@ def _finger_links(
         sites = {names.marker[name, label]: np.asarray(p, float) - centre for label, p in joint.markers_palm.items()}
         if joint.tip_palm is not None:
             sites[names.tip[name]] = np.asarray(joint.tip_palm, float) - centre
-        full, local = (tuple(Capsule(c.start - centre, c.end - centre, c.radius) for c in s[key]) for s in (solid, shapes))
+        full, local = (
+            tuple(Capsule(c.start - centre, c.end - centre, c.radius) for c in s[key]) for s in (solid, shapes)
+        )
         inertia = combined(tuple(capsule_inertia(c) for c in full))
         position, axis, link = centre - origin, np.asarray(joint.axis_palm, float), names.link[key]
         where = (link, name, joint.name, parent, names.joint[key], position, axis, bounds[joint.name])
         links.append(Link(*where, full, local, inertia, sites, link))
         parent, origin = link, centre
     return links
-
-

@@ -17,7 +17,8 @@ STEP = 0.02  # a finger in the way of another stops short in steps of this fract
 
 
 def grips_of(hand: Hand) -> dict[str, Mapping[str, float]]:
-    """Keyframe -> {finger: fraction closed}: open, close, and what `hand.extra["grips"]` adds for the hand's own fingers."""
+    """Keyframe -> {finger: fraction closed}: open, close, and what `hand.extra["grips"]` adds for the hand's own
+    fingers."""
     out: dict[str, Mapping[str, float]] = {
         "open": {f.name: 0.0 for f in hand.fingers},
         "close": {f.name: 1.0 for f in hand.fingers},
@@ -26,7 +27,9 @@ def grips_of(hand: Hand) -> dict[str, Mapping[str, float]]:
     for name, fractions in hand.extra.get("grips", {}).items():
         for finger, fraction in fractions.items():
             if not (isinstance(fraction, (int, float)) and 0 <= fraction <= 1):
-                raise HandFileError(f'grip "{name}" closes "{finger}" by {fraction!r}; a fraction from 0 to 1 is needed')
+                raise HandFileError(
+                    f'grip "{name}" closes "{finger}" by {fraction!r}; a fraction from 0 to 1 is needed'
+                )
         if set(fractions) <= fingers:
             out[name] = {f: float(fractions.get(f, 0.0)) for f in sorted(fingers)}
     return out
@@ -42,7 +45,8 @@ def known_grip_fingers(hand: Hand) -> None:
 
 
 def finger_posture(finger: Finger, fraction: float) -> dict[str, float]:
-    """Joint -> angle [rad] of a finger closed by a fraction: independent joints between rest and the far end of their range."""
+    """Joint -> angle [rad] of a finger closed by a fraction: independent joints between rest and the far end of their
+    range."""
     bounds, followers = limits(finger), {c.follower for c in finger.couplings}
     drivers = {}
     for joint in finger.joints:
@@ -55,7 +59,10 @@ def finger_posture(finger: Finger, fraction: float) -> dict[str, float]:
 
 
 def posture(
-    hand: Hand, fractions: Mapping[str, float], shapes: Mapping[Key, tuple[Capsule, ...]], excluded: Collection[frozenset[Key]]
+    hand: Hand,
+    fractions: Mapping[str, float],
+    shapes: Mapping[Key, tuple[Capsule, ...]],
+    excluded: Collection[frozenset[Key]],
 ) -> tuple[dict[Key, float], dict[str, float]]:
     """Angles of one keyframe, {(finger, joint): [rad]}, and the fractions that were reached.
 
@@ -87,9 +94,21 @@ Placed = Mapping[Key, tuple[Capsule, ...]]
 def _placed(finger: Finger, angles: Mapping[str, float], shapes: Mapping[Key, tuple[Capsule, ...]]) -> Placed:
     motion = displace(finger, [angles[j.name] for j in finger.joints])
     keys = [(finger.name, joint.name) for joint in finger.joints]
-    return {key: tuple(moved(c, motion.rotation[0, i], motion.translation[0, i]) for c in shapes[key]) for i, key in enumerate(keys)}
+    return {
+        key: tuple(moved(c, motion.rotation[0, i], motion.translation[0, i]) for c in shapes[key])
+        for i, key in enumerate(keys)
+    }
 
 
 def _in_the_way(own: Placed, other: Placed, excluded: Collection[frozenset[Key]]) -> bool:
-    pairs = ((a, b) for k, one in own.items() for j, two in other.items() if frozenset((k, j)) not in excluded for a in one for b in two)
-    return any(segment_distance(a.start, a.end, b.start, b.end) < a.radius + b.radius + 0.999 * CLEARANCE for a, b in pairs)
+    pairs = (
+        (a, b)
+        for k, one in own.items()
+        for j, two in other.items()
+        if frozenset((k, j)) not in excluded
+        for a in one
+        for b in two
+    )
+    return any(
+        segment_distance(a.start, a.end, b.start, b.end) < a.radius + b.radius + 0.999 * CLEARANCE for a, b in pairs
+    )

@@ -17,15 +17,15 @@ CHANGELOG = """# Changelog
 """
 
 LICENSE = """This description (MJCF, URDF, meshes, hand.json) was generated from recordings by hand_model (MIT).
-The figures in it belong to whoever made the recordings named in README.md; their terms apply to this folder. Where they state
-none, treat it as MIT-licensed:
+The figures in it belong to whoever made the recordings named in README.md; their terms apply to this folder.
+Where they state none, treat it as MIT-licensed:
 
-Permission is hereby granted, free of charge, to any person obtaining a copy of these files, to deal in them without restriction,
-including without limitation the rights to use, copy, modify, merge, publish, distribute, sublicense, and/or sell copies of them,
-subject to this notice being included in all copies or substantial portions of them.
+Permission is hereby granted, free of charge, to any person obtaining a copy of these files, to deal in them without
+restriction, including without limitation the rights to use, copy, modify, merge, publish, distribute, sublicense,
+and/or sell copies of them, subject to this notice being included in all copies or substantial portions of them.
 
-THE FILES ARE PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED. IN NO EVENT SHALL THE AUTHORS OR COPYRIGHT
-HOLDERS BE LIABLE FOR ANY CLAIM, DAMAGES OR OTHER LIABILITY ARISING FROM THE FILES OR THEIR USE.
+THE FILES ARE PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR IMPLIED. IN NO EVENT SHALL THE AUTHORS OR
+COPYRIGHT HOLDERS BE LIABLE FOR ANY CLAIM, DAMAGES OR OTHER LIABILITY ARISING FROM THE FILES OR THEIR USE.
 """
 
 
@@ -37,6 +37,7 @@ def readme(hand: Hand, plans: tuple[Plan, ...]) -> str:
         _derivation(hand, plans),
         _joints(hand),
         _linkages(plans),
+        _motors(hand),
         _keyframes(plans),
         _known_issues(hand, plans),
         f"{VERIFICATION}\n\nNot yet run. `hand-model check` on this folder measures every item of it.\n",
@@ -48,27 +49,41 @@ def _files(plans: tuple[Plan, ...]) -> str:
     lines = ["## Files\n"]
     for plan in plans:
         fingers = ", ".join(f.name for f in plan.hand.fingers)
-        lines.append(f"- `{plan.stem}.xml`, `{plan.stem}.urdf`: {fingers}; {plan.mass * 1e3:.1f} g (fallback, see below)")
+        lines.append(
+            f"- `{plan.stem}.xml`, `{plan.stem}.urdf`: {fingers}; {plan.mass * 1e3:.1f} g (fallback, see below)"
+        )
     lines.append("- `scene_*.xml`: the hand with floor and light. `assets/`: meshes.")
-    lines.append("- `scene_*_cylinder.xml` (hands with the grip `power`): close the hand, lower the mocap body `support`, and it holds.")
-    lines.append("- `*.ros2_control.xacro` (hands with actuators): on a robot's link (argument `parent`), actuators under ros2_control.")
-    lines.append("- `hand.json`: encoder maps, uncertainties, exact couplings, motors, effects, provenance; readable as a `.hand` file.")
+    lines.append(
+        "- `scene_*_cylinder.xml` (with the grip `power`): close the hand, lower the mocap body `support`: it holds."
+    )
+    lines.append(
+        "- `*.ros2_control.xacro` (with actuators): the hand on a robot's link (`parent`), under ros2_control."
+    )
+    lines.append(
+        "- `hand.json`: encoder maps, uncertainties, couplings, motors, effects, provenance; also a `.hand` file."
+    )
     return "\n".join(lines) + "\n"
 
 
 def _derivation(hand: Hand, plans: tuple[Plan, ...]) -> str:
     steps = [
         "The `palm` body is the repeatable frame that the three probed palm landmarks define.",
-        "Every other body has the palm's orientation at rest, and its origin at its joint's centre; joint angles are zero there.",
-        hand.extra.get("origin", "Axes, centres and markers were identified from the recordings listed below; covariances: `hand.json`."),
+        "Every other body has the palm's orientation at rest, where angles are zero, and its origin at its joint's centre.",
+        hand.extra.get(
+            "origin",
+            "Axes, centres and markers were identified from the recordings listed below; covariances: `hand.json`.",
+        ),
         "Limits are the recorded ranges, widened to what a follower's polynomial reaches over its driver's range.",
         "A linkage is its polynomial, enforced by an MJCF joint equality (`joint1` follows `joint2`).",
         "URDF's mimic holds the least-squares line through that polynomial that stays within the limits.",
-        f"Masses and inertias are a fallback: solid capsules between the joints, {DENSITY:.0f} kg/m^3. Nothing of them was measured.",
-        "Visual meshes (group 2) are these capsules. Collision capsules (group 3) are the same, shrunk until nothing touches at any keyframe.",
+        f"Masses and inertias are a fallback, not measured: solid capsules between the joints, {DENSITY:.0f} kg/m^3.",
+        "Visual meshes (group 2) are these capsules.",
+        "Collision capsules (group 3) are the same, shrunk until nothing touches at any keyframe.",
     ]
     if any(plan.names.actuator for plan in plans) and not hand.motors:
-        steps.append("Actuators, armature and damping are nominal, scaled to the fallback inertias: stable, not measured.")
+        steps.append(
+            "Actuators, armature and damping are nominal, scaled to the fallback inertias: stable, not measured."
+        )
     steps += hand.notes
     text = "## How it was derived\n\n" + "\n".join(f"{i}. {step}" for i, step in enumerate(steps, 1)) + "\n"
     if hand.provenance:
@@ -78,7 +93,11 @@ def _derivation(hand: Hand, plans: tuple[Plan, ...]) -> str:
 
 
 def _joints(hand: Hand) -> str:
-    rows = ["## Joints\n", "| finger | joint | range, deg | axis sd, deg | centre sd, mm | |", "| --- | --- | --- | --- | --- | --- |"]
+    rows = [
+        "## Joints\n",
+        "| finger | joint | range, deg | axis sd, deg | centre sd, mm | |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
     for finger in hand.fingers:
         for joint in finger.joints:
             low, high = np.degrees(joint.range_rad)
@@ -105,7 +124,26 @@ def _linkages(plans: tuple[Plan, ...]) -> str:
     rows = ["## Linkages\n", "What URDF's linear mimic loses against the polynomial, at worst over the range:\n"]
     rows += ["| equality | follower of | angle, deg | tip, mm |", "| --- | --- | --- | --- |"]
     for name, (_, k) in seen.items():
-        rows.append(f"| `{name}` | {k.follower} of {k.driver} | {np.degrees(k.loss_rad):.2f} | {k.loss_tip_m * 1e3:.2f} |")
+        rows.append(
+            f"| `{name}` | {k.follower} of {k.driver} | {np.degrees(k.loss_rad):.2f} | {k.loss_tip_m * 1e3:.2f} |"
+        )
+    return "\n".join(rows) + "\n"
+
+
+def _motors(hand: Hand) -> str:
+    if not hand.motors and not hand.effects:
+        return ""
+    rows = ["## Motors and effects\n", "In the hand's raw units where a unit says so; what is not listed is nominal.\n"]
+    rows += ["| of | parameter | value | 95 % interval | unit | origin |", "| --- | --- | --- | --- | --- | --- |"]
+    named = [(m.actuator, m.parameters) for m in hand.motors]
+    named += [
+        (f"{e.effect} ({e.where.get('finger') or e.where.get('actuator') or 'hand'})", e.parameters)
+        for e in hand.effects
+    ]
+    for owner, parameters in named:
+        for name, e in parameters.items():
+            interval = "-" if e.ci95 is None else f"{e.ci95[0]:.4g} to {e.ci95[1]:.4g}"
+            rows.append(f"| {owner} | {name} | {e.value:.4g} | {interval} | {e.unit} | {e.origin} |")
     return "\n".join(rows) + "\n"
 
 
@@ -114,7 +152,10 @@ def _keyframes(plans: tuple[Plan, ...]) -> str:
     for plan in plans:
         fingers = [f.name for f in plan.hand.fingers]
         rows += [f"| `{plan.stem}` | " + " | ".join(fingers) + " |", "| --- |" + " --- |" * len(fingers)]
-        rows += [f"| `{name}` | " + " | ".join(f"{reached[f]:.2f}" for f in fingers) + " |" for name, reached in plan.reached.items()]
+        rows += [
+            f"| `{name}` | " + " | ".join(f"{reached[f]:.2f}" for f in fingers) + " |"
+            for name, reached in plan.reached.items()
+        ]
         rows.append("")
     return "\n".join(rows)
 
@@ -124,7 +165,9 @@ def _known_issues(hand: Hand, plans: tuple[Plan, ...]) -> str:
     for finger in hand.fingers:
         for joint in finger.joints:
             if joint.degenerate:
-                issues.append(f"{finger.name} {joint.name}: the recorded arc does not determine axis or centre; see its uncertainty.")
+                issues.append(
+                    f"{finger.name} {joint.name}: the recorded arc does not determine axis or centre; see its uncertainty."
+                )
     for plan in plans:
         issues += [f"{finger}: the fingertip is a guess ({how})." for finger, how in plan.guessed_tips.items()]
         for name, reached in plan.reached.items():

@@ -15,8 +15,9 @@ MOCK = "mock_components/GenericSystem"  # ros2_control's own stand-in for hardwa
 def ros2_control(plan: Plan) -> Any | None:
     """Tree (lxml element) of `<stem>.ros2_control.xacro`; None for a hand without actuators.
 
-    Arguments: `plugin`, the hardware interface; `parent`, a link of the robot to fix the palm to (empty: the hand alone);
-    `xyz`, `rpy`, where on it. A driven joint takes position commands, a follower only reports its state: its <mimic> is in the URDF.
+    Arguments: `plugin`, the hardware interface; `parent`, a link of the robot to fix the palm to (empty: the hand
+    alone); `xyz`, `rpy`, where on it. A driven joint takes position commands, a follower only reports its state: its
+    <mimic> is in the URDF.
     """
     from lxml import etree
 

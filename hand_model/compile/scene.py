@@ -16,7 +16,10 @@ from .xml import child, vector
 Array = NDArray[np.float64]
 
 GRIP = "power"  # a hand with this keyframe gets a cylinder
-RADIUS, FORWARD = 0.6, 0.0  # of the cylinder and of its place before the finger bases, in lengths of the fingers' first segment
+RADIUS, FORWARD = (
+    0.6,
+    0.0,
+)  # of the cylinder and of its place before the finger bases, in lengths of the fingers' first segment
 DENSITY = 400.0  # kg/m^3, wood
 GAP = 5e-4  # m between the open fingers and the cylinder
 
@@ -36,18 +39,37 @@ def surroundings(root: Any, reach: float) -> None:
     child(root, "statistic", center=(0.3 * reach, 0.0, 0.0), extent=1.2 * reach, meansize=0.05 * reach)
     child(child(root, "visual"), "headlight", ambient=(0.4, 0.4, 0.4), diffuse=(0.5, 0.5, 0.5))
     asset = child(root, "asset")
-    child(asset, "texture", name="floor", type="2d", builtin="checker", rgb1=(0.85, 0.85, 0.85), rgb2=(0.7, 0.7, 0.7), width="64", height="64")
+    child(
+        asset,
+        "texture",
+        name="floor",
+        type="2d",
+        builtin="checker",
+        rgb1=(0.85, 0.85, 0.85),
+        rgb2=(0.7, 0.7, 0.7),
+        width="64",
+        height="64",
+    )
     child(asset, "material", name="floor", texture="floor", texrepeat=(20, 20), texuniform=True)
     world = root.find("worldbody")
     world = child(root, "worldbody") if world is None else world
     child(world, "light", pos=(0.0, 0.0, 10 * reach), dir=(0.0, 0.0, -1.0), directional=True)
-    child(world, "geom", name="floor", type="plane", size=(10 * reach, 10 * reach, 0.1), pos=(0.0, 0.0, -2 * reach), material="floor")
+    child(
+        world,
+        "geom",
+        name="floor",
+        type="plane",
+        size=(10 * reach, 10 * reach, 0.1),
+        pos=(0.0, 0.0, -2 * reach),
+        material="floor",
+    )
 
 
 def cylinder_scene(plan: Plan) -> Any | None:
     """The hand over a cylinder that lies on two supports; None for a hand without the grip `power`.
 
-    Close the fingers (keyframe `power`, or full controls), then lower the mocap body `support`: the hand holds the cylinder.
+    Close the fingers (keyframe `power`, or full controls), then lower the mocap body `support`: the hand holds the
+    cylinder.
     """
     room = _room(plan) if GRIP in plan.keyframes else None
     if room is None:
@@ -60,7 +82,16 @@ def cylinder_scene(plan: Plan) -> Any | None:
     quaternion = _quaternion(along, out)
     body = child(world, "body", name="cylinder", pos=centre, quat=quaternion)
     child(body, "freejoint", name="cylinder_free")
-    child(body, "geom", name="cylinder_geom", type="cylinder", size=(radius, half), density=DENSITY, condim="4", friction=(1.0, 0.01, 1e-4))
+    child(
+        body,
+        "geom",
+        name="cylinder_geom",
+        type="cylinder",
+        size=(radius, half),
+        density=DENSITY,
+        condim="4",
+        friction=(1.0, 0.01, 1e-4),
+    )
     support = child(world, "body", name="support", mocap=True, pos=centre, quat=quaternion)
     for i, end in enumerate((-1.0, 1.0)):  # in the support's frame: z along the cylinder, y out of the palm
         below = (0.0, radius + 0.003, end * (half - 0.004))
@@ -74,8 +105,9 @@ def cylinder_scene(plan: Plan) -> Any | None:
 
 
 def _room(plan: Plan) -> tuple[Array, Array, Array, float, float] | None:
-    """Centre (3,) [m], unit axis (3,), unit direction out of the palm (3,), radius and half length [m] of a cylinder under the open
-    fingers' first segments; None where there is no room for it, or fewer than two fingers beside the thumb."""
+    """Centre (3,) [m], unit axis (3,), unit direction out of the palm (3,), radius and half length [m] of a cylinder
+    under the open fingers' first segments; None where there is no room for it, or fewer than two fingers beside the
+    thumb."""
     fingers = [f for f in plan.hand.fingers if not f.name.startswith("thumb")]
     if len(fingers) < 2:
         return None

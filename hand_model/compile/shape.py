@@ -44,8 +44,9 @@ class Inertia:
 def with_tips(hand: Hand) -> tuple[Hand, Mapping[str, str]]:
     """The hand with a tip on every finger's last segment, and finger -> how it was guessed where none was recorded.
 
-    A missing tip is put straight on from the segment before the last, as far as a marker reaches that way and at least 0.8 times as far
-    as that segment is long; for a single segment, across its axis towards its markers, as far as the furthest; else 25 mm along palm x.
+    A missing tip is put straight on from the segment before the last, as far as a marker reaches that way and at least
+    0.8 times as far as that segment is long; for a single segment, across its axis towards its markers, as far as the
+    furthest; else 25 mm along palm x.
     """
     guessed: dict[str, str] = {}
     fingers = []
@@ -67,13 +68,18 @@ def _tip_guess(finger: Finger) -> tuple[Array, str]:
         length = float(np.linalg.norm(step))
         if length > 1e-6:
             reach = max([USUAL_TAPER * length, *(offsets @ step / length)])
-            return centre + reach * step / length, "no tip was recorded: straight on from the segment before it, as far as markers reach"
+            return (
+                centre + reach * step / length,
+                "no tip was recorded: straight on from the segment before it, as far as markers reach",
+            )
     if len(offsets):
         sideways = np.asarray(last.axis_palm, float)
         direction = offsets.mean(0) - (offsets.mean(0) @ sideways) * sideways
         if np.linalg.norm(direction) > 1e-6:
             reach = np.linalg.norm(offsets, axis=1).max()
-            return centre + reach * direction / np.linalg.norm(direction), "no tip was recorded: as far out as the furthest marker"
+            return centre + reach * direction / np.linalg.norm(
+                direction
+            ), "no tip was recorded: as far out as the furthest marker"
     return centre + np.array([0.025, 0.0, 0.0]), "neither tip nor markers nor a segment before it: 25 mm along palm x"
 
 
@@ -101,7 +107,8 @@ def _bones(finger: Finger) -> tuple[list[Array], list[float]]:
 
 
 def palm_capsules(hand: Hand) -> tuple[Capsule, ...]:
-    """One capsule per finger in the palm frame, to the finger's base from the middle of the palm's landmarks (or markers).
+    """One capsule per finger in the palm frame, to the finger's base from the middle of the palm's landmarks (or
+    markers).
 
     Those of the fingers beside the thumb start spread out, as the bones of a palm do.
     """

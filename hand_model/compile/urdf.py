@@ -63,7 +63,14 @@ def _link(root: Any, link: Link) -> None:
         length = float(np.linalg.norm(shape.end - shape.start))
         if length > 1e-6:
             rpy = roll_pitch_yaw((shape.end - shape.start) / length)
-            _collision(element, (shape.start + shape.end) / 2, rpy, "cylinder", radius=number(shape.radius), length=number(length))
+            _collision(
+                element,
+                (shape.start + shape.end) / 2,
+                rpy,
+                "cylinder",
+                radius=number(shape.radius),
+                length=number(length),
+            )
         for end in (shape.start, shape.end) if length > 1e-6 else (shape.start,):
             _collision(element, end, np.zeros(3), "sphere", radius=number(shape.radius))
 

@@ -19,7 +19,8 @@ def vector(values: ArrayLike) -> str:
 
 
 def child(parent: Any, tag: str, **attributes: Any) -> Any:
-    """Append an element; floats and arrays keep all their digits, None is left out, a trailing underscore of a key is dropped."""
+    """Append an element; floats and arrays keep all their digits, None is left out, a trailing underscore of a key is
+    dropped."""
     from lxml import etree
 
     element = etree.SubElement(parent, tag)

@@ -1,4 +1,5 @@
-"""MuJoCo: kinematics of an MJCF or URDF, and the simulation in which the linkages move the driven fingers' further joints."""
+"""MuJoCo: kinematics of an MJCF or URDF, and the simulation in which the linkages move the driven fingers' further
+joints."""
 
 from __future__ import annotations
 
@@ -32,7 +33,8 @@ class Model:
 
 @dataclass(frozen=True)
 class Simulated:
-    """positions: site -> (t, 3) [m] in the palm frame. angles_rad: joint -> (t,) [rad]. warnings: those MuJoCo raised."""
+    """positions: site -> (t, 3) [m] in the palm frame. angles_rad: joint -> (t,) [rad]. warnings: those MuJoCo
+    raised."""
 
     positions: Mapping[str, Array]
     angles_rad: Mapping[str, Array]
@@ -61,7 +63,11 @@ def wrap(mj: Any) -> Model:
     moving = [i for i in range(mj.njnt) if mj.jnt_type[i] in kinds]
     bodies = {mj.body(i).name: i for i in range(1, mj.nbody)}
     points = {mj.site(i).name: ("site", i) for i in range(mj.nsite)}
-    points |= {name: ("body", i) for name, i in bodies.items() if mj.body_jntnum[i] == 0 and name != "palm" and name not in points}
+    points |= {
+        name: ("body", i)
+        for name, i in bodies.items()
+        if mj.body_jntnum[i] == 0 and name != "palm" and name not in points
+    }
     return Model(mj, tuple(mj.joint(i).name for i in moving), mj.jnt_qposadr[moving], points, bodies)
 
 
@@ -134,8 +140,9 @@ def simulate(
 ) -> Simulated:
     """Simulate with the palm fixed, the independent joints on given paths and everything else moved by the equalities.
 
-    time_s: (t,) [s], increasing. driver_angles: independent joint -> (t,) [rad], joined by a cubic spline; independent joints that are
-    not given stay at zero. sample_s: (m,) [s] within time_s at which to report (default time_s). Contact, limits and actuators are off:
+    time_s: (t,) [s], increasing. driver_angles: independent joint -> (t,) [rad], joined by a cubic spline; independent
+    joints that are not given stay at zero. sample_s: (m,) [s] within time_s at which to report (default time_s).
+    Contact, limits and actuators are off:
     this measures the linkages. Raises DescriptionError for unknown or dependent joints, or paths with gaps.
     """
     from scipy.interpolate import CubicSpline
@@ -148,12 +155,16 @@ def simulate(
     for name in driver_angles:
         if name not in free:
             raise DescriptionError(f'joint "{name}" cannot be driven; {did_you_mean(name, free)}')
-    angles = columns(free, {name: np.broadcast_to(np.asarray(a, float), time.shape) for name, a in driver_angles.items()})
+    angles = columns(
+        free, {name: np.broadcast_to(np.asarray(a, float), time.shape) for name, a in driver_angles.items()}
+    )
     angles = np.broadcast_to(angles, (len(time), len(free)))
     if len(time) < 2 or not (np.isfinite(angles).all() and np.isfinite(time).all() and (np.diff(time) > 0).all()):
         raise DescriptionError("a path needs two or more samples, time increasing, without gaps")
     if sample.min() < time[0] - 1e-9 or sample.max() > time[-1] + 1e-9:
-        raise DescriptionError(f"samples from {sample.min()} to {sample.max()} s lie outside the path ({time[0]} to {time[-1]} s)")
+        raise DescriptionError(
+            f"samples from {sample.min()} to {sample.max()} s lie outside the path ({time[0]} to {time[-1]} s)"
+        )
     spline = CubicSpline(time, angles)
     steps = int(np.ceil((time[-1] - time[0]) / STEP_S)) + 1
     grid = time[0] + STEP_S * np.arange(steps + 1)

@@ -37,7 +37,9 @@ def load(file: str | Path) -> Model:
     description = read_description(path if path.is_dir() else path.parent)
     chosen = [m for m in description.models if path.name in (m.mjcf.name, m.urdf.name, m.scene.name)]
     if not chosen and not (path.is_dir() or path.name == "hand.json"):
-        raise DescriptionError(f"{path}: not one of this folder's files ({', '.join(m.mjcf.name for m in description.models)}, ...)")
+        raise DescriptionError(
+            f"{path}: not one of this folder's files ({', '.join(m.mjcf.name for m in description.models)}, ...)"
+        )
     fingers = (chosen or description.models)[0].fingers
     return of_hand(replace(description.hand, fingers=tuple(description.hand.finger(name) for name in fingers)))
 
@@ -61,7 +63,9 @@ def poses(model: Model, joint_angles: Mapping[str, ArrayLike]) -> Mapping[str, A
 def kinematics(model: Model, joint_angles: Mapping[str, ArrayLike]) -> tuple[dict[str, Array], dict[str, Array]]:
     """Link poses (n, 4, 4) and positions (n, 3) [m] in the palm frame; joint_angles: joint -> (n,) [rad]."""
     angles = columns(model.joints, joint_angles)
-    fixed = {model.names.marker["", label]: p for label, p in model.hand.palm_markers_palm.items()} | {"attachment": np.zeros(3)}
+    fixed = {model.names.marker["", label]: p for label, p in model.hand.palm_markers_palm.items()} | {
+        "attachment": np.zeros(3)
+    }
     points = {name: np.tile(np.asarray(p, float), (len(angles), 1)) for name, p in fixed.items()}
     links = {"palm": np.tile(np.eye(4), (len(angles), 1, 1))}
     start = 0

@@ -1,4 +1,5 @@
-"""Pinocchio: kinematics of a URDF or MJCF. Mimic is not left to it: every joint's angle is passed (it refuses chains of mimics)."""
+"""Pinocchio: kinematics of a URDF or MJCF. Mimic is not left to it: every joint's angle is passed (it refuses chains of
+mimics)."""
 
 from __future__ import annotations
 
@@ -18,8 +19,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Model:
-    """A Pinocchio model. joints: those with one angle. frames: name -> (parent joint id, placement (4, 4)); links: names of bodies,
-    points: names of sites and of links without a joint of their own."""
+    """A Pinocchio model. joints: those with one angle. frames: name -> (parent joint id, placement (4, 4)); links:
+    names of bodies, points: names of sites and of links without a joint of their own."""
 
     pin: Any
     joints: tuple[str, ...]
@@ -29,7 +30,8 @@ class Model:
 
 
 def load(file: str | Path) -> Model:
-    """Load a URDF, or an MJCF as far as Pinocchio's parser goes; raises DescriptionError with its reason where that fails."""
+    """Load a URDF, or an MJCF as far as Pinocchio's parser goes; raises DescriptionError with its reason where that
+    fails."""
     import pinocchio as pin
 
     path = Path(file)
@@ -40,10 +42,16 @@ def load(file: str | Path) -> Model:
         model = build(str(path))
     except (ValueError, RuntimeError) as error:
         raise DescriptionError(f"{path}: Pinocchio cannot load it ({error})") from None
-    frames = {f.name: (int(f.parentJoint), np.array(f.placement.homogeneous)) for f in model.frames if f.type != pin.FrameType.JOINT}
+    frames = {
+        f.name: (int(f.parentJoint), np.array(f.placement.homogeneous))
+        for f in model.frames
+        if f.type != pin.FrameType.JOINT
+    }
     bodies = [f for f in model.frames if f.type == pin.FrameType.BODY]
     own = {f.name for f in bodies if np.array_equal(f.placement.homogeneous, np.eye(4)) and _first(bodies, f)}
-    points = tuple(f.name for f in model.frames if f.type == pin.FrameType.OP_FRAME or (f in bodies and f.name not in own))
+    points = tuple(
+        f.name for f in model.frames if f.type == pin.FrameType.OP_FRAME or (f in bodies and f.name not in own)
+    )
     joints = tuple(name for i, name in enumerate(model.names) if i and model.joints[i].nq == 1)
     return Model(model, joints, frames, tuple(f.name for f in bodies), points)
 

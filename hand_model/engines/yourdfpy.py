@@ -1,4 +1,5 @@
-"""yourdfpy: kinematics of a URDF. Mimic is taken out after loading and every joint's angle is passed (it evaluates chains wrongly)."""
+"""yourdfpy: kinematics of a URDF. Mimic is taken out after loading and every joint's angle is passed (it evaluates
+chains wrongly)."""
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Model:
-    """A yourdfpy model without mimic. joints: its moving joints. fixed: link on a fixed joint -> (moving ancestor, (4, 4))."""
+    """A yourdfpy model without mimic. joints: its moving joints. fixed: link on a fixed joint -> (moving ancestor, (4,
+    4))."""
 
     urdf: Any
     joints: tuple[str, ...]
