@@ -25,6 +25,7 @@ STEP_S = 2e-3
 SHARED = ("inertia", "viscous", "coulomb", "stiffness", "preload", "presliding", "bristle", "speed_full", "rise", "gain", "damping", "delay")
 CONTROLLERS = {"profile": (*SHARED, "fall"), "cascade": (*SHARED, "position_gain", "deadband")}
 STRIBECK = ("static_ratio", "stribeck_speed")
+CONTACT = ("contact_stiffness", "contact_at", "contact_damping")  # optional: an object met in flexion, [raw/%], [%], [s]
 EDGE = 0.05  # [%]: width over which the deadband sets in
 
 
@@ -87,6 +88,7 @@ def simulate(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, contr
         started = moves.start_s
     top = coulomb * (1.0 + ratio)
     f = np.clip(u - spring * p - preload, -top, top)
+    touch = "contact_stiffness" in q
     linear = mass + viscous + half * spring
     delay = np.minimum(q["delay"], 0.8 * q["inertia"] / np.maximum(damping, 1e-9))
     closed = gain * (half - delay) + damping * (1.0 - delay / half)
@@ -124,6 +126,11 @@ def simulate(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, contr
         travel = np.maximum(step_s * np.abs(v), 1e-6 * distance[:k])
         slope = (level - f * way) * -np.expm1(-travel / distance[:k]) / travel
         inner = linear[:k] + (half + bristle[:k]) * slope
+        if touch:
+            pressed = np.where(p > q["contact_at"][:k], q["contact_stiffness"][:k], 0.0)
+            push = push - pressed * (p - q["contact_at"][:k])
+            rest = rest - pressed * (p - q["contact_at"][:k])
+            inner = inner + pressed * (half + q["contact_damping"][:k])
         middle = push / (inner + closed[:k])
         u_middle = ahead - closed[:k] * middle
         over = np.abs(u_middle) > limit[:k]

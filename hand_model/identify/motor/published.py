@@ -1,6 +1,7 @@
 """The identification as published: position filtered, current not, four models by least squares on samples above a speed.
 
-Modelling of Robotic Hands: Kinematic and Dynamic Parameter Identification, section 4.3 and tables 4.12, 4.13.
+Modelling of Robotic Hands: Kinematic and Dynamic Parameter Identification, section 4.3; tables 4.12, 4.13,
+whose figures are `hand_model.published.current_rmse_raw`.
 """
 
 from __future__ import annotations
@@ -24,24 +25,6 @@ TERMS = {
     "SMD+Fc": ("inertia", "viscous", "stiffness", "coulomb"),
     "SMD+Frec+Fc": ("inertia", "viscous", "stiffness", "coulomb", "reciprocal"),
 }
-# RMSE of predicted current, raw units, tables 4.12 (right) and 4.13 (left), in the order of MODELS.
-PUBLISHED_RMSE = {
-    "right": {
-        "thumb": (27.624, 18.653, 13.407, 12.872),
-        "index": (23.671, 18.157, 12.393, 11.251),
-        "middle": (19.520, 16.899, 13.041, 11.165),
-        "ring": (10.803, 10.449, 10.292, 10.264),
-        "little": (20.448, 17.727, 14.311, 12.863),
-    },
-    "left": {
-        "thumb": (29.31, 20.830, 15.536, 14.793),
-        "index": (20.103, 17.071, 13.132, 11.714),
-        "middle": (19.719, 16.940, 13.025, 11.154),
-        "ring": (20.033, 17.234, 13.443, 11.687),
-        "little": (20.874, 18.109, 14.579, 13.108),
-    },
-}
-
 
 @dataclass(frozen=True)
 class PublishedFit:

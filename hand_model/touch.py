@@ -1,0 +1,177 @@
+"""Touch read from the current: what the free-motion model does not explain, tested sample by sample.
+
+Residual: measured less predicted current of the open-loop simulation, in units of the noise, along the motion. Test: Page's (1954)
+cumulative sum. Its threshold is set for a false-alarm rate on free motion: the maxima of the sum's excursions have an exponential tail,
+which is fitted to the excursions of free-motion logs, so that correlation and model error in them count (Siegmund 1985, ch. 2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import IdentificationError
+from .hand import Estimate
+from .identify.motor import MotorFit, identify_motor
+from .identify.motor import output_error
+from .identify.motor.output_error import MoveData, moves_from_rest
+from .identify.motor.recording import actuator_trials, motor_trial
+from .session import Log, Session
+
+Array = NDArray[np.float64]
+
+ALIGN_S = 0.25  # of a move, within which its own unknowns are found; nothing is tested there
+SLACK = 1.0  # of the cumulative sum, in noise deviations: half the rise that is looked for
+AFTER_S = 1.2  # of pressing that the stiffness is read from
+
+
+@dataclass(frozen=True)
+class TouchDetector:
+    """Threshold of the cumulative sum [noise deviations]; its false-alarm rate [1/min] on free motion; decay of the excursions'
+    tail, the free motion that it was calibrated on [min], and the white-noise threshold below which it is never set."""
+
+    threshold: float
+    false_alarms_per_minute: float
+    decay: float
+    free_minutes: float
+    white_threshold: float
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A touch. detected_s: time of the alarm on the log's clock [s]; onset_s: when the object was met [s]; position [%] there;
+    stiffness [raw/%] with interval; kind: "stiff" (the object gives way less than the drive's own position loop), "compliant",
+    or "undetermined"."""
+
+    trial: str
+    detected_s: float
+    onset_s: float
+    position: float
+    stiffness: Estimate | None
+    kind: str
+
+
+def residuals(fit: MotorFit, log: Log, name: str = "log") -> list[tuple[MoveData, Array, Array]]:
+    """Per move into flexion: the move, its sample times on the log's clock (n,) [s], and the residual (n,) [noise deviations].
+
+    The residual is zero within ALIGN_S of the command. Raises IdentificationError where the fit has no controller.
+    """
+    if not fit.predictive:
+        raise IdentificationError(f'motor "{fit.motor.actuator}": no controller was identified; touch needs a free-motion prediction')
+    trial = motor_trial(name, log, fit.scale)
+    data = moves_from_rest(trial, (fit.sigma_position, fit.sigma_current), fit.scale.speed_full)
+    data = [m for m in data if m.target > m.origin and (m.time_s > ALIGN_S).sum() > 3]
+    if not data:
+        return []
+    early = [_until(m, ALIGN_S) for m in data]
+    noise = (fit.sigma_position, fit.sigma_current)
+    own = output_error.fit(early, fit.values, (), noise, {}, fit.output_error.controller, iterations=4).own
+    simulated = output_error.simulate_moves(data, fit.values, own, fit.output_error.controller)
+    begin = log.time_s[np.isfinite(log.time_s)][0]
+    out = []
+    for m, y in zip(data, simulated, strict=True):
+        z = (m.current - y[:, 1]) / fit.sigma_current
+        out.append((m, begin + trial.time_s[m.index] + m.time_s, np.where(m.time_s > ALIGN_S, z, 0.0)))
+    return out
+
+
+def _until(m: MoveData, end_s: float) -> MoveData:
+    k = m.time_s <= end_s
+    return MoveData(m.trial, m.index, m.time_s[k], m.position[k], m.current[k], m.origin, m.target, m.limit, m.own, m.own_sd)
+
+
+def cumulative_sum(z: Array, slack: float = SLACK) -> Array:
+    """Page's sum (n,) of residuals (n,): g = max(0, g + z - slack)."""
+    out, g = np.empty(len(z)), 0.0
+    for i, value in enumerate(z.tolist()):
+        g = max(0.0, g + value - slack)
+        out[i] = g
+    return out
+
+
+def excursions(z: Array, slack: float = SLACK) -> Array:
+    """Maxima of the cumulative sum between its returns to zero."""
+    g = cumulative_sum(z, slack)
+    starts = np.flatnonzero((g > 0) & (np.r_[0.0, g[:-1]] == 0))
+    return np.maximum.reduceat(g, starts) if len(starts) else np.empty(0)
+
+
+def calibrate(fit: MotorFit, free: Sequence[tuple[str, Log]], false_alarms_per_minute: float = 0.1) -> TouchDetector:
+    """Threshold for a false-alarm rate [1/min] from logs of free motion (name, log).
+
+    Raises IdentificationError with fewer than 30 excursions of the sum: too little free motion to calibrate on.
+    """
+    peaks, samples, minutes = [], 0, 0.0
+    for name, log in free:
+        for m, _, z in residuals(fit, log, name):
+            tested = z[m.time_s > ALIGN_S]
+            peaks.append(excursions(tested))
+            samples += len(tested)
+            minutes += float(m.time_s[-1] - ALIGN_S) / 60
+    heights = np.concatenate(peaks) if peaks else np.empty(0)
+    if len(heights) < 30:
+        raise IdentificationError(f"{len(heights)} excursions of the free-motion residual; at least 30 are needed to calibrate touch")
+    # the tail above the median: exponential, so its mean excess is one over its decay; two standard errors on the safe side
+    middle = float(np.median(heights))
+    tail = heights[heights > middle] - middle
+    decay = 1 / (float(tail.mean()) * (1 + 2 / np.sqrt(len(tail))))
+    rate = len(tail) / max(minutes, 1e-9)
+    threshold = middle + np.log(max(rate / false_alarms_per_minute, 1.0)) / decay
+    per_minute = samples / max(minutes, 1e-9)
+    white = np.log(2 * SLACK**2 * per_minute / false_alarms_per_minute + 1) / (2 * SLACK) - 1.166
+    return TouchDetector(float(max(threshold, white)), false_alarms_per_minute, decay, minutes, float(white))
+
+
+def detect(fit: MotorFit, detector: TouchDetector, log: Log, name: str = "log") -> tuple[Contact, ...]:
+    """Contacts in one log: at most one per closing move, at the first sample whose sum passes the threshold."""
+    found = []
+    for m, time_s, z in residuals(fit, log, name):
+        over = np.flatnonzero(cumulative_sum(z) > detector.threshold)
+        if len(over):
+            found.append(_contact(fit, m, time_s, z, int(over[0]), name))
+    return tuple(found)
+
+
+def score(fit: MotorFit, log: Log, name: str = "log") -> Array:
+    """Largest value of the cumulative sum in each closing move: the statistic of the receiver operating characteristic."""
+    return np.array([cumulative_sum(z).max() for _, _, z in residuals(fit, log, name)])
+
+
+def touch_session(session: Session, actuator: str, false_alarms_per_minute: float = 0.1) -> tuple[Contact, ...]:
+    """Contacts in all grasp trials of an actuator, the detector calibrated on its excitation and flexion trials."""
+    fit = identify_motor(session, actuator)
+    detector = calibrate(fit, [(t.name, t.log()) for t in actuator_trials(session, actuator, validate=None)], false_alarms_per_minute)
+    grasps = actuator_trials(session, actuator, ("grasp",), validate=None)
+    return tuple(c for t in grasps for c in detect(fit, detector, t.log(), t.name))
+
+
+def _contact(fit: MotorFit, m: MoveData, time_s: Array, z: Array, alarm: int, name: str) -> Contact:
+    """Onset and stiffness by output error: the free drive against a one-sided spring, from the move's start to AFTER_S of pressing."""
+    g = cumulative_sum(z)
+    began = alarm
+    while began > 0 and g[began - 1] > 0:
+        began -= 1
+    onset, at = float(time_s[max(began - 1, 0)]), float(m.position[max(began - 1, 0)])
+    best, noise = None, (fit.sigma_position, fit.sigma_current)
+    data = [_until(m, float(m.time_s[alarm] + AFTER_S))]
+    names = ("contact_stiffness", "contact_at", "contact_damping")
+    bounds = {"contact_stiffness": (1e-3, 1e4), "contact_at": (m.origin, m.target), "contact_damping": (0.0, 0.1)}
+    for stiffness in (1.0, 6.0, 40.0):
+        start = {**fit.values, "contact_stiffness": stiffness, "contact_at": at, "contact_damping": 0.01}
+        one = output_error.fit(data, start, names, noise, bounds, fit.output_error.controller)
+        if best is None or one.cost < best.cost:
+            best = one
+    # the free-motion parameters are known only so well too; the misfit of a spring that is not quite linear widens the interval
+    value, sd = best.values["contact_stiffness"], float(np.sqrt(best.covariance[0, 0]))
+    low, high = max(0.0, value - 1.96 * sd), value + 1.96 * sd
+    estimate = Estimate(float(value), (float(low), float(high)), "raw/%", "output error of the drive against an object")
+    passed = np.flatnonzero(data[0].position > best.values["contact_at"])
+    if len(passed) and max(best.chi2) < 3.0:
+        at = float(best.values["contact_at"])
+        onset = float(time_s[max(int(passed[0]) - 1, 0)])
+    gain = fit.values["gain"]
+    kind = "stiff" if low > gain else "compliant" if high < gain else "undetermined"
+    return Contact(name, float(time_s[alarm]), onset, at, estimate, kind)
