@@ -22,6 +22,9 @@ MAX_RATE_HZ = 250.0  # faster recordings are thinned to this: joints move below 
 MAX_SAMPLES = 4000  # per trial: residuals are correlated over far longer than this spacing
 
 
+MOMENTS = ("hx", "hy", "hz")
+
+
 @dataclass(frozen=True)
 class Column:
     """One declared parameter that the balance is linear in. kind: "inertial", "armature", "damping", "frictionloss",
@@ -42,9 +45,8 @@ class Column:
 class Rows:
     """The balance of one independent joint in one trial.
 
-    Full-rate grid (n,): time_s, states, extra channels (never filtered: an effect reads them as they are), load_columns
-    (n, P) and load_known (n,): what the joint carries besides its own drive and friction, at parameters theta the load
-    is load_columns @ theta - load_known. Filtered and thinned (m,): effort, columns (m, P), moving (bool).
+    Full-rate grid (n,): time_s, states, extra channels (never filtered: an effect reads them as they are), full_columns
+    (n, P), carried (P,) bool and load_known (n,): of what the joint carries besides its own drive and friction. Filtered and thinned (m,): effort, columns (m, P), moving (bool).
     """
 
     trial: str
@@ -61,7 +63,8 @@ class Rows:
     cutoff_hz: float
     rate_hz: float
     extra: Mapping[str, Array]
-    load_columns: Array
+    full_columns: Array
+    carried: Array
     load_known: Array
     step: int
 
@@ -76,7 +79,11 @@ class Rows:
 
     def load(self, theta: Array) -> Array:
         """Load (n,) that the joint transmits at declared parameters theta (P,)."""
-        return self.load_columns @ theta - self.load_known
+        return self.full_columns @ (theta * self.carried) - self.load_known
+
+    def expected(self, theta: Array) -> Array:
+        """Effort (n,) of the joint's own drive that the declared parameters theta (P,) ask for at this motion."""
+        return self.full_columns @ theta - self.load_known
 
 
 def compile_model(rig: RigModel, trial: RigTrial | None = None) -> Any:
@@ -89,15 +96,16 @@ def compile_model(rig: RigModel, trial: RigTrial | None = None) -> Any:
     return model
 
 
-def declared_columns(rig: RigModel) -> tuple[Column, ...]:
+def declared_columns(rig: RigModel, off_axis: bool = False) -> tuple[Column, ...]:
     """The parameters that the MJCF declares: every number in it that is not zero is a starting value to be fitted; a
-    declared zero is a statement (a symmetric body, a joint without friction) and stays."""
+    declared zero is a statement (a symmetric body, a joint without friction) and stays. off_axis: free the first
+    moments that are declared zero as well (centres of mass off their declared axes)."""
     model = compile_model(rig)
     columns: list[Column] = []
     inertial = inertial_parameters(model)
     for b in range(1, model.nbody):
         for p, part in enumerate(INERTIAL):
-            if inertial[b - 1, p] != 0:
+            if inertial[b - 1, p] != 0 or (off_axis and part in MOMENTS):
                 columns.append(Column("inertial", model.body(b).name, part, float(inertial[b - 1, p])))
     for j, joint in enumerate(rig.joints):
         for kind, value in (("armature", model.dof_armature[j]), ("damping", model.dof_damping[j]),
@@ -165,7 +173,7 @@ def trial_rows(rig: RigModel, trial: RigTrial, columns: tuple[Column, ...], cuto
             Rows(trial.name, joint, trial.validate, grid, q[:, i], v[:, i], a[:, i],
                  low_pass(y, rate, cutoff)[::step], low_pass(x, rate, cutoff)[::step],
                  (np.abs(v[:, i]) > rest[i])[::step], float(rest[i]), cutoff, rate,
-                 {"effort": y, **channels}, x * external, y - effort[joint], step)
+                 {"effort": y, **channels}, x, external, y - effort[joint], step)
         )  # fmt: skip
     return tuple(rows)
 

@@ -10,13 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..effects import DriveState, catalogue
-from .balance import Rows, compile_model
+from .balance import Rows
 from .declared import DeclaredFit
-from .dynamics import INERTIAL, inertial_parameters
 from .model import RigModel
 
 Array = NDArray[np.float64]
-NOT_FOR_RIGS = frozenset({"external_contact", "gravity_load", "spring_decoupling", "asymmetric_friction"})
+# Those that rigs have in a form of their own, or that need a hand.
+NOT_FOR_RIGS = frozenset({"external_contact", "gravity_load", "spring_decoupling", "asymmetric_friction", "drive_sag",
+                          "command_delay", "current_channel_delay"})
+LONGEST_DELAY_S = 0.03
 Bound = tuple[str, str, float, float]
 
 
@@ -81,42 +83,28 @@ def _from_catalogue(effect: Any, joint: str, train: tuple[DriveState, ...], stat
 
 
 def _own(rig: RigModel, fit: DeclaredFit, joint: str, rows: list[Rows]) -> list[Candidate]:
-    """Offset, load-dependent friction of several kinds, weight off its declared axis, sag, delay of the drive."""
+    """Offset, load-dependent friction of several kinds, delay between the channels."""
     free = (-np.inf, np.inf)
     drive = rig.drive(joint)
     speeds = np.concatenate([np.abs(r.velocity) for r in rows])
     knees = tuple({"stribeck_speed": float(s)} for s in np.geomspace(*np.percentile(speeds[speeds > 0], [10, 90]), 6))
     load = {r.trial: np.abs(r.load(fit.theta)) for r in fit.rows if r.joint == joint}
+    expected = {r.trial: np.abs(r.expected(fit.theta)) for r in fit.rows if r.joint == joint}
+    sample = max(float(np.median(np.diff(t.time_s))) for t in rig.trials)
+    late = sorted({k * sample for k in (1, 2, 3, 5, 8)} | {k * LONGEST_DELAY_S / 6 for k in range(1, 7)})
+    delays = tuple({"delay": sign * d} for d in late if d <= max(8 * sample, LONGEST_DELAY_S) for sign in (-1.0, 1.0))
     own = [
         Candidate("load_dependent_friction", "low speed", joint, (("per_load", "1", 0.0, np.inf),), knees,
                   lambda r, s: (direction(r) * load[r.trial] * np.exp(-((r.velocity / s["stribeck_speed"]) ** 2)))[:, None]),
         Candidate("load_dependent_friction", "with speed", joint, (("per_load_speed", "s", 0.0, np.inf),), ({},),
                   lambda r, s: (r.velocity * load[r.trial])[:, None]),
     ]  # fmt: skip
+    if drive is not None:
+        own.append(Candidate("load_dependent_friction", "motor side", joint, (("per_effort", "1", 0.0, np.inf),), ({},),
+                             lambda r, s: (direction(r) * expected[r.trial])[:, None]))  # fmt: skip
+        own.append(Candidate("current_channel_delay" if drive.kind == "force" else "command_delay", "", joint, (), delays,
+                             lambda r, s: np.zeros((len(r.time_s), 0)), True))  # fmt: skip
     if drive is None or not drive.offset:
         own.append(Candidate("asymmetric_friction", "", joint, (("offset", rig.effort_unit(joint), *free),), ({},),
                              lambda r, s: np.ones((len(r.time_s), 1))))  # fmt: skip
-    return own + _weight(rig, joint, rows)
-
-
-def _weight(rig: RigModel, joint: str, rows: list[Rows]) -> list[Candidate]:
-    """A centre of mass off the declared axis (a zero that is none): sine and cosine of the pose, by the regressor."""
-    from .dynamics import inertial_columns
-
-    model = compile_model(rig)
-    declared = inertial_parameters(model)
-    i = rig.joints.index(joint)
-    body = int(model.jnt_bodyid[i])
-    zero = [p for p in (1, 2, 3) if declared[body - 1, p] == 0]
-    gravity = np.array(model.opt.gravity)
-    if not zero or len(rig.joints) > 1 or not np.any(gravity):
-        return []
-
-    def columns(row: Rows, shape: Mapping[str, float]) -> Array:
-        q, v, a = (x[:, None] for x in (row.position, row.velocity, row.acceleration))
-        return inertial_columns(model, q, v, a, gravity)[:, i, body - 1][:, zero]
-
-    seen = columns(rows[0], {})
-    zero = [p for p, c in zip(zero, seen.T, strict=True) if np.std(c) > 1e-9]
-    bounds = tuple((f"moment_{INERTIAL[p]}", "kg m", -np.inf, np.inf) for p in zero)
-    return [Candidate("gravity_load", "centre of mass off its axis", joint, bounds, ({},), columns)] if zero else []
+    return own

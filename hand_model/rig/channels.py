@@ -184,7 +184,7 @@ def check_balance(rig: RigModel, fit: DeclaredFit) -> tuple[ChannelIssue, ...]:
             found = ("has no sign: it follows the size of the expected effort", unsigned)
         elif (static := _static(row, x, start)) is not None:
             found = ("is a static function of the position, without the friction and inertia of the motion", static)
-        elif _stranger(fit, row) and (left := _own_fit(fit, row)) > STRANGE:
+        elif size > fit.scale[row.joint] and _stranger(fit, row) and (left := _own_fit(fit, row)) > STRANGE:
             found = ("explains nothing of the motion, though it does in other recordings", left)
         if found is not None:
             name = column[drive.name]

@@ -19,7 +19,8 @@ from .solve import solve_bounded
 
 Array = NDArray[np.float64]
 FOLDS, RESAMPLES = 6, 600
-LEAST_GAIN = 0.04  # of the held-out residual variance: less is not worth a name
+LEAST_SHARE = 0.05  # of the declared model's held-out residual variance: less is not worth a name
+NEAR = 1.02  # errors within this factor are a tie, and the one with fewer parameters wins (Occam)
 LEAST_PROBABILITY = 0.95
 MOST_TERMS = 4
 
@@ -196,45 +197,48 @@ def score(problem: Problem, terms: Sequence[Term], candidate: Candidate, parts: 
     return best
 
 
-def compete(problem: Problem, rivals: Sequence[Candidate]) -> tuple[tuple[Term, ...], tuple[Step, ...], tuple[Score, ...]]:
+def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ...] = (),
+            most: int = MOST_TERMS) -> tuple[tuple[Term, ...], tuple[Step, ...], tuple[Score, ...]]:  # fmt: skip
     """Forward selection: the candidate that lowers the held-out error most, while it does so beyond doubt.
 
-    Returns the terms, the rounds, and the scores of the last round (all that was not taken).
+    begin: terms that stand already. Returns all terms, the rounds, and the scores of the last round (all not taken).
     """
     _CACHE.clear()
-    terms: tuple[Term, ...] = ()
+    terms = begin
     steps: list[Step] = []
     scores: list[Score] = []
-    while True:
+    whole = held_out(problem, (), normal(problem, ()))[0].sum()
+    while len(terms) < most:
         parts = normal(problem, terms)
         none, _ = held_out(problem, terms, parts)
         taken = {t.candidate.key for t in terms}
         scores = [score(problem, terms, c, parts) for c in rivals if c.key not in taken]
-        step = _judge(none, scores)
-        if step is None or len(terms) >= MOST_TERMS:
-            return terms, tuple(steps), tuple(scores)
+        step = judge(none, scores, whole)
+        if step is None:
+            break
         terms = (*terms, step.winner.term)
         steps.append(step)
+    return terms, tuple(steps), tuple(scores)
 
 
-def _judge(none: Array, scores: Sequence[Score]) -> Step | None:
-    """The winner of a round, or None where no candidate beats "nothing" beyond doubt and by enough."""
+def judge(none: Array, scores: Sequence[Score], whole: float) -> Step | None:
+    """The winner of a round, or None where no candidate beats "nothing" (none (B,)) beyond doubt and by enough of the
+    declared model's error (whole)."""
     if not scores:
         return None
     errors = np.array([s.error for s in scores])
     best = int(np.argmin(errors.sum(1)))
-    gain = 1.0 - errors[best].sum() / max(none.sum(), 1e-300)
     random = np.random.default_rng(0)
     draw = random.integers(0, len(none), (RESAMPLES, len(none)))
     resampled = errors[:, draw].sum(2)
     probability = float(np.mean(resampled[best] < none[draw].sum(1)))
-    if gain < LEAST_GAIN or probability < LEAST_PROBABILITY:
+    if none.sum() - errors[best].sum() < LEAST_SHARE * whole or probability < LEAST_PROBABILITY:
         return None
-    # of those that cannot be told from the best, the one with fewest parameters (Occam)
     close = [k for k in range(len(scores)) if np.mean(resampled[best] < resampled[k]) < LEAST_PROBABILITY]
     close.sort(key=lambda k: errors[k].sum())
     size = {k: len(scores[k].term.shape) + len(scores[k].term.candidate.amplitudes) for k in close}
-    chosen = min(close, key=lambda k: (size[k], errors[k].sum()))
+    tied = [k for k in close if errors[k].sum() <= NEAR * errors[best].sum()]
+    chosen = min(tied, key=lambda k: (size[k], errors[k].sum()))
     wins = np.bincount(np.argmin(resampled, 0), minlength=len(scores)) / RESAMPLES
     order = np.argsort(-wins)
     rivals = tuple((scores[i].term.candidate.key, float(wins[i])) for i in order if wins[i] > 0.005)

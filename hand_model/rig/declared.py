@@ -47,9 +47,15 @@ def bounds(columns: Sequence[Column]) -> tuple[Array, Array]:
 def prior(columns: Sequence[Column]) -> tuple[Array, Array]:
     """Prior mean and weight (P,): a mass may be wrong by as much as itself, friction and springs by a hundred times."""
     value = np.array([c.value for c in columns])
+    moment = {c.name: 0.0 for c in columns if c.kind == "inertial"}
+    for c in columns:
+        if c.kind == "inertial" and c.part in ("m", "hx", "hy", "hz"):
+            moment[c.name] = max(moment[c.name], abs(c.value) * (0.1 if c.part == "m" else 1.0))
+    zero = np.array([moment.get(c.name, 0.0) if c.value == 0 and c.kind == "inertial" else 0.0 for c in columns])
+    value_size = np.maximum(np.abs(value), zero)
     loose = np.array([1.0 if c.kind == "inertial" else 100.0 for c in columns])
-    weight = CORRELATED / np.maximum(np.abs(value * loose), 1e-150) ** 2
-    return value, np.where(value == 0, 1e-12, weight)
+    weight = CORRELATED / np.maximum(value_size * loose, 1e-150) ** 2
+    return value, np.where(value_size == 0, 1e-12, weight)
 
 
 def fit_rows(columns: Sequence[Column], rows: Sequence[Rows], scale: dict[str, float], weight: dict[str, float]) -> Array:
@@ -66,7 +72,8 @@ def fit_rows(columns: Sequence[Column], rows: Sequence[Rows], scale: dict[str, f
     return solve_bounded(gram, moment, low, high, mean, stiff)
 
 
-def fit_declared(rig: RigModel, refused: Collection[tuple[str, str]] = (), cutoff_hz: float | None = None) -> DeclaredFit:
+def fit_declared(rig: RigModel, refused: Collection[tuple[str, str]] = (), cutoff_hz: float | None = None,
+                 off_axis: bool = False) -> DeclaredFit:
     """Fit the declared parameters to the trials that do not validate.
 
     refused: (trial, joint) whose effort channel cannot be trusted; their balance is not fitted, nor kept. A trial that
@@ -74,7 +81,7 @@ def fit_declared(rig: RigModel, refused: Collection[tuple[str, str]] = (), cutof
     The cut-off is the one at which the declared model explains the largest share of the effort: below it the motion is
     lost, above it noise and flexibility that no rigid model holds.
     """
-    columns = declared_columns(rig)
+    columns = declared_columns(rig, off_axis)
     refused = set(refused)
     best: DeclaredFit | None = None
     sample, most = _sample(rig), 0.0

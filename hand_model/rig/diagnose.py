@@ -11,20 +11,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..session import Session
-from .candidates import candidates
+from .candidates import Candidate, candidates
 from .channels import ChannelIssue, check_balance, check_channels
-from .compete import Step, Term, compete, design, pose, solution
+from .compete import Score, Step, Term, compete, design, held_out, judge, normal, pose, solution
 from .declared import DeclaredFit, fit_declared
 from .findings import Finding, Findings
 from .model import RigModel, load_rig
-from .patch import write_declared, write_effects
+from .patch import write_couplings, write_declared, write_effects
 from .replay import replay_rig
 from .states import noise_std
-from .swing import Fitted, Swing, Task, vector
+from .swing import INDEX, Fitted, Swing, Task, fit_together, vector
 from .swing_build import build_swing, can_swing
 from .swing_compete import Round, Variant, compete_swing, free_declared, polish
 from .swing_patch import write_swing
-from .transmission import coupling_candidates, fit_coupling
+from .transmission import coupling_candidates, fit_coupling, zero_shift
 
 Array = NDArray[np.float64]
 SEARCH_STEP_S = 4e-3
@@ -38,7 +38,7 @@ def diagnose_rig(session: Session, output: str | Path | None = None,
     Raises SessionError or DescriptionError where the session or its MJCF cannot be read.
     """
     say = progress or (lambda _: None)
-    rig = load_rig(session)
+    rig = with_couplings(load_rig(session))
     fit, issues = trusted_fit(rig)
     found = [_channel_finding(i) for i in issues]
     refused = {(t, i.joint) for i in issues if i.refuse for t in i.trials}
@@ -78,14 +78,23 @@ def diagnose_rig(session: Session, output: str | Path | None = None,
 def trusted_fit(rig: RigModel) -> tuple[DeclaredFit, tuple[ChannelIssue, ...]]:
     """The declared fit to the channels that can be trusted, and what is wrong with the others."""
     issues = list(check_channels(rig))
-    cutoff = None
     while True:
         refused = {(t, i.joint) for i in issues if i.refuse for t in i.trials}
-        fit = fit_declared(rig, refused, cutoff)
+        fit = fit_declared(rig, refused)
         more = check_balance(rig, fit) if fit.rows else ()
         if not more:
             return fit, tuple(issues)
         issues += more
+
+
+def with_couplings(rig: RigModel) -> RigModel:
+    """The rig with its couplings' polynomials fitted to the encoders: what follows projects efforts through them."""
+    couplings, values = [], {}
+    for c in rig.couplings:
+        fit = fit_coupling(rig, c)
+        values[c.name] = c.polycoef if fit is None else fit.theta
+        couplings.append(replace(c, polycoef=values[c.name]))
+    return replace(rig, couplings=tuple(couplings), xml=write_couplings(rig.xml, values)) if couplings else rig
 
 
 def _rate(rig: RigModel) -> float:
@@ -106,40 +115,58 @@ def _channel_finding(issue: ChannelIssue) -> Finding:
 
 def _diagnose_balance(rig: RigModel, fit: DeclaredFit, say: Callable[[str], None]) -> tuple:
     """Findings, rejections, lack of fit, patched and declared MJCF of a rig whose efforts are recorded."""
-    terms: list[Term] = []
     stories: list[tuple[Step, Term]] = []
     rejected: list[dict[str, Any]] = []
     joints = [j for j in rig.joints if any(r.joint == j for r in fit.rows)]
     if not fit.rows:
         return [], [], {"metric": None, "before": None, "after": None}, rig.xml, rig.xml
+    first = {j: _offset_first(rig, fit, j) for j in joints}  # a sensor's zero is the recording's error: before physics
+    off_axis = _off_axis(rig, fit, [t for _, t in first.values() if t is not None])
+    base_fit = fit
+    if off_axis is not None:
+        fit, finding = off_axis
     for joint in joints:
-        taken, steps, scores = compete(pose(fit, joint), candidates(rig, fit, joint))
-        terms += taken
-        stories += zip(steps, taken, strict=True)
+        step, term = first[joint]
+        begin = () if term is None else (term,)
+        taken, steps, scores = compete(pose(fit, joint), candidates(rig, fit, joint), begin)
+        stories += zip(([step] if begin else []) + list(steps), taken, strict=True)
         rejected += [{"effect": s.term.candidate.key, "reason": "held-out error does not fall enough"} for s in scores]
         say(f"{rig.name}: {joint}: {', '.join(t.candidate.key for t in taken) or 'nothing'}")
-    problem = pose(fit)
-    found: list[Finding] = []
-    kept: list[Term] = []
+    problem, base = pose(fit), solution(pose(base_fit), [])
+    offsets = [(s, t) for s, t in stories if t.candidate.effect == "asymmetric_friction" and first[t.candidate.joint][1] is t]
+    found, kept = _prove(rig, base_fit, offsets, [], rejected)
+    if off_axis is not None:
+        found.append(finding)
+    one = _ratio(base_fit, base, base_fit, kept[:1] or [], solution(pose(base_fit), kept[:1])) if kept else None
+    later, kept = _prove(rig, fit, [s for s in stories if s not in offsets], kept, rejected)
+    found += later
+    theta = solution(problem, kept)
+    if one is None:
+        few = [] if off_axis is not None else kept[:1]
+        one = _ratio(base_fit, base, fit, few, solution(problem, few))
+    lack = {"metric": "effort_rmse", "unit": "share of the declared model's",
+            "before": 1.0, "after": _ratio(base_fit, base, fit, kept, theta), "one_effect": one,
+            "joints": {j: _proof(rig, base_fit, [], base, kept, theta, j, fit) for j in joints}}  # fmt: skip
+    declared_xml = write_declared(rig, base_fit.columns, base)
+    p = len(fit.columns)
+    records = _records(kept, theta[p:])
+    xml = write_effects(write_declared(rig, fit.columns, theta[:p]), records)
+    return _shares(found), rejected, lack, xml, declared_xml
+
+
+def _prove(rig: RigModel, fit: DeclaredFit, stories: Sequence[tuple[Step, Term]], kept: Sequence[Term],
+           rejected: list[dict[str, Any]]) -> tuple[list[Finding], list[Term]]:  # fmt: skip
+    """Findings that hold on the validation recordings, one after the other beside `kept`; the rest goes to rejected."""
+    problem, kept, found = pose(fit), list(kept), []
     for step, term in stories:
-        before = solution(problem, kept)
-        after = solution(problem, [*kept, term])
+        before, after = solution(problem, kept), solution(problem, [*kept, term])
         proof = _proof(rig, fit, kept, before, [*kept, term], after, term.candidate.joint)
         if proof["ci95_reduction"][0] <= 0:
             rejected.append({"effect": term.candidate.key, "reason": "error on validation trials does not fall"})
             continue
         kept.append(term)
         found.append(_joint_finding(rig, fit, step, term, after[len(after) - len(term.candidate.amplitudes):], proof))
-    theta = solution(problem, kept)
-    base = solution(problem, [])
-    lack = {"metric": "effort_rmse", "unit": "share of the declared model's",
-            "before": 1.0, "after": _ratio(fit, base, kept, theta), "one_effect": _ratio(fit, base, kept[:1], solution(problem, kept[:1])),
-            "joints": {j: _proof(rig, fit, [], base, kept, theta, j) for j in joints}}  # fmt: skip
-    declared_xml = write_declared(rig, fit.columns, base)
-    p = len(fit.columns)
-    records = _records(kept, theta[p:])
-    xml = write_effects(write_declared(rig, fit.columns, theta[:p]), records)
-    return _shares(found), rejected, lack, xml, declared_xml
+    return found, kept
 
 
 def _records(kept: Sequence[Term], amplitude: Array) -> list[dict[str, Any]]:
@@ -163,9 +190,9 @@ def _residuals(fit: DeclaredFit, terms: Sequence[Term], theta: Array, joint: str
 
 
 def _proof(rig: RigModel, fit: DeclaredFit, few: Sequence[Term], before: Array, many: Sequence[Term], after: Array,
-           joint: str) -> dict[str, Any]:  # fmt: skip
+           joint: str, fit_after: DeclaredFit | None = None) -> dict[str, Any]:  # fmt: skip
     """Held-out effort error before and after, with an interval of its fall from resampled blocks."""
-    a, b = _residuals(fit, few, before, joint), _residuals(fit, many, after, joint)
+    a, b = _residuals(fit, few, before, joint), _residuals(fit_after or fit, many, after, joint)
     squares = np.array([[np.sum(p**2) for _, e in side for p in np.array_split(e, max(2, 24 // len(side)))] for side in (a, b)])
     count = np.array([len(p) for _, e in a for p in np.array_split(e, max(2, 24 // len(a)))])
     draw = np.random.default_rng(0).integers(0, len(count), (RESAMPLES, len(count)))
@@ -178,11 +205,49 @@ def _proof(rig: RigModel, fit: DeclaredFit, few: Sequence[Term], before: Array, 
             "held_out": [t for t, _ in a], "engine": "mujoco"}  # fmt: skip
 
 
-def _ratio(fit: DeclaredFit, base: Array, kept: Sequence[Term], theta: Array) -> float:
+def _offset_first(rig: RigModel, fit: DeclaredFit, joint: str) -> tuple[Step | None, Term | None]:
+    """A constant offset of a joint's effort, where it wins the first round; (None, None) else."""
+    taken, steps, _ = compete(pose(fit, joint), candidates(rig, fit, joint), most=1)
+    if taken and taken[0].candidate.effect == "asymmetric_friction":
+        return steps[0], taken[0]
+    return None, None
+
+
+def _off_axis(rig: RigModel, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple[DeclaredFit, Finding] | None:
+    """Centres of mass off their declared axes: one change to the whole chain, tried before anything at a joint."""
+    refused = {(t.name, j) for t in rig.trials for j in rig.joints} - {(r.trial, r.joint) for r in fit.rows}
+    freed = fit_declared(rig, refused, fit.cutoff_hz, off_axis=True)
+    if len(freed.columns) == len(fit.columns):
+        return None
+    freed = replace(freed, scale=fit.scale)
+    sides = pose(fit), pose(freed)
+    errors = [held_out(p, offsets, normal(p, offsets))[0] for p in sides]
+    shape = Candidate("gravity_load", "centres of mass off their axes", "*", (), ({},), lambda r, s: np.zeros((len(r.time_s), 0)))
+    step = judge(errors[0], [Score(Term(shape, {}), errors[1], 0.0)], errors[0].sum())
+    if step is None:
+        return None
+    before, after = (solution(p, offsets) for p in sides)
+    joints = sorted({r.joint for r in fit.rows})
+    proofs = {j: _proof(rig, fit, offsets, before, offsets, after, j, freed) for j in joints}
+    best = max(joints, key=lambda j: 1 - proofs[j]["after"] / max(proofs[j]["before"], 1e-300))
+    ratio = float(np.sqrt(np.mean([(p["after"] / p["before"]) ** 2 for p in proofs.values()])))
+    if ratio >= 1 or proofs[best]["ci95_reduction"][0] <= 0:
+        return None
+    moved = {c.label: {"value": float(v), "unit": "kg m"} for c, v in zip(freed.columns, after)
+             if c.kind == "inertial" and c.value == 0}  # fmt: skip
+    where = {"finger": None, "joint": best, "actuator": None, "signal": "effort", "marker": None,
+             "trials": proofs[best]["held_out"], "share_of_mismatch": proofs[best]["before"] ** 2 - proofs[best]["after"] ** 2}  # fmt: skip
+    words = (f"Centres of mass lie off the axes on which they are declared: held-out effort error falls to "
+             f"{100 * ratio:.0f} % over all joints (most at {best}: {proofs[best]['before']:.4g} to {proofs[best]['after']:.4g}).")
+    return freed, Finding("gravity_load", ("gravity_load",), step.probability, (), where, words, moved, proofs[best],
+                          {"native": True, "mjcf": "body/inertial/@pos", "urdf": "link/inertial/origin"})  # fmt: skip
+
+
+def _ratio(base_fit: DeclaredFit, base: Array, fit: DeclaredFit, kept: Sequence[Term], theta: Array) -> float:
     """Root mean over joints of the squared ratio of held-out errors."""
     ratios = []
     for joint in {r.joint for r in fit.rows}:
-        before = np.concatenate([e for _, e in _residuals(fit, [], base, joint)])
+        before = np.concatenate([e for _, e in _residuals(base_fit, [], base, joint)])
         after = np.concatenate([e for _, e in _residuals(fit, kept, theta, joint)])
         ratios.append(np.sum(after**2) / max(np.sum(before**2), 1e-300))
     return float(np.sqrt(np.mean(ratios)))
@@ -223,7 +288,13 @@ def _diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Call
     declared = polish(swing, Task(free_declared(swing), vector(swing.initial), train))
     taken, _, rounds = compete_swing(swing, declared)
     say(f"{rig.name}: {', '.join(v.key for v in taken) or 'nothing'}")
-    files = [write_swing(rig, swing, f.theta) for f in (declared, *(r.fit for r in rounds))]
+    fine = build_swing(rig, fit)
+    sets = [free_declared(swing)] + [tuple(dict.fromkeys((*free_declared(swing), *(n for v in taken[: k + 1] for n in v.start))))
+                                     for k in range(len(taken))]  # fmt: skip
+    tasks = [Task(free, f.theta, train) for free, f in zip(sets, (declared, *(r.fit for r in rounds)), strict=True)]
+    fits = fit_together(fine, tasks, 8)
+    rounds = tuple(replace(r, fit=f) for r, f in zip(rounds, fits[1:], strict=True))
+    files = [write_swing(rig, fine, f.theta) for f in fits]
     replays = [replay_rig(session, load_rig(session, x)) for x in files]
     figures = [r.figure("position_rmse", True) for r in replays]
     means = [r.figure("position_mae", True) for r in replays]
@@ -253,8 +324,6 @@ def _fall(before: Any, after: Any) -> list[float]:
 
 
 def _swing_finding(rig: RigModel, variant: Variant, round_: Round, swing: Swing, proof: dict) -> Finding:
-    from .swing import INDEX
-
     joint = rig.joints[0]
     parameters = {n: {"value": float(round_.fit.theta[INDEX[n]]), "unit": ""} for n in variant.start}
     where = {"finger": None, "joint": joint, "actuator": (rig.drive(joint).name if rig.drive(joint) else None),
@@ -277,22 +346,22 @@ def _diagnose_coupling(rig: RigModel, coupling: Any) -> tuple[list[Finding], lis
     fit = fit_coupling(rig, coupling)
     if fit is None:
         return [], []
-    problem = pose(fit)
-    taken, steps, scores = compete(problem, coupling_candidates(fit, coupling))
-    found, kept = [], []
+    taken, steps, scores = compete(pose(fit), coupling_candidates(fit, coupling))
+    moved = zero_shift(fit, solution(pose(fit), taken), taken)
+    if moved is not None:
+        fit = moved
+        taken, steps, scores = compete(pose(fit), coupling_candidates(fit, coupling))
     rejected = [{"effect": s.term.candidate.key, "reason": "held-out error does not fall enough"} for s in scores]
-    for step, term in zip(steps, taken, strict=True):
-        before, after = solution(problem, kept), solution(problem, [*kept, term])
-        proof = _proof(rig, fit, kept, before, [*kept, term], after, coupling.dependent)
-        proof |= {"metric": "angle_rmse", "unit": rig.unit(coupling.dependent)}
-        if proof["ci95_reduction"][0] <= 0:
-            rejected.append({"effect": term.candidate.key, "reason": "error on validation trials does not fall"})
-            continue
-        kept.append(term)
-        finding = _joint_finding(rig, fit, step, term, after[len(after) - len(term.candidate.amplitudes):], proof)
-        where = {**finding.where, "actuator": None, "signal": "position", "joint": coupling.dependent, "coupling": coupling.name}
-        found.append(replace(finding, where=where))
-    return _shares(found), rejected
+    found, _ = _prove(rig, fit, list(zip(steps, taken, strict=True)), [], rejected)
+    named = []
+    for f in found:
+        proof = {**f.fit, "metric": "angle_rmse", "unit": rig.unit(coupling.dependent)}
+        where = {**f.where, "actuator": None, "signal": "position", "coupling": coupling.name}
+        words = f.statement.replace("effort rmse", "angle rmse").replace(rig.effort_unit(coupling.dependent), proof["unit"])
+        if moved is not None:
+            words += " The zero between the two encoders differs between recordings and was taken out of each."
+        named.append(replace(f, fit=proof, where=where, statement=words))
+    return _shares(named), rejected
 
 
 # --- words -----------------------------------------------------------------------------------------------------------

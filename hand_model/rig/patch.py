@@ -135,6 +135,16 @@ def physical(p: Array) -> tuple[float, Array, Array]:
     return mass, centre, inertia
 
 
+def write_couplings(xml: bytes, polycoef: Mapping[str, Array]) -> bytes:
+    """The MJCF with the polynomials (5,) of named equality joints."""
+    root = parse(xml)
+    for section in root.iter("equality"):
+        for element in section:
+            if element.get("name") in polycoef:
+                element.set("polycoef", number(*polycoef[element.get("name")]))
+    return serialise(root)
+
+
 def write_effects(xml: bytes, effects: Sequence[Mapping[str, Any]]) -> bytes:
     """The MJCF with effects that have no attribute kept as JSON in custom/text; [] removes them."""
     root = parse(xml)

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ..effects.path import jenkins
 from .balance import Column, Rows
-from .candidates import Candidate, direction
+from .candidates import Candidate
+from .compete import Term, design
 from .declared import DeclaredFit, _robust_fit
 from .model import Coupling, RigModel, RigTrial
 from .states import choose_cutoff, differentiate, fill_gaps, low_pass, uniform_time, velocity_noise
@@ -55,7 +59,7 @@ def _rows(rig: RigModel, coupling: Coupling, columns: tuple[Column, ...], trial:
     moving[: int(0.5 * rate / skip)] = False  # the first half second: the transmission is not yet wound up
     return Rows(trial.name, coupling.dependent, trial.validate, grid[s], q[s], v[s], a[s], out[s], powers, moving, rest,
                 cutoff, rate / skip, {"effort": out[s], **{k: c[s] for k, c in extra.items()}},
-                np.zeros_like(powers), np.zeros(len(q[s])), 1)  # fmt: skip
+                powers, np.zeros(5, bool), np.zeros(len(q[s])), 1)  # fmt: skip
 
 
 def coupling_candidates(fit: DeclaredFit, coupling: Coupling) -> tuple[Candidate, ...]:
@@ -80,8 +84,24 @@ def coupling_candidates(fit: DeclaredFit, coupling: Coupling) -> tuple[Candidate
     return tuple(out)
 
 
+def zero_shift(fit: DeclaredFit, theta: Array, terms: Sequence[Term]) -> DeclaredFit | None:
+    """The coupling with each recording's own zero taken out, where zeros differ between recordings; else None.
+
+    An incremental encoder starts anywhere: what remains after all effects then differs from recording to recording far
+    more than within one (by five times in variance).
+    """
+    left = [(r.effort - design(r, terms) @ theta)[r.moving] for r in fit.rows]
+    between, within = np.var([e.mean() for e in left]), np.mean([e.var() for e in left])
+    if between < 5 * within:
+        return None
+    rows = []
+    for r, e in zip(fit.rows, left, strict=True):
+        rows.append(replace(r, effort=r.effort - e.mean(), extra={**r.extra, "effort": r.extra["effort"] - e.mean()}))
+    return _robust_fit(fit.columns, tuple(rows), fit.cutoff_hz)
+
+
 def _load(row: Rows, channel: str) -> Array:
     return row.extra.get(channel, np.zeros(len(row.time_s)))
 
 
-__all__ = ["coupling_candidates", "coupling_columns", "direction", "fit_coupling"]
+__all__ = ["coupling_candidates", "coupling_columns", "fit_coupling", "zero_shift"]
