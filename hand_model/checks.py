@@ -15,7 +15,7 @@ from scipy.stats import chi2
 from .errors import HandModelError
 from .hand import Finger, Hand, Joint
 from .published import axis_parallelism_deg, axis_repeatability_deg
-from .rotation import angle_between
+from .rotation import angle_between, skew
 from .twin.published import FINGERS, published_joint
 
 Array = NDArray[np.float64]
@@ -62,30 +62,60 @@ class JointRow:
 def repeatability(first: Hand, second: Hand) -> tuple[JointRow, ...]:
     """Axes and centres of one hand from two sessions (table 4.9). Raises HandModelError where they share no joint."""
     if first.side != second.side:
-        raise HandModelError(f"repeatability needs two sessions of one hand; these are a {first.side} and a {second.side} one")
+        raise HandModelError(
+            f"repeatability needs two sessions of one hand; these are a {first.side} and a {second.side} one"
+        )
     return _compared(first, second, np.eye(3), axis_repeatability_deg)
 
 
 def mirror(left: Hand, right: Hand) -> tuple[JointRow, ...]:
     """The left hand, reflected, against the right one (table 4.10). Raises HandModelError where they share no joint."""
     if {left.side, right.side} != {"left", "right"}:
-        raise HandModelError(f"the mirror relation needs a left and a right hand; these are {left.side} and {right.side}")
+        raise HandModelError(
+            f"the mirror relation needs a left and a right hand; these are {left.side} and {right.side}"
+        )
     pair = (left, right) if left.side == "left" else (right, left)
     return _compared(*pair, MIRROR, _published_mirror_deg)
 
 
-def parallelism(hand: Hand) -> tuple[JointRow, ...]:
-    """Angle between the first axis of a finger and each further one (table 4.11).
+def frame_covariance(hand: Hand) -> Array:
+    """(6, 6) of turn [rad] and shift [m] of the palm frame as the landmarks give it, in that frame; zero where it is not known."""
+    return np.array(hand.extra.get("frame_covariance", np.zeros((6, 6))), float)
 
-    Both axes count as independently uncertain: what they share, the landmarks, makes the interval too wide, never too narrow.
+
+def joint_covariance(hand: Hand, joint: Joint) -> Array:
+    """(6, 6) of axis and centre without the palm frame's own uncertainty, which moves all joints of the hand together."""
+    by_frame = np.zeros((6, 6))
+    by_frame[:3, :3] = skew(joint.axis_palm)
+    by_frame[3:, :3] = skew(joint.centre_palm)
+    by_frame[3:, 3:] = -np.eye(3)
+    rest = joint.covariance - by_frame @ frame_covariance(hand) @ by_frame.T
+    value, vector = np.linalg.eigh((rest + rest.T) / 2)
+    return (vector * np.maximum(value, 0.0)) @ vector.T  # a difference of covariances: rounding may leave -1e-20
+
+
+def parallelism(hand: Hand) -> tuple[JointRow, ...]:
+    """Angle between the first axis of a finger and each further one (table 4.11), the palm frame's uncertainty left out.
+
+    Both axes count as independently uncertain.
     """
     rows = []
     for finger in hand.fingers:
         first = finger.joints[0]
         for joint in finger.joints[1:]:
             published = axis_parallelism_deg(hand.side, finger.name) if len(finger.joints) == 2 else None
-            angle = axis_difference(first.axis_palm, joint.axis_palm, first.covariance[:3, :3] + joint.covariance[:3, :3])
-            rows.append(JointRow(finger.name, f"{first.name} to {joint.name}", angle, None, published, first.degenerate or joint.degenerate))
+            uncertain = joint_covariance(hand, first) + joint_covariance(hand, joint)
+            angle = axis_difference(first.axis_palm, joint.axis_palm, uncertain[:3, :3])
+            rows.append(
+                JointRow(
+                    finger.name,
+                    f"{first.name} to {joint.name}",
+                    angle,
+                    None,
+                    published,
+                    first.degenerate or joint.degenerate,
+                )
+            )
     return tuple(rows)
 
 
@@ -115,7 +145,9 @@ def _difference(vector: Array, covariance: Array) -> Difference:
         along = vector / length
         half = 1.96 * float(np.sqrt(along @ covariance @ along))
         return Difference(length, noise, (max(0.0, length - half), length + half), significance)
-    return Difference(length, noise, (0.0, length + 1.96 * float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))), significance)
+    return Difference(
+        length, noise, (0.0, length + 1.96 * float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))), significance
+    )
 
 
 def _compared(first: Hand, second: Hand, reflection: Array, published: Published) -> tuple[JointRow, ...]:
@@ -126,7 +158,9 @@ def _compared(first: Hand, second: Hand, reflection: Array, published: Published
             rows += _finger_rows(finger, other[finger.name], reflection, published)
     if not rows:
         names = ", ".join(f.name for f in first.fingers), ", ".join(other)
-        raise HandModelError(f"the two hands share no finger with the same joints (first: {names[0]}; second: {names[1]})")
+        raise HandModelError(
+            f"the two hands share no finger with the same joints (first: {names[0]}; second: {names[1]})"
+        )
     return tuple(rows)
 
 
@@ -140,7 +174,16 @@ def _finger_rows(a: Finger, b: Finger, reflection: Array, published: Published) 
             total = turned.covariance + other.covariance
             angle = axis_difference(turned.axis_palm, other.axis_palm, total[:3, :3])
             distance = point_difference(turned.centre_palm, other.centre_palm, total[3:, 3:])
-            rows.append(JointRow(a.name, joint.name, angle, distance, known[k] if known else None, joint.degenerate or other.degenerate))
+            rows.append(
+                JointRow(
+                    a.name,
+                    joint.name,
+                    angle,
+                    distance,
+                    known[k] if known else None,
+                    joint.degenerate or other.degenerate,
+                )
+            )
     return rows
 
 
@@ -163,4 +206,6 @@ def _published_mirror_deg(finger: str) -> tuple[float, ...] | None:
     if finger not in FINGERS:
         return None
     turned = published_joint("left", finger)[0] @ -MIRROR
-    return tuple(np.rad2deg(angle_between(a, b)) for a, b in zip(turned, published_joint("right", finger)[0], strict=True))
+    return tuple(
+        np.rad2deg(angle_between(a, b)) for a, b in zip(turned, published_joint("right", finger)[0], strict=True)
+    )

@@ -12,7 +12,17 @@ from ..hand import Hand
 from .page import Cell, Section, note, page, table
 from .words import count, number
 
-COLUMNS = ("finger", "joint", "angle", "noise alone", "95 % interval", "thesis", "distance", "noise alone", "95 % interval")
+COLUMNS = (
+    "finger",
+    "joint",
+    "angle",
+    "noise alone",
+    "95 % interval",
+    "thesis",
+    "distance",
+    "noise alone",
+    "95 % interval",
+)
 
 
 def angle_cells(row: JointRow) -> list[str | Cell]:
@@ -33,7 +43,11 @@ def distance_cells(row: JointRow) -> list[str | Cell]:
         return []
     low, high = 1e3 * row.distance.ci95[0], 1e3 * row.distance.ci95[1]
     value = number(1e3 * row.distance.value)
-    return [Cell(value, "best" if row.distance.real else ""), number(1e3 * row.distance.noise), f"{number(low)} to {number(high)}"]
+    return [
+        Cell(value, "best" if row.distance.real else ""),
+        number(1e3 * row.distance.noise),
+        f"{number(low)} to {number(high)}",
+    ]
 
 
 def angle_words(rows: Sequence[JointRow], agree: str) -> str:
@@ -44,7 +58,9 @@ def angle_words(rows: Sequence[JointRow], agree: str) -> str:
     words = f"{same} of {count(len(rows), 'pair')} of axes {agree}; median angle {number(middle)} deg, largest "
     words += f"{number(np.rad2deg(worst.angle.value))} deg ({worst.finger} {worst.joint})"
     known = [row.published_deg for row in rows if row.published_deg is not None]
-    return words + (f"; thesis: median {number(float(np.median(known)))} deg, largest {number(max(known))} deg." if known else ".")
+    return words + (
+        f"; thesis: median {number(float(np.median(known)))} deg, largest {number(max(known))} deg." if known else "."
+    )
 
 
 @dataclass(frozen=True)
@@ -79,7 +95,10 @@ def checks(a: Hand, b: Hand) -> tuple[Check, ...]:
         name, title = "mirror", "Left hand, reflected, against the right"
         meaning = "Reflected across the palm's x-z plane. Thesis: its two hands, from tables 4.1 and 4.2."
     far = [row.distance for row in rows if row.distance is not None]
-    words = angle_words(rows, agree) + f" {sum(not d.real for d in far)} of {count(len(far), 'centre')} agree within their uncertainty; "
+    words = (
+        angle_words(rows, agree)
+        + f" {sum(not d.real for d in far)} of {count(len(far), 'centre')} agree within their uncertainty; "
+    )
     words += f"median distance {number(1e3 * float(np.median([d.value for d in far])))} mm, largest {number(1e3 * max(d.value for d in far))} mm."
     caption = f"Degrees and millimetres, in the form of table {number_}; bold: more than the uncertainty explains"
     found = [Check(name, title, words, meaning, caption, rows)]
@@ -88,17 +107,27 @@ def checks(a: Hand, b: Hand) -> tuple[Check, ...]:
         if rows:
             title = f"Parallelism, {label} hand ({hand.name}, {hand.side})"
             words = angle_words(rows, "are parallel within their uncertainty")
-            meaning = "Angle between the axes of one finger; what both share, the landmarks, counts twice, so the interval is too wide rather than too narrow."
-            found.append(Check(f"parallelism-{label}", title, words, meaning, "Degrees, in the form of table 4.11", rows))
+            meaning = (
+                "Angle between the axes of one finger; the palm frame's own uncertainty, shared by both, is left out."
+            )
+            found.append(
+                Check(f"parallelism-{label}", title, words, meaning, "Degrees, in the form of table 4.11", rows)
+            )
     return tuple(found)
 
 
 def comparison_page(a: Hand, b: Hand) -> bytes:
     """The checks as a page."""
     sections = [
-        Section(c.name, c.title, c.words, (table(c.columns, c.cells(), c.caption, text_columns=2), note(c.meaning))) for c in checks(a, b)
+        Section(c.name, c.title, c.words, (table(c.columns, c.cells(), c.caption, text_columns=2), note(c.meaning)))
+        for c in checks(a, b)
     ]
-    return page(f"{a.name} ({a.side}) and {b.name} ({b.side})", "The thesis's checks of identified hands, each with its uncertainty.", (), sections)
+    return page(
+        f"{a.name} ({a.side}) and {b.name} ({b.side})",
+        "The thesis's checks of identified hands, each with its uncertainty.",
+        (),
+        sections,
+    )
 
 
 def comparison_text(a: Hand, b: Hand) -> str:

@@ -6,40 +6,59 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..checks import parallelism
+from ..checks import frame_covariance, joint_covariance, parallelism
 from ..hand import Finger, Hand, Joint
 from ..published import mapping_rmse_deg
 from .comparison import angle_cells, angle_words
 from .page import Cell, Section, folded, heading, listing, note, table
 from .words import count, listed, number, span
 
+Array = NDArray[np.float64]
+
 ORDER = {1: "linear", 2: "quadratic", 3: "cubic", 4: "quartic"}
 
 
-def axis_sd_deg(joint: Joint) -> float:
-    """Standard deviation of the axis in its worst direction [deg], the palm frame's own uncertainty included."""
-    return float(np.rad2deg(np.sqrt(max(np.linalg.eigvalsh(joint.covariance[:3, :3])[-1], 0.0))))
+def axis_sd_deg(hand: Hand, joint: Joint) -> float:
+    """Standard deviation of the axis in its worst direction [deg], the palm frame taken as known."""
+    return float(np.rad2deg(worst_sd(joint_covariance(hand, joint)[:3, :3])))
 
 
-def centre_sd_mm(joint: Joint) -> float:
-    """Standard deviation of the centre in its worst direction [mm]."""
-    return float(1e3 * np.sqrt(max(np.linalg.eigvalsh(joint.covariance[3:, 3:])[-1], 0.0)))
+def centre_sd_mm(hand: Hand, joint: Joint) -> float:
+    """Standard deviation of the centre in its worst direction [mm], the palm frame taken as known."""
+    return 1e3 * worst_sd(joint_covariance(hand, joint)[3:, 3:])
+
+
+def worst_sd(covariance: Array) -> float:
+    """Standard deviation in the worst direction."""
+    return float(np.sqrt(max(np.linalg.eigvalsh(covariance)[-1], 0.0)))
+
+
+def frame_words(hand: Hand) -> str:
+    """What the landmarks leave open about the palm frame itself; empty where that is not known."""
+    covariance = frame_covariance(hand)
+    if not covariance.any():
+        return ""
+    turn, shift = np.rad2deg(worst_sd(covariance[:3, :3])), 1e3 * worst_sd(covariance[3:, 3:])
+    return (
+        f"the palm frame itself, from the probed landmarks, is uncertain by {number(turn)} deg and {number(shift)} mm"
+    )
 
 
 def axes_section(hand: Hand) -> Section:
     """Axes and centres with their uncertainty, the published method beside them."""
     joints = [(finger, joint) for finger in hand.fingers for joint in finger.joints]
     published = {(f, j): row for f, rows in hand.extra.get("published_method", {}).items() for j, row in rows.items()}
-    rows = [_axis_row(finger, joint, published.get((finger.name, joint.name), {})) for finger, joint in joints]
+    rows = [_axis_row(hand, finger, joint, published.get((finger.name, joint.name), {})) for finger, joint in joints]
     columns = ["finger", "joint", "x", "y", "z", "± deg", "x", "y", "z", "± mm", "deg", "deg", "mm"]
     groups = [("", 2), ("axis", 4), ("centre [mm]", 4), ("arc", 1), ("published method off by", 2)]
     body = [table(columns, rows, groups=groups, text_columns=2)]
     body.append(
         note(
-            "Palm frame of the landmarks; ± is one standard deviation in the worst direction, with the probing of the landmarks in it. "
-            "Published method: axis by Gamage & Lasenby (2002), centre by Chang & Pollard (2007) on the same markers, as its distance from "
-            "the maximum-likelihood chain (for the centre, across the axis)."
+            "Palm frame of the landmarks; ± is one standard deviation in the worst direction, the palm frame taken as known. "
+            "Published method: axis by Gamage & Lasenby (2002), centre by Chang & Pollard (2007) on the same markers, as its "
+            "distance from the maximum-likelihood chain (for the centre, across the axis)."
         )
     )
     parallel = parallelism(hand)
@@ -47,41 +66,60 @@ def axes_section(hand: Hand) -> Section:
         body.append(heading("Are the axes of a finger parallel?"))
         body.append(note(angle_words(parallel, "are parallel within their uncertainty")))
         columns = ["finger", "joints", "angle", "noise alone", "95 % interval", "thesis"]
-        body.append(table(columns, [[r.finger, r.joint, *angle_cells(r)] for r in parallel], text_columns=2, caption="Degrees, in the form of table 4.11"))
-    return Section("axes", "Axes and centres", _axes_words(joints, published), tuple(body))
+        body.append(
+            table(
+                columns,
+                [[r.finger, r.joint, *angle_cells(r)] for r in parallel],
+                text_columns=2,
+                caption="Degrees, in the form of table 4.11",
+            )
+        )
+    return Section("axes", "Axes and centres", _axes_words(hand, joints, published), tuple(body))
 
 
-def _axis_row(finger: Finger, joint: Joint, old: Mapping[str, Any]) -> list[str | Cell]:
-    sd = number(axis_sd_deg(joint))
+def _axis_row(hand: Hand, finger: Finger, joint: Joint, old: Mapping[str, Any]) -> list[str | Cell]:
+    sd = number(axis_sd_deg(hand, joint))
     cells: list[str | Cell] = [finger.name, joint.name, *(number(v, 4) for v in joint.axis_palm)]
     cells.append(Cell(f"{sd} not determined", "flag") if joint.degenerate else sd)
-    cells += [number(1e3 * v) for v in joint.centre_palm] + [number(centre_sd_mm(joint))]
+    cells += [number(1e3 * v) for v in joint.centre_palm] + [number(centre_sd_mm(hand, joint))]
     cells.append(number(old.get("arc_deg", np.rad2deg(np.ptp(joint.range_rad))), 0))
     if "failed" in old:
         return [*cells, Cell("fails", "flag"), Cell("–", "dim")]
     off = old.get("centre_off_m")
-    return [*cells, Cell(number(old.get("axis_off_deg")), "dim"), Cell(number(None if off is None else 1e3 * off), "dim")]
+    return [
+        *cells,
+        Cell(number(old.get("axis_off_deg")), "dim"),
+        Cell(number(None if off is None else 1e3 * off), "dim"),
+    ]
 
 
-def _axes_words(joints: list[tuple[Finger, Joint]], published: Mapping[tuple[str, str], Mapping[str, Any]]) -> str:
+def _axes_words(
+    hand: Hand, joints: list[tuple[Finger, Joint]], published: Mapping[tuple[str, str], Mapping[str, Any]]
+) -> str:
     weak = [f"{f.name} {j.name}" for f, j in joints if j.degenerate]
     known = [j for _, j in joints if not j.degenerate]
-    words = ""
+    parts = []
     if known:
-        words = f"{'All' if not weak else len(known)} of the {count(len(joints), 'axis', 'axes')} are known to {number(max(map(axis_sd_deg, known)))} deg "
-        words = words.replace("All of the", "All") + f"and {number(max(map(centre_sd_mm, known)))} mm or better (one standard deviation)"
+        which = f"All {len(joints)} axes" if not weak else f"{len(known)} of the {len(joints)} axes"
+        angle = number(max(axis_sd_deg(hand, j) for j in known))
+        distance = number(max(centre_sd_mm(hand, j) for j in known))
+        parts.append(
+            f"{which} are known to {angle} deg and {distance} mm or better within the palm (one standard deviation)"
+        )
     if weak:
         verb = "does not determine its axis" if len(weak) == 1 else "do not determine their axes"
-        words += f"{'; ' if words else ''}the recorded {'arc' if len(weak) == 1 else 'arcs'} of {listed(weak)} {verb}"
+        parts.append(f"the recorded {'arc' if len(weak) == 1 else 'arcs'} of {listed(weak)} {verb}")
+    parts += filter(None, [frame_words(hand)])
     off = {k: row for k, row in published.items() if "axis_off_deg" in row}
     if off:
         worst = max(off, key=lambda k: off[k]["axis_off_deg"])
-        far = max(row["centre_off_m"] for row in off.values())
-        words += (
-            f"; on the same markers the published method lands up to {number(off[worst]['axis_off_deg'], 1)} deg ({' '.join(worst)}, "
-            f"an arc of {number(off[worst]['arc_deg'], 0)} deg) and {number(1e3 * far, 1)} mm away"
+        far = number(1e3 * max(row["centre_off_m"] for row in off.values()), 1)
+        parts.append(
+            f"on the same markers the published method lands up to {number(off[worst]['axis_off_deg'], 1)} deg "
+            f"({' '.join(worst)}, an arc of {number(off[worst]['arc_deg'], 0)} deg) and {far} mm away"
         )
-    return words[0].upper() + words[1:] + "."
+    words = "; ".join(parts)
+    return words[:1].upper() + words[1:] + "."
 
 
 def maps_section(hand: Hand, pictures: tuple[Any, ...] = ()) -> Section | None:
@@ -103,7 +141,7 @@ def maps_section(hand: Hand, pictures: tuple[Any, ...] = ()) -> Section | None:
                     ours.setdefault(place, []).append(_chosen(fitted.rmse_held_out_rad, fitted.coefficients))
                     theirs.setdefault(place, []).extend(thesis[2:] if thesis else [])
         orders = _orders(fingers, place)
-        groups = [("", 1), *[(ORDER[o], 3) for o in orders]]
+        groups = [("", 1), *[(ORDER.get(o, f"order {o}"), 3) for o in orders]]
         columns = ["finger", *["fitted", "held out", "thesis"] * len(orders)]
         body.append(table(columns, rows, f"RMSE of encoder to {place} angle [deg]", groups))
     body.append(
@@ -116,12 +154,22 @@ def maps_section(hand: Hand, pictures: tuple[Any, ...] = ()) -> Section | None:
     for place, values in ours.items():
         beside = f" (thesis, cubic, fitted data: {span(theirs[place])} deg)" if theirs[place] else ""
         words.append(f"{place} angle within {span(values)} deg{beside}")
-    conclusion = f"Encoder counts alone give the {listed(words)}: root mean square on held-out cycles, order chosen there."
+    conclusion = (
+        f"Encoder counts alone give the {listed(words)}: root mean square on held-out cycles, order chosen there."
+    )
     return Section("maps", "Encoder to angles", conclusion, tuple(body))
 
 
 def _orders(fingers: list[Finger], place: str) -> list[int]:
-    return sorted({int(o) for f in fingers for j, m in zip(f.joints, f.encoder_maps, strict=True) if j.name == place for o in m.rmse_rad})
+    return sorted(
+        {
+            int(o)
+            for f in fingers
+            for j, m in zip(f.joints, f.encoder_maps, strict=True)
+            if j.name == place
+            for o in m.rmse_rad
+        }
+    )
 
 
 def _chosen(table_rad: Mapping[str, float], coefficients: Any) -> float:
@@ -150,8 +198,14 @@ def coupling_section(hand: Hand) -> Section | None:
         order = len(c.coefficients) - 1
         line = np.polyfit(q := np.linspace(low, high, 200), c.follower_rad(q), 1)
         bend = np.rad2deg(np.abs(c.follower_rad(q) - np.polyval(line, q)).max())
-        rows.append([finger.name, f"{c.follower} of {c.driver}", ORDER.get(order, str(order)), _polynomial(c.coefficients)])
-        rows[-1] += [f"{ends[0]:.1f} to {ends[1]:.1f}", number(bend), number(_chosen(c.rmse_rad, c.coefficients), 3)]
+        rows.append(
+            [finger.name, f"{c.follower} of {c.driver}", ORDER.get(order, str(order)), _polynomial(c.coefficients)]
+        )
+        rows[-1] += [
+            f"{number(ends[0], 1)} to {number(ends[1], 1)}",
+            number(bend),
+            number(_chosen(c.rmse_rad, c.coefficients), 3),
+        ]
         rows[-1].append(Cell(number(_chosen(c.rmse_held_out_rad, c.coefficients), 3), "best"))
     held = [_chosen(c.rmse_held_out_rad, c.coefficients) for _, c in links]
     bends = [float(str(row[5])) for row in rows]
@@ -159,18 +213,26 @@ def coupling_section(hand: Hand) -> Section | None:
         f"One polynomial per linkage, monotonic over the recorded range, follows the driven joint within {span(held)} deg on held-out cycles; "
         f"a straight line, all that a URDF's mimic can say, would be off by up to {number(max(bends), 1)} deg."
     )
-    columns = ["finger", "linkage", "order", "follower [rad] of driver q [rad]", "range [deg]", "bend [deg]", "fitted [deg]", "held out [deg]"]
+    columns = [
+        "finger",
+        "linkage",
+        "order",
+        "follower [rad] of driver q [rad]",
+        "range [deg]",
+        "bend [deg]",
+        "fitted [deg]",
+        "held out [deg]",
+    ]
     return Section("linkages", "Linkages", conclusion, (table(columns, rows, text_columns=4),))
 
 
 def _polynomial(coefficients: Any) -> str:
-    terms = []
+    text = ""
     for power, value in enumerate(coefficients):
-        sign = "−" if value < 0 else "+"
+        sign = "−" if value < 0 else "+" if text else ""
         unit = "" if power == 0 else " q" if power == 1 else f" q{'²³⁴⁵'[power - 2]}"
-        terms.append(f"{sign} {abs(value):.4f}{unit}")
-    text = " ".join(terms)
-    return text[2:] if text.startswith("+ ") else text
+        text += f" {sign} {abs(value):.4f}{unit}" if text else f"{sign}{abs(value):.4f}{unit}"
+    return text
 
 
 def repairs_section(hand: Hand) -> Section:
@@ -179,9 +241,13 @@ def repairs_section(hand: Hand) -> Section:
     for r in hand.extra.get("repairs", []):
         markers = listed(r["markers"])
         if r["kind"] == "swap":
-            items.append(f"{r['trial']}: {markers} carried each other's label from {r['from_s']:.2f} to {r['to_s']:.2f} s; put right.")
+            items.append(
+                f"{r['trial']}: {markers} carried each other's label from {r['from_s']:.2f} to {r['to_s']:.2f} s; put right."
+            )
         else:
-            items.append(f"{r['trial']}: {markers} moved by {1e3 * r['shift_m']:.2f} mm on its segment at {r['at_s']:.2f} s; two epochs fitted.")
+            items.append(
+                f"{r['trial']}: {markers} moved by {1e3 * r['shift_m']:.2f} mm on its segment at {r['at_s']:.2f} s; two epochs fitted."
+            )
     swaps = sum(r["kind"] == "swap" for r in hand.extra.get("repairs", []))
     slips = len(items) - swaps
     if items:
@@ -192,5 +258,7 @@ def repairs_section(hand: Hand) -> Section:
     if hand.notes:
         body += [heading("Notes"), listing(hand.notes)]
     hashes = [f"{file}  {sha}" for file, sha in hand.provenance.items()]
-    body.append(folded(f"SHA-256 of the {count(len(hashes), 'file')} that the hand was identified from", listing(hashes)))
+    body.append(
+        folded(f"SHA-256 of the {count(len(hashes), 'file')} that the hand was identified from", listing(hashes))
+    )
     return Section("repairs", "Repairs and origin", conclusion, tuple(body))

@@ -43,7 +43,9 @@ def page(title: str, lead: str, tiles: Sequence[tuple[str, str]], sections: Sequ
     )
     body = E.BODY(E.H1(title), E.P(lead, E.CLASS("lead")))
     if tiles:
-        body.append(E.DIV(E.CLASS("tiles"), *[E.DIV(E.CLASS("tile"), E.B(figure), E.SPAN(what)) for figure, what in tiles]))
+        body.append(
+            E.DIV(E.CLASS("tiles"), *[E.DIV(E.CLASS("tile"), E.B(figure), E.SPAN(what)) for figure, what in tiles])
+        )
     if len(sections) > 1:
         body.append(E.E.nav(*[E.A(s.title, href=f"#{s.name}") for s in sections]))
     for section in sections:
@@ -54,7 +56,11 @@ def page(title: str, lead: str, tiles: Sequence[tuple[str, str]], sections: Sequ
 
 
 def table(
-    columns: Sequence[str], rows: Sequence[Sequence[str | Cell]], caption: str = "", groups: Sequence[tuple[str, int]] = (), text_columns: int = 1
+    columns: Sequence[str],
+    rows: Sequence[Sequence[str | Cell]],
+    caption: str = "",
+    groups: Sequence[tuple[str, int]] = (),
+    text_columns: int = 1,
 ) -> Element:
     """A table that scrolls sideways where it is wider than the page. groups: (heading, columns spanned) above the columns.
 
@@ -71,7 +77,9 @@ def table(
 
 def figures(*drawn: tuple[str, bytes]) -> Element:
     """Pictures side by side as the width allows: (caption, SVG) pairs."""
-    return E.DIV(E.CLASS("figures"), *[E.E.figure(E.E.figcaption(caption), etree.fromstring(svg)) for caption, svg in drawn])
+    return E.DIV(
+        E.CLASS("figures"), *[E.E.figure(E.E.figcaption(caption), etree.fromstring(svg)) for caption, svg in drawn]
+    )
 
 
 def key(*entries: tuple[str, str]) -> Element:

@@ -24,7 +24,9 @@ def box_statistics(values: Array) -> dict[str, Any]:
     return {"med": median, "q1": q1, "q3": q3, "whislo": values.min(), "whishi": values.max(), "fliers": []}
 
 
-def boxes(groups: Mapping[str, Mapping[str, Array]], label: str, colours: Mapping[str, str], top: float | None = None) -> bytes:
+def boxes(
+    groups: Mapping[str, Mapping[str, Array]], label: str, colours: Mapping[str, str], top: float | None = None
+) -> bytes:
     """Box plots (median, quartiles, range): groups along the axis, one colour per series in each. colours: series -> colour."""
     with drawing() as d:
         names = list(groups)
@@ -55,18 +57,33 @@ def boxes(groups: Mapping[str, Mapping[str, Array]], label: str, colours: Mappin
 
 
 def encoder_map(finger: Finger, trials: Sequence[TrialResiduals]) -> bytes:
-    """Angles that the markers show over encoder counts, and the maps."""
-    with drawing() as d:
+    """Angles that the markers show over encoder counts with the maps through them; below, what the maps leave."""
+    with drawing(height=3.3, panels=(2.2, 1)) as d:
+        top, below = d.panels
         for k, (joint, fitted) in enumerate(zip(finger.joints, finger.encoder_maps, strict=True)):
             colour = SERIES[k % len(SERIES)]
             counts, angle = _cloud(trials, k)
-            d.axes.plot(counts, np.rad2deg(angle), ".", color=colour, markersize=2.6, alpha=0.45, markeredgewidth=0)
             span = np.linspace(*np.sort([fitted.counts_open, fitted.counts_close]), 80)
-            d.axes.plot(span, np.rad2deg(fitted.angle_rad(span)), color=INK, linewidth=0.9)
-            end = fitted.angle_rad(np.array([fitted.counts_close]))[0]
-            d.axes.annotate(joint.name, (fitted.counts_close, np.rad2deg(end)), (-4, 4), textcoords="offset points", ha="right", color=colour)
-        d.axes.set_xlabel("encoder [counts]")
-        d.axes.set_ylabel("angle [deg]")
+            top.plot(span, np.rad2deg(fitted.angle_rad(span)), color=colour, linewidth=0.8)
+            top.plot(counts[::4], np.rad2deg(angle[::4]), "o", color=colour, markersize=2.6, markeredgewidth=0)
+            at = 0.45 * (fitted.counts_close - fitted.counts_open) + fitted.counts_open
+            place = {"ha": "right", "va": "bottom"} if k == 0 else {"ha": "left", "va": "top"}
+            top.annotate(joint.name, (at, np.rad2deg(fitted.angle_rad(np.array([at]))[0])), (-5, 3) if k == 0 else (5, -3),
+                         textcoords="offset points", color=colour, **place)  # fmt: skip
+            below.plot(
+                counts,
+                np.rad2deg(angle - fitted.angle_rad(counts)),
+                "o",
+                color=colour,
+                markersize=1.7,
+                markeredgewidth=0,
+                alpha=0.75,
+            )
+        below.axhline(0, color=MUTED, linewidth=0.7)
+        below.set_xlabel("encoder [counts]")
+        top.set_ylabel("angle [deg]")
+        below.set_ylabel("left [deg]")
+        d.figure.align_ylabels()
     return d.svg
 
 
@@ -104,7 +121,15 @@ def overlay(finger: Finger, trial: TrialResiduals) -> bytes:
         window = _busiest(trial.time_s, through)
         t = trial.time_s[window]
         keep = slice(None, None, max(1, len(t) // POINTS))
-        d.axes.plot(t[keep], np.rad2deg(trial.angle_rad[window, 0])[keep], ".", color=SERIES[0], markersize=3, markeredgewidth=0, label="markers")
+        d.axes.plot(
+            t[keep],
+            np.rad2deg(trial.angle_rad[window, 0])[keep],
+            ".",
+            color=SERIES[0],
+            markersize=3,
+            markeredgewidth=0,
+            label="markers",
+        )
         d.axes.plot(t[keep], np.rad2deg(through[window])[keep], color=INK, linewidth=0.9, label="encoder, aligned")
         d.axes.set_xlabel("mocap time [s]")
         d.axes.set_ylabel(f"{finger.joints[0].name} angle [deg]")

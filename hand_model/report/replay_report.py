@@ -12,7 +12,17 @@ from ..output import new_folder
 from ..replay import Residuals
 from .identified import axes_section, axis_sd_deg, coupling_section, maps_section, repairs_section
 from .page import Section, heading, listing, page
-from .replayed import best_mode, by_finger, clock_section, distances_mm, engines_section, error_section, map_pictures, noise_ratio, trials_words
+from .replayed import (
+    best_mode,
+    by_finger,
+    clock_section,
+    distances_mm,
+    engines_section,
+    error_section,
+    map_pictures,
+    noise_ratio,
+    trials_words,
+)
 from .words import count, number
 
 PAGE, FIGURES = "report.html", "figures.json"
@@ -46,10 +56,14 @@ def replay_page(residuals: Residuals, *further: Section) -> bytes:
     ]
     title = f"{hand.name}, {hand.side} hand"
     lead = (
-        f"{count(len(hand.fingers), 'finger')}, identified from a recording session, compiled to URDF and MJCF, and replayed on "
-        f"{trials_words(residuals)} ({residuals.session.hand}, {residuals.session.side}, recorded in {residuals.session.path.name})."
+        f"{count(len(hand.fingers), 'finger')} identified from {count(_fitted(residuals), 'file')} of a recording session, compiled to URDF and "
+        f"MJCF, and replayed on {trials_words(residuals)}."
     )
     return page(title, lead, _tiles(residuals), [s for s in sections if s is not None])
+
+
+def _fitted(residuals: Residuals) -> int:
+    return len([file for file in residuals.description.hand.provenance if not file.endswith(".toml")])
 
 
 def _repairs(residuals: Residuals) -> Section:
@@ -65,13 +79,13 @@ def _tiles(residuals: Residuals) -> list[tuple[str, str]]:
     trials = list(residuals.trials)
     every = distances_mm(trials, mode)
     how = "driven by encoder counts alone" if mode == "encoder" else "driven by measured angles"
-    known = [axis_sd_deg(j) for f in hand.fingers for j in f.joints if not j.degenerate]
+    known = [axis_sd_deg(hand, j) for f in hand.fingers for j in f.joints if not j.degenerate]
     tiles = [(f"{number(float(np.median(every)))} mm", f"median marker error, {how}")]
     if mode == "encoder":
         tiles.append((f"{number(noise_ratio(trials, mode))} ×", "that error over what marker noise alone gives"))
     tiles.append((f"{number(1e3 * hand.noise_m)} mm", "marker noise per coordinate"))
     if known:
-        tiles.append((f"± {number(float(np.median(known)))}°", "median uncertainty of an axis"))
+        tiles.append((f"± {number(float(np.median(known)))}°", "median uncertainty of an axis in the palm"))
     tiles.append((f"{max(residuals.agreement_m.values()):.0e} m", "largest difference between the engines"))
     return tiles
 
@@ -83,7 +97,10 @@ def replay_figures(residuals: Residuals) -> dict[str, Any]:
         fingers[name] = {
             mode: {
                 "error_m": _quantiles(1e-3 * distances_mm(trials, mode)),
-                "segments": {s: _quantiles(1e-3 * distances_mm(trials, mode, segment=s)) for s in dict.fromkeys(trials[0].segment)},
+                "segments": {
+                    s: _quantiles(1e-3 * distances_mm(trials, mode, segment=s))
+                    for s in dict.fromkeys(trials[0].segment)
+                },
                 "over_noise": noise_ratio(trials, mode),
             }
             for mode in trials[0].residual_palm
@@ -92,7 +109,10 @@ def replay_figures(residuals: Residuals) -> dict[str, Any]:
         "format": FORMAT,
         "hand": residuals.description.hand.name,
         "side": residuals.description.side,
-        "trials": [{"name": t.trial.name, "finger": t.finger, "held_out": t.held_out, "frames": len(t.time_s)} for t in residuals.trials],
+        "trials": [
+            {"name": t.trial.name, "finger": t.finger, "held_out": t.held_out, "frames": len(t.time_s)}
+            for t in residuals.trials
+        ],
         "fingers": fingers,
         "agreement_m": dict(residuals.agreement_m),
         "notes": list(residuals.notes),

@@ -8,14 +8,18 @@ from numpy.typing import NDArray
 from ..published import MARKER_ERROR_M
 from ..replay import AGREEMENT_POSES, MODES, PHASES, Residuals, TrialResiduals
 from . import pictures
-from .page import Cell, Element, Section, figures, heading, key, note, table
+from .page import Cell, Element, Section, figures, folded, heading, key, note, table
 from .style import SERIES
 from .words import count, listed, number, span
 
 Array = NDArray[np.float64]
 
 COLOURS = dict(zip(MODES, (SERIES[2], SERIES[0], SERIES[1]), strict=True))
-KEY = {"measured": ("c3", "driven by the measured angles"), "encoder": ("c1", "by encoder counts alone"), "simulated": ("c2", "simulated in MuJoCo")}
+KEY = {
+    "measured": ("c3", "driven by measured angles"),
+    "encoder": ("c1", "driven by encoder counts alone"),
+    "simulated": ("c2", "simulated in MuJoCo from encoder counts"),
+}
 
 
 def by_finger(residuals: Residuals) -> dict[str, list[TrialResiduals]]:
@@ -28,14 +32,19 @@ def by_finger(residuals: Residuals) -> dict[str, list[TrialResiduals]]:
 
 def distances_mm(trials: list[TrialResiduals], mode: str, **where: str) -> Array:
     """Marker errors (q,) [mm] of several trials, those that were replayed in this mode."""
-    return 1e3 * np.concatenate([np.zeros(0), *(t.distance_m(mode, **where) for t in trials if mode in t.residual_palm)])
+    return 1e3 * np.concatenate(
+        [np.zeros(0), *(t.distance_m(mode, **where) for t in trials if mode in t.residual_palm)]
+    )
 
 
-def noise_ratio(trials: list[TrialResiduals], mode: str) -> float:
+def noise_ratio(trials: list[TrialResiduals], mode: str, segment: str | None = None) -> float:
     """Root mean square error over that of noise alone, all trials together; nan where the mode was not replayed."""
-    used = [t for t in trials if mode in t.residual_palm and t.seen.any()]
-    error = sum(float(np.sum(t.residual_palm[mode][t.seen] ** 2)) for t in used)
-    noise = sum(float(np.sum(t.noise_m[t.seen] ** 2)) for t in used)
+    error = noise = 0.0
+    for t in trials:
+        if mode in t.residual_palm:
+            mask = t.seen & np.array([segment in (None, s) for s in t.segment])
+            error += float(np.sum(t.residual_palm[mode][mask] ** 2))
+            noise += float(np.sum(t.noise_m[mask] ** 2))
     return float(np.sqrt(error / noise)) if noise else float("nan")
 
 
@@ -71,7 +80,8 @@ def error_section(residuals: Residuals) -> Section:
             "In the form of figures 4.5 and 4.6: box from quartile to quartile, median in it, whiskers over the whole range. With measured "
             "angles the pose is fitted to these markers too; the other two place the palm by its own three markers and know nothing of the finger's."
         ),
-        _segment_table(fingers, modes),
+        _segment_table(fingers, mode),
+        *_others(residuals, fingers, modes, mode),
         heading("Per phase of the motion"),
         figures(*[(name, pictures.boxes(g, label, colours, top)) for name, g in phases]),
         _phase_table(fingers, mode),
@@ -89,7 +99,11 @@ def _short(name: str) -> str:
 
 
 def _error_words(residuals: Residuals, fingers: dict[str, list[TrialResiduals]], mode: str) -> str:
-    middle = {name: float(np.median(distances_mm(trials, mode))) for name, trials in fingers.items() if len(distances_mm(trials, mode))}
+    middle = {
+        name: float(np.median(distances_mm(trials, mode)))
+        for name, trials in fingers.items()
+        if len(distances_mm(trials, mode))
+    }
     ratio = {name: noise_ratio(fingers[name], mode) for name in middle}
     worst = max(ratio, key=lambda name: ratio[name])
     how = "Driven by encoder counts alone" if mode == "encoder" else "Driven by the measured angles"
@@ -98,23 +112,55 @@ def _error_words(residuals: Residuals, fingers: dict[str, list[TrialResiduals]],
         words += f", {number(ratio[worst])} times what marker noise alone gives at worst ({worst})"
         side = residuals.description.side
         low, high = (1e3 * v for v in MARKER_ERROR_M.get(side, (np.nan, np.nan)))
-        if any(name in ("thumb_0", "thumb_1", "index", "middle", "ring", "little") for name in fingers) and np.isfinite(high):
-            words += f"; the thesis reports {f'about {low:.0f} to' if low else 'up to'} {high:.0f} mm for its {side} hand"
+        if any(name in ("thumb_0", "thumb_1", "index", "middle", "ring", "little") for name in fingers) and np.isfinite(
+            high
+        ):
+            words += (
+                f"; the thesis reports {f'about {low:.0f} to' if low else 'up to'} {high:.0f} mm for its {side} hand"
+            )
     return words + "."
 
 
-def _segment_table(fingers: dict[str, list[TrialResiduals]], modes: list[str]) -> Element:
+def _segment_table(fingers: dict[str, list[TrialResiduals]], mode: str) -> Element:
     rows: list[list[str | Cell]] = []
     for name, trials in fingers.items():
-        for mode in modes:
-            for segment in dict.fromkeys(s for t in trials for s in t.segment):
-                values = distances_mm(trials, mode, segment=segment)
-                if len(values):
-                    cells = [number(float(v)) for v in (np.median(values), *np.quantile(values, [0.25, 0.75]), values.min(), values.max())]
-                    ratio = number(noise_ratio(trials, mode)) if mode != "measured" else "–"
-                    rows.append([name, segment, mode, *cells, Cell(ratio, "dim"), Cell(str(len(values)), "dim")])
-    columns = ["finger", "segment", "driven by", "median", "25 %", "75 %", "least", "most", "finger's error over noise", "markers"]
-    return table(columns, rows, "Marker error [mm]", text_columns=3)
+        for segment in dict.fromkeys(s for t in trials for s in t.segment):
+            values = distances_mm(trials, mode, segment=segment)
+            if len(values):
+                cells = [
+                    number(float(v))
+                    for v in (np.median(values), *np.quantile(values, [0.25, 0.75]), values.min(), values.max())
+                ]
+                ratio = number(noise_ratio(trials, mode, segment)) if mode != "measured" else "–"
+                rows.append([name, segment, *cells, ratio, Cell(str(len(values)), "dim")])
+    columns = ["finger", "segment", "median", "25 %", "75 %", "least", "most", "over noise", "values"]
+    return table(columns, rows, f"Marker error [mm], {KEY[mode][1]}", text_columns=2)
+
+
+def _others(
+    residuals: Residuals, fingers: dict[str, list[TrialResiduals]], modes: list[str], shown: str
+) -> list[Element]:
+    """What the other ways to drive the model give, and how far the simulation is from the kinematics."""
+    out: list[Element] = []
+    both = [t for t in residuals.trials if "simulated" in t.residual_palm]
+    if both:
+        apart = [
+            np.nanmax(np.linalg.norm(t.residual_palm["simulated"] - t.residual_palm["encoder"], axis=-1)[t.seen])
+            for t in both
+            if t.seen.any()
+        ]
+        out.append(
+            note(
+                f"Simulated with only the proximal joint driven, the linkages' equalities put every marker within {1e3 * max(apart):.1g} mm of "
+                "where the encoder maps put it: the file moves as the hand was identified to."
+                if max(apart) < 1e-4
+                else f"Simulated with only the proximal joint driven, markers end up to {1e3 * max(apart):.2g} mm from where the encoder maps put them."
+            )
+        )
+    for mode in modes:
+        if mode != shown:
+            out.append(folded(f"The same table, {KEY[mode][1]}", _segment_table(fingers, mode)))
+    return out
 
 
 def _phase_table(fingers: dict[str, list[TrialResiduals]], mode: str) -> Element:
@@ -123,10 +169,14 @@ def _phase_table(fingers: dict[str, list[TrialResiduals]], mode: str) -> Element
         cells: list[str | Cell] = [name]
         for phase in PHASES:
             values = distances_mm(trials, mode, phase=phase)
-            cells += [number(float(np.median(values))), number(float(np.quantile(values, 0.75)))] if len(values) else ["–", "–"]
+            cells += (
+                [number(float(np.median(values))), number(float(np.quantile(values, 0.75)))]
+                if len(values)
+                else ["–", "–"]
+            )
         rows.append(cells)
     columns = ["finger", *["median", "75 %"] * len(PHASES)]
-    return table(columns, rows, f"Marker error [mm], driven by {KEY[mode][1].removeprefix('driven ').removeprefix('by ')}", [("", 1), *[(p, 2) for p in PHASES]])
+    return table(columns, rows, f"Marker error [mm], {KEY[mode][1]}", [("", 1), *[(p, 2) for p in PHASES]])
 
 
 def map_pictures(residuals: Residuals) -> tuple[Element, ...]:
@@ -138,7 +188,10 @@ def map_pictures(residuals: Residuals) -> tuple[Element, ...]:
             drawn.append((name, pictures.encoder_map(finger, trials)))
     if not drawn:
         return ()
-    return figures(*drawn), note(f"Lines: the maps as fitted. Points: angles that the markers show in the {trials_words(residuals)}, thinned evenly along the range.")
+    return figures(*drawn), note(
+        f"Lines: the maps as fitted. Points: angles that the markers show in the {trials_words(residuals)}, thinned evenly along the range; below, "
+        "what the map leaves of them."
+    )
 
 
 def clock_section(residuals: Residuals) -> Section | None:
@@ -147,12 +200,16 @@ def clock_section(residuals: Residuals) -> Section | None:
     if not trials:
         return None
     fitted = residuals.description.hand.extra.get("clock", {})
-    rows: list[list[str | Cell]] = [_clock_row(t.trial.name, vars(t.clock) | {"rate_free": t.clock.rate_free}, "replayed") for t in trials]
+    rows: list[list[str | Cell]] = [
+        _clock_row(t.trial.name, vars(t.clock) | {"rate_free": t.clock.rate_free}, "replayed") for t in trials
+    ]
     rows += [_clock_row(name, row, "fitted") for name, row in fitted.items()]
     sd = 1e3 * max(t.clock.offset_sd_s for t in trials)
     least = min(t.clock.explained for t in trials)
     drifting = [t.trial.name for t in trials if t.clock.rate != 1.0]
-    rates = f"{listed(drifting)}: the log's clock runs at another rate" if drifting else "the two clocks run at one rate"
+    rates = (
+        f"{listed(drifting)}: the log's clock runs at another rate" if drifting else "the two clocks run at one rate"
+    )
     words = f"Log and markers are aligned to {number(sd, 1)} ms or better, the encoder explains at least {number(100 * least, 2)} % of the angle's variance, and {rates}."
     drawn = [("Correlation over the lag, every trial", pictures.correlation(trials))]
     for trial in trials:
@@ -164,7 +221,9 @@ def clock_section(residuals: Residuals) -> Section | None:
         key(("c1", "angle from the markers"), ("ink", "aligned encoder through its map")),
         figures(*drawn),
         table(columns, rows, "log time = offset + rate × mocap time", text_columns=2),
-        note("Correlation finds the offset to one sample, least squares through the encoder map refines it; a rate is used where it differs from 1 by more than four standard deviations."),
+        note(
+            "Correlation finds the offset to one sample, least squares through the encoder map refines it; a rate is used where it differs from 1 by more than four standard deviations."
+        ),
     )
     return Section("clocks", "Synchronisation", words, body)
 
@@ -194,5 +253,8 @@ def engines_section(residuals: Residuals) -> Section:
         f"(limit {limit:.0e} m)."
     )
     words = words[0].upper() + words[1:]
-    rows = [[name, Cell(f"{value:.1e}", "fine" if value <= limit else "flag")] for name, value in residuals.agreement_m.items()]
+    rows = [
+        [name, Cell(f"{value:.1e}", "fine" if value <= limit else "flag")]
+        for name, value in residuals.agreement_m.items()
+    ]
     return Section("engines", "Engines", words, (table(["engine", "largest distance [m]"], rows),))

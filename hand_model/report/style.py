@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 # Colours that stand for the page's CSS variables; replaced when the SVG is written.
 INK, MUTED, LINE, PAPER = "#010203", "#020304", "#030405", "#040506"
 SERIES = ("#110101", "#110102", "#110103", "#110104", "#110105")
-_VARIABLES = {INK: "--ink", MUTED: "--muted", LINE: "--line", PAPER: "--paper"} | {c: f"--c{i + 1}" for i, c in enumerate(SERIES)}
+_VARIABLES = {INK: "--ink", MUTED: "--muted", LINE: "--line", PAPER: "--paper"} | {
+    c: f"--c{i + 1}" for i, c in enumerate(SERIES)
+}
 # Inches of a small picture; on a phone it is as wide as the screen.
 WIDTH, HEIGHT = 4.2, 2.7
 
@@ -47,15 +49,18 @@ _SETTINGS: dict[str, Any] = {
 
 
 class Drawing:
-    """A picture in the making. axes: one matplotlib Axes. svg: the finished picture, set when the `drawing` block ends."""
+    """A picture in the making. panels: matplotlib Axes one below the other, axes: the first. svg: set when the `drawing` block ends."""
 
-    def __init__(self, figure: Any, axes: Any) -> None:
-        self.figure, self.axes, self.svg = figure, axes, b""
+    def __init__(self, figure: Any, panels: tuple[Any, ...]) -> None:
+        self.figure, self.panels, self.axes, self.svg = figure, panels, panels[0], b""
 
 
 @contextmanager
-def drawing(width: float = WIDTH, height: float = HEIGHT) -> Iterator[Drawing]:
-    """`with drawing() as d: d.axes.plot(...)`; afterwards `d.svg` holds the bytes. width, height: inches."""
+def drawing(width: float = WIDTH, height: float = HEIGHT, panels: Sequence[float] = (1.0,)) -> Iterator[Drawing]:
+    """`with drawing() as d: d.axes.plot(...)`; afterwards `d.svg` holds the bytes.
+
+    width, height: inches. panels: relative heights of panels one below the other, on one horizontal axis.
+    """
     import matplotlib
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
@@ -65,7 +70,8 @@ def drawing(width: float = WIDTH, height: float = HEIGHT) -> Iterator[Drawing]:
         matplotlib.rcParams.update(_SETTINGS)
         figure = Figure(figsize=(width, height), layout="constrained")
         canvas = FigureCanvasSVG(figure)
-        done = Drawing(figure, figure.add_subplot())
+        grid = figure.subplots(len(panels), sharex=True, squeeze=False, height_ratios=list(panels))
+        done = Drawing(figure, tuple(grid[:, 0]))
         yield done
         buffer = io.BytesIO()
         canvas.print_figure(buffer, format="svg", metadata={"Date": None, "Creator": None})

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..hand import Hand
 from ..replay import MODES, Residuals
-from .identified import axis_sd_deg, centre_sd_mm
+from .identified import axis_sd_deg, centre_sd_mm, frame_words
 from .page import Cell
 from .replayed import by_finger, distances_mm, noise_ratio, trials_words
 from .words import number
@@ -37,11 +37,21 @@ def hand_text(hand: Hand) -> str:
             axis = " ".join(f"{v:7.4f}" for v in joint.axis_palm)
             centre = " ".join(f"{1e3 * v:7.2f}" for v in joint.centre_palm)
             arc = f"{np.rad2deg(np.ptp(joint.range_rad)):.0f}"
-            row = [finger.name, joint.name, axis, number(axis_sd_deg(joint)), centre, number(centre_sd_mm(joint)), arc, held]
+            row = [
+                finger.name,
+                joint.name,
+                axis,
+                number(axis_sd_deg(hand, joint)),
+                centre,
+                number(centre_sd_mm(hand, joint)),
+                arc,
+                held,
+            ]
             rows.append([*row, "axis not determined" if joint.degenerate else ""])
     head = ["finger", "joint", "axis", "± deg", "centre [mm]", "± mm", "arc deg", "encoder rmse deg", ""]
     lines = [f"{hand.name}, {hand.side} hand, marker noise {1e3 * hand.noise_m:.3f} mm", "", columns(head, rows, 2)]
-    return "\n".join([*lines, *(f"note: {n}" for n in hand.notes)])
+    notes = [*filter(None, [frame_words(hand)]), *hand.notes]
+    return "\n".join([*lines, *(f"note: {n}" for n in notes)])
 
 
 def residuals_text(residuals: Residuals) -> str:

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-LEAST = 1e-12
-
 
 def number(value: float | None, digits: int = 2) -> str:
     """A number with so many decimals; a dash where there is none."""
-    return "–" if value is None or not np.isfinite(value) else f"{value:.{digits}f}"
+    if value is None or not np.isfinite(value):
+        return "–"
+    return f"{round(float(value), digits) + 0.0:.{digits}f}"  # + 0.0: no negative zero
 
 
 def listed(items: Sequence[str], most: int = 6) -> str:
