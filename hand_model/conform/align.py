@@ -155,7 +155,7 @@ def line_distance(axis_a: Array, point_a: Array, axis_b: Array, point_b: Array) 
     return angle, gap - (gap * axis_b).sum(-1, keepdims=True) * axis_b
 
 
-def _line_cost(f: Features, carry: Array, wanted: list[int], other: list[int] | None = None) -> Array:
+def _line_cost(f: Features, carry: Array, wanted: list[int], other: list[int] | None = None, scale: float = SCALE) -> Array:
     """Robust cost (k,) of b's lines `other`, carried over, against a's lines `wanted`."""
     other = wanted if other is None else other
     axes, points = f.axes_b[other] @ carry[:3, :3].T, _apply(carry, f.points_b[other])
@@ -163,12 +163,12 @@ def _line_cost(f: Features, carry: Array, wanted: list[int], other: list[int] | 
     distance = np.sqrt((gap * gap).sum(-1))
     if any(f.slide):
         distance = distance * ~np.array([f.slide[k] for k in wanted], bool)
-    return _robust(np.hypot(LEVER * angle, distance))
+    return _robust(np.hypot(LEVER * angle, distance), scale)
 
 
-def _robust(distance: Array) -> Array:
-    """Nearly flat beyond SCALE (Geman & McClure 1985), so that features count by whether they coincide; a faint slope remains."""
-    squared = (np.asarray(distance) / SCALE) ** 2
+def _robust(distance: Array, scale: float = SCALE) -> Array:
+    """Nearly flat beyond the scale [m] (Geman & McClure 1985), so that features count by whether they coincide; a faint slope remains."""
+    squared = (np.asarray(distance) / scale) ** 2
     return 10 * squared / (1 + squared) + 0.3 * np.log1p(squared)
 
 
@@ -176,13 +176,13 @@ def _turn(frame: Array) -> float:
     return float(np.arctan2(np.linalg.norm(frame - frame.T) / np.sqrt(8), (np.trace(frame) - 1) / 2))
 
 
-def _frame_cost(conventions: Iterable[Array], frame_a: Array, frame_b: Array, carry: Array) -> float:
+def _frame_cost(conventions: Iterable[Array], frame_a: Array, frame_b: Array, carry: Array, scale: float = SCALE) -> float:
     """Cost of the link frame's constant transform being none of the conventions that this hand has used so far."""
     actual = inverse(frame_a) @ carry @ frame_b
     best = np.inf
     for convention in conventions:
         best = min(best, _differs(convention, actual))
-    return float(_robust(best))
+    return float(_robust(best, scale))
 
 
 def _differs(first: Array, second: Array) -> float:
@@ -232,13 +232,15 @@ def _fit(f: Features, k: int, up: Array, conventions: list[Array], frame_weight:
     direct = f.children.get(k, [])
     deeper = [j for j in f.below(k) if j not in direct]
 
+    scale = _scale(f, [k, *direct])
+
     def farther(carry: Array) -> float:
-        out = float(_line_cost(f, carry, direct).sum()) if direct else 0.0
-        out += 0.2 * float(_line_cost(f, carry, deeper).sum()) if deeper else 0.0
-        return out + sum(w * float(_robust(np.linalg.norm(x - _apply(carry, y)))) for x, y, w in points)
+        out = float(_line_cost(f, carry, direct, scale=scale).sum()) if direct else 0.0
+        out += 0.2 * float(_line_cost(f, carry, deeper, scale=scale).sum()) if deeper else 0.0
+        return out + sum(w * float(_robust(np.linalg.norm(x - _apply(carry, y)), scale)) for x, y, w in points)
 
     def cost(carry: Array) -> float:
-        return farther(carry) + frame_weight * sum(_frame_cost(conventions, x, y, carry) for x, y in frames)
+        return farther(carry) + frame_weight * sum(_frame_cost(conventions, x, y, carry, scale) for x, y in frames)
 
     best = None
     for start, follows in starts:
@@ -254,6 +256,12 @@ def _fit(f: Features, k: int, up: Array, conventions: list[Array], frame_weight:
     if f.slide[k]:
         offset, advance = -advance, 0.0
     return Fit(float(angle), gap, sign, float(offset), float(advance), follows, carry, _reach(f, k), seen)
+
+
+def _scale(f: Features, joints: list[int]) -> float:
+    """Distance [m] within which features coincide, given the last digits that both files write at these joints."""
+    slack = (f.slack_a + f.slack_b)[joints] @ [1.0, LEVER]
+    return float(np.clip(3 * slack.max(), SCALE, 1e-5))
 
 
 def _reach(f: Features, k: int) -> float:

@@ -71,18 +71,18 @@ def _parts(f: Features, k: int, fit: Fit) -> dict[str, float]:
     }
 
 
-def _bound(slack: np.ndarray, f: Features, k: int) -> float:
+def _bound(slack: np.ndarray, f: Features, k: int, reach: float) -> float:
     """[m] that the last written digits between the joint before and this one may move its line and what it carries."""
     parent = f.parent[k]
     before = slack[parent] if parent >= 0 else np.zeros(2)
     arm = float(np.linalg.norm(f.points_a[k] - (f.points_a[parent] if parent >= 0 else 0.0)))
-    return float(slack[k, 0] + slack[k, 1] * max(arm, LEVER) + before[1] * arm)
+    return float(slack[k, 0] + slack[k, 1] * max(arm, reach) + before[1] * arm)
 
 
 def _passes(f: Features, k: int, fit: Fit, tolerance_m: float) -> bool:
     if fit.sign < 0:
         return False
-    room = max(tolerance_m, min(ROUNDING_CAP, 2 * max(_bound(f.slack_a, f, k), _bound(f.slack_b, f, k))))
+    room = max(tolerance_m, min(ROUNDING_CAP, 2 * max(_bound(f.slack_a, f, k, fit.reach), _bound(f.slack_b, f, k, fit.reach))))
     return max(_parts(f, k, fit).values()) <= room
 
 

@@ -150,7 +150,9 @@ def _base(tree: Tree, joints: Sequence[str]) -> str:
 
 def tokens(name: str) -> tuple[str, ...]:
     """A name's words, sorted, without those that every hand carries, fingers under one name each."""
-    words = re.findall(r"[a-z]+|\d+", re.sub(r"([a-z])([A-Z])", r"\1 \2", name.replace(".0", "")).lower())
+    spaced = re.sub(r"([a-z])([A-Z])", r"\1 \2", name.replace(".0", "")).lower()
+    spaced = re.sub(r"(?<=[a-z])j(?=\d)", " j", spaced)  # FFJ4: first finger, joint 4
+    words = re.findall(r"[a-z]+|\d+", spaced)
     words = [next((k for k, v in SYNONYMS.items() if w == k or w in v), w) for w in words]
     return tuple(sorted(w for w in words if w not in IGNORED))
 
