@@ -5,22 +5,26 @@ The chain of each finger comes from `identify`; validation recordings are posed 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..effects.base import DriveState
+from ..errors import IdentificationError
 from ..identify.chain import Chain, ChainData, Pose
-from ..identify.finger import FingerFit, identify_finger, observations, sound_frames
-from ..identify.identification import palm_shape
-from ..identify.likelihood import fit_poses
+from ..identify.finger import REST_S, observations, sound_frames
+from ..identify.likelihood import fit_chain, fit_poses
 from ..identify.repair import Swap
+from ..identify.start import start_chain
 from ..session import Finger, Mocap, Session, Trial
 from .drive import count_range
 from .motion import estimate_motion, local_quadratic
 
 Array = NDArray[np.float64]
+
+LEARN_FRAMES = 1500  # of each recording, evenly spaced: enough for a chain, all frames are posed with it
 
 
 @dataclass(frozen=True)
@@ -38,47 +42,46 @@ class FlexionAngles:
 
 @dataclass(frozen=True)
 class FingerAngles:
-    """One finger: the fit of its chain and all its flexion recordings, validation ones included."""
+    """One finger: its chain (angles zero at rest), the marker noise [m], and all its flexion recordings in session order."""
 
     finger: Finger
-    fit: FingerFit
+    chain: Chain
+    noise_m: float
     records: tuple[FlexionAngles, ...]
 
 
-def finger_angles(session: Session, finger: Finger, shape: Array | None = None) -> FingerAngles:
-    """Angles of one finger in every flexion recording; raises IdentificationError as `identify_finger` does."""
-    fit = identify_finger(session, finger, palm_shape(session) if shape is None else shape)
+def finger_angles(session: Session, finger: Finger, shape: Array) -> FingerAngles:
+    """Chain of one finger from its training recordings as they are (nothing split or dropped: that is the diagnosis's
+    part), and its angles in every flexion recording.
+
+    shape: (3, 3) [m] palm markers (`identify.palm_shape`). Raises IdentificationError where no recording tells the chain.
+    """
+    trials = [t for t in session.select("flexion", finger.name) if t.mocap_path is not None]
+    if not trials:
+        raise IdentificationError(f'{session.path}: finger "{finger.name}" has no flexion trial with markers')
+    seen = [(t, t.mocap()) for t in trials]
+    observed = [observations(session, finger, mocap) for _, mocap in seen]
+    learn = [i for i, (t, _) in enumerate(seen) if not t.validate] or list(range(len(seen)))
+    parts, rest, count = [], [], 0
+    for i in learn:
+        step = max(1, len(seen[i][1].time_s) // LEARN_FRAMES)
+        parts.append(observed[i][0].position_world[::step])
+        rest.append(count + np.flatnonzero(seen[i][1].time_s[::step] < REST_S))
+        count += len(parts[-1])
+    data = ChainData(np.concatenate(parts), observed[0][0].body, observed[0][0].labels)
+    still = np.concatenate(rest)
+    fit = fit_chain(data, start_chain(data, still, shape))
+    zero = np.median(fit.pose.angle_rad[still], axis=0)
+    chain = fit.chain.at(zero, data.body)
     records = []
-    for record in fit.records:
-        frames = np.arange(record.frames.start, record.frames.stop)
-        good = sound_frames(fit.fit.data.take(frames), fit.fit.weight[frames])
-        data, swaps = observations(session, finger, record.mocap)  # as recorded: the fit may have split or dropped a marker
-        pose = fit.fit.pose.take(frames)
-        angle = np.where(good[:, None], pose.angle_rad, np.nan)
-        records.append(FlexionAngles(record.trial, record.mocap, angle, swaps, data, pose))
-    for trial in session.select("flexion", finger.name, validate=True):
-        if trial.mocap_path is None:
-            continue
-        mocap = trial.mocap()
-        data, swaps = observations(session, finger, mocap)
-        chain = plain_chain(fit, data.labels, latest=True)
-        pose, weight = fit_poses(data, chain, fit.fit.noise_m)
-        angle = np.where(sound_frames(data, weight)[:, None], pose.angle_rad, np.nan)
-        records.append(FlexionAngles(trial, mocap, angle, swaps, data, pose))
-    return FingerAngles(finger, fit, tuple(records))
+    for (trial, mocap), (markers, swaps) in zip(seen, observed, strict=True):
+        pose, weight = fit_poses(markers, chain, fit.noise_m)
+        angle = np.where(sound_frames(markers, weight)[:, None], pose.angle_rad, np.nan)
+        records.append(FlexionAngles(trial, mocap, angle, swaps, markers, pose))
+    return FingerAngles(finger, chain, fit.noise_m, tuple(records))
 
 
-def plain_chain(fit: FingerFit, labels: tuple[str, ...], latest: bool = False) -> Chain:
-    """The chain with one column per label: a marker that slipped where it was seen most often (or last)."""
-    seen = np.isfinite(fit.fit.data.position_world[..., 0]).sum(0)
-    pick = []
-    for label in labels:
-        epochs = [j for j, name in enumerate(fit.fit.data.labels) if name == label and seen[j] > 0]
-        pick.append(epochs[-1] if latest else max(epochs, key=lambda j: seen[j]))
-    return Chain(fit.fit.chain.marker_palm[pick], fit.fit.chain.axis_palm, fit.fit.chain.centre_palm)
-
-
-def linkage_states(angles: FingerAngles, joint: int = 1) -> tuple[DriveState, ...]:
+def linkage_states(angles: FingerAngles, joint: int = 1, steps: Sequence[tuple[int, float]] = ()) -> tuple[DriveState, ...]:
     """Balance of a follower: its angle [deg] against a quartic of its driver's angle [deg], one state per recording."""
     states = []
     name = angles.finger.segments[joint].name
@@ -92,16 +95,19 @@ def linkage_states(angles: FingerAngles, joint: int = 1) -> tuple[DriveState, ..
         # The declared columns take the angle as it was read, so that its noise stays white; at rest that noise is all there
         # is to see, and regressing on it would show a slope that is not there.
         raw = q[:, joint - 1]
+        stepped, more = _stepped(index, t, steps)
+        declared = np.concatenate([np.stack([(raw / scale) ** k for k in range(5)], axis=-1), stepped], axis=1)
         follower = np.where(motion.moving, q[:, joint], np.nan)
         extra = {"trial_index": np.full(len(t), float(index)), "load": _load(record, t)}
         extra["slope"] = _slope(motion.position, raw, q[:, joint], motion.moving, 4)
         states.append(DriveState(record.trial.name, f"{angles.finger.name}/{name}", t, motion.position, motion.velocity,
-                                 motion.acceleration, follower, np.stack([(raw / scale) ** k for k in range(5)], axis=-1),
-                                 "deg", "deg", _known(extra), _names(4), record.trial.validate))
+                                 motion.acceleration, follower, declared, "deg", "deg", _known(extra), (*_names(4), *more), record.trial.validate))
     return tuple(states)
 
 
-def encoder_states(angles: FingerAngles, low: float, high: float) -> tuple[DriveState, ...]:
+def encoder_states(
+    angles: FingerAngles, low: float, high: float, steps: Sequence[tuple[int, float]] = ()
+) -> tuple[DriveState, ...]:
     """Balance of the encoder: proximal angle [deg] against a cubic of position [%], at the log's samples.
 
     low, high: counts at 0 and 100 %. Each recording has its own clock offset, as a column of the velocity; the clocks'
@@ -128,6 +134,8 @@ def encoder_states(angles: FingerAngles, low: float, high: float) -> tuple[Drive
         offsets = np.zeros((len(t), len(records)))
         offsets[:, index] = motion.velocity
         declared = np.concatenate([np.stack([x**k for k in range(4)], axis=-1), offsets], axis=1)
+        stepped, more = _stepped(index, at, steps)
+        declared = np.concatenate([declared, stepped], axis=1)
         current = log.columns.get("current")
         extra = {"trial_index": np.full(len(t), float(index)), "clock_s": t - middle}
         if current is not None and np.isfinite(current).all():
@@ -136,8 +144,15 @@ def encoder_states(angles: FingerAngles, low: float, high: float) -> tuple[Drive
         extra["slope"] = _slope(motion.position, motion.position, q, inside, 3)
         states.append(DriveState(record.trial.name, angles.finger.name, t, motion.position, motion.velocity, motion.acceleration,
                                  effort, declared, "%", "deg", extra,
-                                 (*_names(3), *(f"offset_{i}" for i in range(len(records)))), record.trial.validate))
+                                 (*_names(3), *(f"offset_{i}" for i in range(len(records))), *more), record.trial.validate))
     return tuple(states)
+
+
+def _stepped(record: int, time_s: Array, steps: Sequence[tuple[int, float]]) -> tuple[Array, tuple[str, ...]]:
+    """Columns (n, s) that are one from a moment of a record on, in the records after it too, and their names."""
+    columns = [np.full(len(time_s), float(record > r)) if record != r else (time_s >= at).astype(float) for r, at in steps]
+    names = tuple(f"step_{i}" for i in range(len(steps)))
+    return np.stack(columns, axis=-1) if columns else np.zeros((len(time_s), 0)), names
 
 
 def _slope(at: Array, driver: Array, follower: Array, use: NDArray[np.bool_], order: int) -> Array:

@@ -37,10 +37,20 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
     notes: list[str] = []
     marker_findings: list[tuple[float, Finding]] = []
     stations += _kinematic_stations(session, tell, notes, marker_findings)
-    findings = assemble(stations, marker_findings, notes)
+    findings = assemble(stations, _once(marker_findings), notes)
     if output is not None:
         findings.save(output)
     return findings
+
+
+def _once(found: list[tuple[float, Finding]]) -> list[tuple[float, Finding]]:
+    """A palm marker is seen with every finger: its slip is one finding, where it shows most."""
+    best: dict[Any, tuple[float, Finding]] = {}
+    for weight, finding in found:
+        key = (finding.effect, finding.where["marker"]) if finding.effect == "palm_marker_slip" else id(finding)
+        if key not in best or weight > best[key][0]:
+            best[key] = (weight, finding)
+    return list(best.values())
 
 
 class Station:
@@ -105,16 +115,25 @@ def _kinematic_stations(session: Session, tell: Callable[[str], None], notes: li
 def _finger_stations(session: Session, finger: Finger, shape: Any, counts: dict[str, tuple[float, float]],
                      tell: Callable[[str], None], marker_findings: list[tuple[float, Finding]]) -> list[Station]:
     from .angles import encoder_states, finger_angles, linkage_states
+    from .markers import corrected_angles, name_markers
+    from .slips import marker_findings as findings_of
+    from .slips import steps
 
     angles = finger_angles(session, finger, shape)
+    markers = name_markers(angles)
+    found = findings_of(angles, markers)
+    marker_findings += found
+    tell(f"{finger.name} markers: {', '.join(f.effect for _, f in found) or 'consistent'} "
+         f"(p {markers.p_before:.2g} -> {markers.p_after:.2g})")
+    angles, moments = corrected_angles(angles, markers), steps(angles, markers)
     out = []
-    states = encoder_states(angles, *counts[finger.actuator]) if finger.actuator in counts else ()
+    states = encoder_states(angles, *counts[finger.actuator], moments) if finger.actuator in counts else ()
     if states:
         out.append(Station("encoder", finger.name, finger.actuator, finger.segments[0].name,
                            name_effects(states, catalogue("encoder"))))
         tell(out[-1].line())
     for joint in range(1, len(finger.segments)):
-        states = linkage_states(angles, joint)
+        states = linkage_states(angles, joint, moments)
         if states:
             out.append(Station("markers", finger.name, finger.actuator, finger.segments[joint].name,
                                name_effects(states, catalogue("linkage"))))

@@ -13,14 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..identify.chain import Chain, jacobians, propagate
-from .angles import FingerAngles, plain_chain
+from .angles import FingerAngles
 
 Array = NDArray[np.float64]
 
-BLOCK = 5  # frames averaged into one row block
+BLOCK = 8  # frames averaged into one row block
 FARTHEST_M = 6e-3  # a residual beyond is a ghost or a wrong label, no slip
 EVIDENCE_LEAST = 15.0  # log evidence of a marker effect, beyond its parameters and the search over moments
 MOST = 4
+SKIP_P = 0.3  # lack of fit above which no candidate is tried
+BOTH = (True, False)
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,7 @@ class MarkerNaming:
 def blocks_of(angles: FingerAngles) -> Blocks:
     """Residuals, Jacobians and projections in blocks of frames."""
     labels, body = angles.records[0].data.labels, angles.records[0].data.body
-    chain = plain_chain(angles.fit, labels)
+    chain = angles.chain
     parts: list[tuple[Array, ...]] = []
     for index, record in enumerate(angles.records):
         observed = record.data.position_world
@@ -128,7 +130,7 @@ def name_markers(angles: FingerAngles) -> MarkerNaming:
     y = project(blocks, blocks.residual.reshape(len(blocks.residual), -1, 1))
     shared = project(blocks, blocks.chain_columns)
     sigma = _noise(y, blocks)
-    candidates = _candidates(blocks)
+    candidates: list[_Candidate] | None = None
     found: list[MarkerEffect] = []
     p_before = excess_before = None
     for _ in range(MOST + 1):
@@ -136,13 +138,19 @@ def name_markers(angles: FingerAngles) -> MarkerNaming:
         p, excess = _lack(residual, blocks)
         if p_before is None:
             p_before, excess_before = p, excess
-        if len(found) == MOST:
+        if len(found) == MOST or (not found and p > SKIP_P):
             break
-        best = max((_try(c, blocks, shared, y, sigma) for c in candidates), key=lambda e: e.evidence)
+        if candidates is None:
+            candidates = _candidates(blocks)
+            moments = {id(c.columns): _moments(project(blocks, c.columns), shared, y) for c in candidates}
+        best = max((_try(c, blocks, moments[id(c.columns)], _chain_part(shared, y), sigma) for c in candidates),
+                   key=lambda e: e.evidence)
         if best.evidence < EVIDENCE_LEAST:
             break
         found.append(best)
-        shared = np.concatenate([shared, project(blocks, best.columns)], axis=-1)
+        more = project(blocks, best.columns)
+        shared = np.concatenate([shared, more], axis=-1)
+        moments = {key: value.with_shared(more) for key, value in moments.items()}
     start = blocks.chain_columns.shape[-1]
     done = []
     for effect in found:
@@ -155,10 +163,8 @@ def name_markers(angles: FingerAngles) -> MarkerNaming:
 
 def _solve(shared: Array, y: Array) -> tuple[Array, Array]:
     """Shared coefficients and the residual (b, 3m, 1) that they leave."""
-    gram = np.einsum("bic,bid->cd", shared, shared)
-    right = np.einsum("bic,bi->c", shared, y[..., 0])
-    size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    coefficients = np.linalg.pinv(gram / np.outer(size, size), rcond=1e-9, hermitian=True) @ (right / size) / size
+    inverse, right = _chain_part(shared, y)
+    coefficients = inverse @ right
     return coefficients, y - shared @ coefficients[:, None]
 
 
@@ -177,28 +183,38 @@ class _Candidate:
     label: str | None
     columns: Array
     step: bool
+    lasting: bool = True  # a step that lasts for the session, or until the end of the recording (it was put right after)
 
 
 def _candidates(blocks: Blocks) -> list[_Candidate]:
     b, m = blocks.weight.shape
     out = []
     for j, label in enumerate(blocks.labels):
-        columns = np.zeros((b, m, 3, 3))
-        columns[:, j] = blocks.rotation[:, j]
         name = "palm_marker_slip" if blocks.body[j] == 0 else "marker_slip"
-        out.append(_Candidate(name, int(blocks.body[j]), label, columns.reshape(b, 3 * m, 3), True))
+        for frame in _frames(blocks, int(blocks.body[j]), j):
+            columns = np.zeros((b, m, 3, 3))
+            columns[:, j] = frame
+            flat = columns.reshape(b, 3 * m, 3)
+            out += [_Candidate(name, int(blocks.body[j]), label, flat, True, lasting) for lasting in BOTH]
     for k in range(1, int(blocks.body.max()) + 1):
         mine = np.flatnonzero(blocks.body == k)
-        columns = np.zeros((b, m, 3, 6))
-        columns[:, mine, :, :3] = blocks.rotation[:, mine]
-        turned = np.zeros((b, len(mine), 3, 3))
         arm = blocks.position[:, mine] - blocks.position[:, mine].mean(1, keepdims=True)
-        for i in range(3):
-            turned[..., i] = np.cross(blocks.rotation[:, mine][..., i], arm)
-        columns[:, mine, :, 3:] = turned
-        out.append(_Candidate("support_slip", k, None, columns.reshape(b, 3 * m, 6), True))
+        for frame in _frames(blocks, k, int(mine[0])):
+            turned = np.stack([np.cross(frame[:, None, :, i], arm) for i in range(3)], axis=-1)
+            columns = np.zeros((b, m, 3, 6))
+            columns[:, mine, :, :3] = frame[:, None]
+            columns[:, mine, :, 3:] = turned
+            flat = columns.reshape(b, 3 * m, 6)
+            out += [_Candidate("support_slip", k, None, flat, True, lasting) for lasting in BOTH]
         out += _no_hinge(blocks, k)
     return out
+
+
+def _frames(blocks: Blocks, body: int, marker: int) -> list[Array]:
+    """Frames (b, 3, 3) in which a slip may be constant: its segment's, or the palm's (a marker held back by a cable)."""
+    b = len(blocks.residual)
+    fixed = np.broadcast_to(np.eye(3), (b, 3, 3))
+    return [fixed] if body == 0 else [blocks.rotation[:, marker], fixed]
 
 
 def _no_hinge(blocks: Blocks, k: int) -> list[_Candidate]:
@@ -233,33 +249,67 @@ def _no_hinge(blocks: Blocks, k: int) -> list[_Candidate]:
     return out
 
 
-def _try(candidate: _Candidate, blocks: Blocks, shared: Array, y: Array, sigma: float) -> MarkerEffect:
-    """Gain of a candidate beyond poses and chain; a step at its best moment."""
-    d = project(blocks, candidate.columns)
-    gram = np.einsum("bic,bid->cd", shared, shared)
+@dataclass(frozen=True)
+class _Moments:
+    """Products per block of projected columns d: with themselves (b, c, c), with the shared ones (b, s, c), with y (b, c)."""
+
+    d: Array
+    dd: Array
+    sd: Array
+    dy: Array
+
+    def with_shared(self, more: Array) -> _Moments:
+        """The same with further shared columns (b, 3m, e)."""
+        return _Moments(self.d, self.dd, np.concatenate([self.sd, np.swapaxes(more, 1, 2) @ self.d], axis=1), self.dy)
+
+
+def _moments(d: Array, shared: Array, y: Array) -> _Moments:
+    turned = np.swapaxes(d, 1, 2)
+    return _Moments(d, turned @ d, np.swapaxes(shared, 1, 2) @ d, (turned @ y)[..., 0])
+
+
+def _chain_part(shared: Array, y: Array) -> tuple[Array, Array]:
+    """Pseudo-inverse of the shared columns' Gram matrix, and their products with y."""
+    flat = shared.reshape(-1, shared.shape[-1])
+    gram = flat.T @ flat
     size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    inverse = np.linalg.pinv(gram / np.outer(size, size), rcond=1e-9, hermitian=True) / np.outer(size, size)
-    sy = np.einsum("bic,bi->c", shared, y[..., 0])
-    dd, sd = np.einsum("bic,bid->bcd", d, d), np.einsum("bis,bic->bsc", shared, d)
-    dy = np.einsum("bic,bi->bc", d, y[..., 0])
-    if candidate.step:
+    return np.linalg.pinv(gram / np.outer(size, size), rcond=1e-9, hermitian=True) / np.outer(size, size), flat.T @ y.ravel()
+
+
+def _try(candidate: _Candidate, blocks: Blocks, moments: _Moments, chain: tuple[Array, Array], sigma: float) -> MarkerEffect:
+    """Gain of a candidate beyond poses and chain; a step at its best moment."""
+    dd, sd, dy = moments.dd, moments.sd, moments.dy
+    inverse, sy = chain
+    width = dd.shape[-1]
+    total = np.trace(dd.sum(0)) / width
+    last = np.array([np.flatnonzero(blocks.record == r)[-1] + 1 for r in blocks.record])
+    if not candidate.step:
+        dd, sd, dy = (v.sum(0, keepdims=True) for v in (dd, sd, dy))
+    elif candidate.lasting:
         dd, sd, dy = (np.cumsum(v[::-1], axis=0)[::-1] for v in (dd, sd, dy))
     else:
-        dd, sd, dy = (v.sum(0, keepdims=True) for v in (dd, sd, dy))
-    total = np.trace(dd[0]) / dd.shape[-1]
-    free = dd - np.swapaxes(sd, 1, 2) @ inverse @ sd + 1e-6 * total * np.eye(dd.shape[-1])
+        dd, sd, dy = (_until(v, last) for v in (dd, sd, dy))
+    free = dd - np.swapaxes(sd, 1, 2) @ (inverse @ sd) + 1e-6 * total * np.eye(width)
     right = dy - np.einsum("bsc,s->bc", sd, inverse @ sy)
     gain = np.einsum("bc,bc->b", right, np.linalg.solve(free, right[..., None])[..., 0]) / sigma**2
     if candidate.step:
         gain[:3] = gain[-3:] = 0.0
     at = int(np.argmax(gain))
-    parameters = d.shape[-1] + (1 if candidate.step else 0)
+    parameters = width + (1 if candidate.step else 0)
     evidence = 0.5 * float(gain[at]) - 0.5 * parameters * np.log(max((blocks.weight > 0).sum() * 2, 2))
     columns = candidate.columns
     if candidate.step:
-        columns = columns * (np.arange(len(columns)) >= at)[:, None, None]
+        stop = len(columns) if candidate.lasting else last[at]
+        index = np.arange(len(columns))
+        columns = columns * ((index >= at) & (index < stop))[:, None, None]
     return MarkerEffect(candidate.effect, candidate.body, candidate.label, at if candidate.step else None, columns,
                         float(evidence), float(gain[at]))
+
+
+def _until(values: Array, last: NDArray[np.int64]) -> Array:
+    """Sums (b, ...) from each block to the end of its recording."""
+    total = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
+    return total[last] - total[:-1]
 
 
 def _lack(residual: Array, blocks: Blocks) -> tuple[float, float]:
@@ -295,7 +345,7 @@ def corrected_angles(angles: FingerAngles, naming: MarkerNaming) -> FingerAngles
     from dataclasses import replace
 
     body = angles.records[0].data.body
-    chain = plain_chain(angles.fit, angles.records[0].data.labels)
+    chain = angles.chain
     records = []
     for index, record in enumerate(angles.records):
         observed = record.data.position_world

@@ -1,0 +1,127 @@
+"""Marker station -> findings: what slipped, turned or was exchanged, and which joint is no hinge."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .angles import FingerAngles
+from .findings import Finding
+from .markers import MarkerEffect, MarkerNaming
+
+Array = NDArray[np.float64]
+
+CORRECTION = {
+    "marker_slip": "the marker's displacement is taken out from the moment of the slip",
+    "palm_marker_slip": "the palm marker's displacement is taken out from the moment of the slip",
+    "support_slip": "the support's turn is taken out from the moment of the slip",
+    "marker_swap": "the labels are put right while they were exchanged",
+}
+SWAP_FRAMES = 5  # shorter exchanges are ghosts
+
+
+def marker_findings(angles: FingerAngles, naming: MarkerNaming) -> list[tuple[float, Finding]]:
+    """Findings of one finger's markers with their weight (log likelihood gained): swaps first, then the named effects,
+    one per marker, support or joint."""
+    out = _swaps(angles)
+    groups: dict[tuple[str, int, str | None], list[MarkerEffect]] = {}
+    for effect in naming.found:
+        groups.setdefault((effect.effect, effect.body, effect.label), []).append(effect)
+    for (name, body, label), members in groups.items():
+        out.append((0.5 * sum(e.gain for e in members), _finding(angles, naming, name, body, label, members)))
+    return out
+
+
+def _finding(angles: FingerAngles, naming: MarkerNaming, name: str, body: int, label: str | None,
+             members: list[MarkerEffect]) -> Finding:
+    blocks = naming.blocks
+    joint = angles.finger.segments[body - 1].name if body > 0 else None
+    main = max(members, key=lambda e: e.gain)
+    shift = sum((e.columns @ e.coefficients).reshape(len(blocks.residual), -1, 3) for e in members)
+    size = float(np.median(np.linalg.norm(shift, axis=-1).max(1)[main.begin or 0 :]))
+    parameters: dict[str, dict[str, Any]] = {}
+    trials = [r.trial.name for r in angles.records]
+    if main.begin is not None:
+        record = angles.records[int(blocks.record[main.begin])]
+        at = float(blocks.time_s[main.begin])
+        trials = [record.trial.name]
+        sd = naming.sigma_m / np.sqrt(max(len(blocks.residual) - main.begin, 1)) * 4
+        if name == "support_slip":
+            turn = float(np.linalg.norm(main.coefficients[3:6]))
+            parameters["turn"] = {"value": turn, "unit": "rad"}
+        else:
+            parameters["distance"] = {"value": size, "unit": "m", "ci95": [size - sd, size + sd]}
+        parameters["moment"] = {"value": at, "unit": "s"}
+        text = f"{label or joint}: {name.replace('_', ' ')} of {1e3 * size:.2f} mm at {at:.1f} s of {record.trial.name}."
+    elif name == "joint_wobble":
+        tilt = _amount(naming, main)
+        parameters["amplitude"] = {"value": tilt, "unit": "rad"}
+        text = f"{angles.finger.name} {joint}: a second rotation of up to {np.rad2deg(tilt):.2f} deg across the axis, as the angle grows."
+    else:
+        travel = _amount(naming, main)
+        parameters["travel"] = {"value": travel, "unit": "m"}
+        text = f"{angles.finger.name} {joint}: the centre of rotation travels by up to {1e3 * travel:.2f} mm as the angle grows."
+    share = sum(e.gain for e in members) / max(sum(e.gain for e in naming.found), 1e-9)
+    where = {"finger": angles.finger.name, "joint": joint, "actuator": None, "signal": "markers", "marker": label,
+             "trials": trials, "region": None, "share_of_mismatch": share}
+    fit = {"metric": "marker_rmse", "unit": "m", **_proof(naming), "noise_floor": naming.sigma_m,
+           "held_out": [], "engine": "chain"}
+    correction = CORRECTION.get(name)
+    model = None if correction else {"native": True, "mjcf": f"joint[@name='{angles.finger.name}_{joint}'] + tied joints",
+                                     "urdf": "not expressible: kept in hand.json"}
+    return Finding(name, (name,), float(1 - np.exp(-min(main.evidence, 700))), (), where, text, parameters, fit, model, correction)
+
+
+def _amount(naming: MarkerNaming, effect: MarkerEffect) -> float:
+    """Largest tilt [rad] or travel [m] over the recorded angles, beyond the line that another axis or centre explains."""
+    blocks = naming.blocks
+    j = int(np.flatnonzero(blocks.body >= effect.body)[0])
+    shift = (effect.columns @ effect.coefficients).reshape(len(blocks.residual), -1, 3)[:, j]
+    if effect.effect == "joint_wobble":
+        arm = blocks.position[:, j] - blocks.centres[:, effect.body - 1]
+        axis = blocks.axes[:, effect.body - 1]
+        across = arm - axis * np.einsum("bi,bi->b", axis, arm)[:, None]
+        size = np.einsum("bi,bi->b", shift, axis) / np.maximum(np.linalg.norm(across, axis=1), 1e-6)
+        return float(0.5 * np.ptp(size))
+    return float(np.linalg.norm(shift - shift[np.argmin(blocks.angle[:, effect.body - 1])], axis=1).max())
+
+
+def _proof(naming: MarkerNaming) -> dict[str, Any]:
+    """Error per coordinate of block means [m] before and after, from the excess of the cell means."""
+    count = max(naming.blocks.weight.size * 3, 1)
+    before, after = (float(naming.sigma_m * np.sqrt(1 + e / count)) for e in (naming.excess_before, naming.excess_after))
+    return {"before": before, "after": after, "ci95_reduction": None}
+
+
+def _swaps(angles: FingerAngles) -> list[tuple[float, Finding]]:
+    found: dict[frozenset[str], list[tuple[str, float, float]]] = {}
+    for record in angles.records:
+        time_s = record.mocap.time_s
+        for swap in record.swaps:
+            if swap.stop - swap.start + 1 >= SWAP_FRAMES:
+                found.setdefault(frozenset(swap.labels), []).append(
+                    (record.trial.name, float(time_s[swap.start]), float(time_s[swap.stop])))
+    if not found:
+        return []
+    # Pieces of one exchange, interrupted by gaps, are one finding: the labels exchanged for the longest time.
+    labels, spans = max(found.items(), key=lambda item: sum(b - a for _, a, b in item[1]))
+    joint = next((s.name for s in angles.finger.segments if labels & set(s.markers)), None)
+    trial, begin, end = spans[0][0], min(s[1] for s in spans), max(s[2] for s in spans)
+    names = sorted(labels)
+    where = {"finger": angles.finger.name, "joint": joint, "actuator": None, "signal": "markers", "marker": names[0],
+             "markers": names, "trials": sorted({s[0] for s in spans}), "region": {"time": [begin, end], "unit": "s"},
+             "share_of_mismatch": 1.0}
+    parameters = {"begin": {"value": begin, "unit": "s"}, "end": {"value": end, "unit": "s"}}
+    fit = {"metric": "marker_rmse", "unit": "m", "before": None, "after": None, "noise_floor": angles.noise_m,
+           "ci95_reduction": None, "held_out": [], "engine": "chain"}
+    text = f"{' and '.join(names)} are exchanged from {begin:.1f} to {end:.1f} s of {trial}."
+    return [(1e6, Finding("marker_swap", ("marker_swap",), 1.0, (), where, text, parameters, fit, None, CORRECTION["marker_swap"]))]
+
+
+def steps(angles: FingerAngles, naming: MarkerNaming) -> list[tuple[int, float]]:
+    """(record, time [s]) of every slip: a support that turns about its joint's own axis steps the angle, which markers alone
+    cannot tell from motion; encoder and linkage balances let the angle step there."""
+    return [(int(naming.blocks.record[e.begin]), float(naming.blocks.time_s[e.begin]))
+            for e in naming.found if e.begin is not None and e.effect in ("support_slip", "palm_marker_slip")]
