@@ -66,7 +66,8 @@ def _write(folder: Path, hand: Hand, plans: tuple[Plan, ...]) -> None:
             if tree is not None:
                 (folder / name).write_bytes(document(tree))
         for link in plan.links:
-            mesh = joined([capsule_mesh(shape) for shape in link.solid])
+            probed = link.surface
+            mesh = (probed.vertices, probed.faces) if probed else joined([capsule_mesh(shape) for shape in link.solid])
             (folder / "assets" / f"{link.mesh}.stl").write_bytes(stl(*mesh))
     try:
         hand.save(folder / "hand.json")

@@ -17,6 +17,7 @@ from .coupling import Linkage, checked, limits, linkages
 from .names import Names, named, sanitised
 from .posture import finger_posture, grips_of, known_grip_fingers, posture
 from .shape import Capsule, Inertia, capsule_inertia, combined, finger_capsules, palm_capsules, with_tips
+from .surface import Surface, mesh_inertia, surfaces
 
 Array = NDArray[np.float64]
 
@@ -28,6 +29,7 @@ class Link:
     name: body. finger, segment: where it comes from ("" and "palm" for the palm). parent: body, None for the palm.
     position_parent, axis: (3,) [m], [-]. range_rad: (low, high). solid: nominal shape, which the
     inertia and the visual mesh (file stem `mesh`) come from; shapes: what collides. sites: name -> (3,) [m].
+    surface: the probed surface that takes the nominal shape's place as visual, and as origin of the inertia if watertight.
     """
 
     name: str
@@ -43,6 +45,7 @@ class Link:
     inertia: Inertia
     sites: Mapping[str, Array]
     mesh: str
+    surface: Surface | None = None
 
 
 @dataclass(frozen=True)
@@ -151,6 +154,7 @@ def planned(stem: str, suffix: str, hand: Hand, guessed_tips: Mapping[str, str])
     links = [_palm(hand, names, shapes[PALM], shrunk[PALM], f"palm{suffix}")]
     for finger in hand.fingers:
         links += _finger_links(hand, finger.name, names, shapes, shrunk)
+    links = _with_surfaces(hand, links)
     body = {PALM: "palm", **names.link}
     return Plan(
         stem,
@@ -164,6 +168,18 @@ def planned(stem: str, suffix: str, hand: Hand, guessed_tips: Mapping[str, str])
         tuple((*(body[key] for key in body if key in pair), reason) for pair, reason in excluded.items()),
         {f: how for f, how in guessed_tips.items() if f in names.tip},
     )
+
+
+def _with_surfaces(hand: Hand, links: list[Link]) -> list[Link]:
+    probed, out = surfaces(hand), []
+    for link in links:
+        found = probed.get((link.finger, link.segment))
+        if found is not None:
+            joints = [j for f in hand.fingers if f.name == link.finger for j in f.joints if j.name == link.segment]
+            own = found.shifted(joints[0].centre_palm if joints else np.zeros(3))
+            link = replace(link, surface=own, inertia=mesh_inertia(own) if own.watertight else link.inertia)
+        out.append(link)
+    return out
 
 
 def in_file_names(plan: Plan) -> Hand:

@@ -77,7 +77,8 @@ def _derivation(hand: Hand, plans: tuple[Plan, ...]) -> str:
         "A linkage is its polynomial, enforced by an MJCF joint equality (`joint1` follows `joint2`).",
         "URDF's mimic holds the least-squares line through that polynomial that stays within the limits.",
         f"Masses and inertias are a fallback, not measured: solid capsules between the joints, {DENSITY:.0f} kg/m^3.",
-        "Visual meshes (group 2) are these capsules.",
+        "Where a watertight surface was probed, mass and inertia are its inside's at that density.",
+        "Visual meshes (group 2) are the probed surfaces, else these capsules.",
         "Collision capsules (group 3) are the same, shrunk until nothing touches at any keyframe.",
     ]
     if any(plan.names.actuator for plan in plans) and not hand.motors:
@@ -178,5 +179,11 @@ def _known_issues(hand: Hand, plans: tuple[Plan, ...]) -> str:
             if reason != SHARE_A_JOINT:
                 issues.append(f"`{plan.stem}`: no contact between `{one}` and `{other}`, whose primitives {reason}.")
     issues.append("The attachment site is the palm frame itself: the wrist's interface was not measured.")
-    issues.append("Masses, inertias and shapes are a fallback until surfaces are probed.")
+    links = {link.name: link for plan in plans for link in plan.links}.values()
+    fallback = [link.name for link in links if link.surface is None]
+    leaky = [link.name for link in links if link.surface is not None and not link.surface.watertight]
+    if fallback:
+        issues.append(f"Shape, mass and inertia are a fallback until surfaces are probed: {', '.join(fallback)}.")
+    if leaky:
+        issues.append(f"The surface is not watertight, mass and inertia remain the fallback's: {', '.join(leaky)}.")
     return "## Known issues\n\n" + "\n".join(f"- {issue}" for issue in dict.fromkeys(issues)) + "\n"
