@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .published import CUTOFF_HZ, zero_phase
+from .published import CUTOFF_HZ, derivatives, zero_phase
 from .recording import MotorTrial
 
 Array = NDArray[np.float64]
@@ -66,8 +66,7 @@ def _prepare(t: MotorTrial, sigma: float) -> _Prepared:
     time = np.arange(t.time_s[0], t.time_s[-1], 1 / rate)
     position, current = np.interp(time, t.time_s, t.position), np.interp(time, t.time_s, t.current)
     p = zero_phase(position, rate)
-    v = np.gradient(p, time)
-    a = np.gradient(v, time)
+    v, a = derivatives(p, rate)
     light = zero_phase(position, rate, 2 * CUTOFF_HZ)
     z = friction_state(light, PRESLIDING)
     known = zero_phase((np.abs(z) > 0.97).astype(float), rate)  # all that the filter mixes in is sliding
@@ -115,8 +114,7 @@ def _noise_gram(rate: float, sigma: float) -> Array:
     pulse = np.zeros(2 * n + 1)
     pulse[n] = 1.0
     p = zero_phase(pulse, rate)
-    v = np.gradient(p) * rate
-    a = np.gradient(v) * rate
+    v, a = derivatives(p, rate)
     response = np.c_[a, v, p]
     return sigma**2 * response.T @ response
 

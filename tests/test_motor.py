@@ -1,0 +1,203 @@
+"""The motor's identification on simulated drives with known truth, made by a recorder that shares no code with it."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hand_model.errors import IdentificationError
+from hand_model.identify.motor import identify_motor, identify_motors
+from hand_model.identify.motor.corrected import NAMES, fit_regression, friction_state
+from hand_model.identify.motor.drive import Moves, profile, simulate
+from hand_model.identify.motor.fit import white_noise
+from hand_model.identify.motor.predict import predict, reference, replay_table
+from hand_model.identify.motor.published import MODELS, fit_published, smear_share
+from hand_model.identify.motor.recording import MotorTrial, actuator_trials, check_trials, motor_trial, trial_scale
+from hand_model.session import Log, read_session
+
+SHARED = Path(__file__).resolve().parents[2] / "shared" / "sessions"
+TRUTH = {"inertia": 0.0125, "viscous": 0.145, "coulomb": 34.0, "stiffness": 0.23, "preload": 9.0}
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory: pytest.TempPathFactory):
+    from hand_model.twin import bebionic, record
+
+    folder = tmp_path_factory.mktemp("motor") / "session"
+    record(bebionic("left", None, ["index"]), folder, seed=5)
+    return read_session(folder)
+
+
+@pytest.fixture(scope="module")
+def fit(session):
+    return identify_motor(session, "index")
+
+
+@pytest.fixture(scope="module")
+def trials(session):
+    found = actuator_trials(session, "index")
+    logs = [(t.name, t.log()) for t in found]
+    scale = trial_scale(logs)
+    return [motor_trial(n, log, scale) for n, log in logs]
+
+
+def test_plant_is_found(fit) -> None:
+    for name, wanted in TRUTH.items():
+        estimate = fit.motor.parameters[name]
+        assert estimate.value == pytest.approx(wanted, rel=0.08), name
+        assert estimate.ci95[0] < estimate.value < estimate.ci95[1]
+    assert not fit.stribeck  # the drive has none
+    assert fit.motor.current_noise_raw == pytest.approx(5.0, rel=0.1)
+
+
+def test_regression_without_controller(trials) -> None:
+    """A regression that knows nothing of setpoints agrees within its own interval, four deviations at most."""
+    blind = [dataclasses.replace(t, setpoint=None, speed=None, limit=None) for t in trials]
+    found = fit_regression(blind, 3.5 / 58)
+    z = (found.values - [TRUTH[n] for n in NAMES]) / np.sqrt(np.diag(found.covariance))
+    assert np.all(np.abs(z) < 4)
+    assert abs(fit_regression(blind, 3.5 / 58, stribeck=True).excess_z) < 4
+
+
+def test_prediction_of_held_out_trials(session, fit) -> None:
+    for trial in actuator_trials(session, "index", validate=True):
+        table = replay_table(predict(fit, trial.log(), trial.name), fit.sigma_current)
+        assert table["all"][0] < 1.0 and table["all"][2] < 1.15
+
+
+def test_reciprocal_term_is_smear(trials) -> None:
+    """On a drive without Stribeck friction the reciprocal term still lowers the published error, and both sides alike undo that."""
+    published = {f.model: f.rmse_raw for f in fit_published(trials)}
+    assert [published[m] for m in MODELS] == sorted(published.values(), reverse=True)
+    assert published["SMD+Frec+Fc"] < 0.99 * published["SMD+Fc"]
+    assert smear_share(trials) > 0.7
+
+
+def _moves(**more: float) -> Moves:
+    one = np.ones(1)
+    values = {"start_s": 0.05, "origin": 0.0, "target": 80.0, "speed": 1.0, "limit": 255.0, "position": 0.0, "hold": 0.0, "duration_s": 1.5}
+    return Moves(**{k: v * one for k, v in {**values, **more}.items()})
+
+
+PARAMETERS = {
+    **TRUTH, "presliding": 0.5, "bristle": 0.0, "speed_full": 115.0, "rise": 0.1, "fall": 0.1, "gain": 22.0, "damping": 3.0, "delay": 0.0,
+    "static_ratio": 1.0, "stribeck_speed": 20.0, "stribeck_exponent": 1.0,
+}  # fmt: skip
+
+
+def test_profile_is_its_velocitys_integral() -> None:
+    q = {k: np.array([v]) for k, v in PARAMETERS.items()}
+    t = np.linspace(0, 1.5, 30001)
+    r, w = profile(t, _moves(), q)
+    assert r[0, 0] == 0.0 and r[-1, 0] == pytest.approx(80.0)
+    assert np.allclose(np.gradient(r[:, 0], t), w[:, 0], atol=0.3)
+    assert w.max() == pytest.approx(115.0)
+
+
+def test_simulation_obeys_the_plant() -> None:
+    """Inverse dynamics of the simulated motion give back its current, friction by the friction state along the path."""
+    q = {k: np.array([v]) for k, v in PARAMETERS.items()}
+    t, p, u = simulate(_moves(), q, 2e-4)
+    n = int(1.4 / 2e-4)
+    t, p, u = t[:n], p[:n, 0], u[:n, 0]
+    v = np.gradient(p, t)
+    a = np.gradient(v, t)
+    z0 = (u[0] - TRUTH["preload"]) / TRUTH["coulomb"]
+    z = friction_state(np.r_[p], 0.5)
+    sliding = (p > 8) & (p < 70)
+    balance = TRUTH["inertia"] * a + TRUTH["viscous"] * v + TRUTH["coulomb"] * z + TRUTH["stiffness"] * p + TRUTH["preload"]
+    assert abs(z0) <= 1
+    assert np.max(np.abs((balance - u)[sliding])) < 0.2
+
+
+def test_friction_state_sticks() -> None:
+    z = friction_state(np.r_[0.0, 10.0, 10.0, 10.0, 9.99], 0.5)
+    assert z[1] == pytest.approx(1.0, abs=1e-6) and z[1] == z[2] == z[3] and 0.9 < z[4] < 1.0
+
+
+def test_white_noise_estimate() -> None:
+    rng = np.random.default_rng(0)
+    t = np.cumsum(rng.uniform(0.012, 0.024, 4000))
+    assert white_noise(50 * np.sin(t) + rng.normal(0, 5, 4000), t) == pytest.approx(5.0, rel=0.06)
+
+
+def test_reference_drives_the_compiled_actuator(fit, trials) -> None:
+    t = np.arange(0, 5, 0.001)
+    control = reference(fit, trials[0], t)
+    assert control.min() > -5 and control.max() < 105 and np.ptp(control) > 50
+
+
+# --- bad input: one sentence each
+
+
+def _log(**columns: np.ndarray) -> Log:
+    t = np.arange(600) * 0.018
+    position = 12000 + 2900 * (1 - np.cos(t))
+    current = 40 * np.sign(np.sin(t)) + 0.2 * position / 60 + np.random.default_rng(1).normal(0, 5, 600)
+    base = {"position": position, "current": current}
+    return Log(t, {**base, **columns}, Path("x.csv"))
+
+
+def _check(log: Log) -> None:
+    scale = trial_scale([("log/x.csv", log)])
+    check_trials([motor_trial("log/x.csv", log, scale)])
+
+
+def test_good_log_passes() -> None:
+    _check(_log())
+
+
+@pytest.mark.parametrize(
+    ("columns", "words"),
+    [
+        ({"current": np.full(600, 7.0)}, "constant"),
+        ({"position": np.full(600, 12000.0)}, "does not move"),
+        ({"position": np.linspace(12000, 18000, 600)}, "no extension"),
+        ({"current": np.clip(60 * np.sin(np.arange(600) * 0.018), -40, 40)}, "saturated"),
+        ({"current": (lambda p: 0.01 * p - 100)(12000 + 2900 * (1 - np.cos(np.arange(600) * 0.018)))}, "command"),
+        ({"setpoint": np.repeat([12000.0, 18000.0, 12000.0], 200), "current": np.repeat([5.0, 80.0, 5.0], 200)}, "command"),
+    ],
+)
+def test_bad_current_or_motion(columns: dict[str, np.ndarray], words: str) -> None:
+    with pytest.raises(IdentificationError, match=words) as info:
+        _check(_log(**columns))
+    assert "\n" not in str(info.value) and "log/x.csv" in str(info.value)
+
+
+def test_missing_column_and_actuator(session) -> None:
+    log = _log()
+    without = Log(log.time_s, {"position": log.columns["position"], "curent": log.columns["current"]}, log.path)
+    with pytest.raises(IdentificationError, match='no column "current"; did you mean "curent"'):
+        trial_scale([("log/x.csv", without)])
+    with pytest.raises(IdentificationError, match="did you mean"):
+        identify_motor(session, "indx")
+    empty = dataclasses.replace(session, trials=())
+    with pytest.raises(IdentificationError, match="no excitation or flexion trial"):
+        identify_motor(empty, "index")
+    motors, notes = identify_motors(empty)
+    assert not motors and len(notes) == 1
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason="shown sessions are not here")
+@pytest.mark.parametrize(("name", "stribeck"), [("shown_00", False), ("shown_01", True)])
+def test_shown_sessions(name: str, stribeck: bool) -> None:
+    import json
+
+    answer = json.loads((SHARED / name / "answer.json").read_text())["motor"]["index"]
+    fit = identify_motor(read_session(SHARED / name), "index")
+    sd = dict(zip(fit.names, np.sqrt(np.diag(fit.covariance)), strict=True))
+    for key, wanted in zip(NAMES, (answer[k] for k in ("m", "b", "Fc", "k", "tau0")), strict=True):
+        assert abs(fit.values[key] - wanted) < 3.3 * sd[key], key
+    assert fit.stribeck is stribeck
+
+
+def test_current_of_another_drive_is_not_explained(trials) -> None:
+    """A model that does not fit says so instead of giving intervals of the perfect fit."""
+    rng = np.random.default_rng(2)
+    t = trials[0]
+    wrong = MotorTrial(t.name, t.time_s, t.position, rng.normal(0, 40, len(t.time_s)), t.setpoint, t.speed, t.limit)
+    found = fit_regression([wrong], 0.06)
+    assert np.sqrt(found.covariance[2, 2]) > 1.0
