@@ -6,6 +6,7 @@ import numpy as np
 
 from ..description import Description, Model
 from ..engines import mujoco as engine
+from ..engines.ours import load
 from .finding import Finding
 
 RANDOM_S = 10.0
@@ -61,7 +62,8 @@ def quiet(description: Description, model: Model) -> Finding:
         mujoco.mj_resetDataKeyframe(mj, data, 0)
     low, high = mj.actuator_ctrlrange.T if mj.nu else (np.zeros(0), np.zeros(0))
     beyond, hold = 0.0, max(1, round(HOLD_S / mj.opt.timestep))
-    limited = np.flatnonzero(mj.jnt_limited)
+    own = {mj.joint(name).id for name in load(model.mjcf).joints}  # a motor's own joint is in other units
+    limited = np.array([j for j in range(mj.njnt) if mj.jnt_limited[j] and j in own], int)
     for step in range(round(RANDOM_S / mj.opt.timestep)):
         if step % hold == 0:
             data.ctrl[:] = random.uniform(low, high)
