@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from .errors import IdentificationError
 from .hand import Estimate
-from .identify.motor import MotorFit, identify_motor
-from .identify.motor import output_error
+from .identify.motor import MotorFit, identify_motor, output_error
 from .identify.motor.output_error import MoveData, moves_from_rest
 from .identify.motor.recording import actuator_trials, motor_trial
 from .session import Log, Session

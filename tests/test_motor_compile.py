@@ -111,9 +111,10 @@ def test_lugre_where_presliding_was_found() -> None:
     assert root.find(".//joint[@name='index_motor']").get("frictionloss") is None
 
 
-def test_keyframe_puts_motor_where_the_finger_is() -> None:
+@pytest.mark.parametrize("more", [{}, {"presliding": 0.6}])
+def test_keyframe_puts_motor_where_the_finger_is(more: dict[str, float]) -> None:
     root = etree.fromstring(XML)
-    write_motors(root, _hand())
+    write_motors(root, _hand(**more))
     root.find("keyframe/key").set("qpos", "1.2 1.08 0 0")
     complete_keyframes(root, _hand())
     model = mujoco.MjModel.from_xml_string(etree.tostring(root).decode())

@@ -39,10 +39,13 @@ def write_motors(root: Any, hand: Hand, newton_metre_per_unit: float | None = No
 def complete_keyframes(root: Any, hand: Hand) -> None:
     """Put every motor and lever of the keyframes where their proximal joint stands, and the controls of the motors with them."""
     joints = [j.get("name") for j in root.find("worldbody").iter("joint")]
-    actuators = [a.get("name") for a in root.iterfind("actuator/*") if isinstance(a.tag, str)]
+    every = [a for a in root.iterfind("actuator/*") if isinstance(a.tag, str)]
+    actuators = [a.get("name") for a in every if a.get("input") != "none"]  # an actuator without input has no control
     for key in root.iterfind("keyframe/key"):
         pose = dict(zip(joints, map(float, (key.get("qpos") or "").split()), strict=False))
-        control = dict.fromkeys(actuators, 0.0) | dict(zip(actuators, map(float, (key.get("ctrl") or "").split()), strict=False))
+        given = [float(x) for x in (key.get("ctrl") or "").split()]
+        names = [a.get("name") for a in every] if len(given) == len(every) else actuators
+        control = dict.fromkeys(actuators, 0.0) | dict(zip(names, given, strict=False))
         for motor, finger in _driven(root, hand):
             angle, grid = _map(finger, motor), np.linspace(0, 100, 2001)
             values = np.polynomial.polynomial.polyval(grid, angle)
@@ -104,8 +107,8 @@ def _write_motor(root: Any, finger: Finger, motor: Motor, scale: float | None) -
         polycoef=coefficients, solref=SOLREF, solimp=SOLIMP,
     )  # fmt: skip
     _write_push(root, name, proximal)
-    lugre = _write_friction(root, joint, name, value, unit)
     _write_actuator(root, name, proximal.get("name"), motor, unit)
+    lugre = _write_friction(root, joint, name, value, unit)
     child(_section(root, "custom"), "numeric", name=f"{name}_effort_per_raw", data=unit)
     notes = [
         f'motor "{name}": joint {name}_motor is in percent of the encoder range, efforts in {label}',

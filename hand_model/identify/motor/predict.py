@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...errors import IdentificationError
 from ...session import Log
 from . import output_error
-from .drive import Moves, profile, simulate
+from .drive import Moves, profile
 from .fit import MotorFit
 from .output_error import MoveData, moves_from_rest
 from .recording import MotorTrial, motor_trial
