@@ -144,7 +144,8 @@ def _keyframes(root: Any, plan: Plan) -> None:
     """Every joint of the tree at its angle; what a motor or an effect brought in is at zero until it is completed."""
     keyframe = child(root, "keyframe")
     joints = [e.get("name") for e in root.find("worldbody").iter("joint")]
-    actuators = [a for a in root.iterfind("actuator/*") if isinstance(a.tag, str)]
+    # an actuator without input has no control
+    actuators = [a for a in root.iterfind("actuator/*") if isinstance(a.tag, str) and a.get("input") != "none"]
     for name, angles in plan.keyframes.items():
         key = child(keyframe, "key", name=name, qpos=[angles.get(joint, 0.0) for joint in joints])
         if actuators:
