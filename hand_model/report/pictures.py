@@ -83,7 +83,6 @@ def encoder_map(finger: Finger, trials: Sequence[TrialResiduals]) -> bytes:
         below.set_xlabel("encoder [counts]")
         top.set_ylabel("angle [deg]")
         below.set_ylabel("left [deg]")
-        d.figure.align_ylabels()
     return d.svg
 
 

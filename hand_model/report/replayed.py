@@ -15,6 +15,14 @@ from .words import count, listed, number, span
 Array = NDArray[np.float64]
 
 COLOURS = dict(zip(MODES, (SERIES[2], SERIES[0], SERIES[1]), strict=True))
+ENGINE = {
+    "mujoco": "MuJoCo (MJCF)",
+    "mujoco (URDF)": "MuJoCo (URDF)",
+    "pinocchio": "Pinocchio (URDF)",
+    "yourdfpy": "yourdfpy (URDF)",
+}
+# What the conventions for descriptions ask for [m].
+AGREEMENT_M = 1e-9
 KEY = {
     "measured": ("c3", "driven by measured angles"),
     "encoder": ("c1", "driven by encoder counts alone"),
@@ -243,18 +251,14 @@ def _clock_row(name: str, clock: dict, use: str) -> list[str | Cell]:
 
 def engines_section(residuals: Residuals) -> Section:
     """Agreement of the engines with this project's own forward kinematics."""
-    worst = max(residuals.agreement_m, key=lambda name: residuals.agreement_m[name])
-    limit = 1e-9
-    good = residuals.agreement_m[worst] <= limit
-    verdict = "agree" if good else "do not agree"
+    distance = {ENGINE.get(name, name): value for name, value in residuals.agreement_m.items()}
+    worst = max(distance, key=lambda name: distance[name])
+    verdict = "agree" if distance[worst] <= AGREEMENT_M else "do not agree"
     words = (
-        f"{listed([name for name in residuals.agreement_m])} {verdict} with this project's own forward kinematics: at most "
-        f"{residuals.agreement_m[worst]:.1e} m apart ({worst}) at any marker or tip, over {AGREEMENT_POSES} random poses of each file "
-        f"(limit {limit:.0e} m)."
+        f"{listed(list(distance))} {verdict} with this project's own forward kinematics: at most {distance[worst]:.1e} m "
+        f"apart ({worst}) at any marker or tip, over {AGREEMENT_POSES} random poses of each file (limit {AGREEMENT_M:.0e} m)."
     )
-    words = words[0].upper() + words[1:]
     rows = [
-        [name, Cell(f"{value:.1e}", "fine" if value <= limit else "flag")]
-        for name, value in residuals.agreement_m.items()
+        [name, Cell(f"{value:.1e}", "fine" if value <= AGREEMENT_M else "flag")] for name, value in distance.items()
     ]
     return Section("engines", "Engines", words, (table(["engine", "largest distance [m]"], rows),))
