@@ -122,8 +122,12 @@ def write_mjcf(
     degrees: bool = False,
     tips: bool = True,
     poly: dict[str, list[float]] | None = None,
+    base: np.ndarray | None = None,
 ) -> Path:
-    """frames: seed of other link frames than the URDF's (None: the same). poly: joint -> polynomial instead of its line."""
+    """frames: seed of other link frames than the URDF's (None: the same); base: (4, 4) the base frame's own turn.
+
+    poly: joint -> polynomial instead of its line.
+    """
     scale = 180 / np.pi if degrees else 1.0
     root = etree.Element("mujoco", model="synthetic")
     etree.SubElement(root, "compiler", angle="degree" if degrees else "radian", autolimits="true")
@@ -131,6 +135,7 @@ def write_mjcf(
     rng = np.random.default_rng(frames)
     turn = {n: transform(rng.normal(size=3), 0.01 * rng.normal(size=3)) for n in ("palm_base", *(link.name for link in links))}
     turn = {n: np.eye(4) if frames is None or n == "palm_base" else t for n, t in turn.items()}
+    turn["palm_base"] = np.eye(4) if base is None else base
     bodies = {"palm_base": etree.SubElement(world, "body", name="palm_base", pos="0.1 0.2 0.3", quat="0.8 0.6 0 0")}
     for link in links:
         ref = transform(-link.ref * link.axis, [0, 0, 0])

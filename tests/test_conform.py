@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conform_hand import make_hand, write_mjcf, write_urdf
+from conform_hand import make_hand, transform, write_mjcf, write_urdf
 
 from hand_model.conform import CAUSES, conform, main_check, read
 from hand_model.conform.evaluate import skeleton
@@ -192,7 +192,8 @@ def test_names_that_say_nothing_and_another_base_frame(tmp_path):
     """Numbered joints are paired by place and shape, also when the two base frames differ."""
     links = make_hand(15)
     urdf = write_urdf(links, tmp_path / "a.urdf", tips=False)
-    mjcf = write_mjcf(links, tmp_path / "b.xml", frames=1, tips=False)
+    turned = transform([0.4, 1.2, -0.7], [0.03, 0.02, 0.05])
+    mjcf = write_mjcf(links, tmp_path / "b.xml", frames=1, tips=False, base=turned)
     text = mjcf.read_text()
     for n, link in enumerate(sorted(links, key=lambda k: k.joint[::-1])):
         text = text.replace(f'"{link.joint}"', f'"q{n}"').replace(f'"{link.name}"', f'"part{n}"')
@@ -201,6 +202,8 @@ def test_names_that_say_nothing_and_another_base_frame(tmp_path):
     truth = {link.joint: f"q{n}" for n, link in enumerate(sorted(links, key=lambda k: k.joint[::-1]))}
     assert {j.a: j.b for j in report.joints} == truth
     assert report.ok, report.text()
+    assert report.base_deg == pytest.approx(np.degrees(np.linalg.norm([0.4, 1.2, -0.7])), abs=1e-6)
+    assert report.base_mm == pytest.approx((30, 20, 50), abs=1e-6)
 
 
 def test_exit_codes_and_output(tmp_path, capsys):

@@ -243,6 +243,8 @@ def _fit(f: Features, k: int, up: Array, conventions: list[Array], frame_weight:
         return farther(carry) + frame_weight * sum(_frame_cost(conventions, x, y, carry, scale) for x, y in frames)
 
     best = None
+    if farther(up) + (cost(up) - farther(up)) * (frame_weight > 0.1) < 0.5:  # everything beyond is in place
+        best, starts = (0.0, up, 0.0, 0.0, False, False), []
     for start, follows in starts:
         offsets = [0.0] if f.slide[k] else [0.0, *_offsets(f, axis, point, start, direct, points, frames)]
         for offset in offsets:
@@ -416,12 +418,15 @@ def mirrored(f: Features) -> Features:
     )  # fmt: skip
 
 
-def exchange(f: Features, pairing: Pairing, a: Tree, b: Tree) -> tuple[Pairing, Features, Alignment]:
+def exchange(
+    f: Features, pairing: Pairing, a: Tree, b: Tree, start: Alignment | None = None
+) -> tuple[Pairing, Features, Alignment]:
     """Look for joints that stand under each other's names: swaps that make more lines coincide, the best first.
 
     Whole fingers are tried before single joints. Returns the pairing, its features and its alignment after all swaps that help.
+    start: the alignment under the pairing, where it is known already.
     """
-    current, best = pairing, align(f)
+    current, best = pairing, start or align(f)
     for _ in range(len(f.names)):
         wrong = [k for k, fit in enumerate(best.fits) if LEVER * fit.angle_rad + fit.shift > 1e-4 or abs(fit.offset) > 1e-2]
         trials = []
@@ -455,17 +460,26 @@ def _swaps(f: Features, at: Alignment, wrong: list[int]) -> list[dict[int, int]]
         return at.base
 
     out, suspects = [], sorted(spoilt)
+    tables: dict[bytes, Array] = {}
+
+    def against(k: int) -> Array:
+        """Cost (k,) of a's line k against every line of b, under the transform that k's surroundings trust."""
+        carry = trusted(k)
+        key = carry.tobytes()
+        if key not in tables:
+            every = list(range(len(f.names)))
+            tables[key] = np.stack([_line_cost(f, carry, [i] * len(every), every) for i in every])
+        return tables[key][k]
+
     for n, i in enumerate(suspects):
         for j in suspects[n + 1 :]:
-            if f.slide[i] != f.slide[j]:
+            crossed, straight = (against(i)[j], against(j)[i]), against(i)[i] + against(j)[j]
+            if f.slide[i] != f.slide[j] or min(crossed) >= 14.4 or sum(crossed) >= straight - 2:
                 continue
+            out.append({i: j, j: i})
             chain_i, chain_j = [i, *f.below(i)], [j, *f.below(j)]
             if f.parent[i] == f.parent[j] and len(chain_i) == len(chain_j) > 1:
                 out.append({**dict(zip(chain_i, chain_j, strict=True)), **dict(zip(chain_j, chain_i, strict=True))})
-            crossed = _line_cost(f, trusted(i), [i], [j])[0], _line_cost(f, trusted(j), [j], [i])[0]
-            straight = _line_cost(f, trusted(i), [i])[0] + _line_cost(f, trusted(j), [j])[0]
-            if min(crossed) < 14.4 and sum(crossed) < straight - 2:
-                out.append({i: j, j: i})
     return out
 
 

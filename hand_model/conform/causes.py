@@ -38,9 +38,8 @@ def geometry_findings(
     return out + _written_short(f, at, wrong, skipped)
 
 
-def mirror_finding(a: Tree, b: Tree, f: Features) -> Finding | None:
+def mirror_finding(a: Tree, b: Tree, f: Features, at: Alignment) -> Finding | None:
     """A left hand against a right one: most axes lie elsewhere, and fall into place once b is reflected."""
-    at = align(f)
     sizes = [_size(f, k, fit) for k, fit in enumerate(at.fits)]
     if 3 * sum(s > 1e-4 for s in sizes) < len(sizes):
         return None
@@ -72,11 +71,13 @@ def _parts(f: Features, k: int, fit: Fit) -> dict[str, float]:
 
 
 def _bound(slack: np.ndarray, f: Features, k: int, reach: float) -> float:
-    """[m] that the last written digits between the joint before and this one may move its line and what it carries."""
-    parent = f.parent[k]
-    before = slack[parent] if parent >= 0 else np.zeros(2)
-    arm = float(np.linalg.norm(f.points_a[k] - (f.points_a[parent] if parent >= 0 else 0.0)))
-    return float(slack[k, 0] + slack[k, 1] * max(arm, reach) + before[1] * arm)
+    """[m] that the last written digits from the base to this joint may move its line and what it carries."""
+    total, at = 0.0, k
+    while at >= 0:
+        arm = reach + float(np.linalg.norm(f.points_a[k] - f.points_a[at]))
+        total += float(slack[at, 0] + slack[at, 1] * arm)
+        at = f.parent[at]
+    return total
 
 
 def _passes(f: Features, k: int, fit: Fit, tolerance_m: float) -> bool:
@@ -240,6 +241,8 @@ def _points(a: Tree, b: Tree, f: Features, at: Alignment, tolerance_m: float, sk
                 continue
             gap = float(np.linalg.norm(x[:3, 3] - carry[:3, :3] @ y[:3, 3] - carry[:3, 3]))
             slack = sum(t.nodes[t.node_of_link(n)].slack_m for t, n in ((a, name), (b, partner)))
+            if k >= 0:
+                slack += max(_bound(f.slack_a, f, k, at.fits[k].reach), _bound(f.slack_b, f, k, at.fits[k].reach))
             if gap > max(tolerance_m, min(ROUNDING_CAP, 2 * slack)):
                 label = f'"{name}"' if name == partner else f'"{name}" (= "{partner}")'
                 text = f"{label} sits {gap * 1e3:.4g} mm elsewhere on its link: another length of the last link, or another point"

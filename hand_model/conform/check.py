@@ -63,8 +63,10 @@ def conform(
     tree_a, tree_b = read(a), read(b)
     given = read_pair(pair, tree_a, tree_b) if pair is not None else pair_automatically(tree_a, tree_b)
     f = features(tree_a, tree_b, given)
-    reflected = mirror_finding(tree_a, tree_b, f)
-    settled, f, at = (given, f, align(f)) if reflected else exchange(f, given, tree_a, tree_b)
+    at = align(f)
+    reflected = mirror_finding(tree_a, tree_b, f, at)
+    settled, f, at = (given, f, at) if reflected else exchange(f, given, tree_a, tree_b, at)
+    given = _guessed(given, settled)
     values = sample(tree_a, tree_b, given, poses, seed)
     links = link_rows(tree_a, tree_b, given, settled, f, at, values)
     findings = relation_findings(tree_a, tree_b, settled, f, at)
@@ -107,6 +109,13 @@ def main_check(
         print(f"hand-model check: {error}", file=sys.stderr)
         return 2
     return 0 if report.ok else 1
+
+
+def _guessed(given: Pairing, settled: Pairing) -> Pairing:
+    """A pairing that rested on geometry alone takes the exchanges as its own; one that names gave keeps what they say."""
+    before, after = dict(given.joints), dict(settled.joints)
+    moved = {x for x in before if before[x] != after[x]}
+    return settled if moved and all(given.how.get(x) == "geometry" for x in moved) else given
 
 
 def sample(a: Tree, b: Tree, pairing: Pairing, count: int, seed: int) -> dict[str, Array]:

@@ -78,12 +78,11 @@ def _limits(a: Tree, b: Tree, joints: Sequence[tuple[str, str]], fits: Mapping[s
 
 def _misplaced(a: Tree, b: Tree, wrong: list[str], of_a, of_b, partner):
     """Limits that belong to another joint: two exchanged, or a run moved on by one, in the order of either file."""
-    for n, i in enumerate(wrong):
-        for j in wrong[n + 1 :]:
-            if max(_gap(of_a[i], of_b[j]), _gap(of_a[j], of_b[i])) <= LIMIT_TOLERANCE:
-                if len(wrong) == 2:
-                    yield "limits_exchanged", f'"{i}" and "{j}" have each other\'s limits', [i, j]
-                    return
+    for i in list(wrong):
+        mutual = (j for j in wrong if j != i and max(_gap(of_a[i], of_b[j]), _gap(of_a[j], of_b[i])) <= LIMIT_TOLERANCE)
+        if i in wrong and (j := next(mutual, None)) is not None:
+            wrong = [x for x in wrong if x not in (i, j)]
+            yield "limits_exchanged", f'"{i}" and "{j}" have each other\'s limits', [i, j]
     orders = [[j.name for j in a.joints if j.name in of_a], sorted(of_a, key=lambda x: b.joint_node[partner[x]])]
     orders += [_depth_first(a, set(of_a)), sorted(of_a, key=lambda x: a.joint(x).line or 0)]
     orders.append(sorted(of_a, key=lambda x: b.joint(partner[x]).line or 0))
