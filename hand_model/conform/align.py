@@ -9,12 +9,12 @@ by a turn about its own axis (another zero), or because the links beyond follow 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..rotation import kabsch, rotation_about
-from .pairing import Pairing, owner
+from .pairing import Pairing
 from .tree import Array, Tree, inverse, pose, zero_lines, zero_poses
 
 LEVER = 0.03
@@ -155,7 +155,7 @@ def line_distance(axis_a: Array, point_a: Array, axis_b: Array, point_b: Array) 
     return angle, gap - (gap * axis_b).sum(-1, keepdims=True) * axis_b
 
 
-def _line_cost(f: Features, carry: Array, wanted: list[int], other: list[int] | None = None, scale: float = SCALE) -> Array:
+def line_cost(f: Features, carry: Array, wanted: list[int], other: list[int] | None = None, scale: float = SCALE) -> Array:
     """Robust cost (k,) of b's lines `other`, carried over, against a's lines `wanted`."""
     other = wanted if other is None else other
     axes, points = f.axes_b[other] @ carry[:3, :3].T, _apply(carry, f.points_b[other])
@@ -206,7 +206,7 @@ def align(f: Features, base: Array | None = None) -> Alignment:
         fit = _fit(f, k, up, [np.eye(4), held], 0.5 if rule else 0.1)
         fits.append(fit)
         carries[k], conventions[k] = fit.carry, _convention(f, k, fit.carry)
-        total += float(_line_cost(f, up, [k])[0]) + 2.0 * (abs(fit.offset) > 1e-9) + (fit.sign < 0)
+        total += float(line_cost(f, up, [k])[0]) + 2.0 * (abs(fit.offset) > 1e-9) + (fit.sign < 0)
         total += 0.3 * sum(_frame_cost([np.eye(4), conventions[f.parent[k]]], *frame[:2], fit.carry) for frame in f.frames.get(k, []))
     return Alignment(base, tuple(fits), total)
 
@@ -235,8 +235,8 @@ def _fit(f: Features, k: int, up: Array, conventions: list[Array], frame_weight:
     scale = _scale(f, [k, *direct])
 
     def farther(carry: Array) -> float:
-        out = float(_line_cost(f, carry, direct, scale=scale).sum()) if direct else 0.0
-        out += 0.2 * float(_line_cost(f, carry, deeper, scale=scale).sum()) if deeper else 0.0
+        out = float(line_cost(f, carry, direct, scale=scale).sum()) if direct else 0.0
+        out += 0.2 * float(line_cost(f, carry, deeper, scale=scale).sum()) if deeper else 0.0
         return out + sum(w * float(_robust(np.linalg.norm(x - _apply(carry, y)), scale)) for x, y, w in points)
 
     def cost(carry: Array) -> float:
@@ -345,7 +345,7 @@ def base_transform(f: Features) -> Array:
     """
     roots = f.children.get(-1, [])
     fixed = f.frames.get(-1, [])[1:]
-    plain = _line_cost(f, np.eye(4), roots)
+    plain = line_cost(f, np.eye(4), roots)
     points = sum(float(_robust(np.linalg.norm(x[:3, 3] - y[:3, 3]))) for x, y, *_ in fixed)
     if 2 * int((plain < 15.5).sum()) >= len(roots) or (len(roots) == 1 and f.parent != f.parent_b):
         return np.eye(4)
@@ -355,9 +355,9 @@ def base_transform(f: Features) -> Array:
 
     def price(carry: Array) -> float:
         near = sum(float(_robust(np.linalg.norm(x[:3, 3] - _apply(carry, y[:3, 3])))) for x, y, *_ in fixed)
-        return float(_line_cost(f, carry, roots).sum()) + 0.2 * float(_line_cost(f, carry, everything).sum()) + near
+        return float(line_cost(f, carry, roots).sum()) + 0.2 * float(line_cost(f, carry, everything).sum()) + near
 
-    best = (float(plain.sum()) + 0.2 * float(_line_cost(f, np.eye(4), everything).sum()) + points - 2.0, np.eye(4))
+    best = (float(plain.sum()) + 0.2 * float(line_cost(f, np.eye(4), everything).sum()) + points - 2.0, np.eye(4))
     pool = roots if len(roots) > 2 else everything
     for n, i in enumerate(pool):
         for j in pool[n + 1 :]:
@@ -416,85 +416,3 @@ def mirrored(f: Features) -> Features:
         f.names, f.axes_a, f.points_a, -f.axes_b @ flip, f.points_b @ flip, f.parent, f.parent_b, f.slide,
         {-1: f.frames[-1][:1]}, {}, f.slack_a, f.slack_b, f.children,
     )  # fmt: skip
-
-
-def exchange(
-    f: Features, pairing: Pairing, a: Tree, b: Tree, start: Alignment | None = None
-) -> tuple[Pairing, Features, Alignment]:
-    """Look for joints that stand under each other's names: swaps that make more lines coincide, the best first.
-
-    Whole fingers are tried before single joints. Returns the pairing, its features and its alignment after all swaps that help.
-    start: the alignment under the pairing, where it is known already.
-    """
-    current, best = pairing, start or align(f)
-    for _ in range(len(f.names)):
-        wrong = [k for k, fit in enumerate(best.fits) if LEVER * fit.angle_rad + fit.shift > 1e-4 or abs(fit.offset) > 1e-2]
-        trials = []
-        for swap in _swaps(f, best, wrong):
-            named = dict(f.names)
-            keys = [f.names[i][0] for i in swap]
-            for i, j in swap.items():
-                named[f.names[i][0]] = f.names[j][1]
-            links = _relinked(current, a, b, keys, named)
-            trial = replace(current, joints=tuple(named.items()), links=links)
-            g = features(a, b, trial)
-            trials.append((align(g), trial, g))
-        if not trials:
-            break
-        top = min(trials, key=lambda t: t[0].cost)
-        if top[0].cost > best.cost - 4.0:
-            break
-        best, current, f = top
-    return current, f, best
-
-
-def _swaps(f: Features, at: Alignment, wrong: list[int]) -> list[dict[int, int]]:
-    """Swaps worth a trial: two like subtrees, or two joints whose lines fit better the other way round."""
-    spoilt = set(wrong).union(*(f.below(k) for k in wrong))
-
-    def trusted(k: int) -> Array:
-        """The transform of the nearest link towards the base that nothing spoils."""
-        while (k := f.parent[k]) >= 0:
-            if k not in spoilt:
-                return at.fits[k].carry
-        return at.base
-
-    out, suspects = [], sorted(spoilt)
-    tables: dict[bytes, Array] = {}
-
-    def against(k: int) -> Array:
-        """Cost (k,) of a's line k against every line of b, under the transform that k's surroundings trust."""
-        carry = trusted(k)
-        key = carry.tobytes()
-        if key not in tables:
-            every = list(range(len(f.names)))
-            tables[key] = np.stack([_line_cost(f, carry, [i] * len(every), every) for i in every])
-        return tables[key][k]
-
-    for n, i in enumerate(suspects):
-        for j in suspects[n + 1 :]:
-            crossed, straight = (against(i)[j], against(j)[i]), against(i)[i] + against(j)[j]
-            if f.slide[i] != f.slide[j] or min(crossed) >= 14.4 or sum(crossed) >= straight - 2:
-                continue
-            out.append({i: j, j: i})
-            chain_i, chain_j = [i, *f.below(i)], [j, *f.below(j)]
-            if f.parent[i] == f.parent[j] and len(chain_i) == len(chain_j) > 1:
-                out.append({**dict(zip(chain_i, chain_j, strict=True)), **dict(zip(chain_j, chain_i, strict=True))})
-    return out
-
-
-def _relinked(pairing: Pairing, a: Tree, b: Tree, keys: list[str], named: dict[str, str]) -> tuple[tuple[str, str], ...]:
-    """Links that hang on re-paired joints follow them; tips and sites that found no new partner are left out."""
-    before = dict(pairing.joints)
-    by_owner: dict[str, list[tuple[str, str]]] = {}
-    for x, y in pairing.links:
-        by_owner.setdefault(owner(a, a.node_of_link(x)) or "", []).append((x, y))
-    out = []
-    holder = {v: k for k, v in before.items()}
-    for key, rows in by_owner.items():
-        if key not in keys:
-            out += rows
-            continue
-        partner_rows = by_owner.get(holder.get(named[key], ""), [])
-        out += [(x, y) for (x, _), (_, y) in zip(rows, partner_rows, strict=False)]
-    return tuple(out)

@@ -11,13 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import DescriptionError, HandModelError, did_you_mean
-from .align import Alignment, Features, align, exchange, features
+from .align import Alignment, Features, align, features
 from .causes import geometry_findings, mirror_finding
+from .exchange import exchange
 from .mjcf import read_mjcf
 from .pairing import Pairing, pair_automatically, read_pair
 from .relations import relation_findings
 from .report import CAUSES, ConformReport, Finding, JointRow, LinkRow
-from .tree import Array, Tree, forward, inverse, pose
+from .tree import Array, Tree, forward, inverse
 from .urdf import parse_xml, read_urdf
 
 TOLERANCE_M = 1e-7
@@ -219,6 +220,3 @@ def _warnings(a: Tree, b: Tree) -> tuple[str, ...]:
         if tree.missing_meshes:
             out.append(f"{tree.path.name}: {len(tree.missing_meshes)} mesh file(s) missing, such as {tree.missing_meshes[0]}; kinematics need none")
     return tuple(out)
-
-
-__all__ = ["align", "conform", "inverse", "main_check", "pose", "read"]

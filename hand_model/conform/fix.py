@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import DescriptionError
-from .align import Features, Fit, align, exchange, features
-from .check import TOLERANCE_M, conform, read
+from .align import Features, Fit, align, features
+from .check import conform, read
 from .edit import MjcfEditor, UrdfEditor, editor, relative
+from .exchange import exchange
 from .pairing import Pairing, owner, pair_automatically, read_pair
 from .relations import COUPLING_TOLERANCE, LIMIT_TOLERANCE, resolved
 from .report import ConformReport
@@ -230,6 +231,3 @@ def _write_pair(path: Path, a: Tree, b: Tree, p: Pairing) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary.write_text("\n".join(rows) + "\n")
     os.replace(temporary, path)
-
-
-__all__ = ["TOLERANCE_M", "Fixed", "write_fixed"]
