@@ -9,12 +9,15 @@ from typing import Any
 import numpy as np
 
 from ..effects import catalogue
+from ..effects.base import DriveState
 from ..errors import IdentificationError
 from ..session import Finger, Session, read_session
-from .drive import drive_states, drive_trials
+from .balance import Balance
+from .command import command_facts, command_findings, refused
+from .drive import drive_states, drive_trials, is_measured
 from .findings import Finding, Findings
 from .interval import held_out, parameter_intervals, variance_ratio
-from .name import ALPHA, Named, Naming, name_effects
+from .name import ALPHA, Named, Naming, name_effects, polish, scan
 
 EXPLAINED_LEAST = 0.7  # of the explainable mismatch: below, the names are not believed
 
@@ -29,18 +32,68 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
     """
     session = session if isinstance(session, Session) else read_session(session)
     tell = say or (lambda line: None)
-    stations: list[Station] = []
-    for actuator, states in drive_states(session).items():
-        naming = name_effects(states, catalogue("drive"))
-        stations.append(Station("current", _finger_of(session, actuator), actuator, None, naming))
-        tell(stations[-1].line())
     notes: list[str] = []
-    marker_findings: list[tuple[float, Finding]] = []
-    stations += _kinematic_stations(session, tell, notes, marker_findings)
-    findings = assemble(stations, _once(marker_findings), notes)
+    found: list[tuple[float, Finding]] = []
+    stations = _kinematic_stations(session, tell, notes, found)
+    drives = drive_states(session, _encoder_corrections(stations))
+    for actuator in [a for a, states in drives.items() if not is_measured(states)]:
+        found.append(refused(actuator, _finger_of(session, actuator), tuple(s.trial for s in drives.pop(actuator))))
+    found += _command(session, drives)
+    for _, finding in found:
+        tell(finding.statement)
+    allowed = _delays_apart(drives)
+    for actuator, states in drives.items():
+        effects = [e for e in catalogue("drive") if not e.warps or allowed[actuator]]
+        stations.append(Station("current", _finger_of(session, actuator), actuator, None, name_effects(states, effects)))
+        tell(stations[-1].line())
+    findings = assemble(stations, _once(found), notes)
     if output is not None:
         findings.save(output)
     return findings
+
+
+def _encoder_corrections(stations: list[Station]) -> dict[str, Callable[[Any], Any]]:
+    """Actuator -> correction of its position [%] for a periodic encoder error: the recording is put right before physics."""
+    out: dict[str, Callable[[Any], Any]] = {}
+    for station in stations:
+        for named in station.naming.found:
+            if named.term.effect.name == "encoder_periodic_error" and station.believed and station.actuator is not None:
+                slope = float(np.median(np.concatenate([s.slope for s in station.naming.balance.states])))
+                out[station.actuator] = _periodic(named.term.shape["period"], named.amplitudes["sine"] / slope,
+                                                  named.amplitudes["cosine"] / slope)
+    return out
+
+
+def _periodic(period: float, sine: float, cosine: float) -> Callable[[Any], Any]:
+    def correct(position: Any) -> Any:
+        phase = 2 * np.pi * position / period
+        return position + sine * np.sin(phase) + cosine * np.cos(phase)
+
+    return correct
+
+
+def _delays_apart(drives: dict[str, tuple[DriveState, ...]]) -> dict[str, bool]:
+    """Whether each drive's current may be delayed: a delay that all drives of a session share is how the log is read."""
+    best: dict[str, float] = {}
+    for actuator, states in drives.items():
+        balance = Balance(states).sharpened()
+        delay = next(e for e in catalogue("drive") if e.warps)
+        fit = scan(balance, delay, ())
+        best[actuator] = polish(balance, fit, 0).terms[0].shape["delay"] if fit is not None else 0.0
+    step = {a: float(np.median(np.diff(s[0].time_s))) for a, s in drives.items()}
+    common = min(best.values(), key=abs) if len(best) > 1 else 0.0
+    return {a: abs(value - common) > 0.75 * step[a] for a, value in best.items()}
+
+
+def _command(session: Session, drives: dict[str, tuple[DriveState, ...]]) -> list[tuple[float, Finding]]:
+    facts = {}
+    for actuator, trials in drive_trials(session).items():
+        logs = {t.name: t.log() for t in trials}
+        states = drives.get(actuator, ())
+        currents = tuple(np.interp(s.time_s, logs[s.trial].time_s, np.nan_to_num(logs[s.trial].column("current"))) for s in states)
+        if states:
+            facts[actuator] = command_facts(states, currents)
+    return command_findings(facts, {a: _finger_of(session, a) for a in facts})
 
 
 def _once(found: list[tuple[float, Finding]]) -> list[tuple[float, Finding]]:
@@ -155,6 +208,7 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
             unexplained.append(_unexplained(station, 1 - station.explained))
         rejected += [{"effect": name, "where": str(station.finger), "reason": _reason(value)}
                      for name, value in station.naming.rejected[:4]]
+    ranked = _one_clock(ranked)
     ranked.sort(key=lambda item: -item[0])
     found = tuple(f for _, f in ranked)
     verdict = "mismatch" if found else "unexplained" if unexplained else "consistent"
@@ -167,6 +221,12 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
                 "after": variance_ratio(worst.naming, worst.naming.fit), "limit": 1 + 2.6 * float(np.sqrt(2 / count))}
     return Findings(verdict, lack, _protocol(stations), found, tuple(rejected), tuple(unexplained), _next(found),
                     tuple(_channel(s) for s in stations), tuple(notes))
+
+
+def _one_clock(ranked: list[tuple[float, Finding]]) -> list[tuple[float, Finding]]:
+    """A log has one clock: its drift is one finding, where it shows most."""
+    drifts = sorted((i for i in ranked if i[1].effect == "clock_drift"), key=lambda i: -i[0])
+    return [i for i in ranked if i[1].effect != "clock_drift"] + drifts[:1]
 
 
 def _reason(log_evidence: float) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -42,15 +43,22 @@ def count_range(logs: list[Log]) -> tuple[float, float]:
     return low, max(high, low + 1e-9)
 
 
-def drive_states(session: Session) -> dict[str, tuple[DriveState, ...]]:
-    """DriveStates of every actuator, [%] of its range and raw current; one bristle length for the whole session."""
+def drive_states(
+    session: Session, corrections: Mapping[str, Callable[[Array], Array]] | None = None
+) -> dict[str, tuple[DriveState, ...]]:
+    """DriveStates of every actuator, [%] of its range and raw current; one bristle length for the whole session.
+
+    corrections: actuator -> function that takes its position [%] to what it should have read.
+    """
     raw = {a: [(t, t.log()) for t in trials] for a, trials in drive_trials(session).items()}
-    prepared = {a: _prepare(a, entries) for a, entries in raw.items()}
+    prepared = {a: _prepare(a, entries, (corrections or {}).get(a)) for a, entries in raw.items()}
     give = session_give({a: states for a, states in prepared.items() if states})
     return {a: tuple(with_coulomb(s, give) for s in states) for a, states in prepared.items() if states}
 
 
-def _prepare(actuator: str, entries: list[tuple[Trial, Log]]) -> list[DriveState]:
+def _prepare(
+    actuator: str, entries: list[tuple[Trial, Log]], correct: Callable[[Array], Array] | None = None
+) -> list[DriveState]:
     low, high = count_range([log for _, log in entries])
     first = min(float(log.time_s[0]) for _, log in entries)
     states = []
@@ -60,7 +68,7 @@ def _prepare(actuator: str, entries: list[tuple[Trial, Log]]) -> list[DriveState
         if seen.sum() < 50:
             continue
         time_s, position = log.time_s[seen], 100 * (counts[seen] - low) / (high - low)
-        motion = estimate_motion(time_s, position)
+        motion = estimate_motion(time_s, position if correct is None else correct(position))
         extra = {name: log.columns[name][seen] for name in ("setpoint", "speed", "current_limit", "temperature")
                  if name in log.columns and np.isfinite(log.columns[name][seen]).all()}
         extra["elapsed"] = time_s - first
@@ -74,6 +82,22 @@ def _prepare(actuator: str, entries: list[tuple[Trial, Log]]) -> list[DriveState
                                  effort, declared, extra=extra, validate=trial.validate,
                                  declared_names=("inertia", "viscous", "coulomb", "spring", "preload")))
     return states
+
+
+def is_measured(states: tuple[DriveState, ...]) -> bool:
+    """False where the current channel is dead, or so free of noise beside a motion that it does not explain that it can
+    only be a command."""
+    current = np.concatenate([s.effort[np.isfinite(s.effort)] for s in states])
+    if len(current) < 50:
+        return True
+    spread = float(np.std(current))
+    if len(np.unique(current)) <= 3 or spread == 0:
+        return False
+    declared = np.concatenate([s.declared[np.isfinite(s.effort)] for s in states])
+    scale = np.linalg.norm(declared, axis=0) + 1e-12
+    left = float(np.std(current - declared @ (np.linalg.lstsq(declared / scale, current, rcond=None)[0] / scale)))
+    jitter = float(np.median(np.abs(np.diff(current, 2)))) / 0.6745 / np.sqrt(6)
+    return not (jitter < 0.03 * spread and left > 10 * max(jitter, 0.02 * spread))
 
 
 def steady(time_s: Array, motion: Motion) -> NDArray[np.bool_]:

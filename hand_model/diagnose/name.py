@@ -133,6 +133,9 @@ def _starts(balance: Balance, effects: tuple[Any, ...], terms: tuple[Term, ...],
     ranked = rank(sharp, lively, terms, now)
     if not ranked or ranked[0].evidence < STARTS_EVIDENCE or not _resolved(balance, ranked[0].fit.terms[-1]):
         return terms, fit
+    misfit = now.rss - balance.train.sum()
+    if now.rss - ranked[0].fit.rss < 0.5 * misfit:  # a real delay takes nearly all of it away
+        return terms, fit
     return settle(balance, effects, ranked[0].fit.terms, keep=ranked[0].name)
 
 

@@ -1,0 +1,15 @@
+"""Command as measurement: a channel said to be measured is a command or is dead: it must be refused, not fitted."""
+
+from __future__ import annotations
+
+from .base import Effect
+
+
+class CommandAsMeasurement(Effect):
+    """Seen by a channel without noise that the motion does not explain; nothing is fitted to it."""
+
+    name = "command_as_measurement"
+    station = "command"
+
+
+EFFECT = CommandAsMeasurement()

@@ -1,0 +1,15 @@
+"""Drive sag: the drive delivers less per command as it is loaded (supply, bus current limit, back-EMF)."""
+
+from __future__ import annotations
+
+from .base import Effect
+
+
+class DriveSag(Effect):
+    """Steady speed = commanded speed (1 - sag * load), the load being the current in the direction of motion."""
+
+    name = "drive_sag"
+    station = "command"
+
+
+EFFECT = DriveSag()
