@@ -76,8 +76,8 @@ def _usable(effect: Any) -> bool:
 
 def _from_catalogue(effect: Any, joint: str, train: tuple[DriveState, ...], states: Mapping[str, DriveState]) -> Candidate:
     grid = tuple(effect.grid(train))
-    if len(grid) > 40:  # a coarse look first; the winner's shape is refined
-        grid = grid[:: int(np.ceil(len(grid) / 40))]
+    if len(grid) > 16:  # a coarse look first; the winner's shape is refined
+        grid = grid[:: int(np.ceil(len(grid) / 16))]
     return Candidate(effect.name, "", joint, tuple(effect.amplitudes()), grid,
                      lambda row, shape: np.asarray(effect.columns(states[row.trial], shape), float), bool(effect.warps))  # fmt: skip
 

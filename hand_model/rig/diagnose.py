@@ -20,9 +20,9 @@ from .model import RigModel, load_rig
 from .patch import write_couplings, write_declared, write_effects
 from .replay import replay_rig
 from .states import noise_std
-from .swing import INDEX, Fitted, Swing, Task, fit_together, vector
-from .swing_build import build_swing, can_swing
-from .swing_compete import Round, Variant, compete_swing, free_declared, polish
+from .swing import INDEX, PARAMETERS, STEP_S, Fitted, Swing, Task, vector
+from .swing_build import build_swing, can_swing, windows_s
+from .swing_compete import Round, Variant, compete_swing, fit_stages, free_declared
 from .swing_patch import write_swing
 from .transmission import coupling_candidates, fit_coupling, zero_shift
 
@@ -207,7 +207,12 @@ def _proof(rig: RigModel, fit: DeclaredFit, few: Sequence[Term], before: Array, 
 
 def _offset_first(rig: RigModel, fit: DeclaredFit, joint: str) -> tuple[Step | None, Term | None]:
     """A constant offset of a joint's effort, where it wins the first round; (None, None) else."""
-    taken, steps, _ = compete(pose(fit, joint), candidates(rig, fit, joint), most=1)
+    everything = candidates(rig, fit, joint)
+    offset = [c for c in everything if c.effect == "asymmetric_friction"]
+    problem = pose(fit, joint)
+    if not compete(problem, offset, most=1)[0]:
+        return None, None
+    taken, steps, _ = compete(problem, everything, most=1)
     if taken and taken[0].candidate.effect == "asymmetric_friction":
         return steps[0], taken[0]
     return None, None
@@ -283,20 +288,26 @@ def _shares(found: list[Finding]) -> list[Finding]:
 
 def _diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Callable[[str], None]) -> tuple:
     """The same for one joint driven by a voltage or by nothing: MuJoCo's motion in open loop is what is compared."""
-    swing = build_swing(rig, fit, SEARCH_STEP_S)
-    train = tuple(int(i) for i in swing.train())
-    declared = polish(swing, Task(free_declared(swing), vector(swing.initial), train))
-    taken, _, rounds = compete_swing(swing, declared)
+    windows = windows_s(rig, fit)
+    stages = [build_swing(rig, fit, SEARCH_STEP_S, w) for w in windows]
+    free = free_declared(stages[0])
+    declared = fit_stages(stages, [Task(free, vector(stages[0].initial), ())], 15)[0]
+    taken, rounds = compete_swing(stages, declared)
     say(f"{rig.name}: {', '.join(v.key for v in taken) or 'nothing'}")
-    fine = build_swing(rig, fit)
-    sets = [free_declared(swing)] + [tuple(dict.fromkeys((*free_declared(swing), *(n for v in taken[: k + 1] for n in v.start))))
-                                     for k in range(len(taken))]  # fmt: skip
-    tasks = [Task(free, f.theta, train) for free, f in zip(sets, (declared, *(r.fit for r in rounds)), strict=True)]
-    fits = fit_together(fine, tasks, 8)
+    # Last, at the step of the replay; a free swing over whole recordings, for its phase is known well enough by now.
+    fine = [build_swing(rig, fit, STEP_S, w) for w in (windows if stages[0].driven else (*windows[1:], np.inf))]
+    sets = [tuple(dict.fromkeys((*free, *(n for v in taken[:k] for n in v.start)))) for k in range(len(taken) + 1)]
+    last = rounds[-1].fit if rounds else declared
+    starts = [declared.theta] + [np.where(np.isin(PARAMETERS, s), last.theta, vector(stages[0].initial)) for s in sets[1:]]
+    fits = fit_stages(fine, [Task(s, t, ()) for s, t in zip(sets, starts, strict=True)], 8)
     rounds = tuple(replace(r, fit=f) for r, f in zip(rounds, fits[1:], strict=True))
-    files = [write_swing(rig, fine, f.theta) for f in fits]
+    swing = fine[0]
+    files = [write_swing(rig, swing, f.theta) for f in fits]
     replays = [replay_rig(session, load_rig(session, x)) for x in files]
     figures = [r.figure("position_rmse", True) for r in replays]
+    holds = next((k for k in range(len(taken)) if figures[k + 1] >= figures[k]), len(taken))
+    rejected = [{"effect": v.key, "reason": "error on validation trials does not fall"} for v in taken[holds:]]
+    taken, rounds, figures = taken[:holds], rounds[:holds], figures[: holds + 1]
     means = [r.figure("position_mae", True) for r in replays]
     found = []
     for k, (variant, round_) in enumerate(zip(taken, rounds, strict=True)):
@@ -305,9 +316,9 @@ def _diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Call
                  "held_out": [t.name for t in rig.select(True)], "engine": "mujoco"}  # fmt: skip
         found.append(_swing_finding(rig, variant, round_, swing, proof))
     lack = {"metric": "position_rmse", "unit": rig.unit(rig.joints[0]), "before": figures[0], "after": figures[-1],
-            "one_effect": figures[min(1, len(figures) - 1)], "mae_before": means[0], "mae_after": means[-1],
+            "one_effect": figures[min(1, len(figures) - 1)], "mae_before": means[0], "mae_after": means[holds],
             "noise_floor": _resolution(rig)}  # fmt: skip
-    return _shares(found), [], lack, files[-1], files[0]
+    return _shares(found), rejected, lack, files[holds], files[0]
 
 
 def _resolution(rig: RigModel) -> float:

@@ -11,7 +11,17 @@ from .model import RigModel, RigTrial
 from .states import choose_cutoff, differentiate, fill_gaps, low_pass, uniform_time
 from .swing import STEP_S, Lane, Swing
 
-LONGEST_S = 8.0  # a longer trial is fitted in stretches (multiple shooting, Bock 1981), so that phase errors stay small
+# A trial is fitted in stretches (multiple shooting, Bock 1981), in periods of the free swing: short ones where a drive
+# keeps the motion going, for then the cost is smooth; longer ones where damping is all there is to see.
+DRIVEN_PERIODS, FREE_PERIODS = (1.3,), (2.5, 10.0)
+
+
+def windows_s(rig: RigModel, fit: DeclaredFit) -> tuple[float, ...]:
+    """Lengths [s] of the stretches, one stage after the other."""
+    swing = build_swing(rig, fit, 1e-2, np.inf)
+    weight = max(abs(swing.sine), abs(swing.cosine))
+    period = 2 * np.pi * np.sqrt(swing.initial["inertia"] / weight) if weight > 0 else 1.0
+    return tuple(k * period for k in (DRIVEN_PERIODS if swing.driven else FREE_PERIODS))
 
 
 def can_swing(rig: RigModel) -> bool:
@@ -20,7 +30,7 @@ def can_swing(rig: RigModel) -> bool:
     return len(rig.joints) == 1 and (drive is None or drive.kind == "voltage")
 
 
-def build_swing(rig: RigModel, fit: DeclaredFit, step_s: float = STEP_S, longest_s: float = LONGEST_S) -> Swing:
+def build_swing(rig: RigModel, fit: DeclaredFit, step_s: float = STEP_S, longest_s: float = np.inf) -> Swing:
     """Stretches of all trials, and the declared parameters as a start.
 
     The scale of effort is the declared weight's where there is gravity, else the declared inertia's: motion alone shows

@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .swing import DECLARED, INDEX, Fitted, Swing, Task, errors, fit_together
+from .swing import DECLARED, INDEX, Fitted, Swing, Task, errors, fit_together, vector
 
 Array = NDArray[np.float64]
-FOLDS, RESAMPLES, SHORTLIST = 4, 600, 6
+FOLDS, RESAMPLES, SHORTLIST = 4, 600, 5
 LEAST_SHARE, LEAST_PROBABILITY, MOST_TERMS, NEAR = 0.01, 0.95, 4, 1.02
 PARTS = 4  # a recording's error is resampled in so many parts
 
@@ -93,35 +93,66 @@ def _blocks(swing: Swing, theta: Array, lanes: Sequence[int]) -> Array:
     return np.array(out)
 
 
-def compete_swing(swing: Swing, declared: Fitted) -> tuple[tuple[Variant, ...], Fitted, tuple[Round, ...]]:
-    """Forward selection; returns the variants taken, the fit with all of them, and the rounds."""
+def fit_stages(stages: Sequence[Swing], tasks: Sequence[Task], iterations: int = 10) -> list[Fitted]:
+    """Every task on one stage after the other, each from where the last ended; stages differ in their stretches."""
+    fits: list[Fitted] = []
+    for k, swing in enumerate(stages):
+        train = tuple(int(i) for i in swing.train())
+        start = [t.start for t in tasks] if k == 0 else [f.theta for f in fits]
+        fits = fit_together(swing, [Task(t.free, s, train) for t, s in zip(tasks, start, strict=True)], iterations)
+    return fits
+
+
+def compete_swing(stages: Sequence[Swing], declared: Fitted) -> tuple[tuple[Variant, ...], tuple[Round, ...]]:
+    """Forward selection; returns the variants taken and the rounds, each with the fit of all taken so far."""
+    swing = stages[-1]
     train = tuple(int(i) for i in swing.train())
-    trials = list(dict.fromkeys(swing.lanes[i].trial for i in train))
-    folds = _folds(swing, train, trials)
+    folds = _folds(train)
     taken: tuple[Variant, ...] = ()
     current, rounds, whole = declared, [], None
     while len(taken) < MOST_TERMS:
         free = _free(swing, taken)
         rivals = [v for v in variants(swing) if not set(v.start) <= set(free)]
-        tasks = [Task(_free(swing, (*taken, v)), _started(current.theta, v), train) for v in rivals]
-        fits = fit_together(swing, tasks, 8)
+        tasks = [Task(_free(swing, (*taken, v)), _started(current.theta, v), ()) for v in rivals]
+        fits = fit_stages(stages, tasks, 8)
         order = sorted(range(len(rivals)), key=lambda k: fits[k].cost)[:SHORTLIST]
-        for k, fit in zip(order, _several(swing, [replace(tasks[k], start=fits[k].theta) for k in order]), strict=True):
-            fits[k] = fit if fit.cost < fits[k].cost else fits[k]
+        best = _several(swing, [Task(tasks[k].free, fits[k].theta, train) for k in order])
         none, scores = _left_out(swing, folds, (Task(free, current.theta, train), current),
-                                 [(tasks[k], fits[k]) for k in order])  # fmt: skip
+                                 [(tasks[k], f) for k, f in zip(order, best, strict=True)])  # fmt: skip
         whole = none.sum() if whole is None else whole
         found = _judge(none, scores, [rivals[k] for k in order], [len(tasks[k].free) for k in order], whole)
         if found is None:
             break
-        best, round_ = found
-        taken = (*taken, rivals[order[best]])
-        current = polish(swing, Task(_free(swing, taken), fits[order[best]].theta, train))
-        rounds.append(replace(round_, fit=current))
-    return taken, current, tuple(rounds)
+        taken, current = (*taken, rivals[order[found[0]]]), best[found[0]]
+        rounds.append(replace(found[1], fit=current))
+        taken, current = _exchanged(stages, taken, current)
+        rounds[-1] = replace(rounds[-1], fit=current)
+    return taken, tuple(rounds)
 
 
-def _several(swing: Swing, tasks: Sequence[Task], starts: int = 3, iterations: int = 8) -> list[Fitted]:
+def _exchanged(stages: Sequence[Swing], taken: tuple[Variant, ...], current: Fitted) -> tuple[tuple[Variant, ...], Fitted]:
+    """Another variant of an effect that was taken before, where beside the later ones it fits better with no more parameters."""
+    swing = stages[-1]
+    if len(taken) < 2:
+        return taken, current
+    sets = [(*taken[:k], other, *taken[k + 1 :]) for k, v in enumerate(taken) for other in variants(swing)
+            if other.effect == v.effect and other.key != v.key and len(other.start) <= len(v.start)]  # fmt: skip
+    if not sets:
+        return taken, current
+    tasks = []
+    for group in sets:
+        theta = current.theta.copy()
+        for name in {n for v in taken for n in v.start} - {n for v in group for n in v.start}:
+            theta[INDEX[name]] = vector({})[INDEX[name]]
+        for v in group:
+            theta = _started(theta, v) if v not in taken else theta
+        tasks.append(Task(_free(swing, group), theta, ()))
+    fits = fit_stages(stages, tasks, 12)
+    best = min(range(len(sets)), key=lambda k: fits[k].cost)
+    return (sets[best], fits[best]) if NEAR * fits[best].cost < current.cost else (taken, current)
+
+
+def _several(swing: Swing, tasks: Sequence[Task], starts: int = 2, iterations: int = 8) -> list[Fitted]:
     """Every task from several starts around its own, in one batch; the best of each."""
     random = np.random.default_rng(2)
     more = []
@@ -135,28 +166,11 @@ def _several(swing: Swing, tasks: Sequence[Task], starts: int = 3, iterations: i
     return [min(fits[k * starts : (k + 1) * starts], key=lambda f: f.cost) for k in range(len(tasks))]
 
 
-def polish(swing: Swing, task: Task, starts: int = 5, iterations: int = 14) -> Fitted:
-    """The best of several starts around a task's own: stiction makes the cost rugged."""
-    random = np.random.default_rng(1)
-    free = [INDEX[n] for n in task.free]
-    tasks = [task]
-    for _ in range(starts - 1):
-        theta = task.start.copy()
-        theta[free] *= np.exp(random.normal(0.0, 0.4, len(free)))
-        tasks.append(replace(task, start=theta))
-    fits = fit_together(swing, tasks, iterations)
-    best = min(fits, key=lambda f: f.cost)
-    return replace(best, evaluations=sum(f.evaluations for f in fits))
-
-
-def _folds(swing: Swing, train: Sequence[int], trials: Sequence[str]) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
-    """(kept, left out) stretches; whole recordings are left out where there are enough, else stretches."""
-    names = [swing.lanes[i].trial for i in train] if len(trials) >= FOLDS else [str(i) for i in train]
-    groups = list(dict.fromkeys(names))
-    count = min(FOLDS, len(groups))
-    member = {g: k % count for k, g in enumerate(groups)}
-    return [(tuple(i for i, n in zip(train, names, strict=True) if member[n] != f),
-             tuple(i for i, n in zip(train, names, strict=True) if member[n] == f)) for f in range(count)]  # fmt: skip
+def _folds(train: Sequence[int]) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
+    """(kept, left out) stretches; every fold leaves out some of every recording, as the validation set leaves a whole one."""
+    count = min(FOLDS, len(train))
+    return [(tuple(i for k, i in enumerate(train) if k % count != f), tuple(i for k, i in enumerate(train) if k % count == f))
+            for f in range(count)]  # fmt: skip
 
 
 def _free(swing: Swing, taken: Sequence[Variant]) -> tuple[str, ...]:
