@@ -38,6 +38,11 @@ def axis_repeatability_deg(finger: str) -> tuple[float, ...] | None:
     return _row(finger, "left", "axis_repeatability_deg")
 
 
+# The figures of table 4.11 for the two thumb positions are those of each other's axes in tables 4.1 and 4.2, on both hands
+# (8.44 and 5.21 deg from the right hand's axes of thumb_0 and thumb_1, against 5.191 and 8.456 printed).
+EXCHANGED = {"thumb_0": "thumb_1", "thumb_1": "thumb_0"}
+
+
 def axis_parallelism_deg(side: str, finger: str) -> float | None:
-    """Angle [deg] between the two axes of a finger (table 4.11); None where there is none."""
-    return _tables()["axis_parallelism_deg"].get(side, {}).get(finger)
+    """Angle [deg] between the two axes of a finger (table 4.11, the thumb's rows put right); None where there is none."""
+    return _tables()["axis_parallelism_deg"].get(side, {}).get(EXCHANGED.get(finger, finger))

@@ -63,6 +63,9 @@ def angle_words(rows: Sequence[JointRow], agree: str) -> str:
     )
 
 
+THUMBS = "Thesis: table 4.11, its two thumb rows exchanged, as they belong to each other's axes in tables 4.1 and 4.2."
+
+
 @dataclass(frozen=True)
 class Check:
     """One of the three checks. words: its sentence. meaning: what is compared. caption: of its table."""
@@ -108,7 +111,8 @@ def checks(a: Hand, b: Hand) -> tuple[Check, ...]:
             title = f"Parallelism, {label} hand ({hand.name}, {hand.side})"
             words = angle_words(rows, "are parallel within their uncertainty")
             meaning = (
-                "Angle between the axes of one finger; the palm frame's own uncertainty, shared by both, is left out."
+                "Angle between the axes of one finger; the palm frame's own uncertainty, shared by both, is left out. "
+                + THUMBS
             )
             found.append(
                 Check(f"parallelism-{label}", title, words, meaning, "Degrees, in the form of table 4.11", rows)

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import frame_covariance, joint_covariance, parallelism
-from ..hand import Finger, Hand, Joint
+from ..hand import EncoderMap, Finger, Hand, Joint
 from ..published import mapping_rmse_deg
-from .comparison import angle_cells, angle_words
-from .page import Cell, Section, folded, heading, listing, note, table
+from .comparison import THUMBS, angle_cells, angle_words
+from .page import Cell, Element, Section, folded, heading, listing, note, table
 from .words import count, listed, number, span
 
 Array = NDArray[np.float64]
@@ -74,6 +74,8 @@ def axes_section(hand: Hand) -> Section:
                 caption="Degrees, in the form of table 4.11",
             )
         )
+        if any(r.published_deg for r in parallel):
+            body.append(note(THUMBS))
     return Section("axes", "Axes and centres", _axes_words(hand, joints, published), tuple(body))
 
 
@@ -127,63 +129,48 @@ def maps_section(hand: Hand, pictures: tuple[Any, ...] = ()) -> Section | None:
     fingers = [f for f in hand.fingers if f.encoder_maps]
     if not fingers:
         return None
-    places = list(dict.fromkeys(j.name for f in fingers for j in f.joints))
     body = list(pictures)
-    ours: dict[str, list[float]] = {}
-    theirs: dict[str, list[float]] = {}
-    for place in places:
-        rows = []
-        for finger in fingers:
-            for joint, fitted in zip(finger.joints, finger.encoder_maps, strict=True):
-                if joint.name == place:
-                    thesis = mapping_rmse_deg(hand.side, place, finger.name)
-                    rows.append(_rmse_row(finger.name, fitted, thesis))
-                    ours.setdefault(place, []).append(_chosen(fitted.rmse_held_out_rad, fitted.coefficients))
-                    theirs.setdefault(place, []).extend(thesis[2:] if thesis else [])
-        orders = _orders(fingers, place)
-        groups = [("", 1), *[(ORDER.get(o, f"order {o}"), 3) for o in orders]]
-        columns = ["finger", *["fitted", "held out", "thesis"] * len(orders)]
-        body.append(table(columns, rows, f"RMSE of encoder to {place} angle [deg]", groups))
+    words = []
+    for place in dict.fromkeys(j.name for f in fingers for j in f.joints):
+        maps = [(f.name, m) for f in fingers for j, m in zip(f.joints, f.encoder_maps, strict=True) if j.name == place]
+        body.append(_rmse_table(hand.side, place, maps))
+        known = [r for name, _ in maps if (r := mapping_rmse_deg(hand.side, place, name))]
+        beside = f" (thesis, cubic, fitted data: {span([r[2] for r in known])} deg)" if known else ""
+        values = [chosen_deg(m.rmse_held_out_rad, m.coefficients) for _, m in maps]
+        words.append(f"{place} angle within {span(values)} deg{beside}")
     body.append(
         note(
-            "Fitted: on the cycles that it was fitted to, as the thesis reports it. Held out: on cycles left out in turn; it chooses the "
-            "order (bold). Thesis: tables 4.5 to 4.8, another specimen in another laboratory."
+            "Fitted: on the cycles that it was fitted to, as the thesis reports it. Held out: on cycles left out in turn; "
+            "it chooses the order (bold). Thesis: tables 4.5 to 4.8, another specimen in another laboratory."
         )
     )
-    words = []
-    for place, values in ours.items():
-        beside = f" (thesis, cubic, fitted data: {span(theirs[place])} deg)" if theirs[place] else ""
-        words.append(f"{place} angle within {span(values)} deg{beside}")
-    conclusion = (
-        f"Encoder counts alone give the {listed(words)}: root mean square on held-out cycles, order chosen there."
-    )
-    return Section("maps", "Encoder to angles", conclusion, tuple(body))
+    words = f"Encoder counts alone give the {listed(words)}: root mean square on held-out cycles, order chosen there."
+    return Section("maps", "Encoder to angles", words, tuple(body))
 
 
-def _orders(fingers: list[Finger], place: str) -> list[int]:
-    return sorted(
-        {
-            int(o)
-            for f in fingers
-            for j, m in zip(f.joints, f.encoder_maps, strict=True)
-            if j.name == place
-            for o in m.rmse_rad
-        }
-    )
+def _rmse_table(side: str, place: str, maps: list[tuple[str, EncoderMap]]) -> Element:
+    """One of the tables 4.5 to 4.8: rows fingers, columns orders; the thesis's figures where it has any."""
+    orders = sorted({int(order) for _, m in maps for order in m.rmse_rad})
+    theirs = {name: mapping_rmse_deg(side, place, name) for name, _ in maps}
+    heads = ["fitted", "held out"] + ["thesis"] * any(theirs.values())
+    rows = []
+    for name, fitted in maps:
+        row: list[str | Cell] = [name]
+        for order in orders:
+            kind = "best" if order == len(fitted.coefficients) - 1 else ""
+            for errors in (fitted.rmse_rad, fitted.rmse_held_out_rad):
+                row.append(Cell(number(np.rad2deg(errors.get(str(order), np.nan)), 3), kind))
+            if "thesis" in heads:
+                known = theirs[name] or ()
+                row.append(Cell(number(known[order - 1] if 0 < order <= len(known) else None, 3), "dim"))
+        rows.append(row)
+    groups = [("", 1), *[(ORDER.get(order, f"order {order}"), len(heads)) for order in orders]]
+    return table(["finger", *heads * len(orders)], rows, f"RMSE of encoder to {place} angle [deg]", groups)
 
 
-def _chosen(table_rad: Mapping[str, float], coefficients: Any) -> float:
-    return float(np.rad2deg(table_rad[str(len(coefficients) - 1)]))
-
-
-def _rmse_row(name: str, fitted: Any, thesis: tuple[float, ...] | None) -> list[str | Cell]:
-    row: list[str | Cell] = [name]
-    for order in sorted(map(int, fitted.rmse_rad)):
-        kind = "best" if order == len(fitted.coefficients) - 1 else ""
-        row.append(Cell(number(np.rad2deg(fitted.rmse_rad[str(order)]), 3), kind))
-        row.append(Cell(number(np.rad2deg(fitted.rmse_held_out_rad[str(order)]), 3), kind))
-        row.append(Cell(number(thesis[order - 1] if thesis and order <= len(thesis) else None, 3), "dim"))
-    return row
+def chosen_deg(errors_rad: Mapping[str, float], coefficients: Any) -> float:
+    """RMSE [deg] of the order that was chosen; nan where it is not known."""
+    return float(np.rad2deg(errors_rad.get(str(len(coefficients) - 1), np.nan)))
 
 
 def coupling_section(hand: Hand) -> Section | None:
@@ -192,26 +179,32 @@ def coupling_section(hand: Hand) -> Section | None:
     if not links:
         return None
     rows: list[list[str | Cell]] = []
+    bends = []
     for finger, c in links:
-        low, high = finger.joints[0].range_rad
-        ends = np.rad2deg([c.follower_rad(low), c.follower_rad(high)])
+        low, high = next(j.range_rad for j in finger.joints if j.name == c.driver)
+        driver = np.linspace(low, high, 200)
+        angle = np.rad2deg(c.follower_rad(driver))
+        bends.append(np.abs(angle - np.polyval(np.polyfit(driver, angle, 1), driver)).max())
         order = len(c.coefficients) - 1
-        line = np.polyfit(q := np.linspace(low, high, 200), c.follower_rad(q), 1)
-        bend = np.rad2deg(np.abs(c.follower_rad(q) - np.polyval(line, q)).max())
         rows.append(
-            [finger.name, f"{c.follower} of {c.driver}", ORDER.get(order, str(order)), _polynomial(c.coefficients)]
+            [
+                finger.name,
+                f"{c.follower} of {c.driver}",
+                ORDER.get(order, str(order)),
+                _polynomial(c.coefficients),
+                f"{number(angle[0], 1)} to {number(angle[-1], 1)}",
+                number(bends[-1]),
+                number(chosen_deg(c.rmse_rad, c.coefficients), 3),
+                Cell(number(chosen_deg(c.rmse_held_out_rad, c.coefficients), 3), "best"),
+            ]
         )
-        rows[-1] += [
-            f"{number(ends[0], 1)} to {number(ends[1], 1)}",
-            number(bend),
-            number(_chosen(c.rmse_rad, c.coefficients), 3),
-        ]
-        rows[-1].append(Cell(number(_chosen(c.rmse_held_out_rad, c.coefficients), 3), "best"))
-    held = [_chosen(c.rmse_held_out_rad, c.coefficients) for _, c in links]
-    bends = [float(str(row[5])) for row in rows]
+    held = [v for _, c in links if np.isfinite(v := chosen_deg(c.rmse_held_out_rad, c.coefficients))]
+    follows = (
+        f" follows the driven joint within {span(held)} deg on held-out cycles" if held else " moves each driven joint"
+    )
     conclusion = (
-        f"One polynomial per linkage, monotonic over the recorded range, follows the driven joint within {span(held)} deg on held-out cycles; "
-        f"a straight line, all that a URDF's mimic can say, would be off by up to {number(max(bends), 1)} deg."
+        f"One polynomial per linkage, monotonic over the recorded range,{follows}; a straight line, all that a URDF's "
+        f"mimic can say, would be off by up to {number(max(bends), 1)} deg."
     )
     columns = [
         "finger",

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..hand import Hand
 from ..replay import MODES, Residuals
-from .identified import axis_sd_deg, centre_sd_mm, frame_words
+from .identified import axis_sd_deg, centre_sd_mm, chosen_deg, frame_words
 from .page import Cell
 from .replayed import by_finger, distances_mm, noise_ratio, trials_words
 from .words import number
@@ -33,7 +33,7 @@ def hand_text(hand: Hand) -> str:
             held = "–"
             if finger.encoder_maps:
                 fitted = finger.encoder_maps[k]
-                held = number(np.rad2deg(fitted.rmse_held_out_rad[str(len(fitted.coefficients) - 1)]))
+                held = number(chosen_deg(fitted.rmse_held_out_rad, fitted.coefficients))
             axis = " ".join(f"{v:7.4f}" for v in joint.axis_palm)
             centre = " ".join(f"{1e3 * v:7.2f}" for v in joint.centre_palm)
             arc = f"{np.rad2deg(np.ptp(joint.range_rad)):.0f}"

@@ -22,7 +22,8 @@ def listed(items: Sequence[str], most: int = 6) -> str:
 
 def span(values: Sequence[float], digits: int = 2, unit: str = "") -> str:
     """`0.38 to 1.30 deg`, or one figure where both ends read the same."""
-    low, high = number(min(values), digits), number(max(values), digits)
+    known = [v for v in values if np.isfinite(v)]
+    low, high = number(min(known, default=np.nan), digits), number(max(known, default=np.nan), digits)
     return (low if low == high else f"{low} to {high}") + (f" {unit}" if unit else "")
 
 
