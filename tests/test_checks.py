@@ -8,7 +8,16 @@ import numpy as np
 import pytest
 from synthetic_hand import synthetic_hand
 
-from hand_model.checks import MIRROR, axis_difference, joint_covariance, mirror, parallelism, point_difference, reflected, repeatability
+from hand_model.checks import (
+    MIRROR,
+    axis_difference,
+    joint_covariance,
+    mirror,
+    parallelism,
+    point_difference,
+    reflected,
+    repeatability,
+)
 from hand_model.errors import HandModelError
 from hand_model.hand import Joint
 from hand_model.rotation import rotation_from_vector, skew

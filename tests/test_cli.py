@@ -122,7 +122,7 @@ def test_the_package_is_light_and_its_verbs_can_be_called():
         "try: identify('/nowhere')\n"
         "except HandModelError as error: print(error)\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "/nowhere/session.toml: no such file" in done.stdout
 
@@ -130,7 +130,7 @@ def test_the_package_is_light_and_its_verbs_can_be_called():
 def test_as_a_process(recorded, tmp_path):
     """Exit status and streams as a shell sees them."""
     argv = [sys.executable, "-c", "import sys; from hand_model.cli import main; sys.exit(main())"]
-    done = subprocess.run([*argv, "identify", str(recorded / "none"), "--output", "x.hand"], capture_output=True, text=True, cwd=tmp_path)
+    done = subprocess.run([*argv, "identify", str(recorded / "none"), "--output", "x.hand"], capture_output=True, text=True, cwd=tmp_path, check=False)
     assert done.returncode == 2 and done.stdout == "" and done.stderr.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
 
