@@ -17,7 +17,7 @@ class ThermalFrictionDrift(Effect):
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """Warm-up time between 5 s and four times the session."""
         total = max(max(float(s.elapsed_s[-1]) for s in states), 10.0)
-        return (Shape("warm_up_time", "s", min(5.0, 0.2 * total), 4 * total, tuple(np.geomspace(0.04 * total, 2 * total, 7))),)
+        return (Shape("warm_up_time", "s", 5.0, 4 * total, tuple(np.geomspace(max(5.0, 0.04 * total), 2 * total, 7))),)
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Friction above the final value when cold; lubricants thin out, yet either sign is allowed."""

@@ -1,0 +1,166 @@
+"""Diagnosis: planted effects are named with their parameters, healthy drives stay consistent, noise is what it is."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hand_model.diagnose import Finding, Findings, diagnose
+from hand_model.diagnose.balance import Balance, bounded_least_squares
+from hand_model.diagnose.interval import held_out, parameter_intervals
+from hand_model.diagnose.motion import estimate_motion, local_quadratic
+from hand_model.diagnose.name import name_effects
+from hand_model.effects import catalogue, effect
+from hand_model.effects.base import DriveState
+
+SHARED = Path(__file__).resolve().parents[2] / "shared" / "sessions"
+NAMES = ("inertia", "viscous", "coulomb", "spring", "preload")
+TRUTH = np.array([0.012, 0.15, 35.0, 0.22, 9.0])
+
+
+def drive(seed: int, add=None, noise: float = 5.0, colour: float = 0.0, trials: int = 4) -> tuple[DriveState, ...]:
+    """Trapezoidal strokes at five speeds, current by the declared model plus `add(state)`, white or AR(1) noise."""
+    rng = np.random.default_rng(seed)
+    out = []
+    for k in range(trials):
+        t = np.cumsum(rng.uniform(0.012, 0.024, 1500))
+        x, v = _path(t, rng.permutation([17.0, 30.0, 55.0, 80.0, 110.0]))
+        moving = np.abs(v) > 1
+        declared = np.stack([np.zeros_like(v), v, np.sign(v), x, np.ones_like(v)], axis=-1)
+        state = DriveState(f"trial_{k}", "index", t, x, v, np.zeros_like(v), np.zeros_like(v), declared,
+                           extra={"elapsed": t + 40.0 * k, "trial_index": np.full(len(t), float(k))},
+                           declared_names=NAMES, validate=k == trials - 1)
+        e = rng.normal(0, noise * np.sqrt(1 - colour**2), len(t))
+        for i in range(1, len(e)):
+            e[i] += colour * e[i - 1]
+        effort = declared @ TRUTH + e + (0.0 if add is None else add(state))
+        out.append(DriveState(**{**state.__dict__, "effort": np.where(moving, effort, np.nan)}))
+    return tuple(out)
+
+
+def _path(t: np.ndarray, speeds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    x, v, at, way, k, i = np.zeros(len(t)), np.zeros(len(t)), 0.0, 1, 0, 0
+    while i < len(t) - 1:
+        speed = speeds[(k // 2) % len(speeds)]
+        v[i] = way * speed
+        at += v[i] * (t[i + 1] - t[i])
+        if not 0 <= at <= 100:
+            at, way, k = float(np.clip(at, 0, 100)), -way, k + 1
+        i += 1
+        x[i] = at
+    v[-1] = v[-2]
+    return x, v
+
+
+def planted(name: str, shape: dict[str, float], amplitude: list[float]):
+    return lambda state: effect(name).columns(state, shape) @ np.array(amplitude)
+
+
+PLANTED = [
+    ("stribeck_friction", {"stribeck_speed": 20.0}, [20.0]),
+    ("position_dependent_friction", {"centre": 45.0, "width": 7.0}, [15.0]),
+    ("detent_load", {"centre": 60.0, "width": 6.0}, [-10.0]),
+    ("load_dependent_friction", {}, [0.12]),
+    ("asymmetric_viscous_friction", {}, [0.06]),
+    ("quadratic_damping", {}, [0.0015]),
+    ("elastoplastic_hysteresis", {"reach": 15.0}, [10.0]),
+    ("torque_ripple", {"period": 9.0}, [4.0, 3.0]),
+    ("end_stop_contact", {"side": 1.0, "begin": 82.0}, [1.5]),
+    ("thermal_friction_drift", {"warm_up_time": 60.0}, [12.0]),
+    ("nonlinear_spring", {}, [1.5e-5]),
+    ("viscoelastic_spring", {"relaxation_time": 1.0}, [0.2]),
+]
+
+
+@pytest.mark.parametrize(("name", "shape", "amplitude"), PLANTED, ids=[p[0] for p in PLANTED])
+def test_planted_effect_is_named_alone_with_its_parameters(name, shape, amplitude) -> None:
+    naming = name_effects(drive(3, planted(name, shape, amplitude)), catalogue("drive"))
+    assert [f.term.effect.name for f in naming.found] == [name]
+    entries = parameter_intervals(naming, 0)
+    for key, value in shape.items():
+        if "ci95" in entries.get(key, {}):
+            low, high = entries[key]["ci95"]
+            wide = 2 * (high - low)
+            assert low - wide <= value <= high + wide, (key, entries[key])
+    proof = held_out(naming, 0)
+    assert proof["after"] < proof["before"]
+    assert proof["after"] < 1.06 * proof["noise_floor"]
+    assert proof["held_out"] == ["trial_3"]
+
+
+def test_two_effects_are_both_named() -> None:
+    one = planted("stribeck_friction", {"stribeck_speed": 20.0}, [20.0])
+    two = planted("detent_load", {"centre": 60.0, "width": 6.0}, [-12.0])
+    naming = name_effects(drive(5, lambda s: one(s) + two(s)), catalogue("drive"))
+    assert {f.term.effect.name for f in naming.found} == {"stribeck_friction", "detent_load"}
+
+
+@pytest.mark.parametrize("colour", [0.0, 0.5])
+def test_healthy_drives_stay_consistent(colour: float) -> None:
+    alarms = [seed for seed in range(6) if not name_effects(drive(seed, colour=colour), catalogue("drive")).consistent]
+    assert not alarms  # nominal rate 0.3 %
+
+
+def test_noise_and_its_correlation_are_measured_beside_a_misfit() -> None:
+    add = planted("detent_load", {"centre": 60.0, "width": 6.0}, [-12.0])
+    white, red = Balance(drive(1, add)), Balance(drive(1, add, colour=0.5))
+    assert white.inflation == 1.0 and abs(white.sigma / 5 - 1) < 0.06
+    assert 2.0 < red.inflation < 4.2 and abs(red.sigma / 5 - 1) < 0.15  # AR(1), 0.5: (1 + r) / (1 - r) = 3
+
+
+def test_naming_never_reads_validation_recordings() -> None:
+    states = drive(3, planted("detent_load", {"centre": 60.0, "width": 6.0}, [-12.0]))
+    spoiled = (*states[:-1], DriveState(**{**states[-1].__dict__, "effort": states[-1].effort * 0 + 7.0}))
+    a, b = Balance(states).fit(), Balance(spoiled)
+    b.sigma, b.weight = Balance(states).sigma, Balance(states).weight
+    assert a.declared == b.fit().declared
+
+
+def test_bounded_least_squares_keeps_bounds_and_optimum() -> None:
+    rng = np.random.default_rng(0)
+    a = rng.normal(size=(200, 4))
+    x = bounded_least_squares(a, a @ np.array([1.0, -2.0, 3.0, 0.5]), np.array([0, 0, -np.inf, 0]), np.full(4, np.inf))
+    assert x[1] == 0 and (x[[0, 3]] > 0).all()
+    gradient = a.T @ (a @ x - a @ np.array([1.0, -2.0, 3.0, 0.5]))
+    np.testing.assert_allclose(gradient[[0, 2, 3]], 0, atol=1e-5)
+    assert gradient[1] > 0  # pushing against its bound
+
+
+def test_local_quadratic_is_exact_on_quadratics() -> None:
+    t = np.cumsum(np.random.default_rng(0).uniform(0.01, 0.03, 200))
+    x, v, a = local_quadratic(t, 3 - 2 * t + 0.7 * t**2, 0.03)
+    np.testing.assert_allclose(x, 3 - 2 * t + 0.7 * t**2, atol=1e-5)
+    np.testing.assert_allclose(v, -2 + 1.4 * t, atol=1e-4)
+    np.testing.assert_allclose(a, 1.4, atol=1e-2)
+
+
+def test_motion_tells_rest_from_motion() -> None:
+    rng = np.random.default_rng(2)
+    t = np.cumsum(rng.uniform(0.012, 0.024, 900))
+    x = np.clip((t - 4) * 30, 0, 100) + rng.normal(0, 0.09, len(t))
+    motion = estimate_motion(t, x)
+    assert not motion.moving[t < 3.8].any()
+    assert motion.moving[(t > 4.2) & (t < 7.1)].all()
+    assert abs(np.median(motion.velocity[(t > 4.3) & (t < 7)]) - 30) < 0.5
+
+
+def test_findings_are_json_without_nan(tmp_path: Path) -> None:
+    finding = Finding("stribeck_friction", ("stribeck_friction",), 0.9, (("quadratic_damping", 0.1),), {"finger": "index"},
+                      "text", {"static_ratio": {"value": float("nan"), "unit": "1"}}, {"before": np.float64(2.0)})
+    path = Findings("mismatch", {"before": 2.0}, {}, (finding,)).save(tmp_path / "new")
+    read = json.loads(path.read_text())
+    assert read["format"] == "hand-findings/1" and read["findings"][0]["class"] == ["stribeck_friction"]
+    assert read["findings"][0]["parameters"]["static_ratio"]["value"] is None
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason="shared sessions are not here")
+@pytest.mark.parametrize("name", ["shown_00", "shown_04"])
+def test_shown_sessions(name: str, tmp_path: Path) -> None:
+    answer = json.loads((SHARED / name / "answer.json").read_text())["effects"]
+    findings = diagnose(SHARED / name, output=tmp_path)
+    named = [(f.effect, f.where["finger"], f.where["joint"]) for f in findings.findings]
+    assert named == [(e["effect"], e["finger"], e["joint"]) for e in answer if e["effect"] != "none"]
+    assert json.loads((tmp_path / "findings.json").read_text())["verdict"] == findings.verdict

@@ -1,0 +1,115 @@
+"""Effects: found by the catalogue, columns that are finite and have the physics they claim, path operators."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from hand_model.effects import catalogue, effect
+from hand_model.effects.base import DriveState
+from hand_model.effects.path import dahl, jenkins, lowpass, strokes, travelled
+from hand_model.errors import DescriptionError
+
+STATIONS = {"drive", "encoder", "linkage", "command"}
+
+
+def state(n: int = 1200, seed: int = 0) -> DriveState:
+    """Three full cycles at different speeds, 0 to 100 %."""
+    t = np.arange(n) * 0.018
+    phase = np.cumsum(np.repeat([0.3, 0.6, 1.0], n // 3)) * 0.018
+    x = 50 - 50 * np.cos(2 * np.pi * phase)
+    v, a = np.gradient(x, t), np.gradient(np.gradient(x, t), t)
+    declared = np.stack([a, v, np.sign(v), x, np.ones(n)], axis=-1)
+    names = ("inertia", "viscous", "coulomb", "spring", "preload")
+    effort = declared @ np.array([0.01, 0.15, 35.0, 0.2, 9.0]) + np.random.default_rng(seed).normal(0, 1, n)
+    return DriveState("trial", "drive", t, x, v, a, effort, declared, declared_names=names,
+                      extra={"load": effort, "trial_index": np.zeros(n)})
+
+
+def test_catalogue_holds_one_effect_per_name_and_station() -> None:
+    names = [e.name for e in catalogue()]
+    assert len(names) == len(set(names)) >= 26
+    assert {e.station for e in catalogue()} == STATIONS
+    for name in ("stribeck_friction", "linkage_backlash", "clock_drift", "current_channel_delay", "command_delay"):
+        assert effect(name).name == name
+
+
+def test_unknown_effect_names_a_near_one() -> None:
+    with pytest.raises(DescriptionError, match="stribeck_friction"):
+        effect("stribek_friction")
+
+
+@pytest.mark.parametrize("candidate", catalogue(), ids=lambda e: e.name)
+def test_columns_are_finite_and_as_many_as_amplitudes_at_every_start(candidate) -> None:
+    s = state()
+    for shape in candidate.grid((s,)):
+        columns = candidate.columns(s, shape)
+        if candidate.station == "command":
+            continue
+        assert columns.shape == (len(s.time_s), len(candidate.amplitudes()))
+        assert np.isfinite(columns).all()
+    for shape in candidate.shapes((s,)):
+        assert shape.low < shape.high or shape.name == "trial"
+        assert all(shape.low - 1e-9 <= start <= shape.high + 1e-9 for start in shape.starts), shape
+
+
+@pytest.mark.parametrize("name", ["stribeck_friction", "load_dependent_friction", "position_dependent_friction",
+                                  "quadratic_damping", "thermal_friction_drift", "elastoplastic_hysteresis"])
+def test_friction_opposes_motion(name: str) -> None:
+    s, candidate = state(), effect(name)
+    for shape in candidate.grid((s,))[:5]:
+        power = candidate.columns(s, shape)[:, 0] * s.velocity
+        assert power.sum() > 0  # over cycles friction only takes energy
+        if name != "elastoplastic_hysteresis":
+            assert (power > -1e-9).all()
+
+
+@pytest.mark.parametrize("name", ["detent_load", "nonlinear_spring", "end_stop_contact", "torque_ripple"])
+def test_loads_depend_on_position_only(name: str) -> None:
+    s, candidate = state(), effect(name)
+    reverse = DriveState(s.trial, s.drive, s.time_s, s.position, -s.velocity, s.acceleration, s.effort, -s.declared,
+                         declared_names=s.declared_names)
+    for shape in candidate.grid((s,))[:5]:
+        np.testing.assert_allclose(candidate.columns(s, shape), candidate.columns(reverse, shape))
+
+
+def test_strokes_cover_every_sample_once_and_ignore_noise() -> None:
+    s = state()
+    noisy = s.position + np.random.default_rng(1).normal(0, 0.1, len(s.position))
+    cut = strokes(noisy)
+    assert cut[0][0] == 0 and cut[-1][1] == len(noisy)
+    assert all(a[1] == b[0] for a, b in itertools.pairwise(cut))
+    turns = np.sum(np.diff(np.sign(s.velocity[s.velocity != 0])) != 0)
+    assert len(cut) == turns + 1
+
+
+def test_travelled_restarts_at_reversals_and_never_falls_within_a_stroke() -> None:
+    x = state().position
+    for a, b, _ in strokes(x):
+        d = travelled(x)[a:b]
+        assert d[0] == 0 and (np.diff(d) >= 0).all()
+
+
+def test_dahl_solves_its_differential_equation() -> None:
+    x = np.concatenate([np.linspace(0, 20, 4000), np.linspace(20, 5, 3000)])
+    z = dahl(x, 3.0, threshold=0.5)
+    dx, dz = np.diff(x), np.diff(z)
+    inside = np.abs(dx) > 0
+    middle = 0.5 * (z[1:] + z[:-1])
+    np.testing.assert_allclose(dz[inside], ((1 - middle * np.sign(dx)) / 3.0 * dx)[inside], atol=2e-5)
+    assert np.abs(z).max() <= 1
+
+
+def test_jenkins_is_elastic_then_yields() -> None:
+    x = np.concatenate([np.linspace(0, 10, 500), np.linspace(10, 0, 500)])
+    z = jenkins(x, 2.0, threshold=0.1)
+    np.testing.assert_allclose(z[:100], x[:100] / 2.0, atol=1e-9)
+    assert z[499] == 1 and z[-1] == -1
+
+
+def test_lowpass_of_a_step_is_exponential() -> None:
+    t = np.linspace(0, 3, 3001)
+    y = lowpass(t, (t > 1e-4).astype(float), 0.5)
+    np.testing.assert_allclose(y, 1 - np.exp(-t / 0.5), atol=2e-3)
