@@ -69,8 +69,9 @@ def _prepare(t: MotorTrial, sigma: float) -> _Prepared:
     v, a = derivatives(p, rate)
     light = zero_phase(position, rate, 2 * CUTOFF_HZ)
     z = friction_state(light, PRESLIDING)
-    known = zero_phase((np.abs(z) > 0.97).astype(float), rate)  # all that the filter mixes in is sliding
     slow = 8 * sigma * np.sqrt(rate)  # [%/s]: where the smoothed velocity is no longer told from zero
+    sliding = (np.abs(z) > 0.97) & (np.abs(np.gradient(light, time)) > slow)
+    known = zero_phase(sliding.astype(float), rate)  # all that the filter mixes in is sliding
     weight = np.clip((known - 0.9) / 0.1, 0.0, 1.0) * (1 - np.exp(-((v / slow) ** 2)))
     rows = np.column_stack([a, v, zero_phase(z, rate), p, np.ones(len(z))])
     return _Prepared(time, rate, rows, z, np.abs(np.gradient(light, time)), zero_phase(current, rate), weight)
