@@ -282,3 +282,13 @@ def test_the_pytest_plugin(tmp_path):
     command += ["--hand-conform", "c.urdf", "b.xml"]
     run = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
     assert run.returncode == 1 and "1 failed, 1 passed" in run.stdout and "sign_flipped" in run.stdout, run.stdout
+
+
+@pytest.mark.parametrize("seed", [9, 11, 15])
+def test_another_base_frame_is_a_convention_also_with_one_joint_at_the_base(seed, tmp_path):
+    rng = np.random.default_rng(seed)
+    links, turned = make_hand(seed), transform(rng.normal(size=3), 0.05 * rng.normal(size=3))
+    urdf, mjcf = write_urdf(links, tmp_path / "a.urdf"), write_mjcf(links, tmp_path / "b.xml", digits=7, base=turned)
+    report = conform(urdf, mjcf, poses=5)
+    assert report.ok, report.text()
+    np.testing.assert_allclose(report.base_mm, turned[:3, 3] * 1e3, atol=1e-3)

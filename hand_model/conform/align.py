@@ -349,8 +349,6 @@ def base_transform(f: Features) -> Array:
     points = sum(float(_robust(np.linalg.norm(x[:3, 3] - y[:3, 3]))) for x, y, *_ in fixed)
     if 2 * int((plain < 15.5).sum()) >= len(roots) or (len(roots) == 1 and f.parent != f.parent_b):
         return np.eye(4)
-    if len(roots) == 1 and _same_frames(f):
-        return np.eye(4)
     everything = list(range(len(f.names)))
 
     def price(carry: Array) -> float:
@@ -373,16 +371,6 @@ def _unless_slight(f: Features, carry: Array) -> Array:
     """With one joint at the base nothing tells its change from a base frame's; a slight one is a change, not a convention."""
     slight = len(f.children.get(-1, [])) == 1 and _turn(carry[:3, :3]) < SLIGHT_RAD and np.linalg.norm(carry[:3, 3]) < SLIGHT_M
     return np.eye(4) if slight else carry
-
-
-def _same_frames(f: Features) -> bool:
-    """The files share their link frames but for what a few joints carry along: then the base frame is no exception.
-
-    With one joint at the base, a change of that joint and another base frame look alike; only the frames beyond tell.
-    """
-    at = align(f, np.eye(4))
-    plain = [_differs(np.eye(4), _convention(f, k, fit.carry)) < 1e-5 for k, fit in enumerate(at.fits) if f.frames.get(k)]
-    return 2 * sum(plain) > len(plain)
 
 
 def _from_two_lines(f: Features, i: int, j: int) -> list[Array]:
