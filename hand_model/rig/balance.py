@@ -19,6 +19,7 @@ from .states import choose_cutoff, differentiate, fill_gaps, low_pass, noise_std
 
 Array = NDArray[np.float64]
 MAX_RATE_HZ = 250.0  # faster recordings are thinned to this: joints move below 50 Hz
+STATE_CUTOFF = 3.0  # of the states, in cut-offs of the balance
 MAX_SAMPLES = 4000  # per trial: residuals are correlated over far longer than this spacing
 
 
@@ -147,10 +148,12 @@ def trial_rows(rig: RigModel, trial: RigTrial, columns: tuple[Column, ...], cuto
     grid, channels = grid[::skip], {k: c[::skip] for k, c in _channels(trial, grid).items()}
     rate = rate / skip
     cutoff = cutoff_hz or min(choose_cutoff(raw[j], rate) for j in rig.independent)
-    q = np.stack([low_pass(raw[j], rate, cutoff) for j in rig.joints], 1)
+    # Columns pass the balance's filter as the effort does; the states they are made of must not lose that band before.
+    wide = STATE_CUTOFF * cutoff
+    q = np.stack([low_pass(raw[j], rate, wide) for j in rig.joints], 1)
     v = differentiate(q, rate)
     a = differentiate(v, rate)
-    rest = np.array([max(3 * velocity_noise(raw[j], rate, cutoff), 1e-3 * float(np.std(v[:, i])))
+    rest = np.array([max(3 * velocity_noise(raw[j], rate, min(wide, 0.45 * rate)), 1e-3 * float(np.std(v[:, i])))
                      for i, j in enumerate(rig.joints)])  # fmt: skip
     sign = np.clip(v / rest, -1.0, 1.0)
     thin = max(1, int(rate / max(12 * cutoff, 24.0)))

@@ -131,7 +131,7 @@ def normal(problem: Problem, terms: Sequence[Term]) -> tuple[Array, Array, Array
 
 def held_out(problem: Problem, terms: Sequence[Term], parts: tuple) -> tuple[Array, float]:
     """Squared error (B,) of every block under the fit to the other folds, and the training error of the whole fit."""
-    gram, moment, square, count = parts
+    gram, moment, square, _ = parts
     low, high, mean, weight = limits(problem.fit, terms)
     error = np.zeros(len(square))
     total_g, total_m = gram.sum(0), moment.sum(0)

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .balance import Column, Rows, compile_model, declared_columns, trial_rows
-from .dynamics import INERTIAL, inertial_parameters
+from .balance import Column, Rows, declared_columns, trial_rows
 from .model import RigModel, RigTrial
 from .solve import solve_bounded
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .model import RigModel
-from .patch import find, number, parse, serialise, write_effects, _actuator
+from .patch import _actuator, find, number, parse, serialise, write_effects
 from .swing import DECLARED, INDEX, PARAMETERS, Swing
 
 Array = NDArray[np.float64]

@@ -1,0 +1,99 @@
+"""The servo pendulum against the published friction ladder of BAM (Duclusaud, Passault, Padois & Ly 2025), and its speed.
+
+    python scripts/benchmark_rig.py SESSION [--json FILE]
+
+Fits M1 to M6 (Coulomb and viscous; Stribeck; load; Stribeck x load; directional; quadratic in load) to the training
+recordings of a session with one voltage-driven joint, with the simulator and optimiser that the diagnosis uses, from
+several starts, and diagnoses the same session. Every figure is MuJoCo's, in open loop over whole validation trials.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from pathlib import Path
+
+import numpy as np
+
+from hand_model.rig import diagnose_rig, load_rig, replay_rig
+from hand_model.rig.declared import fit_declared
+from hand_model.rig.swing import INDEX, Task, fit_together, typical, vector
+from hand_model.rig.swing_build import build_swing, windows_s
+from hand_model.rig.swing_compete import fit_stages, free_declared
+from hand_model.rig.swing_patch import write_swing
+from hand_model.session import read_session
+
+STRIBECK = ("static_excess", "stribeck_speed")
+LADDER = {
+    "M1 Coulomb, viscous": (),
+    "M2 + Stribeck": STRIBECK,
+    "M3 + load": ("load_gear",),
+    "M4 + Stribeck x load": (*STRIBECK, "load_gear", "load_gear_low"),
+    "M5 + directional": (*STRIBECK, "load_motor", "load_external", "load_motor_low", "load_external_low"),
+    "M6 + quadratic": (*STRIBECK, "load_motor", "load_external", "load_motor_low", "load_external_low",
+                       "motor_squared", "external_squared"),
+}  # fmt: skip
+
+
+def ladder(session_path: str, starts: int = 4) -> dict[str, dict[str, float]]:
+    """Held-out errors [rad] and fitting time [s] of every rung; the best of several starts by training error."""
+    session = read_session(session_path)
+    rig = load_rig(session)
+    declared = fit_declared(rig)
+    stages = [build_swing(rig, declared, 4e-3, w) for w in windows_s(rig, declared)]
+    base, random, unit = free_declared(stages[0]), np.random.default_rng(0), typical(stages[0])
+    out = {}
+    for name, extra in LADDER.items():
+        began, tasks = time.perf_counter(), []
+        for k in range(starts):
+            theta = vector(stages[0].initial)
+            for parameter in extra:
+                size = 0.5 if parameter == "stribeck_speed" else 3.0 * k * unit[INDEX[parameter]]
+                theta[INDEX[parameter]] = size * abs(random.normal())
+            tasks.append(Task((*base, *extra), theta, ()))
+        fits = fit_stages(stages, tasks, 25)
+        best = min(fits, key=lambda f: f.cost)
+        seconds = time.perf_counter() - began
+        file = write_swing(rig, stages[0], best.theta)
+        residuals = replay_rig(session, load_rig(session, file))
+        evaluations = sum(f.evaluations for f in fits)
+        out[name] = {"rmse_rad": residuals.figure("position_rmse", True), "mae_rad": residuals.figure("position_mae", True),
+                     "seconds": seconds, "evaluations": evaluations, "ms_per_evaluation": 1e3 * seconds / evaluations}  # fmt: skip
+    return out
+
+
+def per_evaluation(session_path: str) -> float:
+    """Milliseconds that one evaluation of the whole training set takes when a population of 100 is simulated at once."""
+    rig = load_rig(read_session(session_path))
+    swing = build_swing(rig, fit_declared(rig), 4e-3)
+    train = tuple(int(i) for i in swing.train())
+    tasks = [Task(free_declared(swing), vector(swing.initial), train) for _ in range(20)]
+    began = time.perf_counter()
+    evaluations = sum(f.evaluations for f in fit_together(swing, tasks, 2))
+    return 1e3 * (time.perf_counter() - began) / evaluations
+
+
+def main() -> None:
+    """Print the ladder, the diagnosis and the speed; write them as JSON where asked."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("session")
+    parser.add_argument("--json", type=Path)
+    arguments = parser.parse_args()
+    rungs = ladder(arguments.session)
+    began = time.perf_counter()
+    lack = diagnose_rig(read_session(arguments.session)).lack_of_fit
+    ours = {"declared_rmse_rad": lack["before"], "rmse_rad": lack["after"], "declared_mae_rad": lack["mae_before"],
+            "mae_rad": lack["mae_after"], "seconds": time.perf_counter() - began}  # fmt: skip
+    for name, row in rungs.items():
+        print(f"{name:24s} rmse {row['rmse_rad']:.4f} mae {row['mae_rad']:.4f} rad, fitted in {row['seconds']:.1f} s "
+              f"({row['ms_per_evaluation']:.2f} ms per evaluation)")  # fmt: skip
+    print(f"{'diagnosed':24s} rmse {ours['rmse_rad']:.4f} mae {ours['mae_rad']:.4f} rad; declared {ours['declared_rmse_rad']:.4f} "
+          f"{ours['declared_mae_rad']:.4f}; {ours['seconds']:.1f} s")  # fmt: skip
+    if arguments.json:
+        arguments.json.write_text(json.dumps({"ladder": rungs, "diagnosed": ours,
+                                              "ms_per_evaluation": per_evaluation(arguments.session)}, indent=2) + "\n")  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()
