@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -59,15 +60,17 @@ def _encoder_corrections(stations: list[Station]) -> dict[str, Callable[[Any], A
         for named in station.naming.found:
             if named.term.effect.name == "encoder_periodic_error" and station.believed and station.actuator is not None:
                 slope = float(np.median(np.concatenate([s.slope for s in station.naming.balance.states])))
+                before = out.get(station.actuator)
                 out[station.actuator] = _periodic(named.term.shape["period"], named.amplitudes["sine"] / slope,
-                                                  named.amplitudes["cosine"] / slope)
+                                                  named.amplitudes["cosine"] / slope, before)
     return out
 
 
-def _periodic(period: float, sine: float, cosine: float) -> Callable[[Any], Any]:
+def _periodic(period: float, sine: float, cosine: float, further: Callable[[Any], Any] | None) -> Callable[[Any], Any]:
     def correct(position: Any) -> Any:
         phase = 2 * np.pi * position / period
-        return position + sine * np.sin(phase) + cosine * np.cos(phase)
+        base = position if further is None else further(position)
+        return base + sine * np.sin(phase) + cosine * np.cos(phase)
 
     return correct
 
@@ -201,7 +204,7 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
     unexplained: list[dict[str, Any]] = []
     for station in stations:
         if station.believed:
-            ranked += [_finding(station, named) for named in station.naming.found]
+            ranked += [_finding(station, named, share) for named, share in _merged(station.naming.found)]
         elif station.missing:
             unexplained.append(_unexplained(station, 1.0))
         if station.believed and station.naming.after.p < ALPHA and station.explained < 0.95:
@@ -224,9 +227,22 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
 
 
 def _one_clock(ranked: list[tuple[float, Finding]]) -> list[tuple[float, Finding]]:
-    """A log has one clock: its drift is one finding, where it shows most."""
+    """A drift that several fingers show is the log's one clock: one finding, of no finger in particular."""
     drifts = sorted((i for i in ranked if i[1].effect == "clock_drift"), key=lambda i: -i[0])
-    return [i for i in ranked if i[1].effect != "clock_drift"] + drifts[:1]
+    if len(drifts) > 1:
+        weight, first = drifts[0]
+        trials = sorted({t for _, f in drifts for t in f.where["trials"]})
+        drifts = [(weight, replace(first, where={**first.where, "finger": None, "actuator": None, "trials": trials}))]
+    return [i for i in ranked if i[1].effect != "clock_drift"] + drifts
+
+
+def _merged(found: tuple[Named, ...]) -> list[tuple[Named, float]]:
+    """One entry per effect with its share: further harmonics of a periodic one belong to its first."""
+    out: dict[str, tuple[Named, float]] = {}
+    for named in found:
+        first, share = out.get(named.term.effect.name, (named, 0.0))
+        out[named.term.effect.name] = (first, share + named.share)
+    return list(out.values())
 
 
 def _reason(log_evidence: float) -> str:
@@ -235,7 +251,7 @@ def _reason(log_evidence: float) -> str:
     return f"another effect explains it better, or what it brings is within the noise (log evidence {log_evidence:.1f})"
 
 
-def _finding(station: Station, named: Named) -> tuple[float, Finding]:
+def _finding(station: Station, named: Named, share: float) -> tuple[float, Finding]:
     naming = station.naming
     which = naming.fit.terms.index(named.term)
     effect = named.term.effect
@@ -249,7 +265,7 @@ def _finding(station: Station, named: Named) -> tuple[float, Finding]:
         "marker": None,
         "trials": [s.trial for s in naming.balance.states],
         "region": effect.region(naming.balance.states, named.term.shape),
-        "share_of_mismatch": named.share * station.explained,
+        "share_of_mismatch": share * station.explained,
     }
     top = named.rivals[0].evidence
     weights = np.exp(np.array([r.evidence for r in named.rivals] + [0.0]) - max(top, 0.0))
@@ -263,7 +279,7 @@ def _finding(station: Station, named: Named) -> tuple[float, Finding]:
     recording = getattr(effect, "correction", None)
     model = None if recording else {"native": native is not None, "mjcf": native,
                                     "urdf": "not expressible: kept in hand.json"}
-    weight = 0.5 * max(naming.declared.rss - naming.fit.rss, 0.0) * named.share
+    weight = 0.5 * max(naming.declared.rss - naming.fit.rss, 0.0) * share
     return weight, Finding(effect.name, members, named.probability, alternatives, where,
                            effect.statement(where, values), parameters, fit, model, recording)
 

@@ -151,7 +151,7 @@ def rank(balance: Balance, effects: Iterable[Any], terms: tuple[Term, ...], fit:
     """Every candidate added to `terms`, its shape optimised from several starts; best evidence first."""
     rough = []
     for effect in effects:
-        if any(t.effect.name == effect.name for t in terms) and not getattr(effect, "repeats", False):
+        if any(t.effect.name == effect.name for t in terms) and not effect.repeats:
             continue
         best = scan(balance, effect, terms)
         if best is not None:

@@ -123,6 +123,7 @@ class Effect:
     replaces: ClassVar[str | None] = None  # name of the declared column that `declared` changes
     warps: ClassVar[bool] = False
     clips: ClassVar[bool] = False
+    repeats: ClassVar[bool] = False  # may be named more than once in one balance, with other shapes
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """No nonlinear parameter."""

@@ -13,6 +13,7 @@ class EncoderPeriodicError(Effect):
     """angle = map(encoder) + A sin(2 pi x / P + phase)."""
 
     name = "encoder_periodic_error"
+    repeats = True  # further harmonics
     station = "encoder"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:

@@ -13,6 +13,7 @@ class TorqueRipple(Effect):
     """F = A sin(2 pi x / P + phase)."""
 
     name = "torque_ripple"
+    repeats = True  # further harmonics
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """Period from four times the sample spacing at slow speed to half the range, dense in wavenumber."""
