@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from ..errors import IdentificationError
 from ..session import Finger, Log, Mocap, Session, Trial
+from .bootstrap import variance_inflation
 from .chain import Chain, ChainData, Pose, marker_body
 from .clock import Clock, align
-from .likelihood import ChainFit, fit_chain
+from .likelihood import START_FRAMES, ChainFit, angle_noise_ratio, fit_chain, robust_cost
 from .repair import Slip, Swap, find_slip, repair_labels, split_marker
-from .start import start_chain
+from .start import other_starts, start_chain
 
 Array = NDArray[np.float64]
 
@@ -23,6 +24,10 @@ REST_S = 1.0
 MOST_SLIPS = 6
 # Residuals of a marker that sits on its segment are noise, alike for all; this many times larger and it does not.
 LOOSE = 1.4
+# Noise of a joint angle over the spread of that angle from which on a single start and a linearised covariance are not enough.
+SHORT_ARC = 0.12
+# Doubt added to an axis whose search did not settle [rad].
+UNSETTLED_RAD = 0.1
 
 
 @dataclass(frozen=True)
@@ -97,10 +102,11 @@ def identify_finger(session: Session, finger: Finger, palm_shape: Array) -> Fing
         lengths = np.cumsum([0] + [len(mocap.time_s) for mocap in mocaps])
         data = ChainData(np.concatenate([p.position_world for p, _ in parts]), parts[0][0].body, parts[0][0].labels)
         rest = np.concatenate([start + np.flatnonzero(m.time_s < REST_S) for start, m in zip(lengths, mocaps, strict=False)])
-        fit, slips = _fit_with_slips(data, start_chain(data, rest, palm_shape))
+        fit, slips = _fit_with_slips(_best_fit(data, rest, palm_shape))
     except IdentificationError as error:
         raise IdentificationError(f'{trials[0].name}: finger "{finger.name}": {error}') from None
     fit, covariance = _zero_at_rest(fit, rest)
+    covariance = _honest(covariance, fit)
     records = tuple(
         _record(trial, mocap, slice(int(a), int(b)), swaps, fit)
         for trial, mocap, a, b, (_, swaps) in zip(trials, mocaps, lengths[:-1], lengths[1:], parts, strict=True)
@@ -108,8 +114,23 @@ def identify_finger(session: Session, finger: Finger, palm_shape: Array) -> Fing
     return FingerFit(finger, records, fit, covariance, rest, slips)
 
 
-def _fit_with_slips(data: ChainData, start: Chain) -> tuple[ChainFit, tuple[Slip, ...]]:
-    fit, slips = fit_chain(data, start), []
+def _best_fit(data: ChainData, rest: NDArray[np.int64], palm_shape: Array) -> ChainFit:
+    """The chain from the usual start; where arcs are short, the best of several starts."""
+    first = start_chain(data, rest, palm_shape)
+    fit = fit_chain(data, first)
+    if fit.converged and (angle_noise_ratio(fit) < SHORT_ARC).all():
+        return fit
+    few = data.take(np.unique(np.linspace(0, len(data.position_world) - 1, START_FRAMES).astype(int)))
+    tried = [fit_chain(few, start) for start in (fit.chain, *other_starts(data, rest, palm_shape, first))]
+    costs = [robust_cost(t.residual_palm, fit.noise_m) for t in tried]
+    best = int(np.argmin(costs))
+    if costs[best] > costs[0] - 3:  # no likelier by what three unknowns' worth of noise could make it
+        return fit
+    return fit_chain(data, tried[best].chain)
+
+
+def _fit_with_slips(fit: ChainFit) -> tuple[ChainFit, tuple[Slip, ...]]:
+    slips: list[Slip] = []
     while len(slips) < MOST_SLIPS:
         slip = find_slip(fit)
         if slip is None:
@@ -142,10 +163,14 @@ def _zero_at_rest(fit: ChainFit, rest: NDArray[np.int64]) -> tuple[ChainFit, Arr
     angle = fit.pose.angle_rad
     zero = np.median(angle[still], axis=0)
     zero_sd = np.sqrt(np.mean(fit.angle_sd_rad[still] ** 2, axis=0) / len(still))
-    chain = fit.chain.at(zero, fit.data.body)
+    sign = np.where(np.mean(angle[good] - zero, axis=0) < 0, -1.0, 1.0)
+
+    def at_rest(chain: Chain, rest_rad: Array) -> Chain:
+        moved = chain.at(rest_rad, fit.data.body)
+        return replace(moved, axis_palm=moved.axis_palm * sign[:, None])
 
     def outcome(step: Array) -> Array:
-        moved = fit.chain.moved(step[: fit.chain.size]).at(zero + step[fit.chain.size :], fit.data.body)
+        moved = at_rest(fit.chain.moved(step[: fit.chain.size]), zero + step[fit.chain.size :])
         return np.concatenate([moved.marker_palm.ravel(), np.hstack([moved.axis_palm, moved.centre_palm]).ravel()])
 
     unknowns = fit.chain.size + len(zero)
@@ -153,8 +178,22 @@ def _zero_at_rest(fit: ChainFit, rest: NDArray[np.int64]) -> tuple[ChainFit, Arr
     prior = np.zeros((unknowns, unknowns))
     prior[: fit.chain.size, : fit.chain.size] = fit.covariance
     prior[fit.chain.size :, fit.chain.size :] = np.diag(zero_sd**2)
-    pose = Pose(fit.pose.rotation, fit.pose.translation, angle - zero)
-    return replace(fit, chain=chain, pose=pose), derivative @ prior @ derivative.T
+    pose = Pose(fit.pose.rotation, fit.pose.translation, (angle - zero) * sign)
+    return replace(fit, chain=at_rest(fit.chain, zero), pose=pose), derivative @ prior @ derivative.T
+
+
+def _honest(covariance: Array, fit: ChainFit) -> Array:
+    """Covariance with each joint's rows and columns scaled up by what a bootstrap shows, and beyond SHORT_ARC by the square of
+    noise over arc [rad]: there the estimate can be anywhere within that."""
+    factor, ratio = variance_inflation(fit), angle_noise_ratio(fit)
+    scale = np.ones(len(covariance))
+    for k in range(len(factor)):
+        rows = slice(len(scale) - 6 * (len(factor) - k), len(scale) - 6 * (len(factor) - k) + 6)
+        variance = max(np.trace(covariance[rows, rows][:3, :3]), 1e-18)
+        doubt = ratio[k] ** 4 if ratio[k] > SHORT_ARC else 0.0
+        doubt += 0.0 if fit.converged else UNSETTLED_RAD**2
+        scale[rows] = np.sqrt(factor[k] + doubt / variance)
+    return covariance * scale[:, None] * scale
 
 
 def _record(trial: Trial, mocap: Mocap, frames: slice, swaps: tuple[Swap, ...], fit: ChainFit) -> FlexionRecord:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -60,9 +61,10 @@ def identify_all(session: Session | str | Path, say: Callable[[str], None] = lam
     notes = list(check_session(session))
     shape = palm_shape(session)
     fits = []
-    for finger in session.fingers:
-        fits.append(identify_finger(session, finger, shape))
-        say(f"{finger.name}: {_finger_line(fits[-1])}")
+    with ThreadPoolExecutor(max_workers=2) as pool:  # most of the time is spent in numpy, which lets other threads run
+        for fit in pool.map(lambda finger: identify_finger(session, finger, shape), session.fingers):
+            fits.append(fit)
+            say(f"{fit.finger.name}: {_finger_line(fit)}")
     probe = calibrated_probe(session)
     landmarks = {t.landmark: probed_point(t, session, probe, shape) for t in session.select("landmark", validate=False)} if probe else {}
     joint_points = _joint_points(session, probe, shape)
@@ -312,6 +314,8 @@ def _hashes(session: Session) -> dict[str, str]:
     for trial in session.trials:
         if not trial.validate:
             files |= {path for path in (trial.mocap_path, trial.log_path) if path is not None}
+    for folder in [path for path in files if path.is_dir()]:  # a rosbag2 folder
+        files |= set(folder.rglob("*"))
     table = {}
     for file in sorted(files):
         if file.is_file():

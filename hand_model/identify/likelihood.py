@@ -73,6 +73,12 @@ def fit_chain(data: ChainData, start: Chain, iterations: int = 20) -> ChainFit:
     return _finish(data, chain, pose, noise, converged)
 
 
+def angle_noise_ratio(fit: ChainFit) -> Array:
+    """(k,) noise of one frame's joint angle over the spread of that angle: small where the arc is long."""
+    shown = fit.weight.sum(1) > 0
+    return np.median(fit.angle_sd_rad[shown], axis=0) / np.maximum(np.std(fit.pose.angle_rad[shown], axis=0), 1e-9)
+
+
 def fit_poses(data: ChainData, chain: Chain, noise_m: float, iterations: int = 8) -> tuple[Pose, Array]:
     """Poses of all frames for a known chain, and the robust weights (n, m) of their markers."""
     pose = palm_pose(chain, data)

@@ -76,9 +76,9 @@ def _broken(data: ChainData) -> NDArray[np.bool_]:
 
 def _spacing(data: ChainData) -> float:
     y = data.position_world[:: max(1, len(data.position_world) // 200)]
-    distance = np.linalg.norm(y[:, :, None] - y[:, None], axis=-1)
-    distance[:, np.arange(y.shape[1]), np.arange(y.shape[1])] = np.nan
-    return float(np.nanmin(np.nanmedian(distance, axis=0)))
+    first, second = np.triu_indices(y.shape[1], 1)
+    distance = np.linalg.norm(y[:, first] - y[:, second], axis=-1)
+    return float(np.nanmedian(distance[:, np.isfinite(distance).any(0)], axis=0).min())
 
 
 def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -46,11 +46,11 @@ def rotation_vectors(rotation: Array) -> Array:
     return Rotation.from_matrix(rotation).as_rotvec()
 
 
-def start_chain(data: ChainData, rest: Array, palm_shape: Array) -> Chain:
+def start_chain(data: ChainData, rest: Array, palm_shape: Array, axis_palm: Array | None = None) -> Chain:
     """Chain estimate from cluster poses.
 
     data: observations. rest: (r,) frames that define angle zero. palm_shape: (p, 3) [m] palm markers in the palm frame.
-    Axis: dominant direction of the relative rotation vectors. Centre: least squares of (I - R) c = t over all frames.
+    Axis: dominant direction of the relative rotation vectors, or axis_palm (3,) for every joint where it is given. Centre: least squares of (I - R) c = t over all frames.
     Raises IdentificationError where a segment never shows with the palm.
     """
     few = np.unique(np.concatenate([rest, np.linspace(0, len(data.position_world) - 1, START_FRAMES).astype(int)]))
@@ -74,7 +74,7 @@ def start_chain(data: ChainData, rest: Array, palm_shape: Array) -> Chain:
         rotation, translation = kabsch(marker[columns], in_palm)
         relative = np.swapaxes(outer_rotation, 1, 2) @ rotation
         shift = np.einsum("nji,nj->ni", outer_rotation, translation - outer_translation)
-        axis, centre = _hinge(relative[good], shift[good], marker[columns].mean(0))
+        axis, centre = _hinge(relative[good], shift[good], marker[columns].mean(0), axis_palm)
         axes.append(axis)
         centres.append(centre)
         outer_rotation, outer_translation = rotation, translation
@@ -90,12 +90,12 @@ def _rest_shape(in_palm: Array, good: Array, rest: Array) -> Array:
     return shape @ rotation.T + translation
 
 
-def _hinge(rotation: Array, shift: Array, near: Array) -> tuple[Array, Array]:
+def _hinge(rotation: Array, shift: Array, near: Array, given: Array | None) -> tuple[Array, Array]:
     """Axis (3,) and centre (3,) of relative motions x -> R x + t; the centre is the point of the axis nearest to `near`."""
     vector = rotation_vectors(rotation)
     size = np.linalg.norm(vector, axis=1)
     kept = size <= np.quantile(size, 0.98)
-    axis = np.linalg.eigh(vector[kept].T @ vector[kept])[1][:, -1]
+    axis = np.linalg.eigh(vector[kept].T @ vector[kept])[1][:, -1] if given is None else given
     if np.median(vector @ axis) < 0:  # flexion is positive and starts from the open hand
         axis = -axis
     lever = np.eye(3) - rotation
@@ -107,3 +107,9 @@ def _hinge(rotation: Array, shift: Array, near: Array) -> tuple[Array, Array]:
         miss = np.linalg.norm(np.einsum("nij,j->ni", lever, centre) - shift, axis=1)
         weight = 1 / (1 + (miss / (2 * np.median(miss) + 1e-12)) ** 2)
     return axis, centre + axis * (axis @ (near - centre))
+
+
+def other_starts(data: ChainData, rest: Array, palm_shape: Array, first: Chain) -> list[Chain]:
+    """Further starting chains for arcs so short that noise hides their axis: parallel joints along each axis already guessed
+    and along the palm's own directions."""
+    return [start_chain(data, rest, palm_shape, axis) for axis in (*first.axis_palm, *np.eye(3))]
