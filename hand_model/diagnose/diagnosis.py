@@ -20,6 +20,7 @@ from .findings import Finding, Findings
 from .interval import held_out, parameter_intervals, variance_ratio
 from .name import ALPHA, Named, Naming, name_effects, polish, scan
 
+SMALL = 0.1  # share of the explained mismatch
 EXPLAINED_LEAST = 0.7  # of the explainable mismatch: below, the names are not believed
 
 
@@ -131,12 +132,20 @@ class Station:
         """Whether the names stand: the final model passes the test, or takes most of the mismatch away."""
         return bool(self.naming.found) and (self.naming.after.p >= ALPHA or self.explained >= EXPLAINED_LEAST)
 
+    @property
+    def kept(self) -> tuple[Named, ...]:
+        """The effects that stand beside each other: where the whole still does not fit, the small ones may be no more than
+        the form of the large one being another, and are left to the unexplained part."""
+        if self.naming.after.p >= ALPHA:
+            return self.naming.found
+        return tuple(f for f in self.naming.found if f.share >= SMALL or f is self.naming.found[0])
+
     def line(self) -> str:
         """One line for a progress display."""
         place = " ".join(x for x in (self.finger, self.joint, self.signal) if x)
         if not self.missing:
             return f"{place}: consistent (p {self.naming.before.p:.2g})"
-        names = ", ".join(f.term.effect.name for f in self.naming.found) if self.believed else "unexplained"
+        names = ", ".join(f.term.effect.name for f in self.kept) if self.believed else "unexplained"
         return f"{place}: {names} (p {self.naming.before.p:.2g} -> {self.naming.after.p:.2g})"
 
 
@@ -204,7 +213,7 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
     unexplained: list[dict[str, Any]] = []
     for station in stations:
         if station.believed:
-            ranked += [_finding(station, named, share) for named, share in _merged(station.naming.found)]
+            ranked += [_finding(station, named, share) for named, share in _merged(station.kept)]
         elif station.missing:
             unexplained.append(_unexplained(station, 1.0))
         if station.believed and station.naming.after.p < ALPHA and station.explained < 0.95:

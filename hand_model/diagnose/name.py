@@ -160,7 +160,8 @@ def rank(balance: Balance, effects: Iterable[Any], terms: tuple[Term, ...], fit:
     out = []
     for position, (_, start) in enumerate(rough):
         best = polish(balance, start, len(terms)) if position < refine else start
-        out.append((start.terms[-1].effect.name, best))
+        if _resolved(balance, best.terms[-1]):
+            out.append((start.terms[-1].effect.name, best))
     scale = min((_scale(balance, f) for _, f in out), default=1.0)
     rivals = [Rival(name, evidence(balance, f, fit, scale), f) for name, f in out]
     return sorted(rivals, key=lambda r: -r.evidence)
