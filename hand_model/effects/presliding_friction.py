@@ -17,11 +17,13 @@ class PreslidingFriction(Effect):
     replaces = "coulomb"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """Bristle length, from the resolution of starts and stops (1.2 %) to a third of the range."""
+        """Bristle length: from 1.6 times what the session's stiffest drive gives (or 1.2 % of the range) to a third of it."""
         low, high = position_range(states)
         span = high - low
-        return (Shape("bristle_length", states[0].position_unit, 0.012 * span, 0.35 * span,
-                      tuple(span * np.geomspace(0.015, 0.25, 9))),)
+        give = states[0].extra.get("give")
+        least = 0.012 * span if give is None else 1.6 * float(np.max(give))
+        return (Shape("bristle_length", states[0].position_unit, least, 0.35 * span,
+                      tuple(np.geomspace(1.1 * least, 0.25 * span, 11))),)
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """No amplitude of its own: it is the Coulomb friction."""
