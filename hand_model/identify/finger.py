@@ -62,6 +62,16 @@ class FingerFit:
         """(n,) frames whose angles rest on the palm and at least two markers of every segment."""
         return sound_frames(self.fit.data, self.fit.weight)
 
+    def joint_covariance(self, joint: int) -> Array:
+        """(6, 6) covariance of one joint's axis [-] and centre [m]."""
+        start = 3 * len(self.fit.data.body) + 6 * joint
+        return self.covariance[start : start + 6, start : start + 6]
+
+
+def axis_sd_deg(covariance: Array) -> float:
+    """Standard deviation [deg] of an axis in its worst direction, from the covariance (6, 6) of axis and centre."""
+    return float(np.rad2deg(np.sqrt(max(np.linalg.eigvalsh(covariance[:3, :3])[-1], 0.0))))
+
 
 def sound_frames(data: ChainData, weight: Array) -> NDArray[np.bool_]:
     """(n,) frames in which three palm markers and two of every segment carry (almost) full weight."""

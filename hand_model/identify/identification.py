@@ -17,11 +17,12 @@ from ..hand import Finger, Hand, Joint
 from ..rotation import angle_between, kabsch, skew
 from ..session import Probe, Session, check_session, read_session
 from .centre import project_on_line
-from .finger import FingerFit, identify_finger
+from .finger import FingerFit, axis_sd_deg, identify_finger
 from .frames import palm_frame
 from .mapping import aligned, couplings, encoder_maps, ranges
 from .probe import ProbedPoint, calibrated_probe, probed_point
 from .published import published_joint
+from .screws import Screws, probe_screws
 from .start import cluster_shape
 
 Array = NDArray[np.float64]
@@ -29,8 +30,6 @@ Array = NDArray[np.float64]
 LANDMARKS = ("origin", "medial", "lateral")
 # An axis known worse than this [deg] is reported as not determined by the recorded arc.
 DEGENERATE_DEG = 3.0
-# Placement of a probe tip by hand [m], where the session has too few probed joints to tell.
-PLACEMENT_M = 5e-4
 
 
 @dataclass(frozen=True)
@@ -67,14 +66,14 @@ def identify_all(session: Session | str | Path, say: Callable[[str], None] = lam
             say(f"{fit.finger.name}: {_finger_line(fit)}")
     probe = calibrated_probe(session)
     landmarks = {t.landmark: probed_point(t, session, probe, shape) for t in session.select("landmark", validate=False)} if probe else {}
-    joint_points = _joint_points(session, probe, shape)
-    placement = _placement(fits, joint_points)
+    screws = probe_screws(session, probe, shape, fits)
+    placement = screws.placement_m
     frame = _repeatable_frame(session, shape, landmarks, placement)
     if not landmarks:
         notes.append("no landmark trials: the palm frame is that of the palm markers, not the repeatable one")
     fingers, published = [], {}
     for fit in fits:
-        finger, table = _finger(fit, shape, frame, joint_points, placement, notes)
+        finger, table = _finger(fit, shape, frame, screws, notes)
         fingers.append(finger)
         published[finger.name] = table
     rotation, origin = frame[0], frame[1]
@@ -118,28 +117,6 @@ def palm_shape(session: Session) -> Array:
     return (shape - origin) @ rotation
 
 
-def _joint_points(session: Session, probe: Probe | None, shape: Array) -> dict[tuple[str, str], list[ProbedPoint]]:
-    points: dict[tuple[str, str], list[ProbedPoint]] = {}
-    if probe is not None:
-        for trial in session.select("joint_probe", validate=False):
-            points.setdefault((str(trial.finger), str(trial.joint)), []).append(probed_point(trial, session, probe, shape))
-    return points
-
-
-def _placement(fits: list[FingerFit], points: dict[tuple[str, str], list[ProbedPoint]]) -> float:
-    """How far from the axis a probe tip is held, per coordinate [m]: from the joints whose axis the arc determines."""
-    squares = []
-    for fit in fits:
-        chain = fit.fit.chain
-        for k, segment in enumerate(fit.finger.segments):
-            for point in points.get((fit.finger.name, segment.name), []):
-                arm = point.position_palm - chain.centre_palm[k]
-                across = arm - chain.axis_palm[k] * (arm @ chain.axis_palm[k])
-                if _axis_sd_deg(_joint_covariance(fit, k), chain.axis_palm[k]) < DEGENERATE_DEG / 3:
-                    squares.append(across @ across / 2)
-    return float(np.sqrt(np.mean(squares))) if len(squares) >= 4 else PLACEMENT_M
-
-
 def _repeatable_frame(
     session: Session, shape: Array, landmarks: dict[str | None, ProbedPoint], placement: float
 ) -> tuple[Array, Array, Array]:
@@ -164,22 +141,11 @@ def _repeatable_frame(
     return rotation, origin, derivative @ spread @ derivative.T
 
 
-def _joint_covariance(fit: FingerFit, joint: int) -> Array:
-    start = 3 * len(fit.fit.data.body) + 6 * joint
-    return fit.covariance[start : start + 6, start : start + 6]
-
-
-def _axis_sd_deg(covariance: Array, axis: Array) -> float:
-    """Standard deviation of the axis direction, worst direction [deg]."""
-    return float(np.rad2deg(np.sqrt(max(np.linalg.eigvalsh(covariance[:3, :3])[-1], 0.0))))
-
-
 def _finger(
     fit: FingerFit,
     shape: Array,
     frame: tuple[Array, Array, Array],
-    points: dict[tuple[str, str], list[ProbedPoint]],
-    placement: float,
+    screws: Screws,
     notes: list[str],
 ) -> tuple[Finger, dict[str, Any]]:
     data = aligned(fit)
@@ -191,16 +157,17 @@ def _finger(
     joints, published = [], {}
     for k, segment in enumerate(fit.finger.segments):
         axis, line = turn @ fit.fit.chain.axis_palm[k], turn @ fit.fit.chain.centre_palm[k] + move
-        probed = points.get((fit.finger.name, segment.name), [])
-        near = np.mean([p.position_palm for p in probed], axis=0) if probed else _middle(fit, k) @ turn.T + move
-        if not probed and points:
-            notes.append(f"{fit.finger.name} {segment.name}: no joint_probe trial; the centre's place along the axis is that of the markers")
+        near, along_sd, remark = screws.middle(fit.finger.name, segment.name, axis, line)
+        if near is None:
+            near = _middle(fit, k) @ turn.T + move
+        if remark:
+            notes.append(f"{fit.finger.name} {segment.name}: {remark}")
         centre = project_on_line(near, axis, line)
-        covariance = _moved_covariance(fit, k, turn, move, near, placement / np.sqrt(max(len(probed), 1)))
-        degenerate = _axis_sd_deg(covariance, axis) > DEGENERATE_DEG
+        covariance = _moved_covariance(fit, k, turn, move, near, along_sd)
+        degenerate = axis_sd_deg(covariance) > DEGENERATE_DEG
         arc = np.rad2deg(np.ptp(np.quantile(fit.fit.pose.angle_rad[fit.good, k], [0.01, 0.99])))
         if degenerate:
-            sd = _axis_sd_deg(covariance, axis)
+            sd = axis_sd_deg(covariance)
             notes.append(f"{fit.finger.name} {segment.name}: the recorded arc ({arc:.0f} deg) does not determine the axis (sd {sd:.1f} deg)")
         columns = [j for j in np.flatnonzero(fit.fit.data.body == k + 1)]
         markers = {fit.fit.data.labels[j]: (turn @ fit.fit.chain.marker_palm[j] + move - origin) @ rotation for j in reversed(columns)}
@@ -243,7 +210,7 @@ def _moved_covariance(fit: FingerFit, joint: int, turn: Array, move: Array, near
     derivative[:3, :3] = across
     derivative[3:, 3:] = across
     derivative[3:, :3] = lever * across
-    covariance = derivative @ _joint_covariance(fit, joint) @ derivative.T
+    covariance = derivative @ fit.joint_covariance(joint) @ derivative.T
     covariance[3:, 3:] += along_sd**2 * np.outer(axis, axis)
     both = np.kron(np.eye(2), turn)
     return both @ covariance @ both.T
@@ -264,7 +231,7 @@ def _published(fit: FingerFit, joint: int, near: Array, axis: Array, centre: Arr
     """What the published method gives on the same markers, as its distance from the likelihood's axis."""
     row: dict[str, Any] = {
         "arc_deg": float(arc_deg),
-        "axis_sd_deg": _axis_sd_deg(covariance, axis),
+        "axis_sd_deg": axis_sd_deg(covariance),
         "centre_sd_m": float(np.sqrt(max(np.linalg.eigvalsh(covariance[3:, 3:])[-1], 0.0))),
     }
     try:
