@@ -18,6 +18,7 @@ COMMANDS = {
     "compile": "compile",
     "replay": "replay",
     "diagnose": "diagnose",
+    "touch": "touch",
     "compare": "compare",
     "check": "check",
     "record": "record",
@@ -61,7 +62,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog="hand-model", description="From recordings of a real robot hand to a simulated hand that behaves like it.")
+    parser = _Parser(
+        prog="hand-model", description="From recordings of a real robot hand to a simulated hand that behaves like it."
+    )
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=_Parser)
     for name, module_name in COMMANDS.items():
         module = importlib.import_module(f".{module_name}", __name__)

@@ -12,7 +12,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("--cases", type=int, default=20, help="how many sessions (default: 20)")
     parser.add_argument("--seed", type=int, default=0, help="of everything (default: 0)")
-    parser.add_argument("--output", metavar="DIR", help="keep sessions, answers and findings here (default: a temporary folder)")
+    parser.add_argument(
+        "--output", metavar="DIR", help="keep sessions, answers and findings here (default: a temporary folder)"
+    )
 
 
 def run(options: Namespace, say: Callable[[str], None]) -> int:

@@ -11,7 +11,9 @@ SUMMARY = "the thesis's checks: two sessions of one hand (repeatability), left a
 def add_arguments(parser: ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("first", metavar="A", help="a .hand file")
-    parser.add_argument("second", metavar="B", help="a .hand file: of the same side (repeatability) or of the other one (mirror)")
+    parser.add_argument(
+        "second", metavar="B", help="a .hand file: of the same side (repeatability) or of the other one (mirror)"
+    )
     parser.add_argument("--output", metavar="DIR", help="folder for a page (comparison.html)")
 
 

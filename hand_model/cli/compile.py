@@ -11,7 +11,9 @@ SUMMARY = "write a learned hand as URDF and MJCF"
 def add_arguments(parser: ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("hand", metavar="HAND", help="a .hand file, from identify")
-    parser.add_argument("--output", required=True, metavar="DIR", help="the folder to write; an earlier compiled hand is replaced")
+    parser.add_argument(
+        "--output", required=True, metavar="DIR", help="the folder to write; an earlier compiled hand is replaced"
+    )
 
 
 def run(options: Namespace, say: Callable[[str], None]) -> int:

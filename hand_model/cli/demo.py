@@ -10,8 +10,15 @@ SUMMARY = "run the whole loop on a session that comes with the package"
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("--side", choices=("left", "right"), default="right", help="which of the two sessions (default: right, six fingers)")
-    parser.add_argument("--output", default="hand_model_demo", metavar="DIR", help="folder to write (default: hand_model_demo)")
+    parser.add_argument(
+        "--side",
+        choices=("left", "right"),
+        default="right",
+        help="which of the two sessions (default: right, six fingers)",
+    )
+    parser.add_argument(
+        "--output", default="hand_model_demo", metavar="DIR", help="folder to write (default: hand_model_demo)"
+    )
 
 
 def run(options: Namespace, say: Callable[[str], None]) -> int:

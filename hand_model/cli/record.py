@@ -12,10 +12,16 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("folder", metavar="DIR", help="the session folder to write (new or empty)")
     parser.add_argument("--side", choices=("left", "right"), default="left")
-    parser.add_argument("--seed", type=int, default=0, help="another specimen in another laboratory for each (default: 0)")
+    parser.add_argument(
+        "--seed", type=int, default=0, help="another specimen in another laboratory for each (default: 0)"
+    )
     parser.add_argument("--fingers", metavar="A,B", help="thumb_0, thumb_1, index, middle, ring, little (default: all)")
-    parser.add_argument("--effect", action="append", default=[], metavar="NAME", help="hide an effect; may be given several times")
-    parser.add_argument("--format", choices=("c3d", "tsv", "trc", "csv"), default="c3d", help="of the marker files (default: c3d)")
+    parser.add_argument(
+        "--effect", action="append", default=[], metavar="NAME", help="hide an effect; may be given several times"
+    )
+    parser.add_argument(
+        "--format", choices=("c3d", "tsv", "trc", "csv"), default="c3d", help="of the marker files (default: c3d)"
+    )
     parser.add_argument("--answer", metavar="FILE", help="where to write what was hidden (otherwise it is not kept)")
 
 

@@ -102,11 +102,17 @@ def _axes_words(
     known = [j for _, j in joints if not j.degenerate]
     parts = []
     if known:
-        which = f"All {len(joints)} axes" if not weak else f"{len(known)} of the {len(joints)} axes"
+        which = (
+            f"{len(known)} of the {len(joints)} axes"
+            if weak
+            else f"All {len(joints)} axes"
+            if joints[1:]
+            else "The axis"
+        )
         angle = number(max(axis_sd_deg(hand, j) for j in known))
         distance = number(max(centre_sd_mm(hand, j) for j in known))
         parts.append(
-            f"{which} are known to {angle} deg and {distance} mm or better within the palm (one standard deviation)"
+            f"{which} {'is' if which == 'The axis' else 'are'} known to {angle} deg and {distance} mm or better within the palm (one standard deviation)"
         )
     if weak:
         verb = "does not determine its axis" if len(weak) == 1 else "do not determine their axes"

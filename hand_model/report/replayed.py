@@ -85,8 +85,13 @@ def error_section(residuals: Residuals) -> Section:
         key(*[KEY[m] for m in modes]),
         figures(*[(f"{name}, per marker", pictures.boxes(g, label, colours, top)) for name, g in markers]),
         note(
-            "In the form of figures 4.5 and 4.6: box from quartile to quartile, median in it, whiskers over the whole range. With measured "
-            "angles the pose is fitted to these markers too; the other two place the palm by its own three markers and know nothing of the finger's."
+            "In the form of figures 4.5 and 4.6: box from quartile to quartile, median in it, whiskers over the whole range. "
+            "With measured angles the pose is fitted to these markers too"
+            + (
+                "; the other two place the palm by its own markers and know nothing of the finger's."
+                if modes[1:]
+                else "."
+            )
         ),
         _segment_table(fingers, mode),
         *_others(residuals, fingers, modes, mode),
@@ -115,7 +120,7 @@ def _error_words(residuals: Residuals, fingers: dict[str, list[TrialResiduals]],
     ratio = {name: noise_ratio(fingers[name], mode) for name in middle}
     worst = max(ratio, key=lambda name: ratio[name])
     how = "Driven by encoder counts alone" if mode == "encoder" else "Driven by the measured angles"
-    words = f"{how}, on {trials_words(residuals)}, the median marker error is {span(list(middle.values()), unit='mm')} per finger"
+    words = f"{how}, on {trials_words(residuals)}, the median marker error is {span(list(middle.values()), unit='mm')}{' per finger' if len(middle) > 1 else ''}"
     if mode == "encoder":
         words += f", {number(ratio[worst])} times what marker noise alone gives at worst ({worst})"
         side = residuals.description.side

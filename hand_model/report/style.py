@@ -16,8 +16,8 @@ _VARIABLES = {INK: "--ink", MUTED: "--muted", LINE: "--line", PAPER: "--paper"} 
 }
 # Inches of a small picture; on a phone it is as wide as the screen.
 WIDTH, HEIGHT = 4.2, 2.7
-# Inches left, right, below and above the panels: room for tick labels and axis names.
-MARGINS = (0.5, 0.08, 0.42, 0.08)
+# Inches left, right, below (with and without a name of the axis) and above the panels.
+MARGINS = (0.52, 0.08, 0.42, 0.24, 0.08)
 
 _SETTINGS: dict[str, Any] = {
     "svg.fonttype": "none",
@@ -73,13 +73,14 @@ def drawing(width: float = WIDTH, height: float = HEIGHT, panels: Sequence[float
         figure = Figure(figsize=(width, height))
         canvas = FigureCanvasSVG(figure)
         grid = figure.subplots(len(panels), sharex=True, squeeze=False, height_ratios=list(panels))
-        # Fixed margins: pictures side by side line up, and no layout has to be searched for.
-        left, right, bottom, top = MARGINS
-        figure.subplots_adjust(left / width, bottom / height, 1 - right / width, 1 - top / height, hspace=0.08)
         done = Drawing(figure, tuple(grid[:, 0]))
         yield done
+        # Fixed margins: pictures side by side line up, and no layout has to be searched for.
+        left, right, named, unnamed, top = MARGINS
+        bottom = named if done.panels[-1].get_xlabel() else unnamed
+        figure.subplots_adjust(left / width, bottom / height, 1 - right / width, 1 - top / height, hspace=0.08)
         for axes in done.panels:
-            axes.yaxis.set_label_coords(0.10 / width, 0.5, transform=_beside(figure, axes))
+            axes.yaxis.set_label_coords(0.15 / width, 0.5, transform=_beside(figure, axes))
         buffer = io.BytesIO()
         canvas.print_svg(buffer, metadata={"Date": None, "Creator": None})
         done.svg = themed(buffer.getvalue().decode())
