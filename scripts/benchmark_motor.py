@@ -34,7 +34,7 @@ MODEL = """<mujoco><option timestep="0.001" integrator="implicitfast" gravity="0
 def load_sysid():
     """mujoco.sysid, or MissingDependencyError saying how to get it."""
     try:
-        import mujoco.sysid as sysid
+        from mujoco import sysid
     except ImportError as error:
         raise MissingDependencyError(f"mujoco.sysid is not here ({error}); install it with: pip install 'mujoco[sysid]'") from None
     return sysid

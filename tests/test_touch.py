@@ -1,0 +1,67 @@
+"""Touch from the current: detected soon, not in free motion, its stiffness found."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hand_model import touch
+from hand_model.errors import IdentificationError
+from hand_model.identify.motor import identify_motor
+from hand_model.identify.motor.recording import actuator_trials
+from hand_model.session import read_session
+
+
+@pytest.fixture(scope="module")
+def grasps(tmp_path_factory: pytest.TempPathFactory):
+    from hand_model.twin import Plan, bebionic, record
+
+    folder = tmp_path_factory.mktemp("touch") / "session"
+    answer = record(bebionic("left", None, ["index"]), folder, 3, plan=Plan(grasps=(("block", 40.0), ("foam", 2.0)), grasp_repeats=1))
+    session = read_session(folder)
+    fit = identify_motor(session, "index")
+    detector = touch.calibrate(fit, [(t.name, t.log()) for t in actuator_trials(session, "index")])
+    return session, answer, fit, detector
+
+
+def test_contacts_are_found_in_time(grasps) -> None:
+    session, answer, fit, detector = grasps
+    for trial in actuator_trials(session, "index", ("grasp",), None):
+        log, stem = trial.log(), Path(trial.name).stem
+        found = touch.detect(fit, detector, log, trial.name)
+        assert len(found) == 2  # it closes twice
+        delay = np.interp(found[0].detected_s, log.time_s, answer.trials[stem].log_time_s) - answer.table["grasps"][stem]["contact_s"]
+        assert -0.02 < delay < (0.06 if trial.object == "block" else 0.4)
+        assert found[0].kind == ("stiff" if trial.object == "block" else "compliant")
+        for contact in found:
+            assert contact.stiffness.value == pytest.approx(answer.table["grasps"][stem]["stiffness"], rel=0.3)
+
+
+def test_free_motion_is_silent(grasps) -> None:
+    session, _, fit, detector = grasps
+    for trial in actuator_trials(session, "index", validate=True):
+        assert touch.detect(fit, detector, trial.log(), trial.name) == ()
+
+
+def test_sum_and_excursions() -> None:
+    z = np.array([0.0, 3.0, 0.5, -4.0, 0.0, 2.0, 2.0])
+    assert np.allclose(touch.cumulative_sum(z, 1.0), [0, 2, 1.5, 0, 0, 1, 2])
+    assert np.allclose(touch.excursions(z, 1.0), [2, 2])
+
+
+def test_threshold_rises_with_correlation() -> None:
+    """Correlated residuals have higher excursions than white ones of the same variance: their tail decides."""
+    rng = np.random.default_rng(0)
+    white = rng.normal(size=20000)
+    coloured = np.empty(20000)
+    coloured[0] = white[0]
+    for i in range(1, 20000):
+        coloured[i] = 0.8 * coloured[i - 1] + 0.6 * white[i]
+    assert touch.excursions(coloured).max() > 2 * touch.excursions(white).max()
+
+
+def test_too_little_free_motion_is_refused(grasps) -> None:
+    with pytest.raises(IdentificationError, match="at least 30"):
+        touch.calibrate(grasps[2], [])
