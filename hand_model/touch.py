@@ -124,13 +124,16 @@ def calibrate(fit: MotorFit, free: Sequence[tuple[str, Log]], false_alarms_per_m
     return TouchDetector(float(max(threshold, white)), false_alarms_per_minute, decay, minutes, float(white))
 
 
-def detect(fit: MotorFit, detector: TouchDetector, log: Log, name: str = "log") -> tuple[Contact, ...]:
-    """Contacts in one log: at most one per closing move, at the first sample whose sum passes the threshold."""
+def detect(fit: MotorFit, detector: TouchDetector, log: Log, name: str = "log", measure: bool = True) -> tuple[Contact, ...]:
+    """Contacts in one log: at most one per closing move, at the first sample whose sum passes the threshold.
+
+    measure: estimate the stiffness and refine the onset too (half a second each).
+    """
     found = []
     for m, time_s, z in residuals(fit, log, name):
         over = np.flatnonzero(cumulative_sum(z) > detector.threshold)
         if len(over):
-            found.append(_contact(fit, m, time_s, z, int(over[0]), name))
+            found.append(_contact(fit, m, time_s, z, int(over[0]), name, measure))
     return tuple(found)
 
 
@@ -147,13 +150,15 @@ def touch_session(session: Session, actuator: str, false_alarms_per_minute: floa
     return tuple(c for t in grasps for c in detect(fit, detector, t.log(), t.name))
 
 
-def _contact(fit: MotorFit, m: MoveData, time_s: Array, z: Array, alarm: int, name: str) -> Contact:
+def _contact(fit: MotorFit, m: MoveData, time_s: Array, z: Array, alarm: int, name: str, measure: bool) -> Contact:
     """Onset and stiffness by output error: the free drive against a one-sided spring, from the move's start to AFTER_S of pressing."""
     g = cumulative_sum(z)
     began = alarm
     while began > 0 and g[began - 1] > 0:
         began -= 1
     onset, at = float(time_s[max(began - 1, 0)]), float(m.position[max(began - 1, 0)])
+    if not measure:
+        return Contact(name, float(time_s[alarm]), onset, at, None, "undetermined")
     best, noise = None, (fit.sigma_position, fit.sigma_current)
     data = [_until(m, float(m.time_s[alarm] + AFTER_S))]
     names = ("contact_stiffness", "contact_at", "contact_damping")

@@ -33,7 +33,7 @@ def hand(seed: int):
     return dataclasses.replace(truth, motors=motors, log=noise), rng
 
 
-def one_hand(seed: int, repeats: int) -> list[dict]:
+def one_hand(seed: int, repeats: int, measure: bool) -> list[dict]:
     """Scores and delays of all closing moves of one hand's grasps."""
     truth, rng = hand(seed)
     objects = ((AIR, 0.0), (STIFF, rng.uniform(20, 60)), (COMPLIANT, rng.uniform(0.7, 4.0)))
@@ -50,7 +50,7 @@ def one_hand(seed: int, repeats: int) -> list[dict]:
             stem, log = Path(trial.name).stem, trial.log()
             truth_time = answer.trials[stem].log_time_s
             contact_s = answer.table["grasps"][stem]["contact_s"]
-            found = touch.detect(fit, detector, log, trial.name)
+            found = touch.detect(fit, detector, log, trial.name, measure=measure)
             scores = touch.score(fit, log, trial.name)
             alarm = min((float(np.interp(c.detected_s, log.time_s, truth_time)) for c in found), default=None)
             rows.append({
@@ -75,9 +75,10 @@ def main() -> None:
     parser.add_argument("--hands", type=int, default=6)
     parser.add_argument("--repeats", type=int, default=6)
     parser.add_argument("--first-seed", type=int, default=100)
+    parser.add_argument("--stiffness", action="store_true", help="estimate the stiffness of every contact too")
     parser.add_argument("--output", default="roc_touch.json")
     args = parser.parse_args()
-    rows = [row for seed in range(args.first_seed, args.first_seed + args.hands) for row in one_hand(seed, args.repeats)]
+    rows = [row for seed in range(args.first_seed, args.first_seed + args.hands) for row in one_hand(seed, args.repeats, args.stiffness)]
     pool = {k: np.array([s for r in rows if r["object"] == k for s in r["scores"]]) for k in (AIR, STIFF, COMPLIANT)}
     summary = {"skipped": sum(r["object"] == "none" for r in rows)}
     for kind in (STIFF, COMPLIANT):

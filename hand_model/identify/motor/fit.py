@@ -168,6 +168,8 @@ def fit_motor(trials: Sequence[MotorTrial], scale: Scale, actuator: str = "motor
                 f"setpoints do not explain the motion (residual variance {best.chi2[0]:.1f} of position, {best.chi2[1]:.1f} of current, "
                 "in units of the noise): parameters are those of the regression, and something is missing from the model"
             )
+    if accepted and values["presliding"] <= 1.01 * BOUNDS["presliding"][0]:
+        notes.append("friction turns round within the encoder's noise: the inertia may be off by some percent beyond its interval")
     if stribeck:
         notes.append(f"friction rises as speed falls (Stribeck): misfit falls by {evidence:.0f} noise variances")
     motor = Motor(
