@@ -1,6 +1,7 @@
 """The thesis's three checks of identified hands: repeatability, mirror relation, parallelism (tables 4.9 to 4.11).
 
-Each difference comes with what the uncertainty of both sides explains, so that "they differ" is a statement that can fail.
+Each difference comes with what the uncertainty of both sides explains, so that "they differ" is a statement that can
+fail.
 """
 
 from __future__ import annotations
@@ -79,12 +80,16 @@ def mirror(left: Hand, right: Hand) -> tuple[JointRow, ...]:
 
 
 def frame_covariance(hand: Hand) -> Array:
-    """(6, 6) of turn [rad] and shift [m] of the palm frame as the landmarks give it, in that frame; zero where it is not known."""
+    """(6, 6) of turn [rad] and shift [m] of the palm frame as the landmarks give it, in that frame; zero where it is
+    not known.
+    """
     return np.array(hand.extra.get("frame_covariance", np.zeros((6, 6))), float)
 
 
 def joint_covariance(hand: Hand, joint: Joint) -> Array:
-    """(6, 6) of axis and centre without the palm frame's own uncertainty, which moves all joints of the hand together."""
+    """(6, 6) of axis and centre without the palm frame's own uncertainty, which moves all joints of the hand
+    together.
+    """
     by_frame = np.zeros((6, 6))
     by_frame[:3, :3] = skew(joint.axis_palm)
     by_frame[3:, :3] = skew(joint.centre_palm)
@@ -95,7 +100,8 @@ def joint_covariance(hand: Hand, joint: Joint) -> Array:
 
 
 def parallelism(hand: Hand) -> tuple[JointRow, ...]:
-    """Angle between the first axis of a finger and each further one (table 4.11), the palm frame's uncertainty left out.
+    """Angle between the first axis of a finger and each further one (table 4.11), the palm frame's uncertainty left
+    out.
 
     Both axes count as independently uncertain.
     """
@@ -188,7 +194,9 @@ def _finger_rows(a: Finger, b: Finger, reflection: Array, published: Published) 
 
 
 def reflected(joint: Joint, reflection: Array) -> Joint:
-    """A joint seen in a mirror: the centre as a point, the axis as the pseudovector that it is (flexion stays positive)."""
+    """A joint seen in a mirror: the centre as a point, the axis as the pseudovector that it is (flexion stays
+    positive).
+    """
     turn = np.linalg.det(reflection) * reflection
     both = np.block([[turn, np.zeros((3, 3))], [np.zeros((3, 3)), reflection]])
     return replace(

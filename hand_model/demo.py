@@ -17,7 +17,8 @@ SIDES = ("left", "right")
 
 
 def embedded_session(side: str) -> Path:
-    """Folder of an embedded session, the twin's recording of a "left" (three fingers) or "right" (six fingers) BeBionic hand.
+    """Folder of an embedded session, the twin's recording of a "left" (three fingers) or "right" (six fingers)
+    BeBionic hand.
 
     Raises HandModelError for another side.
     """
@@ -46,7 +47,10 @@ def demo(side: str = "right", folder: str | Path = "hand_model_demo", say: Calla
         say(f"\n[{time.perf_counter() - start:4.1f} s] {text}")
 
     step(f"The session: a {side} hand as a laboratory records it, markers and log on two clocks\n  {session}")
-    step(f"Identify: axes, centres, encoder maps and linkages by maximum likelihood\n  hand-model identify {session} --output {out / name}.hand")
+    step(
+        f"Identify: axes, centres, encoder maps and linkages by maximum likelihood\n  hand-model identify {session} "
+        f"--output {out / name}.hand"
+    )
     hand = identify(session, lambda line: say(f"  {line}"))
     out.mkdir(parents=True, exist_ok=True)
     with new_file(out / f"{name}.hand") as staging:
@@ -57,7 +61,10 @@ def demo(side: str = "right", folder: str | Path = "hand_model_demo", say: Calla
     for model in description.models:
         say(f"  {model.mjcf}\n  {model.urdf}")
     report = out / f"{name}_report"
-    step(f"Replay against trials that took no part in the fit\n  hand-model replay {out / name} {session} --output {report}")
+    step(
+        f"Replay against trials that took no part in the fit\n  hand-model replay {out / name} {session} --output "
+        f"{report}"
+    )
     residuals = replay(description, session, lambda line: say(f"  {line}"))
     page = write_report(residuals, report)
     say("\n" + residuals_text(residuals))
@@ -74,7 +81,9 @@ def truth_words(hand: Hand, answer: Path) -> str:
     for finger in hand.fingers:
         for k, joint in enumerate(finger.joints):
             axis = np.array(truth[finger.name]["axes"][k])
-            angle.append(np.rad2deg(np.arctan2(np.linalg.norm(np.cross(axis, joint.axis_palm)), axis @ joint.axis_palm)))
+            angle.append(
+                np.rad2deg(np.arctan2(np.linalg.norm(np.cross(axis, joint.axis_palm)), axis @ joint.axis_palm))
+            )
             distance.append(1e3 * np.linalg.norm(np.array(truth[finger.name]["centres"][k]) - joint.centre_palm))
     return (
         f"axes off by {np.median(angle):.2f} deg (median) and {max(angle):.2f} deg (worst), "

@@ -2,8 +2,10 @@
 
     OMP_NUM_THREADS=1 python scripts/benchmark.py [RESULT.json]
 
-One finger (40 s at 100 Hz, nine markers, every frame, with covariance) by the chain likelihood, by the published method, and
-by scipy's general least squares with the sparsity of the same problem given to it (few frames: it is slow); ten times the
+One finger (40 s at 100 Hz, nine markers, every frame, with covariance) by the chain likelihood, by the published
+method, and
+by scipy's general least squares with the sparsity of the same problem given to it (few frames: it is slow); ten times
+the
 frames; a six-finger hand from session to report. Sessions are the twin's, recorded into a temporary folder first.
 """
 

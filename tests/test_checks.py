@@ -106,7 +106,9 @@ def test_a_mirrored_joint_moves_its_markers_to_the_mirror_image():
     marker = next(iter(joint.markers_palm.values()))
     for angle in (0.3, 1.2):
         moved = joint.centre_palm + rotation_from_vector(angle * joint.axis_palm) @ (marker - joint.centre_palm)
-        mirrored = seen.centre_palm + rotation_from_vector(angle * seen.axis_palm) @ (MIRROR @ marker - seen.centre_palm)
+        mirrored = seen.centre_palm + rotation_from_vector(angle * seen.axis_palm) @ (
+            MIRROR @ marker - seen.centre_palm
+        )
         np.testing.assert_allclose(mirrored, MIRROR @ moved, atol=1e-15)
 
 
@@ -137,7 +139,9 @@ def test_angles_do_not_depend_on_the_frame():
     both = np.kron(np.eye(2), turn)
     rng = np.random.default_rng(3)
     hand = each_joint(hand, lambda j: replace(j, covariance=random_covariance(rng, 6, 1e-3)))
-    turned = each_joint(hand, lambda j: replace(j, axis_palm=turn @ j.axis_palm, covariance=both @ j.covariance @ both.T))
+    turned = each_joint(
+        hand, lambda j: replace(j, axis_palm=turn @ j.axis_palm, covariance=both @ j.covariance @ both.T)
+    )
     for a, b in zip(parallelism(hand), parallelism(turned), strict=True):
         assert a.angle.value == pytest.approx(b.angle.value, abs=1e-12)
         assert a.angle.noise == pytest.approx(b.angle.noise, rel=1e-9)
@@ -145,7 +149,9 @@ def test_angles_do_not_depend_on_the_frame():
 
 
 def test_the_palm_frames_own_uncertainty_is_taken_out():
-    """By construction: frame noise turns axis and centre of every joint together and leaves angles between them alone."""
+    """By construction: frame noise turns axis and centre of every joint together and leaves angles between them
+    alone.
+    """
     rng = np.random.default_rng(4)
     frame = random_covariance(rng, 6, 1e-2)
     own = random_covariance(rng, 6, 1e-4)

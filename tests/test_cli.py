@@ -85,7 +85,9 @@ def rewrite_markers(file: Path, change) -> None:
                  and len(line.split("\t")) >= 3 * len(names))  # fmt: skip
     table = [line.split("\t") for line in lines[start:]]
     lead = len(table[0]) - 3 * len(names)
-    value = np.array([[float(v) if v else np.nan for v in row[lead:]] for row in table]).reshape(len(table), len(names), 3)
+    value = np.array([[float(v) if v else np.nan for v in row[lead:]] for row in table]).reshape(
+        len(table), len(names), 3
+    )
     tracks = {name: value[:, i] for i, name in enumerate(names)}
     change(tracks)
     for row, points in zip(table, np.stack([tracks[n] for n in names], axis=1), strict=True):
@@ -130,7 +132,13 @@ def test_the_package_is_light_and_its_verbs_can_be_called():
 def test_as_a_process(recorded, tmp_path):
     """Exit status and streams as a shell sees them."""
     argv = [sys.executable, "-c", "import sys; from hand_model.cli import main; sys.exit(main())"]
-    done = subprocess.run([*argv, "identify", str(recorded / "none"), "--output", "x.hand"], capture_output=True, text=True, cwd=tmp_path, check=False)
+    done = subprocess.run(
+        [*argv, "identify", str(recorded / "none"), "--output", "x.hand"],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        check=False,
+    )
     assert done.returncode == 2 and done.stdout == "" and done.stderr.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
 
@@ -175,7 +183,9 @@ def test_outputs_replace_their_own_kind_only(loop, recorded, tmp_path, capsys):
     assert "chapter.tex" in refused(capsys, "demo", "--output", foreign)
     assert "is a folder" in refused(capsys, "identify", recorded, "--output", foreign)
     assert "not a .hand file" in refused(capsys, "identify", recorded, "--output", foreign / "chapter.tex")
-    assert [f.name for f in foreign.iterdir()] == ["chapter.tex"] and (foreign / "chapter.tex").read_text() == "precious"
+    assert [f.name for f in foreign.iterdir()] == ["chapter.tex"] and (
+        foreign / "chapter.tex"
+    ).read_text() == "precious"
     assert main(["replay", str(loop / "compiled"), str(recorded), "--output", str(loop / "report")]) == 0
     assert sorted(f.name for f in loop.iterdir()) == ["compiled", "left.hand", "report"]
 
@@ -186,14 +196,27 @@ def test_compare_and_check(loop, capsys, tmp_path):
     out = capsys.readouterr().out
     assert "Repeatability" in out and "2 of 2 pairs of axes repeat" in out and "Parallelism" in out
     assert (tmp_path / "page" / "comparison.html").is_file()
-    assert main(["check", str(loop / "compiled" / "bebionic_left.xml"), str(loop / "compiled" / "bebionic_left.xml")]) == 0
+    assert (
+        main(["check", str(loop / "compiled" / "bebionic_left.xml"), str(loop / "compiled" / "bebionic_left.xml")]) == 0
+    )
     assert "no folder" in refused(capsys, "check", loop / "left.hand")
 
 
 def test_record(tmp_path, capsys):
-    argv = ["record", str(tmp_path / "s"), "--fingers", "index", "--seed", "4", "--answer", str(tmp_path / "answer.json")]
+    argv = [
+        "record",
+        str(tmp_path / "s"),
+        "--fingers",
+        "index",
+        "--seed",
+        "4",
+        "--answer",
+        str(tmp_path / "answer.json"),
+    ]
     assert main(argv) == 0
-    assert (tmp_path / "s" / "session.toml").is_file() and json.loads((tmp_path / "answer.json").read_text())["seed"] == 4
+    assert (tmp_path / "s" / "session.toml").is_file() and json.loads((tmp_path / "answer.json").read_text())[
+        "seed"
+    ] == 4
     assert "not an empty folder" in refused(capsys, *argv)
     assert 'did you mean "index"' in refused(capsys, "record", tmp_path / "t", "--fingers", "indx")
     message = refused(capsys, "record", tmp_path / "t", "--effect", "stribek_friction")
@@ -308,8 +331,24 @@ def _not_toml(root):
     return ["session.toml"]
 
 
-BREAKS = [_wrong_label, _two_markers, _one_line, _occluded, _empty_log, _header_only, _still_log, _other_motion, _metres,
-          _no_trial, _outside, _missing_file, _no_column, _foreign_c3d, _truncated_c3d, _not_toml]  # fmt: skip
+BREAKS = [
+    _wrong_label,
+    _two_markers,
+    _one_line,
+    _occluded,
+    _empty_log,
+    _header_only,
+    _still_log,
+    _other_motion,
+    _metres,
+    _no_trial,
+    _outside,
+    _missing_file,
+    _no_column,
+    _foreign_c3d,
+    _truncated_c3d,
+    _not_toml,
+]
 
 
 @pytest.mark.parametrize("broken", BREAKS, ids=lambda f: f.__name__.lstrip("_"))
@@ -338,3 +377,52 @@ def test_the_demo_ends_with_figures_and_the_report(tmp_path, capsys, monkeypatch
     assert lines[-1].endswith(str(page)) and page.is_file()
     truth = next(line for line in lines if line.strip().startswith("axes off by"))
     assert float(truth.split("off by ")[1].split()[0]) < 0.5
+
+
+PENDULUM = """<mujoco><option timestep="0.002" gravity="0 0 -9.81"/><worldbody><body name="mass">
+<joint name="hinge" axis="0 1 0" damping="0.01"/><geom type="sphere" size="0.02" pos="0 0 -0.2" mass="0.3"/>
+</body></worldbody></mujoco>"""
+
+
+@pytest.fixture
+def rig(tmp_path):
+    """A pendulum let go by its own model: replayed, it must move as recorded."""
+    import mujoco
+
+    root = tmp_path / "pendulum"
+    (root / "log").mkdir(parents=True)
+    (root / "pendulum.xml").write_text(PENDULUM)
+    trials = ""
+    for name, start, extra in (("a", 0.8, ""), ("b", 0.5, 'purpose = "validate"\n')):
+        model = mujoco.MjModel.from_xml_string(PENDULUM)
+        data = mujoco.MjData(model)
+        data.qpos[0] = start
+        lines = ["time,position"]
+        for i in range(3000):
+            if i % 5 == 0:
+                lines.append(f"{0.002 * i!r},{float(data.qpos[0])!r}")
+            mujoco.mj_step(model, data)
+        (root / "log" / f"{name}.csv").write_text("\n".join(lines) + "\n")
+        trials += f'[[trial]]\nkind = "motion"\nlog = "log/{name}.csv"\n{extra}'
+    (root / "session.toml").write_text(
+        'format = "hand-session/1"\n[hand]\nname = "pendulum"\n[rig]\nmodel = "pendulum.xml"\n'
+        f'[signals]\nposition = "joint:hinge:position"\n{trials}'
+    )
+    return root
+
+
+def test_replay_of_a_rig_needs_no_description(rig, tmp_path, capsys):
+    assert main(["replay", str(rig), "--output", str(tmp_path / "report")]) == 0
+    assert "On 1 validation trial, the motion simulated in open loop" in capsys.readouterr().out
+    rows = json.loads((tmp_path / "report" / "figures.json").read_text())["joints"]
+    assert [r["trial"] for r in rows] == ["log/a.csv", "log/b.csv"] and [r["held_out"] for r in rows] == [False, True]
+    assert all(r["position_rmse"] < 0.05 for r in rows)
+    assert "<svg" in (tmp_path / "report" / "report.html").read_text()
+
+
+def test_what_hands_and_rigs_need(rig, loop, recorded, tmp_path, capsys):
+    assert "name its folder before the session" in refused(capsys, "replay", recorded, "--output", tmp_path / "r")
+    assert "rig" in refused(capsys, "replay", loop / "compiled", rig, "--output", tmp_path / "r")
+    assert "rig" in refused(capsys, "identify", rig, "--output", tmp_path / "x.hand")
+    assert 'kind "grasp"' in refused(capsys, "touch", recorded)
+    assert not (tmp_path / "r").exists()

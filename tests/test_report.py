@@ -126,7 +126,9 @@ def test_degenerate_arcs_are_never_confident(residuals):
 
 def test_the_thesis_stands_beside_its_own_fingers_only(residuals):
     hand = residuals.description.hand
-    assert "thesis" in maps_section(hand).conclusion and "0.979" in " ".join(p.text_content() for p in maps_section(hand).body)
+    assert "thesis" in maps_section(hand).conclusion and "0.979" in " ".join(
+        p.text_content() for p in maps_section(hand).body
+    )
     other = replace(hand, fingers=(replace(hand.fingers[0], name="gripper"),))
     assert "thesis" not in maps_section(other).conclusion
     assert "thesis" not in "".join(h.text_content() for h in maps_section(other).body[0].iter("th"))
@@ -135,7 +137,12 @@ def test_the_thesis_stands_beside_its_own_fingers_only(residuals):
 def test_without_a_log(residuals):
     """Markers only: measured angles are what remains, and no section speaks of encoder or clocks."""
     trials = [
-        replace(t, clock=None, counts=np.full_like(t.counts, np.nan), residual_palm={"measured": t.residual_palm["measured"]})
+        replace(
+            t,
+            clock=None,
+            counts=np.full_like(t.counts, np.nan),
+            residual_palm={"measured": t.residual_palm["measured"]},
+        )
         for t in residuals.trials
     ]
     hand = residuals.description.hand
@@ -174,7 +181,12 @@ def test_engines_that_disagree_are_said_to(residuals):
 
 
 def test_names_are_text_not_markup():
-    raw = page("<b>&", "lead", [("1", "<i>")], [Section("a", "t", "c <script>x</script>.", (table(["<x>"], [["a&b"], [Cell("<y>", "flag")]]),))])
+    raw = page(
+        "<b>&",
+        "lead",
+        [("1", "<i>")],
+        [Section("a", "t", "c <script>x</script>.", (table(["<x>"], [["a&b"], [Cell("<y>", "flag")]]),))],
+    )
     tree = html.fromstring(raw)
     assert not tree.xpath("//script | //x | //y | //body//b[not(text())]")
     assert tree.xpath("//h1")[0].text == "<b>&" and tree.xpath("//td/text()") == ["a&b", "<y>"]

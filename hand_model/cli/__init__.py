@@ -24,7 +24,8 @@ COMMANDS = {
     "record": "record",
     "blind-trial": "blind_trial",
 }
-# Matrices here are small: threads inside BLAS cost several times what they gain. Set before numpy loads; a user's own setting stays.
+# Matrices here are small: threads inside BLAS cost several times what they gain. Set before numpy loads; a user's own
+# setting stays.
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 # Status where the input or the request is wrong; 1 is for a check that ran and found something.
 BAD_INPUT = 2
@@ -38,7 +39,9 @@ class _Parser(argparse.ArgumentParser):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command; returns its exit status: 0 done, 1 a check found something, 2 bad input (one sentence on stderr)."""
+    """Run a command; returns its exit status: 0 done, 1 a check found something, 2 bad input (one sentence on
+    stderr).
+    """
     words = list(sys.argv[1:] if argv is None else argv)
     if words and not words[0].startswith("-") and words[0] not in COMMANDS:
         print(f'hand-model: no command "{words[0]}"; {did_you_mean(words[0], COMMANDS)}', file=sys.stderr)

@@ -1,4 +1,6 @@
-"""`hand-model check DIR [OTHER]`: a compiled hand against its conventions. `hand-model check A.urdf B.xml`: two descriptions."""
+"""`hand-model check DIR [OTHER]`: a compiled hand against its conventions. `hand-model check A.urdf B.xml`: two
+descriptions.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""`hand-model replay DIR SESSION --output REPORT`; a rig session brings its own model: `hand-model replay SESSION --output REPORT`."""
+"""`hand-model replay DIR SESSION --output REPORT`; a rig session brings its own model: `hand-model replay SESSION
+--output REPORT`.
+"""
 
 from __future__ import annotations
 

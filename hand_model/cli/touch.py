@@ -31,7 +31,8 @@ def run(options: Namespace, say: Callable[[str], None]) -> int:
         raise SessionError(f'{session.path}: no grasp trial; one of kind "grasp" is needed to look for a touch')
     if options.actuator and options.actuator not in grasped:
         raise SessionError(
-            f'{session.path}: actuator "{options.actuator}" has no grasp trial; {did_you_mean(options.actuator, grasped)}'
+            f'{session.path}: actuator "{options.actuator}" has no grasp trial; '
+            + did_you_mean(options.actuator, grasped)
         )
     rows = []
     for actuator in [options.actuator] if options.actuator else grasped:

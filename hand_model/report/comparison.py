@@ -51,7 +51,9 @@ def distance_cells(row: JointRow) -> list[str | Cell]:
 
 
 def angle_words(rows: Sequence[JointRow], agree: str) -> str:
-    """`9 of 12 pairs of axes are parallel within their uncertainty; median angle 0.8 deg, largest 3.1 deg (index); thesis ...`."""
+    """`9 of 12 pairs of axes are parallel within their uncertainty; median angle 0.8 deg, largest 3.1 deg (index);
+    thesis ...`.
+    """
     same = sum(not row.angle.real for row in rows)
     worst = max(rows, key=lambda row: row.angle.value)
     middle = np.rad2deg(np.median([row.angle.value for row in rows]))
@@ -102,7 +104,10 @@ def checks(a: Hand, b: Hand) -> tuple[Check, ...]:
         angle_words(rows, agree)
         + f" {sum(not d.real for d in far)} of {count(len(far), 'centre')} agree within their uncertainty; "
     )
-    words += f"median distance {number(1e3 * float(np.median([d.value for d in far])))} mm, largest {number(1e3 * max(d.value for d in far))} mm."
+    words += (
+        f"median distance {number(1e3 * float(np.median([d.value for d in far])))} mm, largest "
+        f"{number(1e3 * max(d.value for d in far))} mm."
+    )
     caption = f"Degrees and millimetres, in the form of table {number_}; bold: more than the uncertainty explains"
     found = [Check(name, title, words, meaning, caption, rows)]
     for hand, label in ((a, "first"), (b, "second")):

@@ -56,8 +56,10 @@ def axes_section(hand: Hand) -> Section:
     body = [table(columns, rows, groups=groups, text_columns=2)]
     body.append(
         note(
-            "Palm frame of the landmarks; ± is one standard deviation in the worst direction, the palm frame taken as known. "
-            "Published method: axis by Gamage & Lasenby (2002), centre by Chang & Pollard (2007) on the same markers, as its "
+            "Palm frame of the landmarks; ± is one standard deviation in the worst direction, the palm frame taken "
+            "as known. "
+            "Published method: axis by Gamage & Lasenby (2002), centre by Chang & Pollard (2007) on the same "
+            "markers, as its "
             "distance from the maximum-likelihood chain (for the centre, across the axis)."
         )
     )
@@ -112,7 +114,8 @@ def _axes_words(
         angle = number(max(axis_sd_deg(hand, j) for j in known))
         distance = number(max(centre_sd_mm(hand, j) for j in known))
         parts.append(
-            f"{which} {'is' if which == 'The axis' else 'are'} known to {angle} deg and {distance} mm or better within the palm (one standard deviation)"
+            f"{which} {'is' if which == 'The axis' else 'are'} known to {angle} deg and {distance} mm or better "
+            "within the palm (one standard deviation)"
         )
     if weak:
         verb = "does not determine its axis" if len(weak) == 1 else "do not determine their axes"
@@ -131,7 +134,9 @@ def _axes_words(
 
 
 def maps_section(hand: Hand, pictures: tuple[Any, ...] = ()) -> Section | None:
-    """RMSE of encoder counts to angle in the form of tables 4.5 to 4.8, the thesis's figures beside; None without a log."""
+    """RMSE of encoder counts to angle in the form of tables 4.5 to 4.8, the thesis's figures beside; None without a
+    log.
+    """
     fingers = [f for f in hand.fingers if f.encoder_maps]
     if not fingers:
         return None
@@ -146,7 +151,8 @@ def maps_section(hand: Hand, pictures: tuple[Any, ...] = ()) -> Section | None:
         words.append(f"{place} angle within {span(values)} deg{beside}")
     body.append(
         note(
-            "Fitted: on the cycles that it was fitted to, as the thesis reports it. Held out: on cycles left out in turn; "
+            "Fitted: on the cycles that it was fitted to, as the thesis reports it. Held out: on cycles left out in "
+            "turn; "
             "it chooses the order (bold). Thesis: tables 4.5 to 4.8, another specimen in another laboratory."
         )
     )
@@ -241,16 +247,21 @@ def repairs_section(hand: Hand) -> Section:
         markers = listed(r["markers"])
         if r["kind"] == "swap":
             items.append(
-                f"{r['trial']}: {markers} carried each other's label from {r['from_s']:.2f} to {r['to_s']:.2f} s; put right."
+                f"{r['trial']}: {markers} carried each other's label from {r['from_s']:.2f} to {r['to_s']:.2f} s; "
+                "put right."
             )
         else:
             items.append(
-                f"{r['trial']}: {markers} moved by {1e3 * r['shift_m']:.2f} mm on its segment at {r['at_s']:.2f} s; two epochs fitted."
+                f"{r['trial']}: {markers} moved by {1e3 * r['shift_m']:.2f} mm on its segment at {r['at_s']:.2f} s; "
+                "two epochs fitted."
             )
     swaps = sum(r["kind"] == "swap" for r in hand.extra.get("repairs", []))
     slips = len(items) - swaps
     if items:
-        conclusion = f"{count(swaps, 'exchange')} of labels and {count(slips, 'slipped marker')} were found in the recordings and corrected; the files are untouched."
+        conclusion = (
+            f"{count(swaps, 'exchange')} of labels and {count(slips, 'slipped marker')} were found in the "
+            "recordings and corrected; the files are untouched."
+        )
     else:
         conclusion = "No exchanged label and no slipped marker was found in the recordings that were fitted."
     body = [listing(items)] if items else []

@@ -1,4 +1,6 @@
-"""A page of sections, each opening with its conclusion. HTML by lxml, one file, no outside resources, the same bytes for the same input."""
+"""A page of sections, each opening with its conclusion. HTML by lxml, one file, no outside resources, the same bytes
+for the same input.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,9 @@ Element = Any  # lxml has no public element type
 
 @dataclass(frozen=True)
 class Section:
-    """One section. name: its anchor. conclusion: one sentence in words with its figures. body: elements that support it."""
+    """One section. name: its anchor. conclusion: one sentence in words with its figures. body: elements that support
+    it.
+    """
 
     name: str
     title: str
@@ -62,7 +66,8 @@ def table(
     groups: Sequence[tuple[str, int]] = (),
     text_columns: int = 1,
 ) -> Element:
-    """A table that scrolls sideways where it is wider than the page. groups: (heading, columns spanned) above the columns.
+    """A table that scrolls sideways where it is wider than the page. groups: (heading, columns spanned) above the
+    columns.
 
     text_columns: how many columns from the left are words, aligned left.
     """

@@ -27,7 +27,9 @@ def box_statistics(values: Array) -> dict[str, Any]:
 def boxes(
     groups: Mapping[str, Mapping[str, Array]], label: str, colours: Mapping[str, str], top: float | None = None
 ) -> bytes:
-    """Box plots (median, quartiles, range): groups along the axis, one colour per series in each. colours: series -> colour."""
+    """Box plots (median, quartiles, range): groups along the axis, one colour per series in each. colours: series ->
+    colour.
+    """
     with drawing() as d:
         names = list(groups)
         series = [s for s in colours if any(s in g for g in groups.values())]
@@ -68,8 +70,14 @@ def encoder_map(finger: Finger, trials: Sequence[TrialResiduals]) -> bytes:
             top.plot(counts[::4], np.rad2deg(angle[::4]), "o", color=colour, markersize=2.6, markeredgewidth=0)
             at = 0.45 * (fitted.counts_close - fitted.counts_open) + fitted.counts_open
             place = {"ha": "right", "va": "bottom"} if k == 0 else {"ha": "left", "va": "top"}
-            top.annotate(joint.name, (at, np.rad2deg(fitted.angle_rad(np.array([at]))[0])), (-5, 3) if k == 0 else (5, -3),
-                         textcoords="offset points", color=colour, **place)  # fmt: skip
+            top.annotate(
+                joint.name,
+                (at, np.rad2deg(fitted.angle_rad(np.array([at]))[0])),
+                (-5, 3) if k == 0 else (5, -3),
+                textcoords="offset points",
+                color=colour,
+                **place,
+            )
             below.plot(
                 counts,
                 np.rad2deg(angle - fitted.angle_rad(counts)),

@@ -56,7 +56,8 @@ def replay_page(residuals: Residuals, *further: Section) -> bytes:
     ]
     title = f"{hand.name}, {hand.side} hand"
     lead = (
-        f"{count(len(hand.fingers), 'finger')} identified from {count(_fitted(residuals), 'file')} of a recording session, compiled to URDF and "
+        f"{count(len(hand.fingers), 'finger')} identified from {count(_fitted(residuals), 'file')} of a recording "
+        "session, compiled to URDF and "
         f"MJCF, and replayed on {trials_words(residuals)}."
     )
     return page(title, lead, _tiles(residuals), [s for s in sections if s is not None])

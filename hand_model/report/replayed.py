@@ -85,7 +85,8 @@ def error_section(residuals: Residuals) -> Section:
         key(*[KEY[m] for m in modes]),
         figures(*[(f"{name}, per marker", pictures.boxes(g, label, colours, top)) for name, g in markers]),
         note(
-            "In the form of figures 4.5 and 4.6: box from quartile to quartile, median in it, whiskers over the whole range. "
+            "In the form of figures 4.5 and 4.6: box from quartile to quartile, median in it, whiskers over the "
+            "whole range. "
             "With measured angles the pose is fitted to these markers too"
             + (
                 "; the other two place the palm by its own markers and know nothing of the finger's."
@@ -120,7 +121,10 @@ def _error_words(residuals: Residuals, fingers: dict[str, list[TrialResiduals]],
     ratio = {name: noise_ratio(fingers[name], mode) for name in middle}
     worst = max(ratio, key=lambda name: ratio[name])
     how = "Driven by encoder counts alone" if mode == "encoder" else "Driven by the measured angles"
-    words = f"{how}, on {trials_words(residuals)}, the median marker error is {span(list(middle.values()), unit='mm')}{' per finger' if len(middle) > 1 else ''}"
+    words = (
+        f"{how}, on {trials_words(residuals)}, the median marker error is "
+        f"{span(list(middle.values()), unit='mm')}{' per finger' if len(middle) > 1 else ''}"
+    )
     if mode == "encoder":
         words += f", {number(ratio[worst])} times what marker noise alone gives at worst ({worst})"
         side = residuals.description.side
@@ -164,10 +168,12 @@ def _others(
         ]
         out.append(
             note(
-                f"Simulated with only the proximal joint driven, the linkages' equalities put every marker within {1e3 * max(apart):.1g} mm of "
+                "Simulated with only the proximal joint driven, the linkages' equalities put every marker within "
+                f"{1e3 * max(apart):.1g} mm of "
                 "where the encoder maps put it: the file moves as the hand was identified to."
                 if max(apart) < 1e-4
-                else f"Simulated with only the proximal joint driven, markers end up to {1e3 * max(apart):.2g} mm from where the encoder maps put them."
+                else f"Simulated with only the proximal joint driven, markers end up to {1e3 * max(apart):.2g} mm "
+                "from where the encoder maps put them."
             )
         )
     for mode in modes:
@@ -202,7 +208,8 @@ def map_pictures(residuals: Residuals) -> tuple[Element, ...]:
     if not drawn:
         return ()
     return figures(*drawn), note(
-        f"Lines: the maps as fitted. Points: angles that the markers show in the {trials_words(residuals)}, thinned evenly along the range; below, "
+        f"Lines: the maps as fitted. Points: angles that the markers show in the {trials_words(residuals)}, thinned "
+        "evenly along the range; below, "
         "what the map leaves of them."
     )
 
@@ -223,7 +230,10 @@ def clock_section(residuals: Residuals) -> Section | None:
     rates = (
         f"{listed(drifting)}: the log's clock runs at another rate" if drifting else "the two clocks run at one rate"
     )
-    words = f"Log and markers are aligned to {number(sd, 1)} ms or better, the encoder explains at least {number(100 * least, 2)} % of the angle's variance, and {rates}."
+    words = (
+        f"Log and markers are aligned to {number(sd, 1)} ms or better, the encoder explains at least "
+        f"{number(100 * least, 2)} % of the angle's variance, and {rates}."
+    )
     drawn = [("Correlation over the lag, every trial", pictures.correlation(trials))]
     for trial in trials:
         finger = residuals.description.hand.finger(trial.finger)
@@ -235,7 +245,8 @@ def clock_section(residuals: Residuals) -> Section | None:
         figures(*drawn),
         table(columns, rows, "log time = offset + rate × mocap time", text_columns=2),
         note(
-            "Correlation finds the offset to one sample, least squares through the encoder map refines it; a rate is used where it differs from 1 by more than four standard deviations."
+            "Correlation finds the offset to one sample, least squares through the encoder map refines it; a rate "
+            "is used where it differs from 1 by more than four standard deviations."
         ),
     )
     return Section("clocks", "Synchronisation", words, body)
@@ -260,8 +271,10 @@ def engines_section(residuals: Residuals) -> Section:
     worst = max(distance, key=lambda name: distance[name])
     verdict = "agree" if distance[worst] <= AGREEMENT_M else "do not agree"
     words = (
-        f"{listed(list(distance))} {verdict} with this project's own forward kinematics: at most {distance[worst]:.1e} m "
-        f"apart ({worst}) at any marker or tip, over {AGREEMENT_POSES} random poses of each file (limit {AGREEMENT_M:.0e} m)."
+        f"{listed(list(distance))} {verdict} with this project's own forward kinematics: at most "
+        f"{distance[worst]:.1e} m "
+        f"apart ({worst}) at any marker or tip, over {AGREEMENT_POSES} random poses of each file (limit "
+        f"{AGREEMENT_M:.0e} m)."
     )
     rows = [
         [name, Cell(f"{value:.1e}", "fine" if value <= AGREEMENT_M else "flag")] for name, value in distance.items()

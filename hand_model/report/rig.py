@@ -54,7 +54,10 @@ def rig_page(session: Session, residuals: RigResiduals) -> bytes:
     ]
     if drawn:
         body += [key(("c1", "recorded"), ("ink", "simulated in open loop")), figures(*drawn[:PICTURES])]
-    lead = f"{session.path.name}: the declared model, as its file stands, against {count(len({r.trial for r in residuals.joints}), 'trial')}."
+    lead = (
+        f"{session.path.name}: the declared model, as its file stands, against "
+        f"{count(len({r.trial for r in residuals.joints}), 'trial')}."
+    )
     return page(
         session.hand or session.path.name,
         lead,
@@ -71,7 +74,10 @@ def rig_words(session: Session, residuals: RigResiduals) -> str:
     words = f"On {count(len({r.trial for r in chosen}), 'validation trial' if held else 'trial')}"
     if ran:
         share = [100 * _share(session, r) for r in ran if np.isfinite(_share(session, r))]
-        words += f", the motion simulated in open loop is off by {number(float(np.median(share)), 1)} % of the recorded range (median)"
+        words += (
+            f", the motion simulated in open loop is off by {number(float(np.median(share)), 1)} % of the recorded "
+            "range (median)"
+        )
     if len(ran) < len(chosen):
         words += f"; {count(len(chosen) - len(ran), 'simulation')} left the recorded range or could not be run"
     effort = [r.effort_rmse for r in chosen if np.isfinite(r.effort_rmse)]

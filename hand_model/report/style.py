@@ -1,4 +1,6 @@
-"""How pictures look: matplotlib drawn small, as SVG whose colours are the page's own, so that it follows light and dark."""
+"""How pictures look: matplotlib drawn small, as SVG whose colours are the page's own, so that it follows light and
+dark.
+"""
 
 from __future__ import annotations
 
@@ -51,7 +53,9 @@ _SETTINGS: dict[str, Any] = {
 
 
 class Drawing:
-    """A picture in the making. panels: matplotlib Axes one below the other, axes: the first. svg: set when the `drawing` block ends."""
+    """A picture in the making. panels: matplotlib Axes one below the other, axes: the first. svg: set when the
+    `drawing` block ends.
+    """
 
     def __init__(self, figure: Any, panels: tuple[Any, ...]) -> None:
         self.figure, self.panels, self.axes, self.svg = figure, panels, panels[0], b""
@@ -75,7 +79,7 @@ def drawing(width: float = WIDTH, height: float = HEIGHT, panels: Sequence[float
         grid = figure.subplots(len(panels), sharex=True, squeeze=False, height_ratios=list(panels))
         done = Drawing(figure, tuple(grid[:, 0]))
         yield done
-        # Fixed margins: pictures side by side line up, and no layout has to be searched for.
+        # Fixed margins: pictures side by side line up,.
         left, right, named, unnamed, top = MARGINS
         bottom = named if done.panels[-1].get_xlabel() else unnamed
         figure.subplots_adjust(left / width, bottom / height, 1 - right / width, 1 - top / height, hspace=0.08)
@@ -94,7 +98,7 @@ def _beside(figure: Any, axes: Any) -> Any:
 
 
 def themed(svg: str) -> bytes:
-    """An SVG with the page's colours and font, sized by its viewBox, without what would leak into the page around it."""
+    """An SVG with the page's colours and font, sized by its viewBox, without what would leak into the page."""
     for pattern in (r"<\?xml.*?\?>", r"<!DOCTYPE.*?>", r"<metadata>.*?</metadata>", r"<style.*?</style>"):
         svg = re.sub(pattern, "", svg, flags=re.DOTALL)
     for colour, variable in _VARIABLES.items():
