@@ -102,7 +102,10 @@ def _own(rig: RigModel, fit: DeclaredFit, joint: str, rows: list[Rows]) -> list[
     if drive is not None:
         own.append(Candidate("load_dependent_friction", "motor side", joint, (("per_effort", "1", 0.0, np.inf),), ({},),
                              lambda r, s: (direction(r) * expected[r.trial])[:, None]))  # fmt: skip
-        own.append(Candidate("current_channel_delay" if drive.kind == "force" else "command_delay", "", joint, (), delays,
+        measured = drive.kind == "force"
+        if not measured:  # a drive can act later than told, not earlier
+            delays = tuple(d for d in delays if d["delay"] < 0)
+        own.append(Candidate("current_channel_delay" if measured else "command_delay", "", joint, (), delays,
                              lambda r, s: np.zeros((len(r.time_s), 0)), True))  # fmt: skip
     if drive is None or not drive.offset:
         own.append(Candidate("asymmetric_friction", "", joint, (("offset", rig.effort_unit(joint), *free),), ({},),

@@ -19,7 +19,7 @@ from .findings import Finding, Findings
 from .model import RigModel, load_rig
 from .patch import write_couplings, write_declared, write_effects
 from .replay import replay_rig
-from .states import noise_std
+from .states import fill_gaps, noise_std
 from .swing import INDEX, PARAMETERS, STEP_S, Fitted, Swing, Task, vector
 from .swing_build import build_swing, can_swing, windows_s
 from .swing_compete import Round, Variant, compete_swing, fit_stages, free_declared
@@ -29,6 +29,7 @@ from .transmission import coupling_candidates, fit_coupling, zero_shift
 Array = NDArray[np.float64]
 SEARCH_STEP_S = 4e-3
 RESAMPLES = 500
+TIED_TO_POSITION = frozenset({"nonlinear_spring", "end_stop_contact", "detent_load", "torque_ripple"})
 
 
 def diagnose_rig(session: Session, output: str | Path | None = None,
@@ -56,16 +57,20 @@ def diagnose_rig(session: Session, output: str | Path | None = None,
         say(f"{rig.name}: coupling {coupling.name}")
     lack = dict(lack)
     unexplained = _unexplained(lack, found)
+    again = repeated_trajectory(rig)
+    if again and len(rig.joints) > 1:  # on one and the same path a load tied to position is as well a weight elsewhere
+        found = [replace(f, members=(*f.members, "gravity_load")) if f.effect in TIED_TO_POSITION else f for f in found]
     findings = Findings(
         session=rig.name,
         verdict=_verdict(found, lack),
         lack_of_fit=lack,
         protocol={"repeats": len(rig.select(False)), "rate_hz": _rate(rig), "held_out": [t.name for t in rig.select(True)],
+                  "held_out_repeats_the_training_trajectory": again,
                   "not_isolable": [list(f.members) for f in found if len(f.members) > 1]},
         findings=tuple(sorted(found, key=lambda f: (f.model is not None, -float(f.where.get("share_of_mismatch") or 0.0)))),
         rejected=tuple(rejected),
         unexplained=unexplained,
-        next_experiment=_next(found, issues),
+        next_experiment=_next(found, issues, again),
         declared={c.label: float(t) for c, t in zip(fit.columns, fit.theta, strict=True)},
         xml=xml,
         declared_xml=declared_xml,
@@ -85,6 +90,20 @@ def trusted_fit(rig: RigModel) -> tuple[DeclaredFit, tuple[ChannelIssue, ...]]:
         if not more:
             return fit, tuple(issues)
         issues += more
+
+
+def repeated_trajectory(rig: RigModel) -> bool:
+    """Whether every validation recording follows a training recording so closely (1 % of the range) that it repeats it."""
+    def path(trial: Any, joint: str) -> Array:
+        q = fill_gaps(trial.time_s, trial.position[joint])
+        return np.interp(np.linspace(0, trial.time_s[-1], 200), trial.time_s, q)
+
+    def same(a: Any, b: Any) -> bool:
+        return all(np.std(path(a, j) - path(b, j)) < 0.01 * np.ptp(path(a, j)) for j in rig.joints
+                   if j in a.position and j in b.position)  # fmt: skip
+
+    held = rig.select(True)
+    return bool(held) and all(any(same(v, t) for t in rig.select(False)) for v in held)
 
 
 def with_couplings(rig: RigModel) -> RigModel:
@@ -406,9 +425,11 @@ def _unexplained(lack: Mapping[str, Any], found: Sequence[Finding]) -> tuple[Map
     return tuple(out)
 
 
-def _next(found: Sequence[Finding], issues: Sequence[ChannelIssue]) -> str:
+def _next(found: Sequence[Finding], issues: Sequence[ChannelIssue], again: bool) -> str:
     if any(i.refuse for i in issues):
         return "record the torque that the drive measures (phase current), not the one that it is asked for"
+    if again:
+        return "record another trajectory: the held-out recording repeats the fitted one, so what is tied to time or place passes"
     for f in found:
         if len(f.members) > 1:
             return f"repeat the motion at other speeds and loads: that separates {' from '.join(f.members)}"

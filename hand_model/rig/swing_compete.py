@@ -16,7 +16,7 @@ from .swing import DECLARED, INDEX, Fitted, Swing, Task, errors, fit_together, v
 
 Array = NDArray[np.float64]
 FOLDS, RESAMPLES, SHORTLIST = 4, 600, 5
-LEAST_SHARE, LEAST_PROBABILITY, MOST_TERMS, NEAR = 0.02, 0.95, 4, 1.02
+LEAST_GAIN, LEAST_PROBABILITY, MOST_TERMS, NEAR = 0.025, 0.95, 4, 1.01
 PARTS = 4  # a recording's error is resampled in so many parts
 
 
@@ -70,6 +70,7 @@ def variants(swing: Swing) -> tuple[Variant, ...]:
             Variant("load_dependent_friction", "gear", {"load_gear": 0.0}),
             Variant("load_dependent_friction", "motor", {"load_motor": 0.0}),
             Variant("load_dependent_friction", "directional", {"load_motor": 0.0, "load_external": 0.0}),
+            Variant("load_dependent_friction", "gear, low speed", {"load_gear_low": 0.0, "stribeck_speed": 0.2 * speed}),
             Variant("drive_sag", "", {"sag": 0.0}),
             Variant("command_delay", "", {"delay": 0.005}),
         ]
@@ -84,12 +85,13 @@ def free_declared(swing: Swing) -> tuple[str, ...]:
 
 
 def _blocks(swing: Swing, theta: Array, lanes: Sequence[int]) -> Array:
-    """Squared error of every part of every stretch, (len(lanes) * PARTS,), mean within it."""
+    """Root mean square error of every part of every stretch, (len(lanes) * PARTS,): one part in which the joint sticks
+    when it should not would outweigh all others if squares were added."""
     residual = errors(swing, np.repeat(theta[None], len(lanes), 0), np.array(lanes))
     out = []
     for run, lane in enumerate(lanes):
         n = len(swing.lanes[lane].position)
-        out += [float(np.mean(p**2)) * len(p) for p in np.array_split(residual[:n, run], PARTS)]
+        out += [float(np.sqrt(np.mean(p**2))) for p in np.array_split(residual[:n, run], PARTS)]
     return np.array(out)
 
 
@@ -109,7 +111,7 @@ def compete_swing(stages: Sequence[Swing], declared: Fitted) -> tuple[tuple[Vari
     train = tuple(int(i) for i in swing.train())
     folds = _folds(train)
     taken: tuple[Variant, ...] = ()
-    current, rounds, whole = declared, [], None
+    current, rounds = declared, []
     while len(taken) < MOST_TERMS:
         free = _free(swing, taken)
         rivals = [v for v in variants(swing) if not set(v.start) <= set(free)]
@@ -119,8 +121,7 @@ def compete_swing(stages: Sequence[Swing], declared: Fitted) -> tuple[tuple[Vari
         best = _several(swing, [Task(tasks[k].free, fits[k].theta, train) for k in order])
         none, scores = _left_out(swing, folds, (Task(free, current.theta, train), current),
                                  [(tasks[k], f) for k, f in zip(order, best, strict=True)])  # fmt: skip
-        whole = none.sum() if whole is None else whole
-        found = _judge(none, scores, [rivals[k] for k in order], [len(tasks[k].free) for k in order], whole)
+        found = _judge(none, scores, [rivals[k] for k in order], [len(tasks[k].free) for k in order])
         if found is None:
             break
         taken, current = (*taken, rivals[order[found[0]]]), best[found[0]]
@@ -198,8 +199,7 @@ def _left_out(swing: Swing, folds: list, none: tuple[Task, Fitted], rivals: list
     return out[0], out[1:]
 
 
-def _judge(none: Array, scores: list[Array], rivals: Sequence[Variant], sizes: Sequence[int],
-           whole: float) -> tuple[int, Round] | None:
+def _judge(none: Array, scores: list[Array], rivals: Sequence[Variant], sizes: Sequence[int]) -> tuple[int, Round] | None:
     """Index of the winner and what the round says, or None where nothing beats "none" beyond doubt."""
     errors_ = np.array(scores)
     draw = np.random.default_rng(0).integers(0, len(none), (RESAMPLES, len(none)))
@@ -207,7 +207,7 @@ def _judge(none: Array, scores: list[Array], rivals: Sequence[Variant], sizes: S
     best = int(np.argmin(errors_.sum(1)))
     close = [k for k in range(len(scores)) if np.mean(resampled[best] < resampled[k]) < LEAST_PROBABILITY]
     probability = float(np.mean(resampled[best] < base))
-    if none.sum() - errors_[best].sum() < LEAST_SHARE * whole or probability < LEAST_PROBABILITY:
+    if none.sum() - errors_[best].sum() < LEAST_GAIN * none.sum() or probability < LEAST_PROBABILITY:
         return None
     wins = np.bincount(np.argmin(resampled, 0), minlength=len(scores)) / RESAMPLES
     order = np.argsort(-wins)
