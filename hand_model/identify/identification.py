@@ -12,14 +12,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..background import Background
 from ..errors import IdentificationError
-from ..hand import Finger, Hand, Joint
+from ..hand import Finger, Hand, Joint, Motor
 from ..rotation import angle_between, kabsch, skew
-from ..session import Probe, Session, check_session, read_session
+from ..session import Session, check_session, read_session
 from .centre import project_on_line
 from .finger import FingerFit, axis_sd_deg, identify_finger
 from .frames import palm_frame
 from .mapping import aligned, couplings, encoder_maps, ranges
+from .motor import identify_motors
 from .probe import ProbedPoint, calibrated_probe, probed_point
 from .published import published_joint
 from .screws import Screws, probe_screws
@@ -59,6 +61,7 @@ def identify_all(session: Session | str | Path, say: Callable[[str], None] = lam
         raise IdentificationError(f"{session.path}: a hand needs palm markers and at least one finger")
     notes = list(check_session(session))
     shape = palm_shape(session)
+    motors = Background(identify_motors, session)
     fits = []
     with ThreadPoolExecutor(max_workers=2) as pool:  # most of the time is spent in numpy, which lets other threads run
         for fit in pool.map(lambda finger: identify_finger(session, finger, shape), session.fingers):
@@ -76,6 +79,9 @@ def identify_all(session: Session | str | Path, say: Callable[[str], None] = lam
         finger, table = _finger(fit, shape, frame, screws, notes)
         fingers.append(finger)
         published[finger.name] = table
+    found_motors, motor_notes = motors.result()
+    notes += motor_notes
+    say(_motor_line(found_motors))
     rotation, origin = frame[0], frame[1]
     hand = Hand(
         name=session.hand,
@@ -85,6 +91,7 @@ def identify_all(session: Session | str | Path, say: Callable[[str], None] = lam
         fingers=tuple(fingers),
         noise_m=float(np.sqrt(np.mean([fit.fit.noise_m**2 for fit in fits]))),
         provenance=_hashes(session),
+        motors=found_motors,
         notes=tuple(notes),
         extra={
             "placement_m": placement,
@@ -274,6 +281,11 @@ def _finger_line(fit: FingerFit) -> str:
     frames, noise = len(fit.fit.pose.angle_rad), 1e3 * fit.fit.noise_m
     arcs = np.rad2deg(np.ptp(np.quantile(fit.fit.pose.angle_rad[fit.good], [0.01, 0.99], axis=0), axis=0))
     return f"{frames} frames, marker noise {noise:.3f} mm, arcs " + ", ".join(f"{arc:.0f}" for arc in arcs) + " deg"
+
+
+def _motor_line(motors: tuple[Motor, ...]) -> str:
+    parts = [f"{m.actuator} (Coulomb {m.parameters['coulomb'].value:.1f}, noise {m.current_noise_raw:.1f} raw)" for m in motors]
+    return "motors: " + (", ".join(parts) or "none")
 
 
 def _hashes(session: Session) -> dict[str, str]:
