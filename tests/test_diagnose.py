@@ -62,11 +62,11 @@ def planted(name: str, shape: dict[str, float], amplitude: list[float]):
 PLANTED = [
     ("stribeck_friction", {"stribeck_speed": 20.0}, [20.0]),
     ("position_dependent_friction", {"centre": 45.0, "width": 7.0}, [15.0]),
-    ("detent_load", {"centre": 60.0, "width": 6.0}, [-10.0]),
+    ("detent_load", {"form": 0.0, "centre": 60.0, "width": 6.0}, [-10.0]),
     ("load_dependent_friction", {}, [0.12]),
     ("asymmetric_viscous_friction", {}, [0.06]),
     ("quadratic_damping", {}, [0.0015]),
-    ("elastoplastic_hysteresis", {"reach": 15.0}, [10.0]),
+    ("elastoplastic_hysteresis", {"form": 0.0, "reach": 15.0}, [10.0]),
     ("torque_ripple", {"period": 9.0}, [4.0, 3.0]),
     ("end_stop_contact", {"side": 1.0, "begin": 82.0}, [1.5]),
     ("thermal_friction_drift", {"warm_up_time": 60.0}, [12.0]),
@@ -93,7 +93,7 @@ def test_planted_effect_is_named_alone_with_its_parameters(name, shape, amplitud
 
 def test_two_effects_are_both_named() -> None:
     one = planted("stribeck_friction", {"stribeck_speed": 20.0}, [20.0])
-    two = planted("detent_load", {"centre": 60.0, "width": 6.0}, [-12.0])
+    two = planted("detent_load", {"form": 0.0, "centre": 60.0, "width": 6.0}, [-12.0])
     naming = name_effects(drive(5, lambda s: one(s) + two(s)), catalogue("drive"))
     assert {f.term.effect.name for f in naming.found} == {"stribeck_friction", "detent_load"}
 
@@ -105,14 +105,14 @@ def test_healthy_drives_stay_consistent(colour: float) -> None:
 
 
 def test_noise_and_its_correlation_are_measured_beside_a_misfit() -> None:
-    add = planted("detent_load", {"centre": 60.0, "width": 6.0}, [-12.0])
+    add = planted("detent_load", {"form": 0.0, "centre": 60.0, "width": 6.0}, [-12.0])
     white, red = Balance(drive(1, add)), Balance(drive(1, add, colour=0.5))
     assert white.inflation == 1.0 and abs(white.sigma / 5 - 1) < 0.06
     assert 2.0 < red.inflation < 4.2 and abs(red.sigma / 5 - 1) < 0.15  # AR(1), 0.5: (1 + r) / (1 - r) = 3
 
 
 def test_naming_never_reads_validation_recordings() -> None:
-    states = drive(3, planted("detent_load", {"centre": 60.0, "width": 6.0}, [-12.0]))
+    states = drive(3, planted("detent_load", {"form": 0.0, "centre": 60.0, "width": 6.0}, [-12.0]))
     spoiled = (*states[:-1], DriveState(**{**states[-1].__dict__, "effort": states[-1].effort * 0 + 7.0}))
     a, b = Balance(states).fit(), Balance(spoiled)
     b.sigma, b.weight = Balance(states).sigma, Balance(states).weight

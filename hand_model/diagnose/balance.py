@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 # What physics allows of a declared coefficient, by its column's name.
 DECLARED_LOW = {"inertia": 0.0, "viscous": 0.0, "coulomb": 0.0, "spring": 0.0}
-DISCRETE = ("side", "trial")  # shapes that choose among few cases: no continuous parameter is spent on them
+DISCRETE = ("side", "trial", "form")  # shapes that choose among few cases: no continuous parameter is spent on them
 
 
 @dataclass(frozen=True)

@@ -103,6 +103,12 @@ def _name(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str], 
     fit = declared
     after = before
     brought: dict[str, float] = {}
+    everything = effects
+    effects = tuple(e for e in everything if not e.warps)  # a delay shows at starts and stops only, or it is none
+    terms, fit = _starts(balance, everything, terms, fit)
+    if terms:
+        after = lack_of_fit(balance, fit.prediction, len(balance.names) + fit.size, ALPHA)
+        before = replace(before, p=0.0)
     while len(terms) < MOST_TERMS and (after.p < ALPHA or not terms):
         ranked = rank(balance, effects, terms, fit)
         if not terms and ranked:
@@ -116,9 +122,10 @@ def _name(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str], 
         after = lack_of_fit(balance, fit.prediction, len(balance.names) + fit.size, ALPHA)
         if progress is not None:
             progress(f"{balance.states[0].drive}: {', '.join(t.effect.name for t in terms)}")
-    terms, fit = _starts(balance, effects, terms, fit)
+    if all(not t.effect.warps for t in terms):
+        terms, fit = _starts(balance, everything, terms, fit)
     after = lack_of_fit(balance, fit.prediction, len(balance.names) + fit.size, ALPHA)
-    found = _findings(balance, effects, terms, fit, declared)
+    found = _findings(balance, everything, terms, fit, declared)
     kept = {t.effect.name for t in terms}
     rejected = tuple(sorted(((n, e) for n, e in brought.items() if n not in kept), key=lambda item: -item[1]))
     return Naming(balance, declared, fit, before, after, found, rejected)
@@ -133,8 +140,10 @@ def _starts(balance: Balance, effects: tuple[Any, ...], terms: tuple[Term, ...],
     ranked = rank(sharp, lively, terms, now)
     if not ranked or ranked[0].evidence < STARTS_EVIDENCE or not _resolved(balance, ranked[0].fit.terms[-1]):
         return terms, fit
-    misfit = now.rss - balance.train.sum()
-    if now.rss - ranked[0].fit.rss < 0.5 * misfit:  # a real delay takes nearly all of it away
+    # A drive that sticks draws current before it moves, which looks like current read early: only a current read late, or
+    # a shift that takes most of the misfit away, is a delay.
+    late = ranked[0].fit.terms[-1].shape.get("delay", 0.0) > 0
+    if now.rss - ranked[0].fit.rss < (0.2 if late else 0.5) * (now.rss - balance.train.sum()):
         return terms, fit
     return settle(balance, effects, ranked[0].fit.terms, keep=ranked[0].name)
 
@@ -275,7 +284,7 @@ def _drop(balance: Balance, fit: Fit, keep: str | None = None) -> Fit | None:
         if fit.terms[which].effect.name == keep:
             continue
         rest = balance.fit(tuple(t for i, t in enumerate(fit.terms) if i != which))
-        if evidence(balance, fit, rest, _scale(balance, fit)) < EVIDENCE_LEAST:
+        if not fit.terms[which].effect.warps and evidence(balance, fit, rest, _scale(balance, fit)) < EVIDENCE_LEAST:
             return refit(balance, rest)
     return None
 

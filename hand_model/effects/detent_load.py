@@ -11,7 +11,7 @@ from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
 
 
 class DetentLoad(Effect):
-    """F = A exp(-((x - c) / w)^2 / 2), either sign."""
+    """F = A exp(-u^2 / 2), u = (x - c) / w, either sign (form 0); or F = A u exp((1 - u^2) / 2), in and out of a notch (form 1)."""
 
     name = "detent_load"
 
@@ -19,7 +19,8 @@ class DetentLoad(Effect):
         """Centre over the range, width from 1.5 % to 20 % of it (wider is a spring)."""
         low, high = position_range(states)
         span, unit = high - low, states[0].position_unit
-        return (Shape("centre", unit, low + 0.08 * span, high - 0.08 * span, tuple(low + span * np.linspace(0.08, 0.92, 18))),
+        return (Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),
+                Shape("centre", unit, low + 0.08 * span, high - 0.08 * span, tuple(low + span * np.linspace(0.08, 0.92, 18))),
                 Shape("width", unit, 0.015 * span, 0.2 * span, (0.03 * span, 0.06 * span, 0.12 * span)))
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
@@ -27,8 +28,10 @@ class DetentLoad(Effect):
         return (("load", "effort", -np.inf, np.inf),)
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """A bell over position, (n, 1)."""
-        return np.exp(-0.5 * ((state.position - shape["centre"]) / shape["width"]) ** 2)[:, None]
+        """A bell over position, or its slope, of unit height, (n, 1)."""
+        u = (state.position - shape["centre"]) / shape["width"]
+        bell = np.exp(-0.5 * u**2)
+        return (bell if shape["form"] < 0.5 else u * bell * np.exp(0.5))[:, None]
 
     def region(self, states: tuple[DriveState, ...], shape: Mapping[str, float]) -> dict[str, Any] | None:
         """Two widths about the centre."""

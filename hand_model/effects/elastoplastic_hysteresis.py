@@ -7,11 +7,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
-from .path import jenkins
+from .path import dahl, jenkins
 
 
 class ElastoplasticHysteresis(Effect):
-    """A stop operator of reach s: adds A clip(z + ds / s, -1, 1) to the friction."""
+    """Adds A z to the friction: a stop operator z = clip(z + ds / s, -1, 1) (form 0), or an exponential build-up (form 1)."""
 
     name = "elastoplastic_hysteresis"
 
@@ -19,15 +19,17 @@ class ElastoplasticHysteresis(Effect):
         """Reach of the elastic part, from 2.5 % of the range to all of it."""
         low, high = position_range(states)
         span = high - low
-        return (Shape("reach", states[0].position_unit, 0.025 * span, 1.2 * span, tuple(span * np.geomspace(0.03, 0.9, 10))),)
+        return (Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),
+                Shape("reach", states[0].position_unit, 0.025 * span, 1.2 * span, tuple(span * np.geomspace(0.03, 0.9, 10))),)
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Load at yield, never negative."""
         return (("yield_load", "effort", 0.0, np.inf),)
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """Stop operator along the recorded path, (n, 1): half the reach from zero, the whole from one side to the other."""
-        return jenkins(state.position, shape["reach"])[:, None]
+        """State along the recorded path, (n, 1), in [-1, 1]."""
+        operator = jenkins if shape["form"] < 0.5 else dahl
+        return operator(state.position, shape["reach"])[:, None]
 
 
 EFFECT = ElastoplasticHysteresis()
