@@ -81,7 +81,7 @@ _HOME = {
     "record": "twin",
 }
 
-__all__ = sorted(_HOME)
+__all__ = list(_HOME)
 
 
 def __getattr__(name: str) -> Any:

@@ -21,7 +21,9 @@ def refuse_foreign(folder: str | Path, ours: Collection[str]) -> None:
         raise HandModelError(f"{target}: is a file; name a folder to write into")
     foreign = sorted(entry.name for entry in target.iterdir() if entry.name not in ours)
     if foreign:
-        raise HandModelError(f'{target}: holds "{foreign[0]}", which this command did not write; name a new or an empty folder')
+        raise HandModelError(
+            f'{target}: holds "{foreign[0]}", which this command did not write; name a new or an empty folder'
+        )
 
 
 @contextmanager

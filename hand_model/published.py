@@ -26,7 +26,7 @@ def _row(finger: str, *path: str) -> tuple[float, ...] | None:
 
 
 def mapping_rmse_deg(side: str, segment: str, finger: str) -> tuple[float, ...] | None:
-    """RMSE [deg] of encoder counts to segment angle for orders 1, 2, 3 (tables 4.5 to 4.8); None where there are none."""
+    """RMSE [deg] of encoder counts to segment angle, orders 1, 2, 3 (tables 4.5 to 4.8); None where there is none."""
     return _row(finger, side, f"mapping_{segment}")
 
 
