@@ -250,3 +250,24 @@ def test_screw_drive_differs_by_direction() -> None:
     findings = diagnose_rig(read_session(REAL / "emps-screw-drive"))
     assert findings.findings[0].effect in ("asymmetric_viscous_friction", "asymmetric_friction")
     assert findings.lack_of_fit["after"] < 0.85
+
+
+def test_a_passive_session_without_validation_is_diagnosed(tmp_path: Path) -> None:
+    """Air drag of a free swing is named from encoder alone; two recordings, none held out."""
+    text = PENDULUM.replace('<actuator><motor name="motor" joint="hinge"/></actuator>', "").replace('damping="0.02"', 'damping="0.004"')
+    text = text.replace('frictionloss="0.05"', 'frictionloss="0.004"')
+    (tmp_path / "log").mkdir()
+    (tmp_path / "rig.xml").write_text(text)
+    manifest, n = SESSION.replace('torque = "actuator:motor:force"\n', ""), 2500
+    truth = vector({"inertia": 0.0225, "damping": 0.001, "coulomb": 0.004, "drag": 0.004})
+    for k, start in enumerate((1.4, 0.8)):
+        lane = Lane("x", False, np.zeros(n), 1.0, np.zeros(n), (start, 0.0), np.zeros(n), np.ones(n))
+        swing = Swing((lane,), 0.981, 0.0, {"inertia": 0.022, "damping": 0.004, "coulomb": 0.004}, False)
+        q = np.round(simulate(swing, truth[None], np.array([0]))[:, 0] / 2e-4) * 2e-4
+        np.savetxt(tmp_path / f"log/{k}.csv", np.stack([np.arange(n) * 2e-3, q], 1), delimiter=",", header="time,position",
+                   comments="", fmt="%.9g")  # fmt: skip
+        manifest += f'[[trial]]\nkind = "motion"\nlog = "log/{k}.csv"\n'
+    (tmp_path / "session.toml").write_text(manifest)
+    findings = diagnose_rig(read_session(tmp_path))
+    assert "quadratic_damping" in findings.findings[0].members
+    assert findings.lack_of_fit["after"] < 0.5 * findings.lack_of_fit["before"]

@@ -101,7 +101,7 @@ def design(row: Rows, terms: Sequence[Term]) -> Array:
 def limits(fit: DeclaredFit, terms: Sequence[Term]) -> tuple[Array, Array, Array, Array]:
     """Lower and upper bounds, prior mean and weight of all parameters (P + J,)."""
     low, high = bounds(fit.columns)
-    mean, weight = prior(fit.columns)
+    mean, weight = prior(fit.columns, fit.anchored)
     extra = [a for t in terms for a in t.candidate.amplitudes]
     more = np.array([[a[2], a[3]] for a in extra]).reshape(-1, 2)
     zero = np.zeros(len(extra))

@@ -31,6 +31,7 @@ class DeclaredFit:
     rows: tuple[Rows, ...]
     cutoff_hz: float
     quality: dict[tuple[str, str], float]
+    anchored: bool = False  # no effort is recorded anywhere: only ratios show, and the declared masses are the scale
 
     def residual(self, row: Rows) -> Array:
         """Effort that the declared model leaves (m,), on the thinned grid."""
@@ -43,8 +44,9 @@ def bounds(columns: Sequence[Column]) -> tuple[Array, Array]:
     return low, np.full(len(columns), np.inf)
 
 
-def prior(columns: Sequence[Column]) -> tuple[Array, Array]:
-    """Prior mean and weight (P,): a mass may be wrong by as much as itself, friction and springs by a hundred times."""
+def prior(columns: Sequence[Column], anchored: bool = False) -> tuple[Array, Array]:
+    """Prior mean and weight (P,): a mass may be wrong by as much as itself, friction and springs by a hundred times;
+    masses are not wrong at all where they are the scale (anchored)."""
     value = np.array([c.value for c in columns])
     moment = {c.name: 0.0 for c in columns if c.kind == "inertial"}
     for c in columns:
@@ -53,11 +55,14 @@ def prior(columns: Sequence[Column]) -> tuple[Array, Array]:
     zero = np.array([moment.get(c.name, 0.0) if c.value == 0 and c.kind == "inertial" else 0.0 for c in columns])
     value_size = np.maximum(np.abs(value), zero)
     loose = np.array([1.0 if c.kind == "inertial" else 100.0 for c in columns])
+    if anchored:
+        loose = np.where(loose == 1.0, 1e-6, loose)
     weight = CORRELATED / np.maximum(value_size * loose, 1e-150) ** 2
     return value, np.where(value_size == 0, 1e-12, weight)
 
 
-def fit_rows(columns: Sequence[Column], rows: Sequence[Rows], scale: dict[str, float], weight: dict[str, float]) -> Array:
+def fit_rows(columns: Sequence[Column], rows: Sequence[Rows], scale: dict[str, float], weight: dict[str, float],
+             anchored: bool = False) -> Array:  # fmt: skip
     """theta (P,) from the moving samples of the rows; scale: joint -> residual rms; weight: trial -> 0..1."""
     p = len(columns)
     gram, moment = np.zeros((p, p)), np.zeros(p)
@@ -67,7 +72,7 @@ def fit_rows(columns: Sequence[Column], rows: Sequence[Rows], scale: dict[str, f
         gram += w * x.T @ x
         moment += w * x.T @ y
     low, high = bounds(columns)
-    mean, stiff = prior(columns)
+    mean, stiff = prior(columns, anchored)
     return solve_bounded(gram, moment, low, high, mean, stiff)
 
 
@@ -124,9 +129,10 @@ def _robust_fit(columns: tuple[Column, ...], rows: tuple[Rows, ...], cutoff: flo
     joints = sorted({r.joint for r in train})
     size = {j: _rms(np.concatenate([_known(r, columns)[r.moving] for r in train if r.joint == j])) + 1e-300 for j in joints}
     scale, weight = dict(size), {}
+    anchored = not any(np.any(r.effort) for r in rows)
     theta = np.array([c.value for c in columns])
     for _ in range(12):
-        theta = fit_rows(columns, train, scale, weight)
+        theta = fit_rows(columns, train, scale, weight, anchored)
         left = {(r.trial, r.joint): _rms((r.effort - r.columns @ theta)[r.moving]) for r in train}
         for j in joints:
             scale[j] = max(float(np.median([left[r.trial, r.joint] for r in train if r.joint == j])), 1e-3 * size[j])
@@ -136,7 +142,7 @@ def _robust_fit(columns: tuple[Column, ...], rows: tuple[Rows, ...], cutoff: flo
     for r in rows:
         m = r.moving
         quality[r.trial, r.joint] = _rms((r.effort - r.columns @ theta)[m]) / (_rms(_known(r, columns)[m]) + 1e-300)
-    return DeclaredFit(columns, theta, scale, rows, cutoff, quality)
+    return DeclaredFit(columns, theta, scale, rows, cutoff, quality, anchored)
 
 
 def _known(row: Rows, columns: Sequence[Column]) -> Array:

@@ -56,6 +56,7 @@ def diagnose_rig(session: Session, output: str | Path | None = None,
         rejected = [*rejected, *said]
         say(f"{rig.name}: coupling {coupling.name}")
     lack = dict(lack)
+    declared = lack.pop("declared", {c.label: float(t) for c, t in zip(fit.columns, fit.theta, strict=True)})
     unexplained = _unexplained(lack, found)
     again = repeated_trajectory(rig)
     if again and len(rig.joints) > 1:  # on one and the same path a load tied to position is as well a weight elsewhere
@@ -71,7 +72,7 @@ def diagnose_rig(session: Session, output: str | Path | None = None,
         rejected=tuple(rejected),
         unexplained=unexplained,
         next_experiment=_next(found, issues, again),
-        declared={c.label: float(t) for c, t in zip(fit.columns, fit.theta, strict=True)},
+        declared=declared,
         xml=xml,
         declared_xml=declared_xml,
     )  # fmt: skip
@@ -323,20 +324,22 @@ def _diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Call
     swing = fine[0]
     files = [write_swing(rig, swing, f.theta) for f in fits]
     replays = [replay_rig(session, load_rig(session, x)) for x in files]
-    figures = [r.figure("position_rmse", True) for r in replays]
+    held = bool(rig.select(True))  # without validation recordings the training ones measure, and the report says so
+    figures = [r.figure("position_rmse", held) for r in replays]
     holds = next((k for k in range(len(taken)) if figures[k + 1] >= figures[k]), len(taken))
     rejected = [{"effect": v.key, "reason": "error on validation trials does not fall"} for v in taken[holds:]]
     taken, rounds, figures = taken[:holds], rounds[:holds], figures[: holds + 1]
-    means = [r.figure("position_mae", True) for r in replays]
+    means = [r.figure("position_mae", held) for r in replays]
     found = []
     for k, (variant, round_) in enumerate(zip(taken, rounds, strict=True)):
         proof = {"metric": "position_rmse", "unit": rig.unit(rig.joints[0]), "before": figures[k], "after": figures[k + 1],
-                 "noise_floor": _resolution(rig), "ci95_reduction": _fall(replays[k], replays[k + 1]),
-                 "held_out": [t.name for t in rig.select(True)], "engine": "mujoco"}  # fmt: skip
+                 "noise_floor": _resolution(rig), "ci95_reduction": _fall(replays[k], replays[k + 1], held),
+                 "held_out": [t.name for t in rig.select(held)], "engine": "mujoco"}  # fmt: skip
         found.append(_swing_finding(rig, variant, round_, swing, proof))
     lack = {"metric": "position_rmse", "unit": rig.unit(rig.joints[0]), "before": figures[0], "after": figures[-1],
             "one_effect": figures[min(1, len(figures) - 1)], "mae_before": means[0], "mae_after": means[holds],
-            "noise_floor": _resolution(rig)}  # fmt: skip
+            "noise_floor": _resolution(rig),
+            "declared": {n: float(fits[0].theta[INDEX[n]]) for n in free}}  # fmt: skip
     return _shares(found), rejected, lack, files[holds], files[0]
 
 
@@ -344,10 +347,10 @@ def _resolution(rig: RigModel) -> float:
     return float(np.median([noise_std(t.position[rig.joints[0]]) for t in rig.trials]))
 
 
-def _fall(before: Any, after: Any) -> list[float]:
+def _fall(before: Any, after: Any, held: bool) -> list[float]:
     """95 % interval of the fall of the held-out rmse, recordings resampled."""
-    a = np.array([r.position_rmse**2 for r in before.joints if r.validate])
-    b = np.array([r.position_rmse**2 for r in after.joints if r.validate])
+    a = np.array([r.position_rmse**2 for r in before.joints if r.validate == held])
+    b = np.array([r.position_rmse**2 for r in after.joints if r.validate == held])
     draw = np.random.default_rng(0).integers(0, len(a), (RESAMPLES, len(a)))
     fall = np.sqrt(a[draw].mean(1)) - np.sqrt(b[draw].mean(1))
     return [float(x) for x in np.percentile(fall, [2.5, 97.5])]
