@@ -131,6 +131,7 @@ class Balance:
         inside = np.ones(len(self.effort), bool)
         for _ in range(4 if clips else 1):
             coefficients = bounded_least_squares(matrix * (w * inside)[:, None], self.effort * w * inside, low, high)
+            coefficients = self._own_nuisances(matrix, coefficients, w)
             prediction = raw = matrix @ coefficients
             for term in clips:
                 prediction = term.effect.clip(prediction, term.shape)
@@ -145,6 +146,21 @@ class Balance:
         size = sum(len([k for k in t.shape if k not in DISCRETE]) + len(t.effect.amplitudes()) for t in terms)
         declared = dict(zip(self.names, coefficients[:k].tolist(), strict=True))
         return Fit(terms, declared, tuple(amplitudes), prediction, rss, size)
+
+
+    def _own_nuisances(self, matrix: Array, coefficients: Array, w: Array) -> Array:
+        """Coefficients of columns that act in validation recordings only (their own clock offset, a step in them) from
+        those recordings: they belong to the recording, not to the model, which stays as trained."""
+        k = len(self.names)
+        idle = (np.abs(matrix[:, :k] * w[:, None]).sum(0) == 0) & (np.abs(matrix[:, :k]).sum(0) > 0)
+        if not idle.any():
+            return coefficients
+        columns = np.flatnonzero(idle)
+        held = self.weight * ~self.train
+        left = (self.effort - matrix @ coefficients) * held
+        out = coefficients.copy()
+        out[columns] += np.linalg.lstsq(matrix[:, columns] * held[:, None], left, rcond=None)[0]
+        return out
 
 
 def bounded_least_squares(matrix: Array, target: Array, low: Array, high: Array) -> Array:
