@@ -112,7 +112,7 @@ def _refine(t: Array, q: Array, s: Array, c: Array, offset: float) -> tuple[floa
         slope = _slope(at[inside], fitted)
         design = np.column_stack([basis, slope, slope * (t[inside] - middle)])
         residual = q[inside] - fitted
-        keep = np.abs(residual) <= 6 * np.median(np.abs(residual)) + 1e-12
+        keep = np.abs(residual) <= 6 * np.median(np.abs(residual)) + 1e-3 * np.ptp(q)
         solution = np.linalg.lstsq(design[keep], residual[keep], rcond=None)[0]
         shift, drift = solution[-2], solution[-1] if iteration > 3 else 0.0
         offset, rate = offset + np.clip(shift, -0.2, 0.2), float(np.clip(rate + drift, 0.9, 1.1))

@@ -112,10 +112,11 @@ def _least_squares(x: Array, y: Array, order: int) -> Array:
 def _kept(x: Array, y: Array, order: int) -> NDArray[np.bool_]:
     """Finite samples within six robust standard deviations of a fit of the highest order."""
     kept = np.isfinite(x) & np.isfinite(y)
+    floor = 1e-3 * np.ptp(y[kept])
     for _ in range(3):
         residual = y - _evaluate(_least_squares(x[kept], y[kept], order), x)
         with np.errstate(invalid="ignore"):
-            kept = np.isfinite(residual) & (np.abs(residual) <= 6 * 1.4826 * np.nanmedian(np.abs(residual)) + 1e-12)
+            kept = np.isfinite(residual) & (np.abs(residual) <= 6 * 1.4826 * np.nanmedian(np.abs(residual)) + floor)
     return kept
 
 

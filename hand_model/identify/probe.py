@@ -30,6 +30,11 @@ def tip_path(trial: Trial, session: Session, probe: Probe, palm_shape: Array) ->
     Frames in which a palm marker or all but two probe markers are hidden are left out. Raises IdentificationError where the
     probe has no known geometry or no frame remains.
     """
+    return tip_and_shaft(trial, session, probe, palm_shape)[0]
+
+
+def tip_and_shaft(trial: Trial, session: Session, probe: Probe, palm_shape: Array) -> tuple[Array, Array]:
+    """As `tip_path`, with the unit directions (n, 3) from the tip to the middle of the probe's markers: away from what it touches."""
     if session.palm is None or probe.position_probe is None:
         raise IdentificationError(f'trial "{trial.name}": needs palm markers and a probe whose tip is known')
     mocap = trial.mocap()
@@ -39,8 +44,10 @@ def tip_path(trial: Trial, session: Session, probe: Probe, palm_shape: Array) ->
     if not good.any():
         raise IdentificationError(f'trial "{trial.name}": no frame shows the palm and three probe markers together')
     rotation, translation = kabsch(palm_shape, palm[good])
-    _, tip_world = kabsch(probe.position_probe, tool[good])
-    return np.einsum("nji,nj->ni", rotation, tip_world - translation)
+    turned, tip_world = kabsch(probe.position_probe, tool[good])
+    shaft = turned @ (np.asarray(probe.position_probe).mean(0))
+    shaft /= np.maximum(np.linalg.norm(shaft, axis=1, keepdims=True), 1e-12)
+    return np.einsum("nji,nj->ni", rotation, tip_world - translation), np.einsum("nji,nj->ni", rotation, shaft)
 
 
 def _probe_markers(tool: Array, probe: Probe) -> Array:

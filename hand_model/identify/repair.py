@@ -13,6 +13,9 @@ from .likelihood import ChainFit
 
 Array = NDArray[np.float64]
 
+# A support does not move by less than this [m] and stay there; rounding in a file may.
+SMALLEST_SLIP_M = 2e-5
+
 
 @dataclass(frozen=True)
 class Swap:
@@ -70,7 +73,7 @@ def _broken(data: ChainData) -> NDArray[np.bool_]:
                 distance = np.linalg.norm(data.position_world[:, a] - data.position_world[:, b], axis=1)
                 off = np.abs(distance - np.nanmedian(distance))
                 with np.errstate(invalid="ignore"):
-                    broken |= off > 10 * np.nanmedian(off) + 1e-9
+                    broken |= off > 10 * np.nanmedian(off) + 1e-4
     return broken
 
 
@@ -136,7 +139,7 @@ def find_slip(fit: ChainFit, block: int = 25) -> Slip | None:
         count = len(frames) // block
         means = np.median(turned[frames[: count * block]].reshape(count, block, 3), axis=1)  # ghosts do not reach a median
         score, at, step = _step(means)
-        if np.linalg.norm(step) > fit.noise_m / 3 and (best is None or score > best[0]):
+        if np.linalg.norm(step) > max(fit.noise_m / 3, SMALLEST_SLIP_M) and (best is None or score > best[0]):
             best = score, Slip(label, int(frames[at * block]), step)
     return best[1] if best is not None and best[0] > 6.1 else None
 
@@ -154,8 +157,9 @@ def _step(means: Array) -> tuple[float, int, Array]:
     direction = step[at - 1] / max(np.linalg.norm(step[at - 1]), 1e-300)
     along = means @ direction
     scatter = np.concatenate([along[:at] - along[:at].mean(), along[at:] - along[at:].mean()])
-    correlated = 1 + 2 * max(0.0, float(np.corrcoef(scatter[:-1], scatter[1:])[0, 1]))
-    deviation = np.sqrt(scatter.var() * correlated * (1 / at + 1 / (count - at)))
+    variance = max(float(scatter.var()), 1e-300)
+    correlated = 1 + 2 * max(0.0, float(np.mean(scatter[:-1] * scatter[1:])) / variance)
+    deviation = np.sqrt(variance * correlated * (1 / at + 1 / (count - at)))
     return float(np.linalg.norm(step[at - 1]) / max(deviation, 1e-300)), at, step[at - 1]
 
 
