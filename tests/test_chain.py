@@ -85,7 +85,7 @@ def test_error_keeps_to_the_cramer_rao_bound():
 
 
 def test_world_frame_does_not_matter():
-    chain, data, _ = recording(5)
+    _, data, _ = recording(5)
     turn, shift = rotation_from_vector(np.array([0.4, -1.2, 0.7])), np.array([3.0, -2.0, 0.5])
     first, second = fitted(data), fitted(replace(data, position_world=data.position_world @ turn.T + shift))
     assert np.rad2deg(angle_between(first.chain.axis_palm, second.chain.axis_palm)).max() < 2e-3
@@ -93,7 +93,7 @@ def test_world_frame_does_not_matter():
 
 
 def test_mirrored_recording_gives_the_mirrored_chain():
-    chain, data, _ = recording(6)
+    _, data, _ = recording(6)
     mirror = np.array([1.0, -1.0, 1.0])
     first = fitted(data)
     mirrored = replace(data, position_world=data.position_world * mirror)

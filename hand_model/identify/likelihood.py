@@ -195,7 +195,7 @@ def _assemble(data: ChainData, linear: tuple[Array, Array, Array, Array], weight
 
 def free_directions(chain: Chain, body: Array) -> Array:
     """(s, s - 6 - k) orthonormal steps that leave the gauge alone: palm markers as a whole, and each joint's zero."""
-    m, k = len(body), len(chain.axis_palm)
+    k = len(chain.axis_palm)
     fixed = np.zeros((6 + k, chain.size))
     for j in np.flatnonzero(body == 0):
         centred = chain.marker_palm[j] - chain.marker_palm[body == 0].mean(0)
