@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 
 NONNEGATIVE = ("damping", "frictionloss", "armature", "back_emf", "spring", "stiffness")
 CORRELATED = 30.0  # neighbouring samples say the same thing: so many of them weigh as one against the prior
+NEAR_BEST = 1.1
 CUTOFFS = (2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 35.0, 60.0)
 
 
@@ -82,14 +83,20 @@ def fit_declared(rig: RigModel, refused: Collection[tuple[str, str]] = (), cutof
 
     refused: (trial, joint) whose effort channel cannot be trusted; their balance is not fitted, nor kept. A trial that
     disagrees with the others weighs less (its residual rms over the median of all, squared, beyond two).
-    The cut-off is the one at which the declared model explains the largest share of the effort: below it the motion is
-    lost, above it noise and flexibility that no rigid model holds.
+    The cut-off is the highest at which the declared model explains nearly the largest share of the effort: below it the
+    motion is lost, above it are noise and flexibility that no rigid model holds.
     """
     columns = declared_columns(rig, off_axis)
     refused = set(refused)
-    best: DeclaredFit | None = None
-    sample, most = _sample(rig), 0.0
-    for cutoff in [cutoff_hz] if cutoff_hz else CUTOFFS:
+    cutoff = cutoff_hz or _choose_cutoff(rig, columns, refused)
+    rows = tuple(r for t in rig.trials for r in trial_rows(rig, t, columns, cutoff) if (r.trial, r.joint) not in refused)
+    return _robust_fit(columns, rows, cutoff or (rows[0].cutoff_hz if rows else float("nan")))
+
+
+def _choose_cutoff(rig: RigModel, columns: tuple[Column, ...], refused: set[tuple[str, str]]) -> float | None:
+    """The highest cut-off at which the share left is within NEAR_BEST of the least; None where none can be tried."""
+    sample, most, shares = _sample(rig), 0.0, {}
+    for cutoff in CUTOFFS:
         rows = [r for t in sample for r in trial_rows(rig, t, columns, cutoff) if (r.trial, r.joint) not in refused]
         if not rows or cutoff > 0.3 * min(r.rate_hz for r in rows):
             continue
@@ -97,12 +104,9 @@ def fit_declared(rig: RigModel, refused: Collection[tuple[str, str]] = (), cutof
         most = max(most, seen)
         if seen < 0.9 * most:  # noise hides when the joint moves
             break
-        fit = _robust_fit(columns, tuple(rows), cutoff)
-        if best is None or _unexplained(fit) < 0.98 * _unexplained(best):
-            best = fit
-    cutoff = best.cutoff_hz if best else None
-    rows = tuple(r for t in rig.trials for r in trial_rows(rig, t, columns, cutoff) if (r.trial, r.joint) not in refused)
-    return _robust_fit(columns, rows, cutoff or (rows[0].cutoff_hz if rows else float("nan")))
+        shares[cutoff] = _unexplained(_robust_fit(columns, tuple(rows), cutoff))
+    least = min(shares.values(), default=1.0)
+    return max((c for c, share in shares.items() if share <= NEAR_BEST * least), default=None)
 
 
 def _sample(rig: RigModel, most: int = 5) -> list[RigTrial]:
@@ -112,12 +116,15 @@ def _sample(rig: RigModel, most: int = 5) -> list[RigTrial]:
 
 
 def _unexplained(fit: DeclaredFit) -> float:
-    """Mean over joints of the log share of training effort left."""
-    shares: dict[str, list[float]] = {}
-    for row in fit.rows:
-        if not row.validate:
-            shares.setdefault(row.joint, []).append(fit.quality[row.trial, row.joint])
-    return float(np.exp(np.mean([np.log(np.sqrt(np.mean(np.square(s))) + 1e-12) for s in shares.values()])))
+    """Share of the training effort left (rms over rms, all trials of a joint pooled), geometric mean over joints."""
+    shares = []
+    for joint in {r.joint for r in fit.rows}:
+        rows = [r for r in fit.rows if r.joint == joint and not r.validate and r.moving.any()]
+        if rows:
+            left = np.concatenate([fit.residual(r)[r.moving] for r in rows])
+            known = np.concatenate([_known(r, fit.columns)[r.moving] for r in rows])
+            shares.append(np.log(_rms(left) / (_rms(known) + 1e-300) + 1e-12))
+    return float(np.exp(np.mean(shares))) if shares else 1.0
 
 
 def _rms(values: Array) -> float:
