@@ -15,12 +15,14 @@ from synthetic_hand import synthetic_hand
 
 from hand_model.compile import compile
 from hand_model.errors import HandModelError
+from hand_model.hand import Estimate, Motor
 from hand_model.identify import identify
 from hand_model.output import new_file, new_folder
 from hand_model.replay import replay
 from hand_model.report import replay_figures, replay_page, write_report
 from hand_model.report.comparison import comparison_page, comparison_text
 from hand_model.report.identified import axes_section, coupling_section, maps_section, repairs_section
+from hand_model.report.motors import MAIN, motors_section
 from hand_model.report.page import Cell, Section, page, table
 from hand_model.report.pictures import box_statistics
 from hand_model.report.replayed import clock_section, distances_mm, error_section, noise_ratio
@@ -56,7 +58,8 @@ def test_the_page_is_one_file_and_every_section_opens_with_a_sentence(residuals)
     outside = [v for v in tree.xpath("//@href | //@src") if not v.startswith("#")]
     assert outside == []
     sections = tree.xpath("//section")
-    assert [s.get("id") for s in sections] == ["error", "axes", "maps", "linkages", "clocks", "engines", "repairs"]
+    ids = [s.get("id") for s in sections if s.get("id") != "motors"]
+    assert ids == ["error", "axes", "maps", "linkages", "clocks", "engines", "repairs"]
     assert tree.xpath("//nav/a/@href") == [f"#{s.get('id')}" for s in sections]
     for section in sections:
         sentence = section.xpath("p[@class='conclusion']")[0].text_content()
@@ -146,7 +149,7 @@ def test_without_a_log(residuals):
         for t in residuals.trials
     ]
     hand = residuals.description.hand
-    bare = replace(hand, fingers=tuple(replace(f, encoder_maps=()) for f in hand.fingers))
+    bare = replace(hand, motors=(), fingers=tuple(replace(f, encoder_maps=()) for f in hand.fingers))
     without = replace(residuals, trials=tuple(trials), description=replace(residuals.description, hand=bare))
     assert clock_section(without) is None and maps_section(bare) is None
     ids = html.fromstring(replay_page(without)).xpath("//section/@id")
@@ -172,6 +175,21 @@ def test_repairs_are_listed(residuals):
     assert section.conclusion.startswith("1 exchange of labels and 1 slipped marker were found")
     for words in ("P1 and P2", "1.00 to 1.50 s", "2.10 mm", "mind this"):
         assert words in text
+
+
+def test_motors_stand_with_their_intervals(residuals):
+    parameters = {
+        n: Estimate(10.0 * (i + 1), (9.0 * (i + 1), 11.0 * (i + 1)), "raw", "test") for i, n in enumerate(MAIN)
+    }
+    parameters["delay"] = Estimate(0.004, None, "s", "test")
+    motor = Motor("index", 0.0, 100.0, parameters, 3.5, ("log/a.csv",), ("mind this too",))
+    hand = replace(residuals.description.hand, motors=(motor,))
+    section = motors_section(hand)
+    text = " ".join(part.text_content() for part in section.body)
+    assert "1 motor (index) identified from 1 trial" in section.conclusion and "10.0 %" in section.conclusion
+    for words in ("30 (27 to 33)", "0.004", "index: mind this too", "3.5"):
+        assert words in text
+    assert "30 (27 to 33)" in hand_text(hand) and motors_section(replace(hand, motors=())) is None
 
 
 def test_engines_that_disagree_are_said_to(residuals):

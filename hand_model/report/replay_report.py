@@ -11,6 +11,7 @@ import numpy as np
 from ..output import new_folder
 from ..replay import Residuals
 from .identified import axes_section, axis_sd_deg, coupling_section, maps_section, repairs_section
+from .motors import motors_section
 from .page import Section, heading, listing, page
 from .replayed import (
     best_mode,
@@ -49,6 +50,7 @@ def replay_page(residuals: Residuals, *further: Section) -> bytes:
         axes_section(hand),
         maps_section(hand, map_pictures(residuals)),
         coupling_section(hand),
+        motors_section(hand),
         clock_section(residuals),
         engines_section(residuals),
         _repairs(residuals),

@@ -9,6 +9,7 @@ import numpy as np
 from ..hand import Hand
 from ..replay import MODES, Residuals
 from .identified import axis_sd_deg, centre_sd_mm, chosen_deg, frame_words
+from .motors import MAIN, motor_rows
 from .page import Cell
 from .replayed import by_finger, distances_mm, noise_ratio, trials_words
 from .words import number
@@ -50,6 +51,8 @@ def hand_text(hand: Hand) -> str:
             rows.append([*row, "axis not determined" if joint.degenerate else ""])
     head = ["finger", "joint", "axis", "± deg", "centre [mm]", "± mm", "arc deg", "encoder rmse deg", ""]
     lines = [f"{hand.name}, {hand.side} hand, marker noise {1e3 * hand.noise_m:.3f} mm", "", columns(head, rows, 2)]
+    if hand.motors:
+        lines += ["", columns(["motor", *MAIN, "current noise"], motor_rows(hand.motors))]
     notes = [*filter(None, [frame_words(hand)]), *hand.notes]
     return "\n".join([*lines, *(f"note: {n}" for n in notes)])
 
