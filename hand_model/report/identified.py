@@ -102,7 +102,7 @@ def _axes_words(
 ) -> str:
     weak = [f"{f.name} {j.name}" for f, j in joints if j.degenerate]
     known = [j for _, j in joints if not j.degenerate]
-    parts = []
+    parts: list[str] = []
     if known:
         which = (
             f"{len(known)} of the {len(joints)} axes"
@@ -112,11 +112,12 @@ def _axes_words(
             else "The axis"
         )
         angle = number(max(axis_sd_deg(hand, j) for j in known))
-        distance = number(max(centre_sd_mm(hand, j) for j in known))
-        parts.append(
-            f"{which} {'is' if which == 'The axis' else 'are'} known to {angle} deg and {distance} mm or better "
-            "within the palm (one standard deviation)"
-        )
+        apart = {f"{f.name} {j.name}": centre_sd_mm(hand, j) for f, j in joints if not j.degenerate}
+        worst = max(apart, key=lambda name: apart[name])
+        verb = "is" if which == "The axis" else "are"
+        parts.append(f"{which} {verb} known to {angle} deg or better within the palm (one standard deviation)")
+        middle = number(float(np.median(list(apart.values()))))
+        parts.append(f"centres to {middle} mm (median), {number(apart[worst])} mm at worst ({worst})")
     if weak:
         verb = "does not determine its axis" if len(weak) == 1 else "do not determine their axes"
         parts.append(f"the recorded {'arc' if len(weak) == 1 else 'arcs'} of {listed(weak)} {verb}")
