@@ -183,7 +183,7 @@ def bounded_least_squares(matrix: Array, target: Array, low: Array, high: Array)
 
 
 COLOURED = 0.05  # autocorrelation of neighbouring samples from which noise counts as coloured
-LONGEST = 25  # samples over which noise may be correlated; what lasts longer is a misfit
+LONGEST = 15  # samples over which noise may be correlated; what lasts longer is a misfit
 
 
 def noise(balance: Balance) -> tuple[float, float]:
@@ -205,12 +205,14 @@ def noise(balance: Balance) -> tuple[float, float]:
     for k in range(LONGEST + 1):
         pair = (balance.stroke[k:] == balance.stroke[: len(r) - k]) & np.isfinite(deviation[k:]) & np.isfinite(deviation[: len(r) - k])
         lags.append(float(np.mean((deviation[k:] * deviation[: len(r) - k])[pair])) if pair.sum() > 20 else 0.0)
-    rho = np.array(lags) / max(lags[0], 1e-300)
+    # What still correlates after LONGEST samples is a misfit that does not repeat (an event), no noise.
+    covariance = np.array(lags) - max(float(np.mean(lags[-5:])), 0.0)
+    rho = covariance / max(covariance[0], 1e-300)
     if rho[1] < COLOURED:
         return max(neighbours, 1e-9), 1.0
     small = np.flatnonzero(rho < 0.03)
     stop = int(small[0]) if len(small) else len(rho)
-    return float(np.sqrt(lags[0] / share)), float(1 + 2 * rho[1:stop].sum())
+    return float(np.sqrt(max(covariance[0], 1e-300) / share)), float(1 + 2 * rho[1:stop].sum())
 
 
 def _replicate_deviation(balance: Balance, residual: Array, use: NDArray[np.bool_]) -> tuple[Array, float]:

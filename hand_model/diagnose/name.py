@@ -143,7 +143,7 @@ def _starts(balance: Balance, effects: tuple[Any, ...], terms: tuple[Term, ...],
     # A drive that sticks draws current before it moves, which looks like current read early: only a current read late, or
     # a shift that takes most of the misfit away, is a delay.
     late = ranked[0].fit.terms[-1].shape.get("delay", 0.0) > 0
-    if now.rss - ranked[0].fit.rss < (0.2 if late else 0.5) * (now.rss - balance.train.sum()):
+    if now.rss - ranked[0].fit.rss < (0.2 if late else 0.8) * (now.rss - balance.train.sum()):
         return terms, fit
     return settle(balance, effects, ranked[0].fit.terms, keep=ranked[0].name)
 

@@ -19,6 +19,7 @@ CORRECTION = {
     "support_slip": "the support's turn is taken out from the moment of the slip",
     "marker_swap": "the labels are put right while they were exchanged",
 }
+SMALL = 0.03  # share of what the marker station explains
 SWAP_FRAMES = 5  # shorter exchanges are ghosts
 
 
@@ -29,7 +30,10 @@ def marker_findings(angles: FingerAngles, naming: MarkerNaming) -> list[tuple[fl
     groups: dict[tuple[str, int, str | None], list[MarkerEffect]] = {}
     for effect in naming.found:
         groups.setdefault((effect.effect, effect.body, effect.label), []).append(effect)
+    total = sum(e.gain for e in naming.found)
     for (name, body, label), members in groups.items():
+        if sum(e.gain for e in members) < SMALL * total:
+            continue  # no more than the form of the large one being another
         out.append((0.5 * sum(e.gain for e in members), _finding(angles, naming, name, body, label, members)))
     return out
 
