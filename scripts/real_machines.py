@@ -1,6 +1,6 @@
 """Diagnose every rig session of a folder and write what was found as JSON and as a section for the README.
 
-    python scripts/real_machines.py FOLDER --output DIR [--only NAME ...]
+python scripts/real_machines.py FOLDER --output DIR [--only NAME ...]
 """
 
 from __future__ import annotations

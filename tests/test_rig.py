@@ -12,8 +12,7 @@ from hand_model.rig import diagnose_rig, fit_declared, load_rig, replay_rig
 from hand_model.rig.dynamics import inertial_columns, inertial_parameters
 from hand_model.rig.patch import physical, read_effects, write_effects
 from hand_model.rig.solve import solve_bounded
-from hand_model.rig.swing import Lane, Swing, errors, fit_together, simulate, vector
-from hand_model.rig.swing import Task
+from hand_model.rig.swing import Lane, Swing, Task, errors, fit_together, simulate, vector
 from hand_model.session import read_session
 
 REAL = Path(__file__).resolve().parents[2] / "shared" / "real"
@@ -85,7 +84,9 @@ def test_regressor_is_mujocos_inverse_dynamics() -> None:
     model = mujoco.MjModel.from_xml_string(TREE)
     data = mujoco.MjData(model)
     q, v, a = np.random.default_rng(1).normal(size=(3, 6, model.nv))
-    effort = np.einsum("njbp,bp->nj", inertial_columns(model, q, v, a, np.array(model.opt.gravity)), inertial_parameters(model))
+    effort = np.einsum(
+        "njbp,bp->nj", inertial_columns(model, q, v, a, np.array(model.opt.gravity)), inertial_parameters(model)
+    )
     for i in range(len(q)):
         data.qpos[:], data.qvel[:], data.qacc[:] = q[i], v[i], a[i]
         mujoco.mj_inverse(model, data)
@@ -199,7 +200,13 @@ def test_output_error_fit_returns_to_the_truth() -> None:
     swing = Swing((lane,), 1.0, 0.0, {"inertia": 0.02, "damping": 0.01, "coulomb": 0.01}, False)
     truth = vector({"inertia": 0.022, "damping": 0.004, "coulomb": 0.006, "drag": 0.001})
     recorded = simulate(swing, truth[None], np.array([0]))[:, 0]
-    swing = Swing((Lane("x", False, lane.drive, 1.0, recorded, lane.start, lane.supply, lane.used),), 1.0, 0.0, swing.initial, False)
+    swing = Swing(
+        (Lane("x", False, lane.drive, 1.0, recorded, lane.start, lane.supply, lane.used),),
+        1.0,
+        0.0,
+        swing.initial,
+        False,
+    )
     fit = fit_together(swing, [Task(("inertia", "damping", "coulomb", "drag"), vector(swing.initial), (0,))], 40)[0]
     assert np.abs(errors(swing, fit.theta[None], np.array([0]))).max() < 5e-3
     assert fit.theta[0] == pytest.approx(0.022, rel=1e-3)
@@ -254,7 +261,9 @@ def test_screw_drive_differs_by_direction() -> None:
 
 def test_a_passive_session_without_validation_is_diagnosed(tmp_path: Path) -> None:
     """Air drag of a free swing is named from encoder alone; two recordings, none held out."""
-    text = PENDULUM.replace('<actuator><motor name="motor" joint="hinge"/></actuator>', "").replace('damping="0.02"', 'damping="0.004"')
+    text = PENDULUM.replace('<actuator><motor name="motor" joint="hinge"/></actuator>', "").replace(
+        'damping="0.02"', 'damping="0.004"'
+    )
     text = text.replace('frictionloss="0.05"', 'frictionloss="0.004"')
     (tmp_path / "log").mkdir()
     (tmp_path / "rig.xml").write_text(text)

@@ -2,7 +2,7 @@
 
 from .declared import DeclaredFit, fit_declared
 from .diagnose import diagnose_rig
-from .findings import Finding, Findings
+from .findings import Finding, Findings, RigFindings
 from .model import RigModel, RigTrial, load_rig
 from .replay import RigResiduals, replay_rig, simulate_trial
 
@@ -10,6 +10,7 @@ __all__ = [
     "DeclaredFit",
     "Finding",
     "Findings",
+    "RigFindings",
     "RigModel",
     "RigResiduals",
     "RigTrial",

@@ -134,7 +134,9 @@ def _back_emf(model: Any, name: str) -> float:
     return float(constant**2 / resistance * model.actuator_gear[a, 0] ** 2)
 
 
-def trial_rows(rig: RigModel, trial: RigTrial, columns: tuple[Column, ...], cutoff_hz: float | None = None) -> tuple[Rows, ...]:
+def trial_rows(
+    rig: RigModel, trial: RigTrial, columns: tuple[Column, ...], cutoff_hz: float | None = None
+) -> tuple[Rows, ...]:
     """The balance of every independent joint whose effort is known (or whose drive is absent or open) in one trial."""
     missing = [j for j in rig.joints if j not in trial.position]
     if missing:
@@ -143,7 +145,10 @@ def trial_rows(rig: RigModel, trial: RigTrial, columns: tuple[Column, ...], cuto
     grid = uniform_time(trial.time_s)
     rate = 1.0 / (grid[1] - grid[0])
     skip = max(1, int(rate / MAX_RATE_HZ)) if cutoff_hz is None or cutoff_hz < 0.3 * MAX_RATE_HZ else 1
-    raw = {j: _thinned(np.interp(grid, trial.time_s, fill_gaps(trial.time_s, trial.position[j])), rate, skip) for j in rig.joints}
+    raw = {
+        j: _thinned(np.interp(grid, trial.time_s, fill_gaps(trial.time_s, trial.position[j])), rate, skip)
+        for j in rig.joints
+    }
     effort = {j: None if e is None else _thinned(e, rate, skip) for j, e in _joint_effort(rig, trial, grid).items()}
     grid, channels = grid[::skip], {k: c[::skip] for k, c in _channels(trial, grid).items()}
     rate = rate / skip
@@ -188,7 +193,9 @@ def _thinned(values: Array, rate: float, skip: int) -> Array:
 
 def _channels(trial: RigTrial, grid: Array) -> dict[str, Array]:
     channels = dict(trial.extra) | {f"setpoint:{j}": s for j, s in trial.setpoint.items()}
-    channels |= {f"position:{j}": s for j, s in trial.position.items()} | {f"voltage:{j}": s for j, s in trial.voltage.items()}
+    channels |= {f"position:{j}": s for j, s in trial.position.items()} | {
+        f"voltage:{j}": s for j, s in trial.voltage.items()
+    }
     return {k: np.interp(grid, trial.time_s, fill_gaps(trial.time_s, s)) for k, s in channels.items()}
 
 

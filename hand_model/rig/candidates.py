@@ -16,8 +16,17 @@ from .model import RigModel
 
 Array = NDArray[np.float64]
 # Those that rigs have in a form of their own, or that need a hand.
-NOT_FOR_RIGS = frozenset({"external_contact", "gravity_load", "spring_decoupling", "asymmetric_friction", "drive_sag",
-                          "command_delay", "current_channel_delay"})
+NOT_FOR_RIGS = frozenset(
+    {
+        "external_contact",
+        "gravity_load",
+        "spring_decoupling",
+        "asymmetric_friction",
+        "drive_sag",
+        "command_delay",
+        "current_channel_delay",
+    }
+)
 LONGEST_DELAY_S = 0.03
 Bound = tuple[str, str, float, float]
 
@@ -74,7 +83,9 @@ def _usable(effect: Any) -> bool:
     return effect.name not in NOT_FOR_RIGS and effect.replaces is None and not effect.clips
 
 
-def _from_catalogue(effect: Any, joint: str, train: tuple[DriveState, ...], states: Mapping[str, DriveState]) -> Candidate:
+def _from_catalogue(
+    effect: Any, joint: str, train: tuple[DriveState, ...], states: Mapping[str, DriveState]
+) -> Candidate:
     grid = tuple(effect.grid(train))
     if len(grid) > 16:  # a coarse look first; the winner's shape is refined
         grid = grid[:: int(np.ceil(len(grid) / 16))]

@@ -74,7 +74,11 @@ def _check_effort(rig: RigModel, joint: str, channel: str) -> list[ChannelIssue]
 def _looks(trial: RigTrial, joint: str, values: Array, measured: bool) -> list[tuple[str, float, str]]:
     out = []
     limits = [np.mean(values == e) for e in (values.min(), values.max())]
-    if min(limits) > CLIPPED and abs(values.max() + values.min()) < 0.02 * np.ptp(values) and len(np.unique(values)) > 20:
+    if (
+        min(limits) > CLIPPED
+        and abs(values.max() + values.min()) < 0.02 * np.ptp(values)
+        and len(np.unique(values)) > 20
+    ):
         out.append(("current_saturation", float(sum(limits)), "stands on its limits, the same both ways"))
     if not measured:
         return out
@@ -108,7 +112,9 @@ def _gather(rig: RigModel, joint: str, channel: str, found: dict, usable: int) -
             trials = tuple(t.name for t in rig.trials)
         share = float(np.median([s for _, s, _ in hits]))
         refuse = kind == "command_as_measurement"
-        out.append(ChannelIssue(kind, channel, joint, trials, f"{channel} {reason} (to {100 * share:.2g} %)", refuse, share))
+        out.append(
+            ChannelIssue(kind, channel, joint, trials, f"{channel} {reason} (to {100 * share:.2g} %)", refuse, share)
+        )
     return out
 
 
@@ -133,7 +139,9 @@ def sinusoids_left(time_s: Array, values: Array, most: int = 2) -> float:
         def cost(f: float, base: list = design) -> float:
             return _rms(_solve([*base, np.sin(2 * np.pi * f * grid), np.cos(2 * np.pi * f * grid)], y))
 
-        f = minimize_scalar(cost, bounds=((k - 1) * step, (k + 1) * step), method="bounded", options={"xatol": 1e-6 * step}).x
+        f = minimize_scalar(
+            cost, bounds=((k - 1) * step, (k + 1) * step), method="bounded", options={"xatol": 1e-6 * step}
+        ).x
         design += [np.sin(2 * np.pi * f * grid), np.cos(2 * np.pi * f * grid)]
         left = _solve(design, y)
     return float(np.median(np.abs(left)) / 0.6745 / total)
@@ -169,7 +177,9 @@ def copy_left(values: Array, other: Array) -> float:
 def check_balance(rig: RigModel, fit: DeclaredFit) -> tuple[ChannelIssue, ...]:
     """Issues that only the balance shows: an unsigned effort, a computed one, one that explains nothing of the motion."""
     out: list[ChannelIssue] = []
-    column = {name: c for c, (kind, name, attribute) in rig.quantity.items() if kind == "actuator" and attribute == "force"}
+    column = {
+        name: c for c, (kind, name, attribute) in rig.quantity.items() if kind == "actuator" and attribute == "force"
+    }
     start = np.array([c.value for c in fit.columns])
     for row in fit.rows:
         drive = rig.drive(row.joint)
@@ -188,7 +198,11 @@ def check_balance(rig: RigModel, fit: DeclaredFit) -> tuple[ChannelIssue, ...]:
             found = ("explains nothing of the motion, though it does in other recordings", left)
         if found is not None:
             name = column[drive.name]
-            out.append(ChannelIssue("command_as_measurement", name, row.joint, (row.trial,), f"{name} {found[0]}", True, found[1]))
+            out.append(
+                ChannelIssue(
+                    "command_as_measurement", name, row.joint, (row.trial,), f"{name} {found[0]}", True, found[1]
+                )
+            )
     return tuple(out)
 
 
@@ -235,5 +249,9 @@ def _check_position(rig: RigModel, joint: str, channel: str) -> list[ChannelIssu
         out.append(ChannelIssue("command_as_measurement", channel, joint, tuple(wrapped),
                                 f"{channel} jumps by a whole turn: it is not unwrapped", True, 1.0))  # fmt: skip
     if dead and len(dead) == len(rig.trials):
-        out.append(ChannelIssue("command_as_measurement", channel, joint, tuple(dead), f"{channel} never moves: dead", True, 1.0))
+        out.append(
+            ChannelIssue(
+                "command_as_measurement", channel, joint, tuple(dead), f"{channel} never moves: dead", True, 1.0
+            )
+        )
     return out

@@ -77,8 +77,9 @@ def fit_rows(columns: Sequence[Column], rows: Sequence[Rows], scale: dict[str, f
     return solve_bounded(gram, moment, low, high, mean, stiff)
 
 
-def fit_declared(rig: RigModel, refused: Collection[tuple[str, str]] = (), cutoff_hz: float | None = None,
-                 off_axis: bool = False) -> DeclaredFit:
+def fit_declared(
+    rig: RigModel, refused: Collection[tuple[str, str]] = (), cutoff_hz: float | None = None, off_axis: bool = False
+) -> DeclaredFit:
     """Fit the declared parameters to the trials that do not validate.
 
     refused: (trial, joint) whose effort channel cannot be trusted; their balance is not fitted, nor kept. A trial that
@@ -89,7 +90,9 @@ def fit_declared(rig: RigModel, refused: Collection[tuple[str, str]] = (), cutof
     columns = declared_columns(rig, off_axis)
     refused = set(refused)
     cutoff = cutoff_hz or _choose_cutoff(rig, columns, refused)
-    rows = tuple(r for t in rig.trials for r in trial_rows(rig, t, columns, cutoff) if (r.trial, r.joint) not in refused)
+    rows = tuple(
+        r for t in rig.trials for r in trial_rows(rig, t, columns, cutoff) if (r.trial, r.joint) not in refused
+    )
     return _robust_fit(columns, rows, cutoff or (rows[0].cutoff_hz if rows else float("nan")))
 
 
@@ -134,7 +137,9 @@ def _rms(values: Array) -> float:
 def _robust_fit(columns: tuple[Column, ...], rows: tuple[Rows, ...], cutoff: float) -> DeclaredFit:
     train = [r for r in rows if not r.validate and r.moving.sum() > 10]
     joints = sorted({r.joint for r in train})
-    size = {j: _rms(np.concatenate([_known(r, columns)[r.moving] for r in train if r.joint == j])) + 1e-300 for j in joints}
+    size = {
+        j: _rms(np.concatenate([_known(r, columns)[r.moving] for r in train if r.joint == j])) + 1e-300 for j in joints
+    }
     scale, weight = dict(size), {}
     anchored = not any(np.any(r.effort) for r in rows)
     theta = np.array([c.value for c in columns])

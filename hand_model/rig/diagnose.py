@@ -15,25 +15,22 @@ from .candidates import Candidate, candidates
 from .channels import ChannelIssue, check_balance, check_channels
 from .compete import Score, Step, Term, compete, design, held_out, judge, normal, pose, solution
 from .declared import DeclaredFit, fit_declared
-from .findings import Finding, Findings
+from .diagnose_swing import diagnose_swing
+from .findings import Finding, RigFindings
 from .model import RigModel, load_rig
 from .patch import write_couplings, write_declared, write_effects
-from .replay import replay_rig
 from .states import fill_gaps, noise_std
-from .swing import INDEX, PARAMETERS, STEP_S, Fitted, Swing, Task, vector
-from .swing_build import build_swing, can_swing, windows_s
-from .swing_compete import Round, Variant, compete_swing, fit_stages, free_declared
-from .swing_patch import write_swing
+from .swing_build import can_swing
 from .transmission import coupling_candidates, fit_coupling, zero_shift
+from .words import shares, statement
 
 Array = NDArray[np.float64]
-SEARCH_STEP_S = 4e-3
 RESAMPLES = 500
 TIED_TO_POSITION = frozenset({"nonlinear_spring", "end_stop_contact", "detent_load", "torque_ripple"})
 
 
 def diagnose_rig(session: Session, output: str | Path | None = None,
-                 progress: Callable[[str], None] | None = None) -> Findings:  # fmt: skip
+                 progress: Callable[[str], None] | None = None) -> RigFindings:  # fmt: skip
     """Diagnose a rig session; with `output`, also write findings.json and the improved rig.xml there.
 
     Raises SessionError or DescriptionError where the session or its MJCF cannot be read.
@@ -45,7 +42,7 @@ def diagnose_rig(session: Session, output: str | Path | None = None,
     refused = {(t, i.joint) for i in issues if i.refuse for t in i.trials}
     say(f"{rig.name}: declared model fitted, {len(issues)} channel issues")
     if can_swing(rig) and not refused:
-        result = _diagnose_swing(rig, session, fit, say)
+        result = diagnose_swing(rig, session, fit, say)
     else:
         result = _diagnose_balance(rig, fit, say)
     parts, rejected, lack, xml, declared_xml = result
@@ -61,7 +58,7 @@ def diagnose_rig(session: Session, output: str | Path | None = None,
     again = repeated_trajectory(rig)
     if again and len(rig.joints) > 1:  # on one and the same path a load tied to position is as well a weight elsewhere
         found = [replace(f, members=(*f.members, "gravity_load")) if f.effect in TIED_TO_POSITION else f for f in found]
-    findings = Findings(
+    findings = RigFindings(
         session=rig.name,
         verdict=_verdict(found, lack),
         lack_of_fit=lack,
@@ -95,6 +92,7 @@ def trusted_fit(rig: RigModel) -> tuple[DeclaredFit, tuple[ChannelIssue, ...]]:
 
 def repeated_trajectory(rig: RigModel) -> bool:
     """Whether every validation recording follows a training recording so closely (1 % of the range) that it repeats it."""
+
     def path(trial: Any, joint: str) -> Array:
         q = fill_gaps(trial.time_s, trial.position[joint])
         return np.interp(np.linspace(0, trial.time_s[-1], 200), trial.time_s, q)
@@ -122,7 +120,9 @@ def _rate(rig: RigModel) -> float:
 
 
 def _channel_finding(issue: ChannelIssue) -> Finding:
-    action = "it is refused, nothing is fitted to it" if issue.refuse else "samples there say only that it is at least that"
+    action = (
+        "it is refused, nothing is fitted to it" if issue.refuse else "samples there say only that it is at least that"
+    )
     return Finding(
         issue.kind, (issue.kind,), 1.0, (), {"joint": issue.joint, "signal": issue.channel, "trials": list(issue.trials)},
         f"{issue.reason}: {action}.", {"share_left": {"value": issue.share, "unit": "1"}}, {}, None,
@@ -153,7 +153,9 @@ def _diagnose_balance(rig: RigModel, fit: DeclaredFit, say: Callable[[str], None
         rejected += [{"effect": s.term.candidate.key, "reason": "held-out error does not fall enough"} for s in scores]
         say(f"{rig.name}: {joint}: {', '.join(t.candidate.key for t in taken) or 'nothing'}")
     problem, base = pose(fit), solution(pose(base_fit), [])
-    offsets = [(s, t) for s, t in stories if t.candidate.effect == "asymmetric_friction" and first[t.candidate.joint][1] is t]
+    offsets = [
+        (s, t) for s, t in stories if t.candidate.effect == "asymmetric_friction" and first[t.candidate.joint][1] is t
+    ]
     found, kept = _prove(rig, base_fit, offsets, [], rejected)
     if off_axis is not None:
         found.append(finding)
@@ -171,7 +173,7 @@ def _diagnose_balance(rig: RigModel, fit: DeclaredFit, say: Callable[[str], None
     p = len(fit.columns)
     records = _records(kept, theta[p:])
     xml = write_effects(write_declared(rig, fit.columns, theta[:p]), records)
-    return _shares(found), rejected, lack, xml, declared_xml
+    return shares(found), rejected, lack, xml, declared_xml
 
 
 def _prove(rig: RigModel, fit: DeclaredFit, stories: Sequence[tuple[Step, Term]], kept: Sequence[Term],
@@ -185,7 +187,7 @@ def _prove(rig: RigModel, fit: DeclaredFit, stories: Sequence[tuple[Step, Term]]
             rejected.append({"effect": term.candidate.key, "reason": "error on validation trials does not fall"})
             continue
         kept.append(term)
-        found.append(_joint_finding(rig, fit, step, term, after[len(after) - len(term.candidate.amplitudes):], proof))
+        found.append(_joint_finding(rig, fit, step, term, after[len(after) - len(term.candidate.amplitudes) :], proof))
     return found, kept
 
 
@@ -213,13 +215,19 @@ def _proof(rig: RigModel, fit: DeclaredFit, few: Sequence[Term], before: Array, 
            joint: str, fit_after: DeclaredFit | None = None) -> dict[str, Any]:  # fmt: skip
     """Held-out effort error before and after, with an interval of its fall from resampled blocks."""
     a, b = _residuals(fit, few, before, joint), _residuals(fit_after or fit, many, after, joint)
-    squares = np.array([[np.sum(p**2) for _, e in side for p in np.array_split(e, max(2, 24 // len(side)))] for side in (a, b)])
+    squares = np.array(
+        [[np.sum(p**2) for _, e in side for p in np.array_split(e, max(2, 24 // len(side)))] for side in (a, b)]
+    )
     count = np.array([len(p) for _, e in a for p in np.array_split(e, max(2, 24 // len(a)))])
     draw = np.random.default_rng(0).integers(0, len(count), (RESAMPLES, len(count)))
     rms = np.sqrt(squares[:, draw].sum(2) / count[draw].sum(1))
     fall = np.percentile(rms[0] - rms[1], [2.5, 97.5])
     whole = np.sqrt(squares.sum(1) / count.sum())
-    floor = [noise_std(r.extra["effort"]) * np.sqrt(min(1.0, 2 * r.cutoff_hz / r.rate_hz)) for r in fit.rows if r.joint == joint]
+    floor = [
+        noise_std(r.extra["effort"]) * np.sqrt(min(1.0, 2 * r.cutoff_hz / r.rate_hz))
+        for r in fit.rows
+        if r.joint == joint
+    ]
     return {"metric": "effort_rmse", "unit": rig.effort_unit(joint), "before": float(whole[0]), "after": float(whole[1]),
             "noise_floor": float(np.median(floor)), "ci95_reduction": [float(fall[0]), float(fall[1])],
             "held_out": [t for t, _ in a], "engine": "mujoco"}  # fmt: skip
@@ -247,7 +255,9 @@ def _off_axis(rig: RigModel, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple
     freed = replace(freed, scale=fit.scale)
     sides = pose(fit), pose(freed)
     errors = [held_out(p, offsets, normal(p, offsets))[0] for p in sides]
-    shape = Candidate("gravity_load", "centres of mass off their axes", "*", (), ({},), lambda r, s: np.zeros((len(r.time_s), 0)))
+    shape = Candidate(
+        "gravity_load", "centres of mass off their axes", "*", (), ({},), lambda r, s: np.zeros((len(r.time_s), 0))
+    )
     step = judge(errors[0], [Score(Term(shape, {}), errors[1], 0.0)], errors[0].sum())
     if step is None:
         return None
@@ -262,8 +272,10 @@ def _off_axis(rig: RigModel, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple
              if c.kind == "inertial" and c.value == 0}  # fmt: skip
     where = {"finger": None, "joint": best, "actuator": None, "signal": "effort", "marker": None,
              "trials": proofs[best]["held_out"], "share_of_mismatch": proofs[best]["before"] ** 2 - proofs[best]["after"] ** 2}  # fmt: skip
-    words = (f"Centres of mass lie off the axes on which they are declared: held-out effort error falls to "
-             f"{100 * ratio:.0f} % over all joints (most at {best}: {proofs[best]['before']:.4g} to {proofs[best]['after']:.4g}).")
+    words = (
+        f"Centres of mass lie off the axes on which they are declared: held-out effort error falls to "
+        f"{100 * ratio:.0f} % over all joints (most at {best}: {proofs[best]['before']:.4g} to {proofs[best]['after']:.4g})."
+    )
     return freed, Finding("gravity_load", ("gravity_load",), step.probability, (), where, words, moved, proofs[best],
                           {"native": True, "mjcf": "body/inertial/@pos", "urdf": "link/inertial/origin"})  # fmt: skip
 
@@ -288,87 +300,9 @@ def _joint_finding(rig: RigModel, fit: DeclaredFit, step: Step, term: Term, ampl
              "trials": proof["held_out"], "share_of_mismatch": max(proof["before"] ** 2 - proof["after"] ** 2, 0.0)}  # fmt: skip
     return Finding(
         c.effect, (c.effect, *(e for e in step.equals if e != c.effect)), step.probability,
-        tuple({"effect": k.split("@")[0], "probability": p} for k, p in rivals), where,
+        tuple((k.split("@")[0], p) for k, p in rivals), where,
         statement(c.effect, c.variant, c.joint, {k: v["value"] for k, v in parameters.items()}, proof), parameters, proof,
         {"native": False, "mjcf": 'custom/text[@name="hand_model"]', "urdf": "not expressible: kept in rig.xml"},
-    )  # fmt: skip
-
-
-def _shares(found: list[Finding]) -> list[Finding]:
-    """share_of_mismatch as a part of what all findings of the same joint explain."""
-    total: dict[str, float] = {}
-    for f in found:
-        total[f.where["joint"]] = total.get(f.where["joint"], 0.0) + f.where["share_of_mismatch"]
-    return [replace(f, where={**f.where, "share_of_mismatch": f.where["share_of_mismatch"] / max(total[f.where["joint"]], 1e-300)})
-            for f in found]  # fmt: skip
-
-
-# --- a joint by its simulated motion ---------------------------------------------------------------------------------
-
-
-def _diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Callable[[str], None]) -> tuple:
-    """The same for one joint driven by a voltage or by nothing: MuJoCo's motion in open loop is what is compared."""
-    windows = windows_s(rig, fit)
-    stages = [build_swing(rig, fit, SEARCH_STEP_S, w) for w in windows]
-    free = free_declared(stages[0])
-    declared = fit_stages(stages, [Task(free, vector(stages[0].initial), ())], 15)[0]
-    taken, rounds = compete_swing(stages, declared)
-    say(f"{rig.name}: {', '.join(v.key for v in taken) or 'nothing'}")
-    # Last, at the step of the replay; a free swing over whole recordings, for its phase is known well enough by now.
-    fine = [build_swing(rig, fit, STEP_S, w) for w in (windows if stages[0].driven else (*windows[1:], np.inf))]
-    sets = [tuple(dict.fromkeys((*free, *(n for v in taken[:k] for n in v.start)))) for k in range(len(taken) + 1)]
-    last = rounds[-1].fit if rounds else declared
-    starts = [declared.theta] + [np.where(np.isin(PARAMETERS, s), last.theta, vector(stages[0].initial)) for s in sets[1:]]
-    fits = fit_stages(fine, [Task(s, t, ()) for s, t in zip(sets, starts, strict=True)], 8)
-    rounds = tuple(replace(r, fit=f) for r, f in zip(rounds, fits[1:], strict=True))
-    swing = fine[0]
-    files = [write_swing(rig, swing, f.theta) for f in fits]
-    replays = [replay_rig(session, load_rig(session, x)) for x in files]
-    held = bool(rig.select(True))  # without validation recordings the training ones measure, and the report says so
-    figures = [r.figure("position_rmse", held) for r in replays]
-    holds = next((k for k in range(len(taken)) if figures[k + 1] >= figures[k]), len(taken))
-    rejected = [{"effect": v.key, "reason": "error on validation trials does not fall"} for v in taken[holds:]]
-    taken, rounds, figures = taken[:holds], rounds[:holds], figures[: holds + 1]
-    means = [r.figure("position_mae", held) for r in replays]
-    found = []
-    for k, (variant, round_) in enumerate(zip(taken, rounds, strict=True)):
-        proof = {"metric": "position_rmse", "unit": rig.unit(rig.joints[0]), "before": figures[k], "after": figures[k + 1],
-                 "noise_floor": _resolution(rig), "ci95_reduction": _fall(replays[k], replays[k + 1], held),
-                 "held_out": [t.name for t in rig.select(held)], "engine": "mujoco"}  # fmt: skip
-        found.append(_swing_finding(rig, variant, round_, swing, proof))
-    lack = {"metric": "position_rmse", "unit": rig.unit(rig.joints[0]), "before": figures[0], "after": figures[-1],
-            "one_effect": figures[min(1, len(figures) - 1)], "mae_before": means[0], "mae_after": means[holds],
-            "noise_floor": _resolution(rig),
-            "declared": {n: float(fits[0].theta[INDEX[n]]) for n in free}}  # fmt: skip
-    return _shares(found), rejected, lack, files[holds], files[0]
-
-
-def _resolution(rig: RigModel) -> float:
-    return float(np.median([noise_std(t.position[rig.joints[0]]) for t in rig.trials]))
-
-
-def _fall(before: Any, after: Any, held: bool) -> list[float]:
-    """95 % interval of the fall of the held-out rmse, recordings resampled."""
-    a = np.array([r.position_rmse**2 for r in before.joints if r.validate == held])
-    b = np.array([r.position_rmse**2 for r in after.joints if r.validate == held])
-    draw = np.random.default_rng(0).integers(0, len(a), (RESAMPLES, len(a)))
-    fall = np.sqrt(a[draw].mean(1)) - np.sqrt(b[draw].mean(1))
-    return [float(x) for x in np.percentile(fall, [2.5, 97.5])]
-
-
-def _swing_finding(rig: RigModel, variant: Variant, round_: Round, swing: Swing, proof: dict) -> Finding:
-    joint = rig.joints[0]
-    parameters = {n: {"value": float(round_.fit.theta[INDEX[n]]), "unit": ""} for n in variant.start}
-    where = {"finger": None, "joint": joint, "actuator": (rig.drive(joint).name if rig.drive(joint) else None),
-             "signal": "position", "marker": None, "trials": proof["held_out"],
-             "share_of_mismatch": max(proof["before"] ** 2 - proof["after"] ** 2, 0.0)}  # fmt: skip
-    native = set(variant.start) <= {"drag"}
-    return Finding(
-        variant.effect, (variant.effect, *(e for e in round_.equals if e != variant.effect)), round_.probability,
-        tuple({"effect": k, "probability": p} for k, p in round_.rivals if k != variant.key), where,
-        statement(variant.effect, variant.name, joint, {k: v["value"] for k, v in parameters.items()}, proof), parameters, proof,
-        {"native": native, "mjcf": f"joint[@name='{joint}']/@damping" if native else 'custom/text[@name="hand_model"]',
-         "urdf": "not expressible: kept in rig.xml"},
     )  # fmt: skip
 
 
@@ -390,21 +324,16 @@ def _diagnose_coupling(rig: RigModel, coupling: Any) -> tuple[list[Finding], lis
     for f in found:
         proof = {**f.fit, "metric": "angle_rmse", "unit": rig.unit(coupling.dependent)}
         where = {**f.where, "actuator": None, "signal": "position", "coupling": coupling.name}
-        words = f.statement.replace("effort rmse", "angle rmse").replace(rig.effort_unit(coupling.dependent), proof["unit"])
+        words = f.statement.replace("effort rmse", "angle rmse").replace(
+            rig.effort_unit(coupling.dependent), proof["unit"]
+        )
         if moved is not None:
             words += " The zero between the two encoders differs between recordings and was taken out of each."
         named.append(replace(f, fit=proof, where=where, statement=words))
-    return _shares(named), rejected
+    return shares(named), rejected
 
 
-# --- words -----------------------------------------------------------------------------------------------------------
-
-
-def statement(effect: str, variant: str, joint: str, parameters: Mapping[str, float], proof: Mapping[str, Any]) -> str:
-    """One plain sentence: what, where, how much, and what it is worth on recordings held out."""
-    listed = ", ".join(f"{k.replace('_', ' ')} {v:.4g}" for k, v in parameters.items())
-    return (f"{joint}: {effect.replace('_', ' ')}{f' ({variant})' if variant else ''}: {listed}; held-out "
-            f"{proof['metric'].replace('_', ' ')} falls from {proof['before']:.4g} to {proof['after']:.4g} {proof['unit']}.")  # fmt: skip
+# --- verdict -----------------------------------------------------------------------------------------------------------
 
 
 def _verdict(found: Sequence[Finding], lack: Mapping[str, Any]) -> str:
@@ -439,4 +368,4 @@ def _next(found: Sequence[Finding], issues: Sequence[ChannelIssue], again: bool)
     return "repeat one trial three times unchanged: that shows the noise floor"
 
 
-__all__ = ["Fitted", "diagnose_rig", "trusted_fit"]
+__all__ = ["diagnose_rig", "trusted_fit"]

@@ -185,7 +185,7 @@ def _parse(session: Session, column: str, quantity: str, joints: tuple[str, ...]
     if name not in names:
         raise SessionError(f'{where}: no {kind} "{name}" in the model; {did_you_mean(name, names)}')
     if attribute not in QUANTITIES[kind]:
-        raise SessionError(f'{where}: {did_you_mean(attribute, QUANTITIES[kind])}')
+        raise SessionError(f"{where}: {did_you_mean(attribute, QUANTITIES[kind])}")
     return kind, name, attribute
 
 

@@ -171,7 +171,9 @@ def _controls(rig: RigModel, trial: RigTrial, model: Any, effects: EffectStepper
     for drive in rig.drives:
         a = model.actuator(drive.name).id
         if drive.joint in trial.voltage:
-            out[:, a] = effects.control(np.interp(at, trial.time_s, fill_gaps(trial.time_s, trial.voltage[drive.joint])), supply)
+            out[:, a] = effects.control(
+                np.interp(at, trial.time_s, fill_gaps(trial.time_s, trial.voltage[drive.joint])), supply
+            )
         elif drive.kind == "position" and drive.joint in trial.setpoint:
             out[:, a] = np.interp(at, trial.time_s, fill_gaps(trial.time_s, trial.setpoint[drive.joint]))
         elif drive.joint in trial.effort and drive.gain:
@@ -195,11 +197,15 @@ def replay_rig(session: Session, model: bytes | RigModel | None = None, simulate
             continue
         time_s, simulated = simulate_trial(rig, trial) if simulate else (trial.time_s, None)
         for i, joint in enumerate(rig.joints):
-            out.append(_residual(trial, joint, time_s, None if simulated is None else simulated[:, i], rows.get(joint), theta))
+            out.append(
+                _residual(trial, joint, time_s, None if simulated is None else simulated[:, i], rows.get(joint), theta)
+            )
     return RigResiduals(tuple(out))
 
 
-def _residual(trial: RigTrial, joint: str, time_s: Array, simulated: Array | None, row: Rows | None, theta: Array) -> JointResidual:
+def _residual(
+    trial: RigTrial, joint: str, time_s: Array, simulated: Array | None, row: Rows | None, theta: Array
+) -> JointResidual:
     recorded = fill_gaps(trial.time_s, trial.position[joint])
     rmse = mae = float("nan")
     if simulated is not None:

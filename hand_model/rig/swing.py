@@ -203,7 +203,9 @@ def typical(swing: Swing) -> Array:
             "external_squared": share / weight, "load_speed": wet / weight, "asymmetry": dry, "drag": wet / speed,
             "damping_asymmetry": wet, "offset": dry, "lateral": dry, "stiffness": dry,
             "sag": 0.1 / weight, "supply": 0.5, "delay": 0.01}  # fmt: skip
-    size = {k: v or 1.0 for k, v in size.items()} | {k: share for k in PARAMETERS if k.startswith("load_") and k not in size}
+    size = {k: v or 1.0 for k, v in size.items()} | {
+        k: share for k in PARAMETERS if k.startswith("load_") and k not in size
+    }
     return vector(size)
 
 

@@ -48,8 +48,13 @@ class Round:
 
 def variants(swing: Swing) -> tuple[Variant, ...]:
     """What may be missing at a joint driven by a voltage (or by nothing)."""
-    speed = float(np.percentile(np.concatenate([np.abs(np.diff(lane.position)) for lane in swing.lanes]), 97)) / swing.step_s
-    out = [Variant("stribeck_friction", f"{k:g}", {"static_excess": 0.0, "stribeck_speed": k * speed}) for k in (0.05, 0.2)]
+    speed = (
+        float(np.percentile(np.concatenate([np.abs(np.diff(lane.position)) for lane in swing.lanes]), 97))
+        / swing.step_s
+    )
+    out = [
+        Variant("stribeck_friction", f"{k:g}", {"static_excess": 0.0, "stribeck_speed": k * speed}) for k in (0.05, 0.2)
+    ]
     out += [
         Variant("asymmetric_friction", "", {"offset": 0.0}),
         Variant("asymmetric_viscous_friction", "", {"damping_asymmetry": 0.0}),
@@ -70,7 +75,9 @@ def variants(swing: Swing) -> tuple[Variant, ...]:
             Variant("load_dependent_friction", "gear", {"load_gear": 0.0}),
             Variant("load_dependent_friction", "motor", {"load_motor": 0.0}),
             Variant("load_dependent_friction", "directional", {"load_motor": 0.0, "load_external": 0.0}),
-            Variant("load_dependent_friction", "gear, low speed", {"load_gear_low": 0.0, "stribeck_speed": 0.2 * speed}),
+            Variant(
+                "load_dependent_friction", "gear, low speed", {"load_gear_low": 0.0, "stribeck_speed": 0.2 * speed}
+            ),
             Variant("drive_sag", "", {"sag": 0.0}),
             Variant("command_delay", "", {"delay": 0.005}),
         ]
@@ -81,7 +88,9 @@ def variants(swing: Swing) -> tuple[Variant, ...]:
 
 def free_declared(swing: Swing) -> tuple[str, ...]:
     """The declared parameters of this joint; the scale (the weight) is not among them."""
-    return tuple(n for n in DECLARED if n in swing.initial and (n != "inertia" or swing.sine or swing.cosine or swing.driven))
+    return tuple(
+        n for n in DECLARED if n in swing.initial and (n != "inertia" or swing.sine or swing.cosine or swing.driven)
+    )
 
 
 def _blocks(swing: Swing, theta: Array, lanes: Sequence[int]) -> Array:
@@ -131,7 +140,9 @@ def compete_swing(stages: Sequence[Swing], declared: Fitted) -> tuple[tuple[Vari
     return taken, tuple(rounds)
 
 
-def _exchanged(stages: Sequence[Swing], taken: tuple[Variant, ...], current: Fitted) -> tuple[tuple[Variant, ...], Fitted]:
+def _exchanged(
+    stages: Sequence[Swing], taken: tuple[Variant, ...], current: Fitted
+) -> tuple[tuple[Variant, ...], Fitted]:
     """Another variant of an effect that was taken before, where beside the later ones it fits better with no more parameters."""
     swing = stages[-1]
     if len(taken) < 2:
@@ -187,7 +198,9 @@ def _started(theta: Array, variant: Variant) -> Array:
     return out
 
 
-def _left_out(swing: Swing, folds: list, none: tuple[Task, Fitted], rivals: list[tuple[Task, Fitted]]) -> tuple[Array, list[Array]]:
+def _left_out(
+    swing: Swing, folds: list, none: tuple[Task, Fitted], rivals: list[tuple[Task, Fitted]]
+) -> tuple[Array, list[Array]]:
     """Block errors of "none" and of each rival on the recordings left out."""
     everyone = [none, *rivals]
     tasks = [replace(task, start=fit.theta, stretches=kept) for task, fit in everyone for kept, _ in folds]
@@ -199,7 +212,9 @@ def _left_out(swing: Swing, folds: list, none: tuple[Task, Fitted], rivals: list
     return out[0], out[1:]
 
 
-def _judge(none: Array, scores: list[Array], rivals: Sequence[Variant], sizes: Sequence[int]) -> tuple[int, Round] | None:
+def _judge(
+    none: Array, scores: list[Array], rivals: Sequence[Variant], sizes: Sequence[int]
+) -> tuple[int, Round] | None:
     """Index of the winner and what the round says, or None where nothing beats "none" beyond doubt."""
     errors_ = np.array(scores)
     draw = np.random.default_rng(0).integers(0, len(none), (RESAMPLES, len(none)))
