@@ -171,3 +171,31 @@ def test_pinocchio_is_given_what_it_leaves_out() -> None:
         assert np.max(np.abs(pin.aba(body, pin_data, q, v, supplied) - wanted)) < 1e-8 * np.max(np.abs(wanted))
         bare = pin.aba(body, pin_data, q, v, motor * current)
         assert np.max(np.abs(bare - wanted)[motor]) > 100  # %/s^2: friction and spring are missing from it
+
+
+def test_names_are_shared_by_no_two_things() -> None:
+    root = etree.fromstring(XML)
+    etree.SubElement(root.find("worldbody/body"), "site", name="index_map")
+    write_motors(root, _hand(presliding=0.6))
+    names = [e.get("name") for e in root.iter() if isinstance(e.tag, str) and e.getparent() is not None and e.get("name")]
+    assert len(names) == len(set(names)) and "index_map_2" in names
+
+
+def test_motor_and_finger_stop_at_the_end_of_the_range() -> None:
+    """Full current into either end: the rotor is held within 2 % of its travel, the finger is not thrown far off."""
+    model, data = _model(_hand())
+    for control in (150.0, -50.0):
+        data.ctrl[model.actuator("index").id] = control
+        seen = []
+        for _ in range(1500):
+            mujoco.mj_step(model, data)
+            seen.append(_q(model, data, "index_motor"))
+        assert -4.0 < min(seen) and max(seen) < 104.0
+
+
+def test_scale_of_efforts_must_be_positive(tmp_path) -> None:
+    from hand_model.compile import compile
+    from hand_model.errors import DescriptionError
+
+    with pytest.raises(DescriptionError, match="positive"):
+        compile(_hand(), tmp_path / "hand", newton_metre_per_unit=-1.0)

@@ -14,6 +14,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--output", required=True, metavar="DIR", help="the folder to write; an earlier compiled hand is replaced"
     )
+    parser.add_argument(
+        "--newton-metre-per-unit", type=float, metavar="X", help="torque at the proximal joint per raw unit of current (default: efforts stay raw)"
+    )
 
 
 def run(options: Namespace, say: Callable[[str], None]) -> int:
@@ -21,7 +24,7 @@ def run(options: Namespace, say: Callable[[str], None]) -> int:
     from ..compile import compile
     from ..hand import load_hand
 
-    description = compile(load_hand(options.hand), options.output)
+    description = compile(load_hand(options.hand), options.output, options.newton_metre_per_unit)
     for model in description.models:
         print(f"{model.mjcf}\n{model.urdf}\n{model.scene}")
     return 0

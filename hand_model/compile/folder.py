@@ -27,14 +27,17 @@ from .urdf import urdf
 from .xml import document
 
 
-def compile(hand: Hand, folder: str | Path) -> Description:
+def compile(hand: Hand, folder: str | Path, newton_metre_per_unit: float | None = None) -> Description:
     """Write a hand as URDF and MJCF, with scene, meshes, hand.json and README, one pair of files per position of the
     thumb.
 
+    newton_metre_per_unit: torque at the proximal joint per raw unit of current [N m]; efforts stay raw without it.
     The folder appears (or replaces a compiled one) only when it is complete; the same hand gives the same bytes.
     Raises HandFileError where the hand cannot be compiled, DescriptionError where `folder` holds something else.
     """
     target = Path(folder)
+    if newton_metre_per_unit is not None and not 0 < newton_metre_per_unit < np.inf:
+        raise DescriptionError(f"{newton_metre_per_unit} N m per unit of current: a positive number is needed")
     if target.exists() and not (target / "hand.json").is_file() and not (target.is_dir() and not any(target.iterdir())):
         raise DescriptionError(
             f"{target}: exists and is not a compiled hand; name a new folder or an earlier one of this command"
@@ -44,7 +47,7 @@ def compile(hand: Hand, folder: str | Path) -> Description:
     target.parent.mkdir(parents=True, exist_ok=True)
     staging = Path(tempfile.mkdtemp(prefix=f".{target.name}.", dir=target.parent))
     try:
-        _write(staging, whole, plans)
+        _write(staging, whole, plans, newton_metre_per_unit)
         staging.chmod(0o755)
         _swap(staging, target)
     finally:
@@ -52,10 +55,10 @@ def compile(hand: Hand, folder: str | Path) -> Description:
     return read_description(target)
 
 
-def _write(folder: Path, hand: Hand, plans: tuple[Plan, ...]) -> None:
+def _write(folder: Path, hand: Hand, plans: tuple[Plan, ...], newton_metre_per_unit: float | None) -> None:
     (folder / "assets").mkdir()
     for plan in plans:
-        (folder / f"{plan.stem}.xml").write_bytes(document(mjcf(plan)))
+        (folder / f"{plan.stem}.xml").write_bytes(document(mjcf(plan, newton_metre_per_unit)))
         (folder / f"{plan.stem}.urdf").write_bytes(document(urdf(plan)))
         (folder / f"{scene_stem(plan)}.xml").write_bytes(document(scene(plan)))
         extra = {

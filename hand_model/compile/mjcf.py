@@ -19,8 +19,8 @@ SOLREF = (2 * TIMESTEP, 1.0)
 SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 
 
-def mjcf(plan: Plan) -> Any:
-    """The MJCF tree (lxml element) of one plan."""
+def mjcf(plan: Plan, newton_metre_per_unit: float | None = None) -> Any:
+    """The MJCF tree (lxml element) of one plan; newton_metre_per_unit: torque per raw unit of current [N m], where it is known."""
     from lxml import etree
 
     root = etree.Element("mujoco", model=plan.stem)
@@ -40,7 +40,7 @@ def mjcf(plan: Plan) -> Any:
             child(contact, "exclude", body1=one, body2=other)
     _equalities(root, plan)
     _actuators(root, plan, drives)
-    _physics(root, in_file_names(plan))
+    _physics(root, in_file_names(plan), newton_metre_per_unit)
     _keyframes(root, plan)
     return root
 
@@ -130,9 +130,9 @@ def _actuators(root: Any, plan: Plan, drives: dict[str, Drive]) -> None:
         )
 
 
-def _physics(root: Any, hand: Hand) -> None:
+def _physics(root: Any, hand: Hand, newton_metre_per_unit: float | None) -> None:
     """Identified motors and effects, as far as MJCF can hold them."""
-    write_motors(root, hand)
+    write_motors(root, hand, newton_metre_per_unit)
     fingers = {f.name for f in hand.fingers} | {None}
     for found in hand.effects:
         if found.where.get("finger") in fingers:
