@@ -56,6 +56,23 @@ def _bins(values: Array, count: int) -> NDArray[np.int64]:
     return np.searchsorted(edges, values).astype(np.int64)
 
 
+def stroke_variance(balance: Balance, z: Array) -> float:
+    """Variance from one stroke to its next replicate (same direction and speed) beyond the samples' noise, in its units:
+    machines do not repeat themselves exactly. Successive differences, so that a slow drift does not count."""
+    use = balance.steady
+    velocity = balance.gather(lambda s: s.velocity)[use]
+    index = np.unique(balance.stroke[use], return_inverse=True)[1]
+    count = np.bincount(index)
+    mean, speed = np.bincount(index, z[use]) / count, np.bincount(index, velocity) / count
+    scale = max(float(np.abs(speed).max()), 1e-12)
+    squares = []
+    for level in np.unique(np.round(8 * speed / scale)):
+        mine = np.flatnonzero((np.round(8 * speed / scale) == level) & (count >= 10))
+        noise = balance.inflation / count[mine]
+        squares += ((np.diff(mean[mine]) ** 2 - noise[1:] - noise[:-1]) / 2).tolist()
+    return max(float(np.mean(squares)), 0.0) if len(squares) >= 8 else 0.0
+
+
 def lack_of_fit(balance: Balance, prediction: Array, parameters: int, alpha: float) -> LackOfFit:
     """Chi-square tests of cell means of the residual (steady samples) against the pure error, several groupings.
 
@@ -66,6 +83,7 @@ def lack_of_fit(balance: Balance, prediction: Array, parameters: int, alpha: flo
 
     z = (balance.effort - prediction) * balance.weight
     use = balance.steady
+    unrest = stroke_variance(balance, z)
     best, excess = LackOfFit(1.0, 0.0, "", 0.0), 0.0
     cells = groupings(balance)
     for name, label in cells.items():
@@ -73,7 +91,10 @@ def lack_of_fit(balance: Balance, prediction: Array, parameters: int, alpha: flo
         count = np.bincount(index)
         total = np.bincount(index, z[use])
         keep = count >= 3
-        statistic = float(np.sum(total[keep] ** 2 / count[keep])) / balance.inflation
+        pairs, size = np.unique(np.stack([index, balance.stroke[use]]), axis=1, return_counts=True)
+        common = np.bincount(pairs[0], size.astype(float) ** 2, minlength=len(count))
+        variance = balance.inflation * count + unrest * common
+        statistic = float(np.sum(total[keep] ** 2 / variance[keep]))
         degrees = max(int(keep.sum()) - (parameters if name != "stroke" else 2), 1)
         excess = max(excess, statistic - degrees)
         p = min(float(chi2.sf(statistic, degrees)) * len(cells), 1.0)
