@@ -66,13 +66,32 @@ def face_normals(vertices: Array, faces: Faces) -> Array:
 
 
 def _outwards(vertices: Array, faces: Faces, normals: Array) -> tuple[Faces, int]:
-    across = face_normals(vertices, faces)
-    faces = faces[np.linalg.norm(across, axis=1) > 1e-12]
-    across = face_normals(vertices, faces)
-    wrong = np.einsum("ij,ij->i", across, normals[faces].sum(1)) < 0
+    """Neighbouring faces turned alike, then every connected part turned to where most of its area's normals point."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import breadth_first_order, connected_components
+
+    faces = faces[np.linalg.norm(face_normals(vertices, faces), axis=1) > 1e-12]
+    if not len(faces):
+        return faces, 0
+    users: dict[tuple[int, int], list[tuple[int, bool]]] = defaultdict(list)
+    for i, (a, b) in enumerate(directed_edges(faces).tolist()):
+        users[min(a, b), max(a, b)].append((i % len(faces), a < b))
+    pairs = {(u[0][0], u[1][0]): u[0][1] == u[1][1] for u in users.values() if len(u) == 2}  # True: one is flipped
+    one, two = np.array(list(pairs), int).reshape(-1, 2).T
+    graph = coo_matrix((np.ones(len(one)), (one, two)), (len(faces), len(faces))).tocsr()
+    count, label = connected_components(graph, directed=False)
+    vote = np.einsum("ij,ij->i", face_normals(vertices, faces), normals[faces].sum(1))
+    turned = np.zeros(len(faces), bool)
+    for part in range(count):
+        order, before = breadth_first_order(graph, int(np.flatnonzero(label == part)[0]), directed=False)
+        for k in order[1:]:
+            b = before[k]
+            turned[k] = turned[b] ^ (pairs[b, k] if (b, k) in pairs else pairs[k, b])
+        if (vote[order] * np.where(turned[order], -1, 1)).sum() < 0:
+            turned[order] ^= True
     faces = faces.copy()
-    faces[wrong] = faces[wrong][:, ::-1]
-    return faces, int(wrong.sum())
+    faces[turned] = faces[turned][:, ::-1]
+    return faces, int(turned.sum())
 
 
 def _edge_manifold(vertices: Array, faces: Faces) -> tuple[Faces, int]:

@@ -15,9 +15,11 @@ LID = "open side closed by a lid"
 SHELL_M = 0.002  # m: wall of a surface that is open and that no lid closes
 HULL = "convex hull of the points"
 
-CONCAVE = 0.05  # share of its convex hull that a solid may miss and still be taken as convex
+CONVEX = 0.95  # share of the vertices that lie on the convex hull, within
+NEAR = 0.2  # of the distance of the points: such a solid is taken as convex
 CORNERS = 64  # of a convex part
 PARTS = 8
+VOXELS, PERCENT = 100_000, 5.0  # resolution of V-HACD, volume by which its parts may miss
 
 
 def volume(vertices: Array, faces: Faces) -> float:
@@ -90,20 +92,33 @@ def hull(points: Array, corners: int | None = None) -> tuple[Array, Faces]:
     return used, faces
 
 
-def convex_parts(vertices: Array, faces: Faces) -> tuple[tuple[tuple[Array, Faces], ...], str]:
+def convex_parts(vertices: Array, faces: Faces, spacing_m: float) -> tuple[tuple[tuple[Array, Faces], ...], str]:
     """Convex meshes that together cover a watertight one, and how they were found.
 
-    One hull where that adds no more than 5 % to the volume; else the parts of V-HACD where vhacdx is installed; else one hull.
+    One hull where hardly a vertex lies deeper in it than a part of spacing_m [m], the distance of the points that it was made
+    from; else the parts of V-HACD (Mamou 2009) where vhacdx is installed; else one hull.
     """
+    from scipy.spatial import ConvexHull
+
     whole = hull(vertices, CORNERS)
-    if volume(vertices, faces) > (1 - CONCAVE) * volume(*hull(vertices)):
+    planes = ConvexHull(vertices).equations
+    depth = -(vertices @ planes[:, :3].T + planes[:, 3]).max(1)
+    if (depth <= NEAR * spacing_m).mean() >= CONVEX:
         return (whole,), "one hull"
     try:
         import vhacdx
     except ImportError:
         return (whole,), "one hull, though the surface is concave: vhacdx is not installed"
     packed = np.hstack([np.full((len(faces), 1), 3), faces]).astype(np.uint32)
-    found = vhacdx.compute_vhacd(vertices, packed, maxConvexHulls=PARTS, maxNumVerticesPerCH=CORNERS, asyncACD=False)
+    found = vhacdx.compute_vhacd(
+        vertices,
+        packed,
+        maxConvexHulls=PARTS,
+        maxNumVerticesPerCH=CORNERS,
+        resolution=VOXELS,
+        minimumVolumePercentErrorAllowed=PERCENT,
+        asyncACD=False,
+    )
     parts = []
     for corner, _ in found:
         if np.linalg.matrix_rank(np.asarray(corner) - np.mean(corner, axis=0), tol=1e-5) == 3:

@@ -143,7 +143,8 @@ def _projected(points: Array, hint: Array, tips: Array, voxel_m: float) -> tuple
     from scipy.spatial import cKDTree
 
     moved, normals = points.copy(), np.zeros_like(points)
-    near, wide = (cKDTree(p).query_ball_point(points, 1.5 * voxel_m) for p in (tips, points))
+    near = cKDTree(tips).query_ball_point(points, 1.5 * voxel_m)
+    _, wide = cKDTree(points).query(points, k=12)
     for i, point in enumerate(points):
         around = tips[near[i]] if len(near[i]) >= 12 else points[wide[i]]
         height, normals[i] = _quadric(around, point, hint[i], voxel_m)

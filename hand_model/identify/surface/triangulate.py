@@ -5,12 +5,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .distance import distance_to_mesh
+
 Array = NDArray[np.float64]
 Faces = NDArray[np.int64]
 
 BALLS = (0.75, 1.0, 1.5, 2.0, 3.0)  # radii of the ball over the distance of the points
-COVERED = 0.95  # share of the points that a triangulation must reach
-FACING = 0.9  # share of the faces that must look away from the segment
+COVERED = 0.95  # share of the points that must lie on the surface, within
+NEAR = 0.25  # of their distance
+FACING = 0.9  # share of the probed faces that must look away from the segment
+
+FILLINGS = 20  # rounds of filling where a carved solid touches itself
 
 PIVOTING = "ball pivoting (Open3D)"
 CARVING = "Delaunay carving"
@@ -35,10 +40,10 @@ def triangulated(points: Array, normals: Array, spacing_m: float, pivoting: bool
         return _pivoted(points, normals, spacing_m), PIVOTING
     for ball in (*BALLS[2:], 4.0, 6.0, 10.0):
         faces = carved(points, ball * spacing_m)
-        if len(np.unique(faces)) >= COVERED * len(points):
-            if _facing(points, faces, normals) >= FACING:
+        if len(faces) and (distance_to_mesh(points, points, faces) <= NEAR * spacing_m).mean() >= COVERED:
+            probed = faces[circumradius(points[faces]) <= BALLS[-1] * spacing_m]
+            if _facing(points, probed, normals) >= FACING:
                 return faces, f"{CARVING}, ball of {ball * spacing_m * 1e3:.1f} mm"
-            break
     return _height_field(points, normals, BALLS[-1] * spacing_m), HEIGHT_FIELD
 
 
@@ -74,7 +79,7 @@ def carved(points: Array, radius_m: float) -> Faces:
         return np.zeros((0, 3), np.int64)
     corners = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
     opposite = mesh.simplices[:, corners].astype(np.int64)  # (t, 4, 3): face k lies opposite vertex k
-    gate = _circumradius(points[opposite]) > radius_m
+    gate = circumradius(points[opposite]) > radius_m
     outside = np.zeros(len(opposite) + 1, bool)
     outside[-1] = True  # neighbour -1: beyond the hull
     while True:
@@ -82,6 +87,12 @@ def carved(points: Array, radius_m: float) -> Faces:
         if not reached.any():
             break
         outside[:-1] |= reached
+    for _ in range(FILLINGS):
+        wall = outside[mesh.neighbors] & ~outside[:-1, None]
+        filling = outside[:-1] & _touching(mesh.simplices, opposite[wall])
+        if not filling.any():
+            break
+        outside[:-1] &= ~filling
     wall = outside[mesh.neighbors] & ~outside[:-1, None]
     faces = opposite[wall]
     inner = points[np.broadcast_to(mesh.simplices[:, :, None], wall.shape + (1,))[wall][:, 0]]
@@ -91,7 +102,16 @@ def carved(points: Array, radius_m: float) -> Faces:
     return faces
 
 
-def _circumradius(triangle: Array) -> Array:
+def _touching(tetrahedra: Faces, faces: Faces) -> NDArray[np.bool_]:
+    """Tetrahedra (t, 4) at an edge along which more than two of the faces (f, 3) meet: filled, the solid no longer touches itself there."""
+    edges, count = np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0, return_counts=True)
+    hit = np.zeros(len(tetrahedra), bool)
+    for a, b in edges[count > 2]:
+        hit |= (tetrahedra == a).any(1) & (tetrahedra == b).any(1)
+    return hit
+
+
+def circumradius(triangle: Array) -> Array:
     """Circumradius (...) [m] of triangles (..., 3, 3) [m]."""
     a, b, c = (np.linalg.norm(triangle[..., i, :] - triangle[..., j, :], axis=-1) for i, j in ((0, 1), (1, 2), (2, 0)))
     twice = np.linalg.norm(np.cross(triangle[..., 1, :] - triangle[..., 0, :], triangle[..., 2, :] - triangle[..., 0, :]), axis=-1)
@@ -121,4 +141,4 @@ def _height_field(points: Array, normals: Array, longest_m: float) -> Faces:
         faces = Delaunay(flat).simplices.astype(np.int64)
     except QhullError:
         return np.zeros((0, 3), np.int64)
-    return faces[_circumradius(points[faces]) <= longest_m]
+    return faces[circumradius(points[faces]) <= longest_m]
