@@ -13,7 +13,7 @@ from .bootstrap import variance_inflation
 from .chain import Chain, ChainData, Pose, marker_body
 from .clock import Clock, align
 from .likelihood import START_FRAMES, ChainFit, angle_noise_ratio, fit_chain, robust_cost
-from .repair import Slip, Swap, find_slip, repair_labels, split_marker
+from .repair import Slip, Swap, find_slip, level_last_joint, repair_labels, split_marker
 from .start import other_starts, start_chain
 
 Array = NDArray[np.float64]
@@ -115,7 +115,7 @@ def identify_finger(session: Session, finger: Finger, palm_shape: Array) -> Fing
         fit, slips = _fit_with_slips(_best_fit(data, rest, palm_shape))
     except IdentificationError as error:
         raise IdentificationError(f'{trials[0].name}: finger "{finger.name}": {error}') from None
-    fit, covariance = _zero_at_rest(fit, rest)
+    fit, covariance = _zero_at_rest(level_last_joint(fit), rest)
     covariance = _honest(covariance, fit)
     records = tuple(
         _record(trial, mocap, slice(int(a), int(b)), swaps, fit)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from ..rotation import rotation_about
 from .chain import ChainData, propagate
 from .likelihood import ChainFit
 
@@ -15,6 +16,8 @@ Array = NDArray[np.float64]
 
 # A support does not move by less than this [m] and stay there; rounding in a file may.
 SMALLEST_SLIP_M = 2e-5
+# Slips of one support's markers are found some blocks apart [frames].
+SAME_MOMENT = 150
 
 
 @dataclass(frozen=True)
@@ -172,3 +175,41 @@ def split_marker(data: ChainData, slip: Slip) -> ChainData:
     y[:, j] = before
     labels = (*data.labels[: j + 1], slip.label, *data.labels[j + 1 :])
     return ChainData(y, np.insert(data.body, j + 1, data.body[j]), labels)
+
+
+def level_last_joint(fit: ChainFit) -> ChainFit:
+    """The fit with the last joint's angle made continuous where its whole support turned on the segment.
+
+    Such a turn about the joint's own axis cannot be told from an angle by the markers of that support; but the linkage can: the
+    last angle is a smooth function of the first, before and after, up to that step. Found by least squares (quartic and step).
+    """
+    k = fit.data.n_joints - 1
+    late = _after_support_slip(fit, k + 1)
+    if k == 0 or late is None:
+        return fit
+    columns, frames = late
+    angle = fit.pose.angle_rad
+    used = (fit.weight[:, fit.data.body == k + 1] > 0.5).sum(1) >= 2
+    basis = np.column_stack([np.polynomial.polynomial.polyvander(angle[:, 0], 4), frames])
+    step = float(np.linalg.lstsq(basis[used], angle[used, k], rcond=None)[0][-1])
+    levelled = angle.copy()
+    levelled[frames, k] -= step
+    axis, centre = fit.chain.axis_palm[k], fit.chain.centre_palm[k]
+    marker = fit.chain.marker_palm.copy()
+    marker[columns] = centre + (marker[columns] - centre) @ rotation_about(axis, step).T
+    return replace(fit, chain=replace(fit.chain, marker_palm=marker), pose=replace(fit.pose, angle_rad=levelled))
+
+
+def _after_support_slip(fit: ChainFit, body: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]] | None:
+    """Columns and frames after the moment from which on no marker of a body sits where it sat before; None where one does."""
+    columns = np.flatnonzero(fit.data.body == body)
+    seen = fit.weight[:, columns] > 0.5
+    frames = np.arange(len(seen))
+    spans = [(frames[s].min(), frames[s].max()) if s.any() else (0, -1) for s in seen.T]
+    alive = [(c, a, b) for c, (a, b) in zip(columns, spans, strict=True) if b >= a]
+    for _, moment, _ in sorted(alive, key=lambda item: item[1]):
+        early = [c for c, _, b in alive if b < moment + SAME_MOMENT]
+        later = [c for c, a, _ in alive if a >= moment]
+        if early and later and len(early) + len(later) == len(alive):
+            return np.array(later), frames >= moment
+    return None
