@@ -15,7 +15,8 @@ import numpy as np
 from ..description import Description, read_description
 from ..errors import DescriptionError, HandFileError
 from ..hand import Hand
-from .mesh import capsule_mesh, joined, stl
+from .contact import settled
+from .mesh import link_meshes, stl
 from .mjcf import mjcf
 from .names import sanitised
 from .plan import Plan, complete, planned, variants
@@ -43,7 +44,7 @@ def compile(hand: Hand, folder: str | Path, newton_metre_per_unit: float | None 
             f"{target}: exists and is not a compiled hand; name a new folder or an earlier one of this command"
         )
     whole, guessed = complete(hand)
-    plans = tuple(planned(stem, suffix, part, guessed) for (stem, suffix), part in variants(whole).items())
+    plans = tuple(settled(planned(stem, suffix, part, guessed)) for (stem, suffix), part in variants(whole).items())
     target.parent.mkdir(parents=True, exist_ok=True)
     staging = Path(tempfile.mkdtemp(prefix=f".{target.name}.", dir=target.parent))
     try:
@@ -69,9 +70,8 @@ def _write(folder: Path, hand: Hand, plans: tuple[Plan, ...], newton_metre_per_u
             if tree is not None:
                 (folder / name).write_bytes(document(tree))
         for link in plan.links:
-            probed = link.surface
-            mesh = (probed.vertices, probed.faces) if probed else joined([capsule_mesh(shape) for shape in link.solid])
-            (folder / "assets" / f"{link.mesh}.stl").write_bytes(stl(*mesh))
+            for name, mesh in link_meshes(link).items():
+                (folder / "assets" / name).write_bytes(stl(*mesh))
     try:
         hand.save(folder / "hand.json")
     except ValueError as error:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..rotation import perpendicular_basis
+from .plan import Link
 from .shape import Capsule
 
 Array = NDArray[np.float64]
@@ -47,6 +48,14 @@ def joined(meshes: list[tuple[Array, NDArray[np.int64]]]) -> tuple[Array, NDArra
     return np.concatenate([v for v, _ in meshes]), np.concatenate(
         [f + o for (_, f), o in zip(meshes, offsets, strict=True)]
     )
+
+
+def link_meshes(link: Link) -> dict[str, tuple[Array, NDArray[np.int64]]]:
+    """File name -> mesh of everything that a link shows, and of the convex parts that it collides with."""
+    probed = link.surface
+    whole = (probed.vertices, probed.faces) if probed else joined([capsule_mesh(shape) for shape in link.solid])
+    parts = {f"{link.mesh}_part_{i}.stl": (part.vertices, part.faces) for i, part in enumerate(link.parts)}
+    return {f"{link.mesh}.stl": whole, **parts}
 
 
 def stl(vertices: Array, faces: NDArray[np.int64]) -> bytes:

@@ -81,7 +81,10 @@ def _body(parent: Any, asset: Any, link: Link, drives: dict[str, Drive]) -> Any:
                 joint.set("armature", number(drive.armature))
     child(asset, "mesh", name=f"{link.name}_visual", file=f"{link.mesh}.stl")
     child(body, "geom", class_="visual", type="mesh", mesh=f"{link.name}_visual")
-    for shape in link.shapes:
+    for i in range(len(link.parts)):
+        child(asset, "mesh", name=f"{link.name}_part_{i}", file=f"{link.mesh}_part_{i}.stl")
+        child(body, "geom", class_="collision", type="mesh", mesh=f"{link.name}_part_{i}")
+    for shape in () if link.parts else link.shapes:
         if np.linalg.norm(shape.end - shape.start) < 1e-6:
             child(body, "geom", class_="collision", type="sphere", size=shape.radius, pos=shape.start)
         else:

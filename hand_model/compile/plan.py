@@ -30,6 +30,7 @@ class Link:
     position_parent, axis: (3,) [m], [-]. range_rad: (low, high). solid: nominal shape, which the
     inertia and the visual mesh (file stem `mesh`) come from; shapes: what collides. sites: name -> (3,) [m].
     surface: the probed surface that takes the nominal shape's place as visual, and as origin of the inertia if watertight.
+    parts: its convex parts, which collide in place of `shapes`.
     """
 
     name: str
@@ -46,6 +47,7 @@ class Link:
     sites: Mapping[str, Array]
     mesh: str
     surface: Surface | None = None
+    parts: tuple[Surface, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,8 @@ class Plan:
 
     stem: file name without ending; suffix: what tells it from the plain variant. linkages: equality name -> (finger,
     Linkage). keyframes: name -> {joint: angle [rad]}.
-    reached: keyframe -> {finger: fraction closed}. excludes: (body, body, reason). guessed_tips: finger -> how.
+    reached: keyframe -> {finger: fraction closed}. excludes: (body, body, reason). guessed_tips: finger -> how. contact_notes: where probed
+    parts could not serve for contact.
     """
 
     stem: str
@@ -67,6 +70,7 @@ class Plan:
     reached: Mapping[str, Mapping[str, float]]
     excludes: tuple[tuple[str, str, str], ...]
     guessed_tips: Mapping[str, str]
+    contact_notes: tuple[str, ...] = ()
 
     @property
     def mass(self) -> float:
@@ -177,7 +181,8 @@ def _with_surfaces(hand: Hand, links: list[Link]) -> list[Link]:
         if found is not None:
             joints = [j for f in hand.fingers if f.name == link.finger for j in f.joints if j.name == link.segment]
             own = found.shifted(joints[0].centre_palm if joints else np.zeros(3))
-            link = replace(link, surface=own, inertia=mesh_inertia(own) if own.watertight else link.inertia)
+            inertia = mesh_inertia(own) if own.watertight else link.inertia
+            link = replace(link, surface=own, inertia=inertia, parts=own.parts)
         out.append(link)
     return out
 

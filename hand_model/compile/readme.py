@@ -38,6 +38,7 @@ def readme(hand: Hand, plans: tuple[Plan, ...]) -> str:
         _joints(hand),
         _linkages(plans),
         _motors(hand),
+        _surfaces(plans),
         _keyframes(plans),
         _known_issues(hand, plans),
         f"{VERIFICATION}\n\nNot yet run. `hand-model check` on this folder measures every item of it.\n",
@@ -79,7 +80,7 @@ def _derivation(hand: Hand, plans: tuple[Plan, ...]) -> str:
         f"Masses and inertias are a fallback, not measured: solid capsules between the joints, {DENSITY:.0f} kg/m^3.",
         "Where a watertight surface was probed, mass and inertia are its inside's at that density.",
         "Visual meshes (group 2) are the probed surfaces, else these capsules.",
-        "Collision capsules (group 3) are the same, shrunk until nothing touches at any keyframe.",
+        "Contact (group 3): convex parts of probed surfaces, else the capsules, shrunk until nothing touches at any keyframe.",
     ]
     if any(plan.names.actuator for plan in plans) and not hand.motors:
         steps.append(
@@ -148,6 +149,14 @@ def _motors(hand: Hand) -> str:
     return "\n".join(rows) + "\n"
 
 
+def _surfaces(plans: tuple[Plan, ...]) -> str:
+    links = {link.name: link for plan in plans for link in plan.links if link.surface is not None and link.surface.how}
+    if not links:
+        return ""
+    rows = [f"- `{name}`: {link.surface.how}; {link.inertia.mass * 1e3:.1f} g" for name, link in links.items()]
+    return "## Surfaces\n\n" + "\n".join(rows) + "\n"
+
+
 def _keyframes(plans: tuple[Plan, ...]) -> str:
     rows = ["## Keyframes\n", "Fraction of its range by which each finger is closed:\n"]
     for plan in plans:
@@ -178,6 +187,8 @@ def _known_issues(hand: Hand, plans: tuple[Plan, ...]) -> str:
         for one, other, reason in plan.excludes:
             if reason != SHARE_A_JOINT:
                 issues.append(f"`{plan.stem}`: no contact between `{one}` and `{other}`, whose primitives {reason}.")
+    for plan in plans:
+        issues += plan.contact_notes
     issues.append("The attachment site is the palm frame itself: the wrist's interface was not measured.")
     links = {link.name: link for plan in plans for link in plan.links}.values()
     fallback = [link.name for link in links if link.surface is None]

@@ -11,6 +11,7 @@ from ..kinematics import unit
 from .mjcf import mjcf
 from .plan import Plan
 from .shape import Capsule, segment_distance
+from .surface import Surface
 from .xml import child, vector
 
 Array = NDArray[np.float64]
@@ -128,13 +129,30 @@ def _room(plan: Plan) -> tuple[Array, Array, Array, float, float] | None:
     thickness = max(c.radius for k in plan.links if k.finger and not k.finger.startswith("thumb") for c in k.shapes)
     breadth = np.array([f.joints[0].centre_palm for f in fingers]) @ along
     half = 0.5 * float(np.ptp(breadth)) + 3 * thickness
-    solids = [Capsule(s.start + plan.origin(k), s.end + plan.origin(k), s.radius) for k in plan.links for s in k.shapes]
+    capsules = [k for k in plan.links if not k.parts]
+    solids = [Capsule(s.start + plan.origin(k), s.end + plan.origin(k), s.radius) for k in capsules for s in k.shapes]
+    probed = [_spread_over(part) + plan.origin(k) for k in plan.links for part in k.parts]
+    points = np.concatenate([np.zeros((0, 3)), *probed])
     for below in np.arange(thickness + GAP, thickness + length, GAP):
         centre = base + FORWARD * length * forward + (below + radius) * out
         ends = centre - half * along, centre + half * along
-        if all(segment_distance(*ends, c.start, c.end) > c.radius + radius + GAP for c in solids):
+        away = _from_segment(points, *ends).min(initial=np.inf) > radius + GAP
+        if away and all(segment_distance(*ends, c.start, c.end) > c.radius + radius + GAP for c in solids):
             return centre, along, out, radius, half
     return None
+
+
+def _spread_over(part: Surface) -> Array:
+    """Points (n, 3) [m] all over a mesh, a sixth of a triangle's edge apart."""
+    weights = np.array([(i, j, 6 - i - j) for i in range(7) for j in range(7 - i)]) / 6
+    return np.einsum("wc,fck->fwk", weights, part.vertices[part.faces]).reshape(-1, 3)
+
+
+def _from_segment(points: Array, a: Array, b: Array) -> Array:
+    """Distances (n,) [m] of points (n, 3) from the line segment a-b."""
+    along = b - a
+    share = np.clip((points - a) @ along / (along @ along), 0, 1)
+    return np.linalg.norm(points - a - share[:, None] * along, axis=1)
 
 
 def _quaternion(along: Array, out: Array) -> Array:

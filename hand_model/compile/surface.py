@@ -1,13 +1,16 @@
-"""Probed surfaces that a hand carries: visual meshes and, where watertight, mass properties in place of the fallback.
+"""Probed surfaces that a hand carries: visual meshes, convex parts for contact and, where watertight, mass properties in
+place of the fallback.
 
 `hand.extra["surfaces"]` maps "palm" or "<finger>/<joint>" to {"vertices": (v, 3) [m] in the palm frame at rest, "faces": (f, 3)
-counter-clockwise from outside}.
+counter-clockwise from outside, "parts": convex meshes of the same form, optional, "how", "error": optional, see
+identify.surface}.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +25,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Surface:
-    """A triangle mesh: vertices (v, 3) [m], faces (f, 3)."""
+    """A triangle mesh: vertices (v, 3) [m], faces (f, 3). parts: convex meshes for contact. how: where it comes from."""
 
     vertices: Array
     faces: NDArray[np.int64]
+    parts: tuple[Surface, ...] = ()
+    how: str = ""
 
     @property
     def watertight(self) -> bool:
@@ -36,7 +41,7 @@ class Surface:
 
     def shifted(self, origin: Array) -> Surface:
         """The surface seen from another origin (3,) [m]."""
-        return Surface(self.vertices - origin, self.faces)
+        return Surface(self.vertices - origin, self.faces, tuple(p.shifted(origin) for p in self.parts), self.how)
 
 
 def surfaces(hand: Hand) -> Mapping[Key, Surface]:
@@ -51,17 +56,30 @@ def surfaces(hand: Hand) -> Mapping[Key, Surface]:
             if name.split("/")[0] in {f.name for f in hand.fingers} or "/" not in name:
                 raise HandFileError(f'surface "{name}" belongs to no segment; {did_you_mean(name, keys)}')
             continue
-        try:
-            vertices, faces = np.array(table["vertices"], float), np.array(table["faces"], np.int64)
-        except (KeyError, TypeError, ValueError):
-            raise HandFileError(f'surface "{name}" needs "vertices" and "faces" of three numbers each') from None
-        sizes = vertices.ndim == 2 and faces.ndim == 2 and vertices.shape[1] == faces.shape[1] == 3 and len(faces) > 3
-        if not (sizes and np.isfinite(vertices).all() and faces.min() >= 0 and faces.max() < len(vertices)):
-            raise HandFileError(
-                f'surface "{name}" is no mesh: vertices (v, 3), finite, and four or more faces (f, 3) into them'
-            )
-        found[keys[name]] = Surface(vertices, faces)
+        whole = _mesh(name, table)
+        parts = tuple(_mesh(f"{name}, part {i}", part) for i, part in enumerate(table.get("parts", ())))
+        found[keys[name]] = Surface(whole.vertices, whole.faces, parts, _how(table))
     return found
+
+
+def _mesh(name: str, table: Any) -> Surface:
+    try:
+        vertices, faces = np.array(table["vertices"], float), np.array(table["faces"], np.int64)
+    except (KeyError, TypeError, ValueError):
+        raise HandFileError(f'surface "{name}" needs "vertices" and "faces" of three numbers each') from None
+    sizes = vertices.ndim == 2 and faces.ndim == 2 and vertices.shape[1] == faces.shape[1] == 3 and len(faces) > 3
+    if not (sizes and np.isfinite(vertices).all() and faces.min() >= 0 and faces.max() < len(vertices)):
+        raise HandFileError(
+            f'surface "{name}" is no mesh: vertices (v, 3), finite, and four or more faces (f, 3) into them'
+        )
+    return Surface(vertices, faces)
+
+
+def _how(table: Mapping[str, Any]) -> str:
+    error = table.get("error", {})
+    names = (("median_mm", "median"), ("p95_mm", "95 %"), ("max_mm", "largest"))
+    said = ", ".join(f"{text} {error[key]:.2f} mm" for key, text in names if key in error)
+    return "; ".join(part for part in (str(table.get("how", "")), said and f"probed points off the mesh: {said}") if part)
 
 
 def mesh_inertia(surface: Surface, density: float = DENSITY) -> Inertia:

@@ -59,7 +59,9 @@ def _link(root: Any, link: Link) -> None:
     visual = child(element, "visual")
     child(visual, "origin", xyz=(0, 0, 0), rpy=(0, 0, 0))
     child(child(visual, "geometry"), "mesh", filename=f"assets/{link.mesh}.stl")
-    for shape in link.shapes:  # URDF has no capsule: a cylinder and two balls
+    for i in range(len(link.parts)):
+        _collision(element, np.zeros(3), np.zeros(3), "mesh", filename=f"assets/{link.mesh}_part_{i}.stl")
+    for shape in () if link.parts else link.shapes:  # URDF has no capsule: a cylinder and two balls
         length = float(np.linalg.norm(shape.end - shape.start))
         if length > 1e-6:
             rpy = roll_pitch_yaw((shape.end - shape.start) / length)
