@@ -26,6 +26,7 @@ from .probe import ProbedPoint, calibrated_probe, probed_point
 from .published import published_joint
 from .screws import Screws, probe_screws
 from .start import cluster_shape
+from .surface import identify_surfaces, with_surfaces
 
 Array = NDArray[np.float64]
 
@@ -102,6 +103,8 @@ def identify_all(session: Session | str | Path, say: Callable[[str], None] = lam
             "published_method": published,
         },
     )
+    if probe is not None:
+        hand = with_surfaces(hand, identify_surfaces(session, hand))
     return Identification(hand, session, shape, tuple(fits))
 
 

@@ -16,7 +16,7 @@ from ..probe import calibrated_probe
 from .distance import distance_to_mesh, summary_mm
 from .mend import face_normals, mended
 from .solid import CLOSED, closed, convex_parts
-from .sweep import resampled, swept
+from .sweep import Cloud, resampled, swept
 from .triangulate import BALLS, circumradius, triangulated
 
 if TYPE_CHECKING:
@@ -99,11 +99,19 @@ def with_surfaces(hand: Hand, surfaces: Iterable[Surface]) -> Hand:
 def _surface(
     segment: str, trials: list[Trial], session: Session, probe: Probe, hand: Hand, voxel_m: float, pivoting: bool | None
 ) -> Surface:
+    from scipy.spatial import QhullError
+
     try:
-        cloud = resampled(*swept(trials, session, probe, hand), voxel_m)
+        return _from_cloud(segment, resampled(*swept(trials, session, probe, hand), voxel_m), voxel_m, pivoting)
     except IdentificationError as error:
-        note = f"{segment}: no surface, shape and inertia stay the fallback's ({error})"
-        return Surface(segment, np.zeros((0, 3)), np.zeros((0, 3), np.int64), notes=(note,))
+        reason = str(error)
+    except QhullError:  # all points on one plane to the last digit, or on one line
+        reason = "its points enclose no volume"
+    note = f"{segment}: no surface, shape and inertia stay the fallback's ({reason})"
+    return Surface(segment, np.zeros((0, 3)), np.zeros((0, 3), np.int64), notes=(note,))
+
+
+def _from_cloud(segment: str, cloud: Cloud, voxel_m: float, pivoting: bool | None) -> Surface:
     faces, method = triangulated(cloud.points_palm, cloud.normals, voxel_m, pivoting)
     vertices, faces, repairs = mended(cloud.points_palm, faces, cloud.normals)
     vertices, faces, closing = closed(vertices, faces, cloud.points_palm)
