@@ -26,6 +26,8 @@ STEP_LIMIT = 0.1
 START_FRAMES = 400
 # There the outlier limit starts this many times wider and halves with every step, so that a poor start is not taken for outliers.
 ANNEALING = 8.0
+# Frames linearised at a time: their Jacobians fit a second-level cache.
+CHUNK = 512
 
 
 @dataclass(frozen=True)
@@ -122,24 +124,24 @@ def _linearise(data: ChainData, chain: Chain, pose: Pose) -> tuple[Array, Array,
 def _optimise(data: ChainData, chain: Chain, iterations: int, width: float = 1.0) -> tuple[Chain, Pose, float, bool]:
     pose = palm_pose(chain, data)
     damping = 1e-8
-    linear = _linearise(data, chain, pose)
-    noise = _noise(linear[0], data)
+    residual = _residual(data, chain, pose)
+    noise = _noise(residual, data)
     for _ in range(iterations):
         scale = noise * width
-        cost = robust_cost(linear[0], scale)
-        normal = _assemble(data, linear, robust_weight(linear[0], scale))
+        cost = robust_cost(residual, scale)
+        normal = _assemble(data, chain, pose, robust_weight(residual, scale))
         for _ in range(8):
             shared, frames = _step(normal, chain, data, damping)
             new_chain, new_pose = chain.moved(shared), pose.moved(frames)
-            new_linear = _linearise(data, new_chain, new_pose)
-            if robust_cost(new_linear[0], scale) <= cost * (1 + 1e-9):
+            new_residual = _residual(data, new_chain, new_pose)
+            if robust_cost(new_residual, scale) <= cost * (1 + 1e-9):
                 damping = max(damping / 10, 1e-12)
                 break
             damping = max(damping * 100, 1e-6)
         else:
             return chain, pose, noise, False
-        chain, pose, linear = new_chain, new_pose, new_linear
-        noise = _noise(linear[0], data)
+        chain, pose, residual = new_chain, new_pose, new_residual
+        noise = _noise(residual, data)
         if width == 1.0 and shared @ normal.reduced @ shared < (STEP_LIMIT * noise) ** 2:
             return chain, pose, noise, True
         width = max(1.0, width / 2)
@@ -166,7 +168,21 @@ def _frame_system(by_frame: Array, residual: Array, weight: Array) -> tuple[Arra
     return block, gradient
 
 
-def _assemble(data: ChainData, linear: tuple[Array, Array, Array, Array], weight: Array) -> _Normal:
+def _assemble(data: ChainData, chain: Chain, pose: Pose, weight: Array) -> _Normal:
+    """Normal equations, a chunk of frames at a time so that what is worked on stays in the cache."""
+    n, f, size = len(weight), 6 + data.n_joints, chain.size
+    block, back = np.empty((n, f, f)), np.empty((n, f, size + 1))
+    reduced, gradient = np.zeros((size, size)), np.zeros(size)
+    for start in range(0, n, CHUNK):
+        part = slice(start, start + CHUNK)
+        linear = _linearise(data.take(part), chain, pose.take(part))
+        block[part], back[part], more, more_gradient = _assemble_chunk(linear, weight[part])
+        reduced += more
+        gradient += more_gradient
+    return _Normal(block, back, (reduced + reduced.T) / 2, gradient)
+
+
+def _assemble_chunk(linear: tuple[Array, Array, Array, Array], weight: Array) -> tuple[Array, Array, Array, Array]:
     residual, by_frame, by_marker, by_joint = linear
     n, m, _, f = by_frame.shape
     block, frame_gradient = _frame_system(by_frame, residual, weight)
@@ -177,20 +193,17 @@ def _assemble(data: ChainData, linear: tuple[Array, Array, Array, Array], weight
     weighted_joint = flat_joint * np.repeat(weight, 3, axis=1)[..., None]
     frame_joint = np.swapaxes(by_frame.reshape(n, 3 * m, f), 1, 2) @ weighted_joint
     frame_shared = np.concatenate([frame_marker, frame_joint], axis=2)
-    size = frame_shared.shape[2]
+    size, columns = frame_shared.shape[2], flat_joint.shape[2]
     shared = np.zeros((size, size))
     shared[: 3 * m, : 3 * m] = np.diag(np.repeat(weight.sum(0), 3))
     marker_joint = np.einsum("nmij,nmiq->mjq", by_marker * w, by_joint, optimize=True).reshape(3 * m, -1)
     shared[: 3 * m, 3 * m :], shared[3 * m :, : 3 * m] = marker_joint, marker_joint.T
-    columns = flat_joint.shape[2]
     shared[3 * m :, 3 * m :] = flat_joint.reshape(-1, columns).T @ weighted_joint.reshape(-1, columns)
     gradient_marker = np.einsum("nmij,nmi->mj", by_marker * w, r, optimize=True).ravel()
     gradient_joint = np.einsum("nrq,nr->q", weighted_joint, r.reshape(n, -1))
     back = np.linalg.solve(block, np.concatenate([frame_shared, frame_gradient[..., None]], axis=2))
     eliminated = frame_shared.reshape(n * f, size).T @ back.reshape(n * f, size + 1)
-    reduced = shared - eliminated[:, :size]
-    gradient = np.concatenate([gradient_marker, gradient_joint]) - eliminated[:, size]
-    return _Normal(block, back, (reduced + reduced.T) / 2, gradient)
+    return block, back, shared - eliminated[:, :size], np.concatenate([gradient_marker, gradient_joint]) - eliminated[:, size]
 
 
 def free_directions(chain: Chain, body: Array) -> Array:
@@ -220,14 +233,14 @@ def _step(normal: _Normal, chain: Chain, data: ChainData, damping: float) -> tup
 
 
 def _finish(data: ChainData, chain: Chain, pose: Pose, noise: float, converged: bool) -> ChainFit:
-    linear = _linearise(data, chain, pose)
-    weight = robust_weight(linear[0], noise)
-    normal = _assemble(data, linear, weight)
+    residual = _residual(data, chain, pose)
+    weight = robust_weight(residual, noise)
+    normal = _assemble(data, chain, pose, weight)
     free = free_directions(chain, data.body)
     redundancy = 3 * weight.sum() - (6 + data.n_joints) * (weight.sum(1) > 0).sum() - free.shape[1]
-    noise = float(np.sqrt(np.nansum(weight[..., None] * linear[0] ** 2) / max(redundancy, 1.0)))
+    noise = float(np.sqrt(np.nansum(weight[..., None] * residual**2) / max(redundancy, 1.0)))
     covariance = noise**2 * free @ np.linalg.pinv(free.T @ normal.reduced @ free, rcond=1e-15, hermitian=True) @ free.T
     angle_sd = noise * np.sqrt(np.einsum("nii->ni", np.linalg.inv(normal.frame_block))[:, 6:])
     return ChainFit(
-        data, chain, pose, covariance, angle_sd, noise, weight, linear[0], robust_cost(linear[0], noise), redundancy, converged
+        data, chain, pose, covariance, angle_sd, noise, weight, residual, robust_cost(residual, noise), redundancy, converged
     )

@@ -121,7 +121,8 @@ def _kept(x: Array, y: Array, order: int) -> NDArray[np.bool_]:
 
 
 def _as_good(loss: Array, best: Array) -> bool:
-    difference = loss - best
+    """Whether held-out losses per group are not worse: in their logarithm, so that no single group decides."""
+    difference = np.log(loss + 1e-300) - np.log(best + 1e-300)
     return difference.mean() <= 2 * difference.std(ddof=1) / np.sqrt(len(difference)) if len(difference) > 1 else False
 
 
