@@ -7,8 +7,9 @@ simulated position out, nothing filtered.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,7 +51,7 @@ class Lane:
     coulomb_scale: float = 1.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Swing:
     """All stretches of a session, and the joint's weight: gravity effort = sine sin q + cosine cos q (what holds it)."""
 
@@ -77,95 +78,144 @@ def vector(values: Mapping[str, float]) -> Array:
 
 def simulate(swing: Swing, theta: Array, lanes: Array) -> Array:
     """Positions (steps, L) of L runs: run l simulates stretch lanes[l] with parameters theta[l]; (L, len(PARAMETERS))."""
-    chosen = [swing.lanes[i] for i in lanes]
-    steps = max(len(c.position) for c in chosen)
-    drive = _delayed(swing, theta, lanes, steps)
-    p = {name: np.ascontiguousarray(theta[:, i]) for name, i in INDEX.items()}
-    live = np.array([c.live for c in chosen])
-    q = np.array([c.start[0] for c in chosen])
-    v = np.array([c.start[1] for c in chosen])
-    scale = np.array([c.coulomb_scale for c in chosen])
-    h = swing.step_s
-    hi = h / p["inertia"]
-    coulomb, emf = p["coulomb"] * scale, p["back_emf"] * live
-    viscous = p["damping"] + emf
-    lateral, has = swing.cosine + p["lateral"], {k: bool(np.any(p[k])) for k in PARAMETERS}
-    low = has["static_excess"] or has["load_gear_low"] or has["load_motor_low"] or has["load_external_low"]
-    inverse = 1.0 / p["stribeck_speed"]
-    out = np.empty((steps, len(chosen)))
-    # Semi-implicit Euler is leapfrog when the velocity starts half a step early: second order instead of first.
-    if not swing.driven:
-        v = v + 0.5 * hi * (swing.sine * np.sin(q) + lateral * np.cos(q))
-    gentle = has["load_gear_low"] or has["load_motor_low"] or has["load_external_low"]
-    for k in range(steps):
-        out[k] = q
-        external = -(swing.sine * np.sin(q) + lateral * np.cos(q))
-        if has["stiffness"]:
-            external = external - p["stiffness"] * q
-        motor = drive[k]
-        friction = coulomb
-        shaft = motor - emf * v
-        if has["load_gear"]:
-            friction = friction + p["load_gear"] * np.abs(external - shaft)
-        if has["load_motor"]:
-            friction = friction + p["load_motor"] * np.abs(shaft)
-        if has["load_external"]:
-            friction = friction + p["load_external"] * np.abs(external)
-        if low:
-            level = p["static_excess"]
-            if gentle:
-                level = (level + p["load_gear_low"] * np.abs(external - shaft) + p["load_motor_low"] * np.abs(shaft)
-                         + p["load_external_low"] * np.abs(external))  # fmt: skip
-            friction = friction + level * np.exp(-((v * inverse) ** 2))
-        if has["motor_squared"] or has["external_squared"]:
-            friction = friction + p["motor_squared"] * shaft**2 + p["external_squared"] * external**2
-        b = viscous
-        if has["load_speed"]:
-            b = b + p["load_speed"] * np.abs(external)
-        if has["drag"]:
-            b = b + p["drag"] * np.abs(v)
-        if has["asymmetry"]:
-            friction = friction + p["asymmetry"] * np.sign(v)
-        if has["damping_asymmetry"]:
-            b = b + p["damping_asymmetry"] * np.sign(v)
-        free = (v + hi * (external + motor + p["offset"])) / (1.0 + hi * b)
-        v = np.sign(free) * np.maximum(np.abs(free) - hi * np.maximum(friction, 0.0) / (1.0 + hi * b), 0.0)
-        q = q + h * v
-    return out
-
-
-def _delayed(swing: Swing, theta: Array, lanes: Array, steps: int) -> Array:
-    """Drive effort (steps, L): gain x recorded drive, late by the delay, less by sag, scaled by the supply."""
-    out = np.zeros((steps, len(lanes)))
-    if not swing.driven:
-        return out
-    for i in np.unique(lanes):
-        lane, mine = swing.lanes[i], np.flatnonzero(lanes == i)
-        if lane.live == 0:
-            continue
-        n = len(lane.drive)
-        t = theta[mine]
-        delay = t[:, INDEX["delay"]] / swing.step_s
-        if np.any(delay):
-            at = np.clip(np.arange(n)[:, None] - delay, 0, n - 1.0001)
-            low = at.astype(int)
-            u = lane.drive[low] * (1 - (at - low)) + lane.drive[np.minimum(low + 1, n - 1)] * (at - low)
-        else:
-            u = np.repeat(lane.drive[:, None], len(mine), 1)
-        u = u * (1.0 + t[:, INDEX["supply"]] * lane.supply[:, None]) * t[:, INDEX["gain"]]
-        out[:n, mine] = u * (1.0 - t[:, INDEX["sag"]] * np.abs(u))
-    return out
+    return _chunks(swing, theta, lanes, False)
 
 
 def errors(swing: Swing, theta: Array, lanes: Array) -> Array:
     """Position residuals (steps, L), zero where nothing was recorded."""
-    simulated = simulate(swing, theta, lanes)
-    out = np.zeros_like(simulated)
-    for run, i in enumerate(lanes):
-        lane = swing.lanes[i]
-        n = len(lane.position)
-        out[:n, run] = np.nan_to_num(simulated[:n, run] - lane.position, nan=1e3, posinf=1e3, neginf=-1e3) * lane.used
-    return np.clip(out, -10.0, 10.0)
+    return np.clip(np.nan_to_num(_chunks(swing, theta, lanes, True), nan=1e1, posinf=1e1, neginf=-1e1), -10.0, 10.0)
+
+
+LANES_AT_ONCE = 3000  # so many runs' state fits a core's own cache
+
+
+@lru_cache(maxsize=16)
+def _stacked(swing: Swing) -> tuple[Array, ...]:
+    """The recordings side by side, (steps, stretches) each: drive, relative supply, position, used; lengths (stretches,)."""
+    length = np.array([len(lane.position) for lane in swing.lanes])
+    out = np.zeros((4, length.max(), len(length)))
+    for i, lane in enumerate(swing.lanes):
+        for k, values in enumerate((lane.drive * lane.live, lane.supply, lane.position, lane.used)):
+            out[k, : length[i], i] = values
+    return *out, length
+
+
+def _chunks(swing: Swing, theta: Array, lanes: Array, residual: bool) -> Array:
+    """Runs of like length together, so that few steps are spent on padding and the state stays in the cache."""
+    lanes = np.asarray(lanes)
+    length = _stacked(swing)[4][lanes]
+    out = np.zeros((length.max(), len(lanes)))
+    order = np.argsort(length, kind="stable")
+    edges = [0]
+    for k in range(1, len(order)):
+        if k - edges[-1] >= LANES_AT_ONCE or (length[order[k]] > 2 * length[order[edges[-1]]] and k - edges[-1] >= 200):
+            edges.append(k)
+    for a, b in zip(edges, [*edges[1:], len(order)], strict=True):
+        mine = order[a:b]
+        steps = int(length[mine].max())
+        out[:steps, mine] = _run(swing, theta[mine], lanes[mine], steps, residual)
+    return out
+
+
+def _run(swing: Swing, theta: Array, lanes: Array, steps: int, residual: bool) -> Array:
+    """Positions, or residuals, (steps, L); an effect that no run has costs nothing."""
+    p = {name: np.ascontiguousarray(theta[:, i]) for name, i in INDEX.items()}
+    has = {name: bool(np.any(values)) for name, values in p.items()}
+    has["level"] = any(has[k] for k in ("load_gear_low", "load_motor_low", "load_external_low"))
+    chosen = [swing.lanes[i] for i in lanes]
+    live = np.array([c.live for c in chosen])
+    q, v = np.array([c.start for c in chosen]).T.copy()
+    h = swing.step_s
+    p["hi"] = h / p["inertia"]
+    p["coulomb"] = p["coulomb"] * np.array([c.coulomb_scale for c in chosen])
+    p["emf"] = p["back_emf"] * live
+    p["inverse"] = 1.0 / p["stribeck_speed"]
+    lateral = swing.cosine + p["lateral"]
+    bends = bool(np.any(lateral))
+    position, used = _stacked(swing)[2:4]
+    drive = _drive(swing, theta, lanes, has) if swing.driven else None
+    # Semi-implicit Euler is leapfrog when the velocity starts half a step early: second order instead of first.
+    if not swing.driven:
+        v = v + 0.5 * p["hi"] * (swing.sine * np.sin(q) + lateral * np.cos(q))
+    out = np.empty((steps, len(lanes)))
+    with np.errstate(all="ignore"):
+        for k in range(steps):
+            out[k] = (q - position[k, lanes]) * used[k, lanes] if residual else q
+            external = -swing.sine * np.sin(q)
+            if bends:
+                external -= lateral * np.cos(q)
+            if has["stiffness"]:
+                external -= p["stiffness"] * q
+            v = _next_speed(p, has, v, external, None if drive is None else drive(k))
+            q = q + h * v
+    return out
+
+
+def _next_speed(p: Mapping[str, Array], has: Mapping[str, bool], v: Array, external: Array, motor: Array | None) -> Array:
+    """Velocity (L,) after one step under external effort and the motor's: implicit damping, clipped dry friction."""
+    friction, b = _friction(p, has, v, external, motor)
+    hi, effort = p["hi"], external
+    if motor is not None:
+        effort = effort + motor
+        b = b + p["emf"]
+    if has["offset"]:
+        effort = effort + p["offset"]
+    share = 1.0 / (1.0 + hi * b)
+    free = (v + hi * effort) * share
+    stop = hi * share * friction
+    return free - np.minimum(np.maximum(free, -stop), stop)
+
+
+def _friction(p: Mapping[str, Array], has: Mapping[str, bool], v: Array, external: Array,
+              motor: Array | None) -> tuple[Array, Array]:  # fmt: skip
+    """Dry friction's bound (L,) and viscous damping (L,) without the motor's own."""
+    friction, b = p["coulomb"], p["damping"]
+    shaft = 0.0 if motor is None else motor - p["emf"] * v
+    if has["load_gear"]:
+        friction = friction + p["load_gear"] * np.abs(external - shaft)
+    if has["load_motor"]:
+        friction = friction + p["load_motor"] * np.abs(shaft)
+    if has["load_external"]:
+        friction = friction + p["load_external"] * np.abs(external)
+    if has["level"] or has["static_excess"]:
+        level = p["static_excess"]
+        if has["level"]:
+            level = (level + p["load_gear_low"] * np.abs(external - shaft) + p["load_motor_low"] * np.abs(shaft)
+                     + p["load_external_low"] * np.abs(external))  # fmt: skip
+        friction = friction + level * np.exp(-((v * p["inverse"]) ** 2))
+    if has["motor_squared"] or has["external_squared"]:
+        friction = friction + p["motor_squared"] * shaft**2 + p["external_squared"] * external**2
+    if has["load_speed"]:
+        b = b + p["load_speed"] * np.abs(external)
+    if has["drag"]:
+        b = b + p["drag"] * np.abs(v)
+    if has["asymmetry"]:
+        friction = np.maximum(friction + p["asymmetry"] * np.sign(v), 0.0)
+    if has["damping_asymmetry"]:
+        b = b + p["damping_asymmetry"] * np.sign(v)
+    return friction, b
+
+
+def _drive(swing: Swing, theta: Array, lanes: Array, has: Mapping[str, bool]) -> Callable[[int], Array]:
+    """Drive effort (L,) at a step: gain x recorded drive, late by the delay, less by sag, scaled by the supply."""
+    recorded, supply = _stacked(swing)[:2]
+    gain, sag, share = (theta[:, INDEX[n]] for n in ("gain", "sag", "supply"))
+    late = theta[:, INDEX["delay"]] / swing.step_s
+    whole = np.ceil(late).astype(int)
+    part = whole - late
+
+    def effort(k: int) -> Array:
+        if has["delay"]:
+            low = np.maximum(k - whole, 0)
+            u = recorded[low, lanes] * (1 - part) + recorded[np.maximum(np.minimum(k - whole + 1, k), 0), lanes] * part
+        else:
+            u = recorded[k, lanes]
+        if has["supply"]:
+            u = u * (1.0 + share * supply[k, lanes])
+        u = u * gain
+        return u * (1.0 - sag * np.abs(u)) if has["sag"] else u
+
+    return effort
 
 
 @dataclass(frozen=True)
