@@ -6,11 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .mend import face_normals, rims
+from .triangulate import BALLS, circumradius
 
 Array = NDArray[np.float64]
 Faces = NDArray[np.int64]
 
 CLOSED = "closed by the sweep"
+UNSWEPT = 0.03  # area share that was not swept from which a surface is called open
 LID = "open side closed by a lid"
 SHELL_M = 0.002  # m: wall of a surface that is open and that no lid closes
 HULL = "convex hull of the points"
@@ -28,16 +30,17 @@ def volume(vertices: Array, faces: Faces) -> float:
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
 
 
-def closed(vertices: Array, faces: Faces, points: Array) -> tuple[Array, Faces, str]:
+def closed(vertices: Array, faces: Faces, points: Array, spacing_m: float) -> tuple[Array, Faces, str]:
     """A watertight mesh from a mended surface, and how it was closed.
 
     In this order: closed already; a fan from the rim's middle, where every face of the surface can be seen from there; a shell of
-    2 mm; the convex hull of points (n, 3) [m].
+    2 mm; the convex hull of points (n, 3) [m], which lie about spacing_m [m] apart.
     """
     loops = rims(faces)
     if len(faces) >= 4:
         if not loops and volume(vertices, faces) > 0:
-            return vertices, faces, CLOSED
+            bare = _unswept(vertices, faces, BALLS[-1] * spacing_m)
+            return vertices, faces, CLOSED if bare <= UNSWEPT else f"{LID} over {100 * bare:.0f} % of the area"
         if len(loops) == 1:
             lid = _lidded(vertices, faces, loops[0])
             if lid is not None:
@@ -47,6 +50,12 @@ def closed(vertices: Array, faces: Faces, points: Array) -> tuple[Array, Faces, 
             if volume(*shell) > 0:
                 return *shell, f"open: a shell of {SHELL_M * 1e3:g} mm behind the surface"
     return *hull(points), HULL
+
+
+def _unswept(vertices: Array, faces: Faces, ball_m: float) -> float:
+    """Area share of triangles that a ball of that radius [m] falls through: nothing was probed within them."""
+    area = np.linalg.norm(face_normals(vertices, faces), axis=1)
+    return float(area[circumradius(vertices[faces]) > ball_m].sum() / max(area.sum(), 1e-300))
 
 
 def _lidded(vertices: Array, faces: Faces, loop: list[int]) -> tuple[Array, Faces] | None:

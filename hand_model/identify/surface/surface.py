@@ -14,10 +14,10 @@ from ...hand import Hand
 from ...session import Probe, Session, Trial
 from ..probe import calibrated_probe
 from .distance import distance_to_mesh, summary_mm
-from .mend import face_normals, mended
+from .mend import mended
 from .solid import CLOSED, closed, convex_parts
 from .sweep import Cloud, resampled, swept
-from .triangulate import BALLS, circumradius, triangulated
+from .triangulate import triangulated
 
 if TYPE_CHECKING:
     from ..identification import Identification
@@ -27,7 +27,6 @@ Faces = NDArray[np.int64]
 Mesh = tuple[Array, Faces]
 
 VOXEL_M = 0.005  # distance of the resampled points, as in the thesis
-UNSWEPT = 0.03  # area share that was not swept from which a surface is called open
 
 
 @dataclass(frozen=True)
@@ -114,22 +113,13 @@ def _surface(
 def _from_cloud(segment: str, cloud: Cloud, voxel_m: float, pivoting: bool | None) -> Surface:
     faces, method = triangulated(cloud.points_palm, cloud.normals, voxel_m, pivoting)
     vertices, faces, repairs = mended(cloud.points_palm, faces, cloud.normals)
-    vertices, faces, closing = closed(vertices, faces, cloud.points_palm)
-    bare = _unswept(vertices, faces, BALLS[-1] * voxel_m)
-    if closing == CLOSED and bare > UNSWEPT:
-        closing = f"{100 * bare:.0f} % of it was not swept and is bridged flat"
+    vertices, faces, closing = closed(vertices, faces, cloud.points_palm, voxel_m)
     parts, split = convex_parts(vertices, faces, voxel_m)
     error = summary_mm(distance_to_mesh(cloud.raw_palm, vertices, faces))
     repairs = {"outliers": cloud.dropped, **repairs}
     how = f"{len(cloud.points_palm)} points {voxel_m * 1e3:g} mm apart; {method}; {closing}; contact: {split}"
     notes = () if closing == CLOSED else (f"{segment}: the sweep leaves the surface open; {closing}",)
     return Surface(segment, vertices, faces, parts, how, tuple(repairs.items()), tuple(error.items()), notes)
-
-
-def _unswept(vertices: Array, faces: Faces, ball_m: float) -> float:
-    """Area share of triangles that a ball of that radius [m] falls through: nothing was probed within them."""
-    area = np.linalg.norm(face_normals(vertices, faces), axis=1)
-    return float(area[circumradius(vertices[faces]) > ball_m].sum() / max(area.sum(), 1e-300))
 
 
 def _plain(mesh: Mesh) -> dict[str, Any]:

@@ -18,7 +18,9 @@ Array = NDArray[np.float64]
 
 LEAST_POINTS = 20  # resampled points below which nothing is triangulated
 LEAST_NEIGHBOURS = 3  # occupied voxels around one that belongs to a surface rather than to a path beside it
+FEW = 0.1  # of the usual number of tips around a tip, within a voxel's edge: with less it is a stray one
 OUTLIER = 5.0  # standard deviations off the surface around it
+STEP = 0.4  # of a voxel's edge: as far may a point be from where its neighbours expect it, even on a smooth surface
 
 
 @dataclass(frozen=True)
@@ -75,8 +77,9 @@ def resampled(tip: Array, shaft: Array, voxel_m: float) -> Cloud:
         raise IdentificationError(f"voxels of {voxel_m * 1e3:g} mm; an edge above zero is needed")
     kept = _on_surface(tip, shaft, voxel_m)
     points, hint = _voxel_means(tip[kept], shaft[kept], voxel_m)
-    solid = _surrounded(points, voxel_m)
-    points, hint = points[solid], hint[solid]
+    for group in (_surrounded, _continued):
+        part = group(points, hint, voxel_m)
+        points, hint = points[part], hint[part]
     if len(points) < LEAST_POINTS:
         raise IdentificationError(
             f"{len(tip)} tips make {len(points)} points {voxel_m * 1e3:g} mm apart, too few for a surface ({LEAST_POINTS} or more); "
@@ -87,6 +90,7 @@ def resampled(tip: Array, shaft: Array, voxel_m: float) -> Cloud:
 
 
 def _voxel_means(points: Array, shaft: Array, voxel_m: float) -> tuple[Array, Array]:
+    """Mean tips (n, 3) [m] and summed shafts (n, 3) of the occupied voxels."""
     cell = np.floor((points - points.min(0)) / voxel_m).astype(int)
     _, index, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
     index = index.reshape(-1)
@@ -94,7 +98,7 @@ def _voxel_means(points: Array, shaft: Array, voxel_m: float) -> tuple[Array, Ar
     return sums[0] / count[:, None], sums[1]
 
 
-def _surrounded(points: Array, voxel_m: float) -> NDArray[np.bool_]:
+def _surrounded(points: Array, hint: Array, voxel_m: float) -> NDArray[np.bool_]:
     """Points with neighbours on more than one line, in the largest group that hangs together."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
@@ -121,8 +125,40 @@ def _surrounded(points: Array, voxel_m: float) -> NDArray[np.bool_]:
     return keep
 
 
+def _continued(points: Array, hint: Array, voxel_m: float) -> NDArray[np.bool_]:
+    """Points that lie where the quadric through their neighbours expects them: not the last of a path that leaves the surface."""
+    from scipy.spatial import cKDTree
+
+    keep = np.ones(len(points), bool)
+    for _ in range(4):
+        at = np.flatnonzero(keep)
+        if len(at) < LEAST_POINTS:
+            return keep
+        _, near = cKDTree(points[at]).query(points[at], k=13)
+        off = np.zeros(len(at))
+        for i, around in enumerate(near):
+            height, _ = _quadric(points[at[around[1:]]], points[at[i]], hint[at[i]], voxel_m)
+            off[i] = abs(height(points[at[i]][None])[0])
+        limit = max(OUTLIER * 1.4826 * float(np.median(off)), STEP * voxel_m)
+        # of neighbours that accuse each other the worst goes first
+        worst = (off > limit) & (off >= off[near].max(1))
+        if not worst.any():
+            break
+        keep[at[worst]] = False
+    return keep
+
+
 def _on_surface(tip: Array, shaft: Array, voxel_m: float) -> NDArray[np.bool_]:
-    """Tips within a few deviations of the quadric through the tips around them."""
+    """Tips with others around them, within a few deviations of the quadric through those."""
+    from scipy.spatial import cKDTree
+
+    crowd = cKDTree(tip).query_ball_point(tip, voxel_m, return_length=True) - 1
+    kept = crowd >= FEW * np.median(crowd)
+    kept[kept] = _near_quadric(tip[kept], shaft[kept], voxel_m)
+    return kept
+
+
+def _near_quadric(tip: Array, shaft: Array, voxel_m: float) -> NDArray[np.bool_]:
     from scipy.spatial import cKDTree
 
     centres, hint = _voxel_means(tip, shaft, voxel_m)
