@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from .errors import IdentificationError
 from .hand import Estimate
 from .identify.motor import MotorFit, identify_motor, output_error
-from .identify.motor.output_error import MoveData, moves_from_rest
+from .identify.motor.output_error import MoveData, moves_from_rest, shortened
 from .identify.motor.recording import actuator_trials, motor_trial
 from .session import Log, Session
 
@@ -65,7 +65,7 @@ def residuals(fit: MotorFit, log: Log, name: str = "log") -> list[tuple[MoveData
     data = [m for m in data if m.target > m.origin and (m.time_s > ALIGN_S).sum() > 3]
     if not data:
         return []
-    early = [_until(m, ALIGN_S) for m in data]
+    early = [shortened(m, ALIGN_S) for m in data]
     noise = (fit.sigma_position, fit.sigma_current)
     own = output_error.fit(early, fit.values, (), noise, {}, fit.output_error.controller, iterations=4).own
     simulated = output_error.simulate_moves(data, fit.values, own, fit.output_error.controller)
@@ -75,11 +75,6 @@ def residuals(fit: MotorFit, log: Log, name: str = "log") -> list[tuple[MoveData
         z = (m.current - y[:, 1]) / fit.sigma_current
         out.append((m, begin + trial.time_s[m.index] + m.time_s, np.where(m.time_s > ALIGN_S, z, 0.0)))
     return out
-
-
-def _until(m: MoveData, end_s: float) -> MoveData:
-    k = m.time_s <= end_s
-    return MoveData(m.trial, m.index, m.time_s[k], m.position[k], m.current[k], m.origin, m.target, m.limit, m.own, m.own_sd)
 
 
 def cumulative_sum(z: Array, slack: float = SLACK) -> Array:
@@ -160,7 +155,7 @@ def _contact(fit: MotorFit, m: MoveData, time_s: Array, z: Array, alarm: int, na
     if not measure:
         return Contact(name, float(time_s[alarm]), onset, at, None, "undetermined")
     best, noise = None, (fit.sigma_position, fit.sigma_current)
-    data = [_until(m, float(m.time_s[alarm] + AFTER_S))]
+    data = [shortened(m, float(m.time_s[alarm] + AFTER_S))]
     names = ("contact_stiffness", "contact_at", "contact_damping")
     bounds = {"contact_stiffness": (1e-3, 1e4), "contact_at": (m.origin, m.target), "contact_damping": (0.0, 0.1)}
     for stiffness in (1.0, 6.0, 40.0):

@@ -7,6 +7,7 @@ Controller: u = gain (r - p) + damping (r' - v), within the current limit. Two k
     "profile": a trapezoidal velocity profile from the old to the new setpoint (a ramp where rise and fall take no time);
     "cascade": r' follows position_gain (setpoint - p) within the speed limit and a slew rate, and holds within a deadband; as r is
     the integral of the wanted speed, this is a position loop round a speed loop with proportional and integral action.
+The recorded current acts `lead` seconds later: a loop that samples holds its value until the next step.
 A loop that samples acts late: p and v reach the controller `delay` seconds old, to first order (p - delay v, v - delay a).
 Integrated by the implicit midpoint rule, linear within a step.
 """
@@ -22,7 +23,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 STEP_S = 2e-3
-SHARED = ("inertia", "viscous", "coulomb", "stiffness", "preload", "presliding", "bristle", "speed_full", "rise", "gain", "damping", "delay")
+SHARED = ("inertia", "viscous", "coulomb", "stiffness", "preload", "presliding", "bristle", "speed_full", "rise", "gain", "damping", "delay", "lead")
 CONTROLLERS = {"profile": (*SHARED, "fall"), "cascade": (*SHARED, "position_gain", "deadband")}
 STRIBECK = ("static_ratio", "stribeck_speed")
 CONTACT = ("contact_stiffness", "contact_at", "contact_damping")  # optional: an object met in flexion, [raw/%], [%], [s]
@@ -32,7 +33,8 @@ EDGE = 0.05  # [%]: width over which the deadband sets in
 @dataclass(frozen=True)
 class Moves:
     """Moves from rest, one per entry (B,): start_s of the command after the move's own zero [s], origin and target [%],
-    speed [share of full], limit [raw], position [%] and current hold [raw] at rest, duration_s [s]; by falling duration for `simulate`."""
+    speed [share of full], limit [raw], position [%] and current hold [raw] at rest, duration_s [s], velocity [%/s] of a drive that
+    creeps within its deadband; by falling duration for `simulate`."""
 
     start_s: Array
     origin: Array
@@ -42,6 +44,7 @@ class Moves:
     position: Array
     hold: Array
     duration_s: Array
+    velocity: Array | float = 0.0
 
 
 def profile(time_s: Array, moves: Moves, q: Mapping[str, Array]) -> tuple[Array, Array]:
@@ -63,7 +66,8 @@ def profile(time_s: Array, moves: Moves, q: Mapping[str, Array]) -> tuple[Array,
 def simulate(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, controller: str = "profile") -> tuple[Array, Array, Array]:
     """Time (n,) [s], position (n, B) [%] and current (n, B) [raw] of B moves under B parameter sets (each (B,)).
 
-    Every move starts at rest in balance, so its friction there is what the controller pushes less the spring.
+    Every move starts at rest in balance, so its friction there is what the controller pushes less the spring; where it creeps,
+    friction is that of sliding.
     Rows after a move's duration are not filled.
     """
     n = int(np.ceil(moves.duration_s.max() / step_s)) + 2
@@ -80,14 +84,14 @@ def simulate(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, contr
     half = 0.5 * step_s
     mass = q["inertia"] / half
     position, current = np.empty((n, len(moves.target))), np.empty((n, len(moves.target)))
-    p, v = moves.position.copy(), np.zeros(len(moves.target))
+    p, v = moves.position.copy(), np.zeros(len(moves.target)) + moves.velocity
     u = np.clip(moves.hold if cascade else gain * (r[0] - p), -limit, limit)
     if cascade:
-        r_now, w_now = p + u / gain, np.zeros(len(p))
+        r_now, w_now = p + (u + damping * v) / gain, np.zeros(len(p))
         slew, top_speed = step_s * q["speed_full"] / np.maximum(q["rise"], 1e-4), q["speed_full"] * moves.speed
         started = moves.start_s
     top = coulomb * (1.0 + ratio)
-    f = np.clip(u - spring * p - preload, -top, top)
+    f = np.where(v == 0.0, np.clip(u - spring * p - preload, -top, top), np.sign(v) * top)
     touch = "contact_stiffness" in q
     linear = mass + viscous + half * spring
     delay = np.minimum(q["delay"], 0.8 * q["inertia"] / np.maximum(damping, 1e-9))
@@ -101,10 +105,13 @@ def simulate(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, contr
             p, v, f, a = p[:k], v[:k], f[:k], a[:k]
         if cascade:
             r_now, w_now = r_now[:k], w_now[:k]
-            error = np.where(time_s[i] < started[:k], moves.origin[:k], moves.target[:k]) - p
-            share = np.minimum(np.maximum((np.abs(error) - q["deadband"][:k]) / EDGE, 0.0), 1.0)
-            wanted = share * np.clip(q["position_gain"][:k] * error, -top_speed[:k], top_speed[:k])
-            w_next = w_now + np.clip(wanted - w_now, -slew[:k], slew[:k])
+            # the share of this step that lies behind the command, so that its instant counts within a step too
+            since = np.minimum(np.maximum((time_s[i] + step_s - started[:k]) / step_s, 0.0), 1.0)
+            share, change = _cascade(q, k, moves.target[:k] - p, w_now, top_speed, slew)
+            if since.min() < 1.0:
+                old_share, old_change = _cascade(q, k, moves.origin[:k] - p, w_now, top_speed, slew)
+                share, change = since * share + (1 - since) * old_share, since * change + (1 - since) * old_change
+            w_next = w_now + change
             r_next = r_now + 0.5 * step_s * (w_now + w_next)
         else:
             r_now, w_now = r[i, :k], w[i, :k]
@@ -145,3 +152,10 @@ def simulate(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, contr
         limit_f = np.sign(middle) * level
         f = limit_f + (f - limit_f) * np.exp(-step_s * np.abs(middle) / distance[:k])
     return time_s, position, current
+
+
+def _cascade(q: Mapping[str, Array], k: int, error: Array, speed: Array, top_speed: Array, slew: Array) -> tuple[Array, Array]:
+    """Share (0..1) in which a position error (k,) [%] is outside the deadband, and the change of the wanted speed [%/s] in one step."""
+    share = np.minimum(np.maximum((np.abs(error) - q["deadband"][:k]) / EDGE, 0.0), 1.0)
+    wanted = share * np.minimum(np.maximum(q["position_gain"][:k] * error, -top_speed[:k]), top_speed[:k])
+    return share, np.minimum(np.maximum(wanted - speed, -slew[:k]), slew[:k])

@@ -15,7 +15,7 @@ from ...session import Session
 from . import output_error
 from .corrected import NAMES, Regression, fit_regression
 from .drive import CONTROLLERS, STRIBECK
-from .output_error import MoveData, OutputErrorFit, moves_from_rest
+from .output_error import BEFORE, MoveData, OutputErrorFit, moves_from_rest, shortened
 from .published import PublishedFit, fit_published, smear_share
 from .recording import MotorTrial, Scale, actuator_trials, check_trials, motor_trial, trial_scale
 
@@ -40,12 +40,13 @@ UNITS = {
     "gain": "raw/%",
     "damping": "raw s/%",
     "delay": "s",
+    "lead": "s",
 }
 BOUNDS = {
     "inertia": (1e-5, 1e3),
     "viscous": (-1e3, 1e4),
     "coulomb": (1e-3, 1e5),
-    "presliding": (0.03, 10.0),
+    "presliding": (0.005, 10.0),
     "bristle": (0.0, 0.2),
     "speed_full": (1.0, 1e4),
     "rise": (0.0, 3.0),
@@ -55,9 +56,11 @@ BOUNDS = {
     "gain": (1e-2, 1e4),
     "damping": (0.0, 1e3),
     "delay": (-0.002, 0.02),
+    "lead": (-0.01, 0.01),
     "static_ratio": (1.0, 8.0),
     "stribeck_speed": (1.5, 100.0),
 }
+MOVE_S = 2.5  # of a move that is simulated: the rest of a slow one says little more
 LACK_OF_FIT = 1.35  # residual variance over the noise's, above which output error does not describe the recording
 EVIDENCE = 16.0  # fall of the misfit (in variances, two parameters and two shapes tried): once in about a thousand by chance
 
@@ -106,6 +109,20 @@ def white_noise(values: Array, time_s: Array) -> float:
     return float(1.4826 * np.median(np.abs(d)))
 
 
+def rest_noise(trials: Sequence[MotorTrial], sigma: tuple[float, float], speed_full: float) -> float:
+    """Standard deviation of the current [raw] while the drive rests before a command, 0 with fewer than four rests.
+
+    Noise with a memory is more than its differences show.
+    """
+    rests = []
+    for t in trials:
+        for m in moves_from_rest(t, sigma, speed_full):
+            held = t.current[max(0, m.index - BEFORE + 1) : m.index]
+            if len(held) >= 8:
+                rests.append(float(np.var(held, ddof=1)))
+    return float(np.sqrt(np.median(rests) * 1.07)) if len(rests) >= 4 else 0.0
+
+
 def identify_motor(session: Session, actuator: str) -> MotorFit:
     """Identify one motor from the session's excitation and flexion logs (validation trials take no part).
 
@@ -145,6 +162,7 @@ def fit_motor(trials: Sequence[MotorTrial], scale: Scale, actuator: str = "motor
     """Identify a motor from checked trials: regression first, then output error from the commands where these explain the motion."""
     sigma_p = max(float(np.median([white_noise(t.position, t.time_s) for t in trials])), 0.3 / scale.counts_per_percent)
     sigma_u = max(float(np.median([white_noise(t.current, t.time_s) for t in trials])), 0.3)
+    sigma_u = max(sigma_u, rest_noise(trials, (sigma_p, sigma_u), scale.speed_full))
     plain = fit_regression(trials, sigma_p)
     curved = fit_regression(trials, sigma_p, stribeck=True)
     published, alike, smear = fit_published(trials), fit_published(trials, both_sides=True), smear_share(trials)
@@ -205,7 +223,7 @@ def _start(moves: Sequence[MoveData], plain: Regression) -> dict[str, float]:
     speed = float(np.median(ratio)) * 1.02 if ratio else 100.0
     return {
         **plant, "presliding": 0.5, "bristle": 0.004, "static_ratio": 1.0, "stribeck_speed": 20.0, "stribeck_exponent": 1.0,
-        "speed_full": speed, "rise": 0.1, "fall": 0.1, "delay": 0.0, "position_gain": 12.0, "deadband": float(np.median(np.abs(error))), "gain": gain,
+        "speed_full": speed, "rise": 0.1, "fall": 0.1, "delay": 0.0, "lead": 5e-4, "position_gain": 12.0, "deadband": float(np.median(np.abs(error))), "gain": gain,
         "damping": 2 * np.sqrt(gain * plant["inertia"]),
     }  # fmt: skip
 
@@ -213,7 +231,9 @@ def _start(moves: Sequence[MoveData], plain: Regression) -> dict[str, float]:
 def _fit_output_error(
     moves: Sequence[MoveData], plain: Regression, curved: Regression, sigma: tuple[float, float]
 ) -> tuple[OutputErrorFit, float]:
-    base = _fit_controller(moves, _start(moves, plain), sigma)
+    start = _start(moves, plain)
+    moves = [shortened(m, MOVE_S) for m in moves]
+    base = _fit_controller(moves, start, sigma)
     fitted = CONTROLLERS[base.controller]
     # a Stribeck rise is tried where either the regression or the misfit leaves room for one
     if max(base.chi2) > 4.0 or (curved.excess_z < 2.0 and max(base.chi2) < 1.15):
@@ -221,8 +241,8 @@ def _fit_output_error(
     ratio = float(np.clip(1 + curved.static_excess / max(base.values["coulomb"], 1.0), 1.1, 3.0))
     fits = []
     for exponent in (1.0, 2.0):
-        start = {**base.values, "static_ratio": ratio, "stribeck_speed": 20.0, "stribeck_exponent": exponent}
-        fits.append(output_error.fit(moves, start, (*fitted, *STRIBECK), sigma, BOUNDS, base.controller, own=base.own))
+        curve = {**base.values, "static_ratio": ratio, "stribeck_speed": 20.0, "stribeck_exponent": exponent}
+        fits.append(output_error.fit(moves, curve, (*fitted, *STRIBECK), sigma, BOUNDS, base.controller, own=base.own))
     best, other = sorted(fits, key=lambda f: f.cost)
     evidence = (base.cost - best.cost) / max(1.0, *best.chi2)
     if evidence < EVIDENCE or _is_at_bound(best):

@@ -6,6 +6,7 @@ drive rested. Shared: plant, friction and controller. Gauss-Newton on whitened r
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -18,8 +19,12 @@ from .recording import MotorTrial
 Array = NDArray[np.float64]
 
 COARSE_S = 5e-3
-ABSOLUTE_REACH = {"preload": 20.0, "viscous": 0.1, "stiffness": 0.2, "coulomb": 10.0, "bristle": 0.01, "damping": 2.0, "rise": 0.02, "fall": 0.02, "deadband": 0.2, "delay": 0.002}
-OWN_STEP = (5e-4, 2e-3, 2e-4, 0.1)
+ABSOLUTE_REACH = {"preload": 20.0, "viscous": 0.1, "stiffness": 0.2, "coulomb": 10.0, "bristle": 0.01, "damping": 2.0, "rise": 0.02, "fall": 0.02, "deadband": 0.2, "delay": 0.002, "lead": 0.002}
+TICK_S = 1e-3  # what instants of the controller's steps are known to: a current that jumps within it says little
+# differences wide enough that the instants at which a drive sticks or a deadband sets in, held to one step, average out
+STEP_SHARE, OWN_STEP = 2e-2, (1e-3, 1e-2, 1e-3, 0.5)
+# a loop that holds its value for a step of 0 to 2 ms acts half a step after the value that is logged
+PRIOR = {"lead": (0.5 * TICK_S, 0.5 * TICK_S)}
 OWN_REACH = np.array([0.01, 0.3, 0.01, 10.0])  # of one step
 SETTLED = 0.6  # [%]: movement allowed over the samples before a move that starts from rest
 BEFORE = 12  # samples at rest that a move looks back to
@@ -31,7 +36,7 @@ class MoveData:
 
     Known only so well, and estimated with the fit: own = when the command took effect (within one sample of the log) [s], where
     the drive rested [%], the speed [share of full] (logged in whole raw units), and the current that held it at rest [raw].
-    own_sd: (4,) standard deviations.
+    own_sd: (4,) standard deviations. velocity [%/s]: of a drive that creeps before the command; 0 at rest.
     """
 
     trial: str
@@ -44,6 +49,7 @@ class MoveData:
     limit: float
     own: Array
     own_sd: Array
+    velocity: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -78,12 +84,10 @@ def moves_from_rest(trial: MotorTrial, sigma: tuple[float, float], speed_full: f
     ends = np.append(change[1:], len(t) - 1)
     found = []
     for i, j in zip(change, ends, strict=True):
-        before = p[max(0, i - BEFORE + 1) : i + 1]
-        settled = len(before) >= 4 and np.ptp(before) < SETTLED + 5 * sigma_position
-        drift = abs(before[len(before) // 2 :].mean() - before[: len(before) // 2].mean()) if len(before) >= 4 else np.inf
-        if not settled or drift > 3 * sigma_position or j - i < 8 or trial.setpoint[i + 1] == trial.setpoint[i]:
+        look = slice(max(0, i - BEFORE + 1), i + 1)
+        if j - i < 8 or trial.setpoint[i + 1] == trial.setpoint[i] or (rest := _rest(t[look], p[look], sigma_position)) is None:
             continue
-        held = trial.current[max(0, i - BEFORE + 1) : i + 1]
+        held = trial.current[look]
         speed = 1.0 if trial.speed is None else float(trial.speed[i + 1])
         limit = np.inf if trial.limit is None else float(trial.limit[i + 1])
         gap = float(t[i + 1] - t[i])
@@ -91,11 +95,33 @@ def moves_from_rest(trial: MotorTrial, sigma: tuple[float, float], speed_full: f
         found.append(
             MoveData(
                 trial.name, int(i), t[k] - t[i], p[k], trial.current[k], float(trial.setpoint[i]), float(trial.setpoint[i + 1]),
-                limit, np.array([0.5 * gap, before.mean(), speed, held.mean()]),
-                np.array([max(gap / np.sqrt(12), 5e-3), sigma_position / np.sqrt(len(before)), speed_sd, sigma[1] / np.sqrt(len(held))]),
+                limit, np.array([0.5 * gap, rest[0], speed, held.mean()]),
+                np.array([max(gap / np.sqrt(12), 5e-3), rest[1], speed_sd, sigma[1] / np.sqrt(len(held))]), rest[2],
             )
         )  # fmt: skip
     return tuple(found)
+
+
+def shortened(m: MoveData, end_s: float) -> MoveData:
+    """The move's samples up to `end_s` [s]."""
+    k = m.time_s <= end_s
+    return dataclasses.replace(m, time_s=m.time_s[k], position=m.position[k], current=m.current[k])
+
+
+def _rest(t: Array, p: Array, sigma: float) -> tuple[float, float, float] | None:
+    """Position [%] at the last of samples before a command, its deviation [%], and the velocity [%/s] of a steady creep.
+
+    0 where none is told from rest; None where the drive is not settled.
+    """
+    n = len(p)
+    if n < 4 or np.ptp(p) > SETTLED + 5 * sigma:
+        return None
+    x = t - t.mean()
+    slope, slope_sd = float(x @ p / (x @ x)), sigma / float(np.sqrt(x @ x))
+    creeps = abs(slope) > 4 * slope_sd
+    if np.sqrt(np.mean((p - p.mean() - slope * x) ** 2)) > 2 * sigma:
+        return None
+    return float(p.mean() + slope * x[-1]), 2 * sigma / np.sqrt(n), slope if creeps else 0.0
 
 
 def _arrays(data: Sequence[MoveData], own: Array, repeat: int) -> Moves:
@@ -105,6 +131,7 @@ def _arrays(data: Sequence[MoveData], own: Array, repeat: int) -> Moves:
     return Moves(
         own[:, 0], tile([m.origin for m in data]), tile([m.target for m in data]), own[:, 2],
         tile([m.limit for m in data]), own[:, 1], own[:, 3], tile([m.time_s[-1] for m in data]),
+        tile([m.velocity for m in data]),
     )  # fmt: skip
 
 
@@ -116,29 +143,31 @@ def simulate_moves(data: Sequence[MoveData], q: Mapping[str, float], own: Array,
     t, p, u = simulate(_arrays(sorted_data, own[order], 1), full, step_s, controller)
     out: list[Array] = [np.empty(0)] * len(data)
     for column, i in enumerate(order):
-        out[i] = _sample(t, p[:, column], u[:, column], data[i].time_s)
+        out[i] = _sample(t, p[:, column : column + 1], u[:, column : column + 1], data[i].time_s, q.get("lead", 0.0))[:, :, 0]
     return out
 
 
-def _sample(t: Array, p: Array, u: Array, at: Array) -> Array:
+def _sample(t: Array, p: Array, u: Array, at: Array, lead: Array | float = 0.0) -> Array:
+    """Position and current (n, 2, columns) of simulated columns (k, columns) at times `at` (n,) [s], the current `lead` [s] later."""
     step = t[1] - t[0]
-    i = np.minimum((at / step).astype(int), len(t) - 2)
-    w = at / step - i
-    if p.ndim == 1:
-        return np.c_[p[i] * (1 - w) + p[i + 1] * w, u[i] * (1 - w) + u[i + 1] * w]
-    w = w[:, None]
-    return np.stack([p[i] * (1 - w) + p[i + 1] * w, u[i] * (1 - w) + u[i + 1] * w], axis=1)
+    out = []
+    for y, shift in ((p, np.zeros_like(lead)), (u, lead)):
+        x = np.clip((at[:, None] + shift) / step, 0.0, len(t) - 1.001)
+        i = x.astype(int)
+        column = np.arange(y.shape[1])
+        out.append(y[i, column] * (1 - (x - i)) + y[i + 1, column] * (x - i))
+    return np.stack(out, axis=1)
 
 
 def _steps(values: Mapping[str, float], names: Sequence[str]) -> Array:
-    floor = {"preload": 1.0, "viscous": 0.02, "damping": 0.1, "bristle": 0.01, "rise": 0.01, "fall": 0.01, "deadband": 0.1, "delay": 0.01, "stiffness": 0.02, "coulomb": 1.0}
-    return np.array([1e-3 * max(abs(values[n]), floor.get(n, 0.0)) for n in names])
+    floor = {"preload": 1.0, "viscous": 0.02, "damping": 0.1, "bristle": 0.01, "rise": 0.01, "fall": 0.01, "deadband": 0.1, "delay": 0.01, "lead": 0.01, "stiffness": 0.02, "coulomb": 1.0}
+    return np.array([STEP_SHARE * max(abs(values[n]), floor.get(n, 0.0)) for n in names])
 
 
 def _linearise(
     data: Sequence[MoveData], q: Mapping[str, float], names: Sequence[str], own: Array, sigma: tuple[float, float], controller: str, step_s: float
-) -> tuple[list[Array], list[Array], list[Array]]:
-    """Whitened residuals (2n,), shared (2n, k) and own (2n, 4) Jacobian of every move, one batch of simulations."""
+) -> tuple[list[Array], list[Array], list[Array], list[Array]]:
+    """Whitened residuals (2n,), shared (2n, k) and own (2n, 4) Jacobian of every move, one batch of simulations; weights (n, 2)."""
     k = len(names)
     width = k + 1 + len(OWN_STEP)
     steps = _steps(q, names)
@@ -156,23 +185,49 @@ def _linearise(
     out_r: list = [None] * len(data)
     out_g: list = [None] * len(data)
     out_l: list = [None] * len(data)
+    out_w: list = [None] * len(data)
     for column, i in enumerate(order):
         m, c = data[i], slice(column * width, (column + 1) * width)
-        y = _sample(t, p[:, c], u[:, c], m.time_s) / np.asarray(sigma)[None, :, None]  # (n, 2, width)
-        target = np.stack([m.position, m.current], axis=1) / np.asarray(sigma)
-        out_r[i] = (target - y[:, :, 0]).T.ravel()
+        weight = _weights(t, u[:, column * width], m.time_s, sigma)
+        y = _sample(t, p[:, c], u[:, c], m.time_s, values["lead"][c] if "lead" in q else 0.0) * weight[:, :, None]  # (n, 2, width)
+        out_r[i] = (np.stack([m.position, m.current], axis=1) * weight - y[:, :, 0]).T.ravel()
         derivative = (y[:, :, 1:] - y[:, :, :1]) / np.append(steps, OWN_STEP)
         derivative = derivative.transpose(1, 0, 2).reshape(-1, width - 1)
-        out_g[i], out_l[i] = derivative[:, :k], derivative[:, k:]
-    return out_r, out_g, out_l
+        out_g[i], out_l[i], out_w[i] = derivative[:, :k], derivative[:, k:], weight
+    return out_r, out_g, out_l, out_w
 
 
-def _cost(data: Sequence[MoveData], q: Mapping[str, float], own: Array, sigma: tuple[float, float], controller: str, step_s: float) -> float:
-    total = 0.0
-    for m, y, x in zip(data, simulate_moves(data, q, own, controller, step_s), own, strict=True):
-        e = (np.stack([m.position, m.current], axis=1) - y) / np.asarray(sigma)
-        total += float(np.sum(e * e) + np.sum(((m.own - x) / m.own_sd) ** 2))
+def _weights(t: Array, u: Array, at: Array, sigma: tuple[float, float]) -> Array:
+    """Inverse standard deviations (n, 2) of position and current: the current's holds its change within TICK_S of the sample."""
+    reach = max(TICK_S, t[1] - t[0])
+    i = np.clip(((at - reach) / (t[1] - t[0])).astype(int), 0, len(t) - 1)
+    j = np.clip(np.ceil((at + reach) / (t[1] - t[0])).astype(int), 0, len(t) - 1)
+    change = (u[j] - u[i]) * (TICK_S / np.maximum((j - i) * (t[1] - t[0]), TICK_S))
+    return np.c_[np.full(len(at), 1 / sigma[0]), 1 / np.hypot(sigma[1], change)]
+
+
+def _misfit(residual: list[Array], data: Sequence[MoveData], own: Array, q: Mapping[str, float]) -> float:
+    """Sum of squares of whitened residuals, of what the moves' own unknowns are off their measured values, and of the priors."""
+    total = sum(((q[n] - mean) / sd) ** 2 for n, (mean, sd) in PRIOR.items() if n in q)
+    total += sum(float(e @ e) + float(np.sum(((m.own - x) / m.own_sd) ** 2)) for m, e, x in zip(data, residual, own, strict=True))
     return total if np.isfinite(total) else np.inf
+
+
+def _costs(
+    data: Sequence[MoveData], qs: Sequence[Mapping[str, float]], owns: Sequence[Array], weights: list[Array], controller: str, step_s: float
+) -> Array:
+    """Misfit of several candidates (their shared values and own unknowns) at fixed weights, in one batch of simulations."""
+    width = len(qs)
+    order = np.argsort([-m.time_s[-1] for m in data], kind="stable")
+    values = {n: np.tile([q[n] for q in qs], len(data)) for n in qs[0]}
+    own = np.stack(owns, axis=1)[order].reshape(len(data) * width, -1)
+    t, p, u = simulate(_arrays([data[i] for i in order], own, width), values, step_s, controller)
+    residual: list = [None] * len(data)
+    for column, i in enumerate(order):
+        m, c = data[i], slice(column * width, (column + 1) * width)
+        y = _sample(t, p[:, c], u[:, c], m.time_s, values["lead"][c] if "lead" in values else 0.0)
+        residual[i] = ((np.stack([m.position, m.current], axis=1)[:, :, None] - y) * weights[i][:, :, None]).reshape(-1, width)
+    return np.array([_misfit([e[:, j] for e in residual], data, owns[j], qs[j]) for j in range(width)])
 
 
 def fit(
@@ -182,7 +237,7 @@ def fit(
     sigma: tuple[float, float],
     bounds: Mapping[str, tuple[float, float]],
     controller: str = "profile",
-    iterations: int = 12,
+    iterations: int = 10,
     own: Array | None = None,
 ) -> OutputErrorFit:
     """Fit the named parameters to the moves by damped Gauss-Newton; the others stay at `start_values`.
@@ -192,14 +247,15 @@ def fit(
     """
     q, own = dict(start_values), np.array([m.own for m in data]) if own is None else own.copy()
     samples = 2 * sum(len(m.time_s) for m in data)
-    for step_s, rounds, enough in ((COARSE_S, 5, 2.0), (STEP_S, iterations, 0.1)):
-        damping, cost = 1e-3, _cost(data, q, own, sigma, controller, step_s)
+    for step_s, rounds, enough in ((COARSE_S, 8, 5.0), (STEP_S, iterations, 0.3)):
+        damping = 1e-3
         for i in range(rounds):
             linear = _linearise(data, q, names, own, sigma, controller, step_s)
-            normal, gradient, blocks, _ = _normal(data, *linear, own)
+            cost = _misfit(linear[0], data, own, q)
+            normal, gradient, blocks, _ = _normal(data, *linear[:3], own, q, names)
             if (expected := _expected(normal, gradient, blocks)) < enough or (i > 3 and cost > 20 * samples and expected > 0.5 * cost):
                 break
-            moved = _step(data, q, names, own, sigma, bounds, (normal, gradient, blocks), cost, damping, controller, step_s)
+            moved = _step(data, q, names, own, linear[3], bounds, (normal, gradient, blocks), cost, damping, controller, step_s)
             if moved is None:
                 break
             q, own, cost, damping = moved
@@ -218,11 +274,12 @@ def first_cost(
     """Misfit that two coarse steps reach on every `share`-th move: to choose where a fit starts."""
     some = tuple(sorted(data, key=lambda m: m.time_s[-1])[: max(6, len(data) // 2) : max(1, len(data) // (2 * share))])
     q, own = dict(values), np.array([m.own for m in some])
-    damping, cost = 1e-3, _cost(some, q, own, sigma, controller, COARSE_S)
+    damping, cost = 1e-3, np.inf
     for _ in range(3):
         linear = _linearise(some, q, names, own, sigma, controller, COARSE_S)
-        normal, gradient, blocks, _ = _normal(some, *linear, own)
-        moved = _step(some, q, names, own, sigma, bounds, (normal, gradient, blocks), cost, damping, controller, COARSE_S)
+        cost = _misfit(linear[0], some, own, q)
+        normal, gradient, blocks, _ = _normal(some, *linear[:3], own, q, names)
+        moved = _step(some, q, names, own, linear[3], bounds, (normal, gradient, blocks), cost, damping, controller, COARSE_S)
         if moved is None:
             break
         q, own, cost, damping = moved
@@ -241,7 +298,7 @@ def _step(
     q: dict[str, float],
     names: Sequence[str],
     own: Array,
-    sigma: tuple[float, float],
+    weights: list[Array],
     bounds: Mapping[str, tuple[float, float]],
     system: tuple[Array, Array, list[tuple[Array, Array, Array]]],
     cost: float,
@@ -249,11 +306,12 @@ def _step(
     controller: str,
     step_s: float,
 ) -> tuple[dict[str, float], Array, float, float] | None:
-    """One Levenberg-Marquardt step: new values, own unknowns, cost and damping; None where nothing improves."""
+    """One Levenberg-Marquardt step, the best of seven dampings: new values, own unknowns, cost and damping; None where nothing improves."""
     normal, gradient, blocks = system
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-30))
-    for _ in range(5):
-        move = np.linalg.lstsq(normal / np.outer(scale, scale) + damping * np.eye(len(names)), gradient / scale, rcond=1e-12)[0] / scale
+    tried, candidates = damping * 10.0 ** np.arange(-2, 5), []
+    for strength in tried:
+        move = np.linalg.lstsq(normal / np.outer(scale, scale) + strength * np.eye(len(names)), gradient / scale, rcond=1e-12)[0] / scale
         new_q = dict(q)
         for n, d in zip(names, move, strict=True):
             low, high = bounds.get(n, (-np.inf, np.inf))
@@ -261,16 +319,14 @@ def _step(
             new_q[n] = float(np.clip(q[n] + np.clip(d, -reach, reach), low, high))
         actual = np.array([new_q[n] - q[n] for n in names])
         local = np.array([inverse @ (b - c @ actual) for inverse, b, c in blocks])
-        new_own = own + np.clip(local, -OWN_REACH, OWN_REACH)
-        new = _cost(data, new_q, new_own, sigma, controller, step_s)
-        if new < cost:
-            return new_q, new_own, new, max(damping / 10, 1e-9)
-        damping = max(damping, 1e-4) * 10
-    return None
+        candidates.append((new_q, own + np.clip(local, -OWN_REACH, OWN_REACH)))
+    costs = _costs(data, [c[0] for c in candidates], [c[1] for c in candidates], weights, controller, step_s)
+    best = int(np.argmin(costs))
+    return (*candidates[best], float(costs[best]), float(np.clip(tried[best], 1e-8, 1e3))) if costs[best] < cost else None
 
 
 def _normal(
-    data: Sequence[MoveData], r: list[Array], g: list[Array], local: list[Array], own: Array
+    data: Sequence[MoveData], r: list[Array], g: list[Array], local: list[Array], own: Array, q: Mapping[str, float], names: Sequence[str]
 ) -> tuple[Array, Array, list[tuple[Array, Array, Array]], Array]:
     """Shared normal matrix and gradient with every move's own unknowns eliminated, what restores these, and the score per move."""
     k = g[0].shape[1]
@@ -282,20 +338,26 @@ def _normal(
         normal += a.T @ a - cross.T @ inverse @ cross
         scores.append(a.T @ e - cross.T @ inverse @ rhs)
         blocks.append((inverse, rhs, cross))
-    return normal, np.sum(scores, axis=0), blocks, np.array(scores)
+    gradient = np.sum(scores, axis=0)
+    for i, n in enumerate(names):
+        if n in PRIOR:
+            mean, sd = PRIOR[n]
+            normal[i, i] += 1 / sd**2
+            gradient[i] -= (q[n] - mean) / sd**2
+    return normal, gradient, blocks, np.array(scores)
 
 
 def _finish(
     data: Sequence[MoveData], linear: tuple[list[Array], ...], q: Mapping[str, float], names: Sequence[str], sigma: tuple[float, float], own: Array, cost: float,
     controller: str,
 ) -> OutputErrorFit:
-    r, g, local = linear
-    normal, _, _, score = _normal(data, r, g, local, own)
+    r, g, local, weights = linear
+    normal, _, _, score = _normal(data, r, g, local, own, q, names)
     k = len(names)
     meat = score.T @ score * len(score) / max(1, len(score) - 1)
     bread = np.linalg.pinv(normal, hermitian=True)
     n = sum(len(m.time_s) for m in data)
-    residual = tuple((e.reshape(2, -1) * np.asarray(sigma)[:, None]).T for e in r)
+    residual = tuple(e.reshape(2, -1).T / w for e, w in zip(r, weights, strict=True))
     squared = np.sum([np.sum(e.reshape(2, -1) ** 2, axis=1) for e in r], axis=0)
     chi2 = squared / (n - 0.5 * (k + 3 * len(data)))
     covariance = _conservative(bread * max(1.0, float(chi2.max())), bread @ meat @ bread)

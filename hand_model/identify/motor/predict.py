@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -68,6 +69,7 @@ def predict(fit: MotorFit, log: Log, name: str = "log", align: bool = True) -> P
         x = x.copy()
         if not first:
             x[1], x[3] = last[0], last[1]
+            m = dataclasses.replace(m, velocity=last[3])
         else:  # the drive's state before its first move is no prediction: it is where the recording starts
             k = slice(0 if last is None else m.index, m.index + 1)
             position[k], current[k] = x[1], (fit.values["gain"] * (m.origin - x[1]) if controller == "profile" else x[3])
@@ -76,7 +78,8 @@ def predict(fit: MotorFit, log: Log, name: str = "log", align: bool = True) -> P
         k = slice(m.index + 1, m.index + 1 + len(m.time_s))
         position[k], current[k], predicted[k] = y[:, 0], y[:, 1], True
         phase[k] = _phases(m, x, y[:, 0])
-        last = (y[-1, 0], y[-1, 1], m.target)
+        creep = float((y[-1, 0] - y[-4, 0]) / (m.time_s[-1] - m.time_s[-4]))
+        last = (y[-1, 0], y[-1, 1], m.target, creep if abs(creep) > 1e-3 else 0.0)
     return Prediction(trial.time_s, position, current, trial.position, trial.current, phase, predicted)
 
 
