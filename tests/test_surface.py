@@ -15,6 +15,7 @@ from hand_model.errors import IdentificationError
 from hand_model.hand import Coupling, Finger, Hand, Joint
 from hand_model.identify.surface import distance_to_mesh, identify_surfaces, with_surfaces
 from hand_model.identify.surface.mend import mended, rims
+from hand_model.identify.surface.refine import refined
 from hand_model.identify.surface.solid import CLOSED, LID, closed, convex_parts, hull, volume
 from hand_model.identify.surface.sweep import resampled
 from hand_model.identify.surface.triangulate import HEIGHT_FIELD, carved, has_open3d, triangulated
@@ -38,7 +39,8 @@ def _swept_ellipsoid(low, high, noise_m=4e-4, seed=3, n=3500, turns=20):
 def _solid(tip, shaft, pivoting, voxel_m=0.005):
     cloud = resampled(tip, shaft, voxel_m)
     faces, method = triangulated(cloud.points_palm, cloud.normals, voxel_m, pivoting)
-    vertices, faces, _ = mended(cloud.points_palm, faces, cloud.normals)
+    vertices, faces, normals, _ = mended(cloud.points_palm, faces, cloud.normals)
+    vertices, faces = refined(vertices, faces, normals)
     return *closed(vertices, faces, cloud.points_palm, voxel_m), method
 
 
@@ -122,7 +124,7 @@ def test_planted_defects_are_repaired(defect):
         far = trimesh.creation.box((0.001, 0.001, 0.001)).apply_translation([0.1, 0, 0])
         faces = np.concatenate([faces, np.array(far.faces) + len(vertices)])
         vertices, normals = np.concatenate([vertices, far.vertices]), np.concatenate([normals, far.vertex_normals])
-    whole, outside, counts = mended(vertices, faces, normals)
+    whole, outside, _, counts = mended(vertices, faces, normals)
     assert rims(outside) == [] and Compiled(whole, outside).watertight
     assert volume(whole, outside) == pytest.approx(ball.volume, rel=0.02)
     assert sum(counts.values()) > 0
@@ -139,8 +141,18 @@ def test_a_carved_cloud_of_two_touching_balls_does_not_touch_itself():
     assert volume(points, faces) > 2 * 4 / 3 * np.pi * 0.019**3
 
 
-def test_distances_from_a_mesh_are_those_of_trimesh():
+def test_refined_triangles_follow_a_ball_and_stay_closed():
     ball = trimesh.creation.icosphere(subdivisions=1, radius=0.02)
+    vertices, faces = refined(np.array(ball.vertices), np.array(ball.faces), np.array(ball.vertices) / 0.02)
+    assert Compiled(vertices, faces).watertight and len(faces) == 4 * len(ball.faces)
+    assert np.abs(np.linalg.norm(vertices, axis=1) - 0.02).max() < 1e-4  # flat, the middles are 1 mm below
+    flat = np.array([[0.0, 0, 0], [0.01, 0, 0], [0, 0.01, 0]]), np.array([[0, 1, 2]])
+    assert np.all(refined(*flat, np.tile([0.0, 0.0, 1.0], (3, 1)))[0][:, 2] == 0)
+
+
+@pytest.mark.parametrize("subdivisions", [0, 1, 3])
+def test_distances_from_a_mesh_are_those_of_trimesh(subdivisions):
+    ball = trimesh.creation.icosphere(subdivisions=subdivisions, radius=0.02).apply_scale([1.0, 0.2, 2.0])
     points = np.random.default_rng(0).normal(0, 0.03, (200, 3))
     nearest, _, _ = trimesh.proximity.closest_point_naive(ball, points)
     found = distance_to_mesh(points, np.array(ball.vertices), np.array(ball.faces))

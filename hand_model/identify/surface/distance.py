@@ -10,15 +10,30 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 Faces = NDArray[np.int64]
 
+CANDIDATES = 40  # nearest triangles, by their middles, that are looked at first
 CHUNK = 400_000  # pairs of point and triangle at a time
 
 
 def distance_to_mesh(points: ArrayLike, vertices: Array, faces: Faces) -> Array:
     """Distance (n,) [m] of points (n, 3) from the nearest triangle of a mesh: (v, 3) [m], (f, 3)."""
-    p = np.asarray(points, float).reshape(-1, 3)
-    corners = vertices[faces]
-    step = max(1, CHUNK // max(len(faces), 1))
-    parts = [_to_triangles(p[i : i + step, None], corners[None]).min(1) for i in range(0, len(p), step)]
+    from scipy.spatial import cKDTree
+
+    p, corners = np.asarray(points, float).reshape(-1, 3), vertices[faces]
+    middle = corners.mean(1)
+    reach = np.linalg.norm(corners - middle[:, None], axis=-1).max()
+    count = min(CANDIDATES, len(faces))
+    far, near = cKDTree(middle).query(p, k=np.arange(1, count + 1))
+    found = _in_chunks(p, corners[near], count)
+    # a face beyond the candidates may be nearer only where the last candidate's middle is not far enough away
+    unsure = np.flatnonzero(found > far[:, -1] - reach) if count < len(faces) else np.zeros(0, int)
+    found[unsure] = _in_chunks(p[unsure], np.broadcast_to(corners, (len(unsure), *corners.shape)), len(faces))
+    return found
+
+
+def _in_chunks(points: Array, triangles: Array, count: int) -> Array:
+    """Distance (n,) of points (n, 3) from the nearest of their own triangles (n, count, 3, 3)."""
+    step = max(1, CHUNK // max(count, 1))
+    parts = [_to_triangles(points[i : i + step, None], triangles[i : i + step]).min(1) for i in range(0, len(points), step)]
     return np.concatenate(parts) if parts else np.zeros(0)
 
 

@@ -14,8 +14,8 @@ HOLE_EDGES = 60  # of a longer rim the smallest filling is not looked for
 LOOKS_ON = 0.3  # cosine between a filling and the surface around it from which the filling continues it
 
 
-def mended(vertices: Array, faces: Faces, normals: Array) -> tuple[Array, Faces, dict[str, int]]:
-    """A manifold, outward-oriented surface without small holes, and how often each defect was repaired.
+def mended(vertices: Array, faces: Faces, normals: Array) -> tuple[Array, Faces, Array, dict[str, int]]:
+    """A manifold, outward-oriented surface without small holes, its normals, and how often each defect was repaired.
 
     vertices: (v, 3) [m]. normals: (v, 3) outward at the vertices. Vertices that no face needs are left out.
     """
@@ -33,7 +33,7 @@ def mended(vertices: Array, faces: Faces, normals: Array) -> tuple[Array, Faces,
             break
     counts["holes"] = filled
     used, index = np.unique(faces, return_inverse=True)
-    return vertices[used], index.reshape(-1, 3).astype(np.int64), counts
+    return vertices[used], index.reshape(-1, 3).astype(np.int64), normals[used], counts
 
 
 def rims(faces: Faces) -> list[list[int]]:

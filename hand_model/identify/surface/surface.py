@@ -15,6 +15,7 @@ from ...session import Probe, Session, Trial
 from ..probe import calibrated_probe
 from .distance import distance_to_mesh, summary_mm
 from .mend import mended
+from .refine import refined
 from .solid import CLOSED, closed, convex_parts
 from .sweep import Cloud, resampled, swept
 from .triangulate import triangulated
@@ -112,7 +113,8 @@ def _surface(
 
 def _from_cloud(segment: str, cloud: Cloud, voxel_m: float, pivoting: bool | None) -> Surface:
     faces, method = triangulated(cloud.points_palm, cloud.normals, voxel_m, pivoting)
-    vertices, faces, repairs = mended(cloud.points_palm, faces, cloud.normals)
+    vertices, faces, normals, repairs = mended(cloud.points_palm, faces, cloud.normals)
+    vertices, faces = refined(vertices, faces, normals)
     vertices, faces, closing = closed(vertices, faces, cloud.points_palm, voxel_m)
     parts, split = convex_parts(vertices, faces, voxel_m)
     error = summary_mm(distance_to_mesh(cloud.raw_palm, vertices, faces))
