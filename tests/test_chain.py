@@ -13,6 +13,7 @@ from hand_model.identify.axis import dominant_axis, gamage_lasenby_axis
 from hand_model.identify.bootstrap import variance_inflation
 from hand_model.identify.centre import project_on_line, sphere_centre
 from hand_model.identify.chain import Chain, Pose, jacobians, palm_pose, propagate
+from hand_model.identify.hinge import block_inflation, hinge_note
 from hand_model.identify.likelihood import angle_noise_ratio, fit_chain, fit_poses
 from hand_model.identify.repair import find_slip, repair_labels, split_marker
 from hand_model.identify.start import cluster_shape, start_chain
@@ -203,3 +204,17 @@ def test_cluster_shape_is_robust_and_rigid():
     assert np.abs(sides).max() < 1e-4
     with pytest.raises(IdentificationError, match="no frame shows all"):
         cluster_shape(np.full((5, 3, 3), np.nan))
+
+
+def test_a_hinge_is_called_a_hinge_and_a_wobble_is_not():
+    chain, data, angle = recording(17)
+    fit = fitted(data)
+    assert [hinge_note(fit, k) for k in range(2)] == ["", ""]
+    assert block_inflation(fit) < 1.3
+    wobble = np.einsum("nij,mj->nmi", rotation_from_vector(0.03 * np.sin(3 * angle[:, :1]) * [1.0, 0, 0]), np.eye(3))
+    pose = palm_pose(chain, data)
+    in_palm = pose.to_palm(data.position_world)
+    in_palm[:, BODY > 0] = chain.centre_palm[0] + (in_palm[:, BODY > 0] - chain.centre_palm[0]) @ np.swapaxes(wobble, 1, 2).transpose(0, 2, 1)
+    moved = fitted(replace(data, position_world=pose.to_world(in_palm)))
+    assert "no plain hinge" in hinge_note(moved, 0)
+    assert block_inflation(moved) > 2

@@ -12,6 +12,7 @@ from ..session import Finger, Log, Mocap, Session, Trial
 from .bootstrap import variance_inflation
 from .chain import Chain, ChainData, Pose, marker_body
 from .clock import Clock, align
+from .hinge import block_inflation
 from .likelihood import START_FRAMES, ChainFit, angle_noise_ratio, fit_chain, robust_cost
 from .repair import Slip, Swap, find_slip, level_last_joint, repair_labels, split_marker
 from .start import other_starts, start_chain
@@ -116,7 +117,7 @@ def identify_finger(session: Session, finger: Finger, palm_shape: Array) -> Fing
     except IdentificationError as error:
         raise IdentificationError(f'{trials[0].name}: finger "{finger.name}": {error}') from None
     fit, covariance = _zero_at_rest(level_last_joint(fit), rest)
-    covariance = _honest(covariance, fit)
+    covariance = _honest(covariance, fit) * block_inflation(fit)
     records = tuple(
         _record(trial, mocap, slice(int(a), int(b)), swaps, fit)
         for trial, mocap, a, b, (_, swaps) in zip(trials, mocaps, lengths[:-1], lengths[1:], parts, strict=True)

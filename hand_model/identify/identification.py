@@ -20,10 +20,11 @@ from ..session import Session, check_session, read_session
 from .centre import project_on_line
 from .finger import FingerFit, axis_sd_deg, identify_finger
 from .frames import palm_frame
+from .hinge import hinge_note
 from .mapping import aligned, couplings, encoder_maps, ranges
 from .motor import identify_motors
 from .probe import ProbedPoint, calibrated_probe, probed_point
-from .published import published_joint
+from .published import dominant_joint, published_joint
 from .screws import Screws, probe_screws
 from .start import cluster_shape
 from .surface import identify_surfaces, with_surfaces
@@ -170,8 +171,7 @@ def _finger(
         near, along_sd, remark = screws.middle(fit.finger.name, segment.name, axis, line)
         if near is None:
             near = _middle(fit, k) @ turn.T + move
-        if remark:
-            notes.append(f"{fit.finger.name} {segment.name}: {remark}")
+        notes += [f"{fit.finger.name} {segment.name}: {text}" for text in (remark, hinge_note(fit.fit, k)) if text]
         centre = project_on_line(near, axis, line)
         covariance = _moved_covariance(fit, k, turn, move, near, along_sd)
         degenerate = axis_sd_deg(covariance) > DEGENERATE_DEG
@@ -252,6 +252,8 @@ def _published(fit: FingerFit, joint: int, near: Array, axis: Array, centre: Arr
     arm = old_centre - now_centre
     row["axis_off_deg"] = float(np.rad2deg(angle_between(old_axis, now_axis)))
     row["centre_off_m"] = float(np.linalg.norm(arm - now_axis * (arm @ now_axis)))
+    dominant = dominant_joint(fit.fit.data, fit.fit.chain, joint)[0]
+    row["dominant_axis_off_deg"] = float(np.rad2deg(angle_between(dominant, now_axis, undirected=True)))
     return row
 
 

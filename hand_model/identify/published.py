@@ -36,9 +36,10 @@ def published_joint(data: ChainData, chain: Chain, joint: int, probed_palm: Arra
     return axis, centre if probed_palm is None else project_on_line(probed_palm, axis, centre)
 
 
-def dominant_joint(data: ChainData, chain: Chain, joint: int, every: int = 10) -> tuple[Array, Array]:
+def dominant_joint(data: ChainData, chain: Chain, joint: int, most: int = 200) -> tuple[Array, Array]:
     """Axis (3,) and centre (3,) [m] by Chang & Pollard's dominant-axis method, started from the published estimate."""
-    markers = in_parent(data, chain, joint)[::every]
+    markers = in_parent(data, chain, joint)
+    markers = markers[:: max(1, len(markers) // most)]
     axis = gamage_lasenby_axis(markers)
     axis = axis if axis @ chain.axis_palm[joint] > 0 else -axis
     return dominant_axis(markers, axis, sphere_centre(markers))

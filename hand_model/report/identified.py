@@ -51,16 +51,16 @@ def axes_section(hand: Hand) -> Section:
     joints = [(finger, joint) for finger in hand.fingers for joint in finger.joints]
     published = {(f, j): row for f, rows in hand.extra.get("published_method", {}).items() for j, row in rows.items()}
     rows = [_axis_row(hand, finger, joint, published.get((finger.name, joint.name), {})) for finger, joint in joints]
-    columns = ["finger", "joint", "x", "y", "z", "± deg", "x", "y", "z", "± mm", "deg", "deg", "mm"]
-    groups = [("", 2), ("axis", 4), ("centre [mm]", 4), ("arc", 1), ("published method off by", 2)]
+    columns = ["finger", "joint", "x", "y", "z", "± deg", "x", "y", "z", "± mm", "deg", "deg", "mm", "deg"]
+    groups = [("", 2), ("axis", 4), ("centre [mm]", 4), ("arc", 1), ("published off by", 2), ("dominant axis off", 1)]
     body = [table(columns, rows, groups=groups, text_columns=2)]
     body.append(
         note(
             "Palm frame of the landmarks; ± is one standard deviation in the worst direction, the palm frame taken "
             "as known. "
-            "Published method: axis by Gamage & Lasenby (2002), centre by Chang & Pollard (2007) on the same "
-            "markers, as its "
-            "distance from the maximum-likelihood chain (for the centre, across the axis)."
+            "Published method: axis by Gamage & Lasenby (2002), centre by Chang & Pollard (2007); dominant axis: Chang & Pollard's "
+            "planar and radial cost; all on the same markers, as their distance from the maximum-likelihood chain (for the centre, "
+            "across the axis)."
         )
     )
     parallel = parallelism(hand)
@@ -88,12 +88,13 @@ def _axis_row(hand: Hand, finger: Finger, joint: Joint, old: Mapping[str, Any]) 
     cells += [number(1e3 * v) for v in joint.centre_palm] + [number(centre_sd_mm(hand, joint))]
     cells.append(number(old.get("arc_deg", np.rad2deg(np.ptp(joint.range_rad))), 0))
     if "failed" in old:
-        return [*cells, Cell("fails", "flag"), Cell("–", "dim")]
+        return [*cells, Cell("fails", "flag"), Cell("–", "dim"), Cell("–", "dim")]
     off = old.get("centre_off_m")
     return [
         *cells,
         Cell(number(old.get("axis_off_deg")), "dim"),
         Cell(number(None if off is None else 1e3 * off), "dim"),
+        Cell(number(old.get("dominant_axis_off_deg")), "dim"),
     ]
 
 

@@ -109,6 +109,19 @@ def fit_regression(trials: Sequence[MotorTrial], sigma_position: float, stribeck
     return Regression(beta[:5], covariance[:5, :5], rmse, float(beta[5]), speed, z)
 
 
+def balance(t: MotorTrial, values: Array, cutoff_hz: float = 2 * CUTOFF_HZ, flexing: bool = False) -> Array:
+    """Current (n,) [raw] that the recorded motion of a trial takes, by `values` (5,) of NAMES; motion filtered at cutoff_hz [Hz].
+
+    flexing: friction as in flexion throughout, which is all that it can be while the drive flexes or is held up in flexion.
+    """
+    rate = 1 / float(np.median(np.diff(t.time_s)))
+    time = np.arange(t.time_s[0], t.time_s[-1], 1 / rate)
+    p = zero_phase(np.interp(time, t.time_s, t.position), rate, cutoff_hz)
+    v, a = derivatives(p, rate)
+    z = np.ones(len(p)) if flexing else friction_state(p, PRESLIDING)
+    return np.interp(t.time_s, time, np.column_stack([a, v, z, p, np.ones(len(p))]) @ values)
+
+
 def _noise_gram(rate: float, sigma: float) -> Array:
     """Expected noise per sample in the products of (acceleration, velocity, position): the filter's response to white noise."""
     n = int(4 * rate)

@@ -5,7 +5,7 @@ Plant: inertia a = u - viscous v - F - stiffness p - preload, with the friction 
 which sticks (any f within its bounds at v = 0) and becomes Coulomb's as the presliding distance goes to zero.
 Controller: u = gain (r - p) + damping (r' - v), within the current limit. Two kinds make the reference r:
     "profile": a trapezoidal velocity profile from the old to the new setpoint (a ramp where rise and fall take no time);
-    "cascade": r' follows position_gain (setpoint - p) within the speed limit and a slew rate, and holds within a deadband; as r is
+    "cascade": r' follows position_gain (setpoint - p) within the speed limit and a slew rate, and holds within a deadband, which sets in over a width `edge`; as r is
     the integral of the wanted speed, this is a position loop round a speed loop with proportional and integral action.
 The recorded current acts `lead` seconds later: a loop that samples holds its value until the next step.
 A loop that samples acts late: p and v reach the controller `delay` seconds old, to first order (p - delay v, v - delay a).
@@ -27,7 +27,6 @@ SHARED = ("inertia", "viscous", "coulomb", "stiffness", "preload", "presliding",
 CONTROLLERS = {"profile": (*SHARED, "fall"), "cascade": (*SHARED, "position_gain", "deadband")}
 STRIBECK = ("static_ratio", "stribeck_speed")
 CONTACT = ("contact_stiffness", "contact_at", "contact_damping")  # optional: an object met in flexion, [raw/%], [%], [s]
-EDGE = 0.05  # [%]: width over which the deadband sets in
 
 
 @dataclass(frozen=True)
@@ -156,6 +155,6 @@ def simulate(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, contr
 
 def _cascade(q: Mapping[str, Array], k: int, error: Array, speed: Array, top_speed: Array, slew: Array) -> tuple[Array, Array]:
     """Share (0..1) in which a position error (k,) [%] is outside the deadband, and the change of the wanted speed [%/s] in one step."""
-    share = np.minimum(np.maximum((np.abs(error) - q["deadband"][:k]) / EDGE, 0.0), 1.0)
+    share = np.minimum(np.maximum((np.abs(error) - q["deadband"][:k]) / q["edge"][:k] + 0.5, 0.0), 1.0)
     wanted = share * np.minimum(np.maximum(q["position_gain"][:k] * error, -top_speed[:k]), top_speed[:k])
     return share, np.minimum(np.maximum(wanted - speed, -slew[:k]), slew[:k])

@@ -247,8 +247,8 @@ def fit(
     """
     q, own = dict(start_values), np.array([m.own for m in data]) if own is None else own.copy()
     samples = 2 * sum(len(m.time_s) for m in data)
-    for step_s, rounds, enough in ((COARSE_S, 8, 5.0), (STEP_S, iterations, 0.3)):
-        damping = 1e-3
+    for step_s, rounds, enough, edge in ((COARSE_S, 8, 5.0, 0.5), (STEP_S, iterations, 0.3, 0.1)):
+        damping, q = 1e-3, {**q, "edge": edge}  # a deadband that sets in softly has no kinks to be caught in
         for i in range(rounds):
             linear = _linearise(data, q, names, own, sigma, controller, step_s)
             cost = _misfit(linear[0], data, own, q)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...errors import IdentificationError
 from ...session import Log
 from . import output_error
+from .corrected import NAMES, balance
 from .drive import Moves, profile
 from .fit import MotorFit
 from .output_error import MoveData, moves_from_rest
@@ -52,11 +53,13 @@ def predict(fit: MotorFit, log: Log, name: str = "log", align: bool = True) -> P
 
     align: the instant at which each command took effect and the speed, which a log holds only to one sample and one raw unit, are
     found within these limits from the recorded position; nothing else is. Every move starts where the last one was predicted to end.
-    Raises IdentificationError where the fit has no controller or the log no setpoint.
+    Where no controller was identified or the log holds no setpoint, the motion is taken as recorded and the current predicted from it.
+    Raises IdentificationError where a log with setpoints holds no move that starts from rest.
     """
-    if not fit.predictive:
-        raise IdentificationError(f'motor "{fit.motor.actuator}": no controller was identified; setpoints do not predict its motion')
     trial = motor_trial(name, log, fit.scale)
+    if fit.simulated is None or trial.setpoint is None:
+        return _from_motion(fit, trial)
+    values = fit.simulated
     data = moves_from_rest(trial, (fit.sigma_position, fit.sigma_current), fit.scale.speed_full)
     if not data:
         raise IdentificationError(f"{name}: no move from rest with a logged setpoint; a prediction needs setpoints")
@@ -72,9 +75,9 @@ def predict(fit: MotorFit, log: Log, name: str = "log", align: bool = True) -> P
             m = dataclasses.replace(m, velocity=last[3])
         else:  # the drive's state before its first move is no prediction: it is where the recording starts
             k = slice(0 if last is None else m.index, m.index + 1)
-            position[k], current[k] = x[1], (fit.values["gain"] * (m.origin - x[1]) if controller == "profile" else x[3])
+            position[k], current[k] = x[1], (values["gain"] * (m.origin - x[1]) if controller == "profile" else x[3])
             predicted[k] = True
-        y = output_error.simulate_moves([m], fit.values, x[None], controller, 1e-3)[0]
+        y = output_error.simulate_moves([m], values, x[None], controller, 1e-3)[0]
         k = slice(m.index + 1, m.index + 1 + len(m.time_s))
         position[k], current[k], predicted[k] = y[:, 0], y[:, 1], True
         phase[k] = _phases(m, x, y[:, 0])
@@ -86,8 +89,16 @@ def predict(fit: MotorFit, log: Log, name: str = "log", align: bool = True) -> P
 def _align(fit: MotorFit, data: tuple[MoveData, ...]) -> Array:
     """Own unknowns of every move from its position alone (the current weighs nothing)."""
     blind = (fit.sigma_position, 1e3 * fit.sigma_current)
-    found = output_error.fit(data, fit.values, (), blind, {}, fit.output_error.controller, iterations=4)
+    found = output_error.fit(data, fit.simulated, (), blind, {}, fit.output_error.controller, iterations=4)
     return found.own
+
+
+def _from_motion(fit: MotorFit, trial: MotorTrial) -> Prediction:
+    """The current of the recorded motion, by the balance; the motion itself is not predicted."""
+    current = balance(trial, np.array([fit.values[n] for n in NAMES]))
+    moving = np.abs(np.gradient(trial.position, trial.time_s)) > 5.0
+    phase = np.where(moving, PHASES.index("cruise"), PHASES.index("rest"))
+    return Prediction(trial.time_s, trial.position, current, trial.position, trial.current, phase, np.ones(len(current), bool))
 
 
 def _phases(m: MoveData, own: Array, position: Array) -> NDArray[np.int64]:
