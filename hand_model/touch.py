@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from .errors import IdentificationError
 from .hand import Estimate
 from .identify.motor import MotorFit, identify_motor, output_error
+from .identify.motor.corrected import NAMES, balance, friction_state
 from .identify.motor.output_error import MoveData, moves_from_rest, shortened
-from .identify.motor.recording import actuator_trials, motor_trial
+from .identify.motor.recording import MotorTrial, actuator_trials, motor_trial
 from .session import Log, Session
 
 Array = NDArray[np.float64]
@@ -56,25 +57,53 @@ class Contact:
 def residuals(fit: MotorFit, log: Log, name: str = "log") -> list[tuple[MoveData, Array, Array]]:
     """Per move into flexion: the move, its sample times on the log's clock (n,) [s], and the residual (n,) [noise deviations].
 
-    The residual is zero within ALIGN_S of the command. Raises IdentificationError where the fit has no controller.
+    The residual is zero within ALIGN_S of the command. Where no controller explains the motion, the current is predicted from the
+    recorded motion instead, with friction as in flexion: an object adds to that, whatever the controller does.
     """
-    if not fit.predictive:
-        raise IdentificationError(f'motor "{fit.motor.actuator}": no controller was identified; touch needs a free-motion prediction')
     trial = motor_trial(name, log, fit.scale)
-    data = moves_from_rest(trial, (fit.sigma_position, fit.sigma_current), fit.scale.speed_full)
-    data = [m for m in data if m.target > m.origin and (m.time_s > ALIGN_S).sum() > 3]
+    begin = log.time_s[np.isfinite(log.time_s)][0]
+    found = _from_commands(fit, trial) if fit.predictive and trial.setpoint is not None else _from_motion(fit, trial)
+    return [(m, begin + trial.time_s[m.index] + m.time_s, np.where(m.time_s > ALIGN_S, z, 0.0)) for m, z in found]
+
+
+def _from_commands(fit: MotorFit, trial: MotorTrial) -> list[tuple[MoveData, Array]]:
+    """Measured less simulated current [noise deviations] of the moves from rest into flexion."""
+    noise = (fit.sigma_position, fit.sigma_current)
+    data = [m for m in moves_from_rest(trial, noise, fit.scale.speed_full) if m.target > m.origin and (m.time_s > ALIGN_S).sum() > 3]
     if not data:
         return []
     early = [shortened(m, ALIGN_S) for m in data]
-    noise = (fit.sigma_position, fit.sigma_current)
-    own = output_error.fit(early, fit.values, (), noise, {}, fit.output_error.controller, iterations=4).own
-    simulated = output_error.simulate_moves(data, fit.values, own, fit.output_error.controller)
-    begin = log.time_s[np.isfinite(log.time_s)][0]
+    own = output_error.fit(early, fit.simulated, (), noise, {}, fit.output_error.controller, iterations=4).own
+    simulated = output_error.simulate_moves(data, fit.simulated, own, fit.output_error.controller)
+    return [(m, (m.current - y[:, 1]) / fit.sigma_current) for m, y in zip(data, simulated, strict=True)]
+
+
+def _from_motion(fit: MotorFit, trial: MotorTrial) -> list[tuple[MoveData, Array]]:
+    """Measured current less that of the recorded motion [noise deviations], of every stretch of flexion."""
+    expected = balance(trial, np.array([fit.values[n] for n in NAMES]), flexing=True)
     out = []
-    for m, y in zip(data, simulated, strict=True):
-        z = (m.current - y[:, 1]) / fit.sigma_current
-        out.append((m, begin + trial.time_s[m.index] + m.time_s, np.where(m.time_s > ALIGN_S, z, 0.0)))
+    for i, j in _flexions(trial):
+        k = slice(i + 1, j + 1)
+        if trial.time_s[j] - trial.time_s[i] < 2 * ALIGN_S:
+            continue
+        rest = np.array([0.0, trial.position[i], 1.0, trial.current[i]])
+        target = float(trial.position[k].max()) if trial.setpoint is None else float(trial.setpoint[i + 1])
+        m = MoveData(trial.name, i, trial.time_s[k] - trial.time_s[i], trial.position[k], trial.current[k],
+                     float(trial.position[i]), target, np.inf, rest, np.ones(4))  # fmt: skip
+        out.append((m, (trial.current - expected)[k] / fit.sigma_current))
     return out
+
+
+def _flexions(trial: MotorTrial) -> list[tuple[int, int]]:
+    """First and last sample of every stretch in which the drive is commanded, or where nothing is logged moves, into flexion."""
+    if trial.setpoint is not None:
+        change = np.flatnonzero(np.diff(trial.setpoint) != 0)
+        ends = np.append(change[1:], len(trial.time_s) - 1)
+        return [(int(i), int(j)) for i, j in zip(change, ends, strict=True) if trial.setpoint[i + 1] > trial.setpoint[i]]
+    path = friction_state(trial.position, 2.0)  # its sign is the direction of the last 2 % of travel
+    flexes = path > 0.5
+    starts, ends = np.flatnonzero(np.diff(flexes.astype(int)) == 1), np.flatnonzero(np.diff(flexes.astype(int)) == -1)
+    return [(int(i), int(ends[ends > i][0]) if (ends > i).any() else len(path) - 1) for i in starts]
 
 
 def cumulative_sum(z: Array, slack: float = SLACK) -> Array:
@@ -152,14 +181,15 @@ def _contact(fit: MotorFit, m: MoveData, time_s: Array, z: Array, alarm: int, na
     while began > 0 and g[began - 1] > 0:
         began -= 1
     onset, at = float(time_s[max(began - 1, 0)]), float(m.position[max(began - 1, 0)])
-    if not measure:
-        return Contact(name, float(time_s[alarm]), onset, at, None, "undetermined")
+    if not measure or not fit.predictive:
+        estimate = None if not measure else _stiffness(fit, m, z, began, at)
+        return Contact(name, float(time_s[alarm]), onset, at, estimate, "undetermined")
     best, noise = None, (fit.sigma_position, fit.sigma_current)
     data = [shortened(m, float(m.time_s[alarm] + AFTER_S))]
     names = ("contact_stiffness", "contact_at", "contact_damping")
     bounds = {"contact_stiffness": (1e-3, 1e4), "contact_at": (m.origin, m.target), "contact_damping": (0.0, 0.1)}
     for stiffness in (1.0, 6.0, 40.0):
-        start = {**fit.values, "contact_stiffness": stiffness, "contact_at": at, "contact_damping": 0.01}
+        start = {**fit.simulated, "contact_stiffness": stiffness, "contact_at": at, "contact_damping": 0.01}
         one = output_error.fit(data, start, names, noise, bounds, fit.output_error.controller)
         if best is None or one.cost < best.cost:
             best = one
@@ -174,3 +204,17 @@ def _contact(fit: MotorFit, m: MoveData, time_s: Array, z: Array, alarm: int, na
     gain = fit.values["gain"]
     kind = "stiff" if low > gain else "compliant" if high < gain else "undetermined"
     return Contact(name, float(time_s[alarm]), onset, at, estimate, kind)
+
+
+def _stiffness(fit: MotorFit, m: MoveData, z: Array, began: int, at: float) -> Estimate | None:
+    """Slope [raw/%] of the unexplained current over the travel since contact, while the drive presses; None where it does not move on."""
+    k = np.arange(len(z)) >= began
+    k &= m.time_s <= m.time_s[began] + AFTER_S
+    x, y = m.position[k] - at, z[k] * fit.sigma_current
+    if k.sum() < 5 or np.ptp(x) < 5 * fit.sigma_position:
+        return None
+    a = np.c_[x, np.ones(len(x))]
+    beta, inverse = np.linalg.lstsq(a, y, rcond=None)[0], np.linalg.inv(a.T @ a)
+    sd = float(np.sqrt(3 * inverse[0, 0] * np.var(y - a @ beta)))  # the filter leaves about one independent sample in three
+    value = float(max(beta[0], 0.0))
+    return Estimate(value, (max(0.0, value - 1.96 * sd), value + 1.96 * sd), "raw/%", "unexplained current over travel")
