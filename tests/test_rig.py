@@ -146,7 +146,11 @@ def test_load_dependent_friction_is_named_and_measured(planted_load: Path, tmp_p
     assert value == pytest.approx(0.25, rel=0.2)
     assert first.fit["held_out"] == ["log/run_3.csv"]
     assert first.fit["after"] < 0.75 * first.fit["before"]
-    assert read_effects((tmp_path / "out" / "rig.xml").read_bytes())[0]["effect"] == "load_dependent_friction"
+    kept = [r["effect"] for r in read_effects((tmp_path / "out" / "rig.xml").read_bytes()) if "effect" in r]
+    assert kept[0] == "load_dependent_friction"
+    for key, name in (("before", "rig_declared.xml"), ("after", "rig.xml")):  # the files alone reproduce the figures
+        replayed = replay_rig(read_session(planted_load), (tmp_path / "out" / name).read_bytes(), simulate=False)
+        assert replayed.figure("effort_rmse", True) == pytest.approx(findings.lack_of_fit["joints"]["hinge"][key], rel=1e-9)
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["findings.json", "rig.xml", "rig_declared.xml"]
 
 

@@ -7,7 +7,7 @@ Effort, columns and states pass the same filter; samples at rest are left out, s
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -48,6 +48,8 @@ class Rows:
 
     Full-rate grid (n,): time_s, states, extra channels (never filtered: an effect reads them as they are), full_columns
     (n, P), carried (P,) bool and load_known (n,): of what the joint carries besides its own drive and friction. Filtered and thinned (m,): effort, columns (m, P), moving (bool).
+    states: position, velocity, acceleration (n, joints) of the whole rig; rest_speeds (joints,); jacobian: joint -> (n,),
+    what hangs on this joint by couplings, itself included; declared: the columns' names.
     """
 
     trial: str
@@ -68,6 +70,10 @@ class Rows:
     carried: Array
     load_known: Array
     step: int
+    states: tuple[Array, Array, Array] = ()
+    rest_speeds: Array = ()
+    jacobian: Mapping[str, Array] = field(default_factory=dict)
+    declared: tuple[Column, ...] = ()
 
     @property
     def filtered_effort(self) -> Array:
@@ -181,7 +187,7 @@ def trial_rows(
             Rows(trial.name, joint, trial.validate, grid, q[:, i], v[:, i], a[:, i],
                  low_pass(y, rate, cutoff)[::step], low_pass(x, rate, cutoff)[::step],
                  (np.abs(v[:, i]) > rest[i])[::step], float(rest[i]), cutoff, rate,
-                 {"effort": y, **channels}, x, external, y - effort[joint], step)
+                 {"effort": y, **channels}, x, external, y - effort[joint], step, (q, v, a), rest, jacobian, columns)
         )  # fmt: skip
     return tuple(rows)
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from .balance import Rows
 from .candidates import Candidate
+from .consistent import consistent
 from .declared import DeclaredFit, bounds, prior
 from .solve import solve_bounded
 
@@ -145,9 +146,11 @@ def held_out(problem: Problem, terms: Sequence[Term], parts: tuple) -> tuple[Arr
 
 
 def solution(problem: Problem, terms: Sequence[Term]) -> Array:
-    """All parameters (P + J,) on all training blocks."""
+    """All parameters (P + J,) on all training blocks; bodies are such as can exist."""
     gram, moment, _, _ = normal(problem, terms)
-    return solve_bounded(gram.sum(0), moment.sum(0), *limits(problem.fit, terms))
+    sums, box, fit = (gram.sum(0), moment.sum(0)), limits(problem.fit, terms), problem.fit
+    theta = solve_bounded(*sums, *box)
+    return consistent(fit.columns, fit.bodies, theta, *sums, *box) if len(fit.bodies) else theta
 
 
 def _extended(problem: Problem, terms: Sequence[Term], new: Term, parts: tuple) -> tuple:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .balance import Column, Rows, declared_columns, trial_rows
+from .balance import Column, Rows, compile_model, declared_columns, trial_rows
+from .dynamics import inertial_parameters
 from .model import RigModel, RigTrial
 from .solve import solve_bounded
 
@@ -32,6 +33,7 @@ class DeclaredFit:
     rows: tuple[Rows, ...]
     cutoff_hz: float
     quality: dict[tuple[str, str], float]
+    bodies: Array = field(default_factory=lambda: np.zeros((0, 10)))  # declared inertial parameters, in columns' order
     anchored: bool = False  # no effort is recorded anywhere: only ratios show, and the declared masses are the scale
 
     def residual(self, row: Rows) -> Array:
@@ -93,7 +95,11 @@ def fit_declared(
     rows = tuple(
         r for t in rig.trials for r in trial_rows(rig, t, columns, cutoff) if (r.trial, r.joint) not in refused
     )
-    return _robust_fit(columns, rows, cutoff or (rows[0].cutoff_hz if rows else float("nan")))
+    fit = _robust_fit(columns, rows, cutoff or (rows[0].cutoff_hz if rows else float("nan")))
+    model = compile_model(rig)
+    names = dict.fromkeys(c.name for c in columns if c.kind == "inertial")
+    bodies = [inertial_parameters(model)[model.body(n).id - 1] for n in names]
+    return replace(fit, bodies=np.array(bodies).reshape(-1, 10))
 
 
 def _choose_cutoff(rig: RigModel, columns: tuple[Column, ...], refused: set[tuple[str, str]]) -> float | None:
@@ -154,7 +160,7 @@ def _robust_fit(columns: tuple[Column, ...], rows: tuple[Rows, ...], cutoff: flo
     for r in rows:
         m = r.moving
         quality[r.trial, r.joint] = _rms((r.effort - r.columns @ theta)[m]) / (_rms(_known(r, columns)[m]) + 1e-300)
-    return DeclaredFit(columns, theta, scale, rows, cutoff, quality, anchored)
+    return DeclaredFit(columns, theta, scale, rows, cutoff, quality, anchored=anchored)
 
 
 def _known(row: Rows, columns: Sequence[Column]) -> Array:

@@ -13,19 +13,19 @@ from numpy.typing import NDArray
 from ..session import Session
 from .candidates import Candidate, candidates
 from .channels import ChannelIssue, check_balance, check_channels
-from .compete import Score, Step, Term, compete, design, held_out, judge, normal, pose, solution
+from .compete import Score, Step, Term, compete, held_out, judge, normal, pose, solution
 from .declared import DeclaredFit, fit_declared
 from .diagnose_swing import diagnose_swing
 from .findings import Finding, RigFindings
 from .model import RigModel, load_rig
-from .patch import write_couplings, write_declared, write_effects
-from .states import fill_gaps, noise_std
+from .patch import write_couplings
+from .proof import Bench
+from .states import fill_gaps
 from .swing_build import can_swing
 from .transmission import coupling_candidates, fit_coupling, zero_shift
 from .words import shares, statement
 
 Array = NDArray[np.float64]
-RESAMPLES = 500
 TIED_TO_POSITION = frozenset({"nonlinear_spring", "end_stop_contact", "detent_load", "torque_ripple"})
 
 
@@ -152,85 +152,39 @@ def _diagnose_balance(rig: RigModel, fit: DeclaredFit, say: Callable[[str], None
         stories += zip(([step] if begin else []) + list(steps), taken, strict=True)
         rejected += [{"effect": s.term.candidate.key, "reason": "held-out error does not fall enough"} for s in scores]
         say(f"{rig.name}: {joint}: {', '.join(t.candidate.key for t in taken) or 'nothing'}")
-    problem, base = pose(fit), solution(pose(base_fit), [])
+    base, bench = solution(pose(base_fit), []), Bench(rig)
+    plain = (base_fit, (), base)
     offsets = [
         (s, t) for s, t in stories if t.candidate.effect == "asymmetric_friction" and first[t.candidate.joint][1] is t
     ]
-    found, kept = _prove(rig, base_fit, offsets, [], rejected)
+    found, kept = _prove(bench, base_fit, offsets, [], rejected)
     if off_axis is not None:
         found.append(finding)
-    one = _ratio(base_fit, base, base_fit, kept[:1] or [], solution(pose(base_fit), kept[:1])) if kept else None
-    later, kept = _prove(rig, fit, [s for s in stories if s not in offsets], kept, rejected)
+    first_fit = base_fit if kept or off_axis is None else fit
+    later, kept = _prove(bench, fit, [s for s in stories if s not in offsets], kept, rejected)
     found += later
-    theta = solution(problem, kept)
-    if one is None:
-        few = [] if off_axis is not None else kept[:1]
-        one = _ratio(base_fit, base, fit, few, solution(problem, few))
-    lack = {"metric": "effort_rmse", "unit": "share of the declared model's",
-            "before": 1.0, "after": _ratio(base_fit, base, fit, kept, theta), "one_effect": one,
-            "joints": {j: _proof(rig, base_fit, [], base, kept, theta, j, fit) for j in joints}}  # fmt: skip
-    declared_xml = write_declared(rig, base_fit.columns, base)
-    p = len(fit.columns)
-    records = _records(kept, theta[p:])
-    xml = write_effects(write_declared(rig, fit.columns, theta[:p]), records)
-    return shares(found), rejected, lack, xml, declared_xml
+    few = [] if off_axis is not None and first_fit is fit else kept[:1]
+    one, every = ((f, t, solution(pose(f), t)) for f, t in ((first_fit, few), (fit, kept)))
+    lack = {"metric": "effort_rmse", "unit": "share of the declared model's", "before": 1.0,
+            "after": bench.ratio(plain, every), "one_effect": bench.ratio(plain, one), "engine": bench.engine,
+            "joints": {j: bench.proof(j, plain, every) for j in joints}}  # fmt: skip
+    return shares(found), rejected, lack, bench.file(*every), bench.file(*plain)
 
 
-def _prove(rig: RigModel, fit: DeclaredFit, stories: Sequence[tuple[Step, Term]], kept: Sequence[Term],
+def _prove(bench: Bench, fit: DeclaredFit, stories: Sequence[tuple[Step, Term]], kept: Sequence[Term],
            rejected: list[dict[str, Any]]) -> tuple[list[Finding], list[Term]]:  # fmt: skip
     """Findings that hold on the validation recordings, one after the other beside `kept`; the rest goes to rejected."""
     problem, kept, found = pose(fit), list(kept), []
     for step, term in stories:
         before, after = solution(problem, kept), solution(problem, [*kept, term])
-        proof = _proof(rig, fit, kept, before, [*kept, term], after, term.candidate.joint)
+        proof = bench.proof(term.candidate.joint, (fit, kept, before), (fit, [*kept, term], after))
         if proof["ci95_reduction"][0] <= 0:
             rejected.append({"effect": term.candidate.key, "reason": "error on validation trials does not fall"})
             continue
         kept.append(term)
-        found.append(_joint_finding(rig, fit, step, term, after[len(after) - len(term.candidate.amplitudes) :], proof))
+        amplitude = after[len(after) - len(term.candidate.amplitudes) :]
+        found.append(_joint_finding(bench.rig, fit, step, term, amplitude, proof))
     return found, kept
-
-
-def _records(kept: Sequence[Term], amplitude: Array) -> list[dict[str, Any]]:
-    """Effects as custom/text keeps them."""
-    out, at = [], 0
-    for t in kept:
-        names = [a[0] for a in t.candidate.amplitudes]
-        values = amplitude[at : at + len(names)]
-        at += len(names)
-        out.append({"effect": t.candidate.effect, "variant": t.candidate.variant, "joint": t.candidate.joint,
-                    "shape": {k: float(v) for k, v in t.shape.items()},
-                    "amplitude": {n: float(v) for n, v in zip(names, values, strict=True)}})  # fmt: skip
-    return out
-
-
-def _residuals(fit: DeclaredFit, terms: Sequence[Term], theta: Array, joint: str) -> list[tuple[str, Array]]:
-    """Residual effort of the moving samples of every validation trial (training ones where none validates)."""
-    rows = [r for r in fit.rows if r.joint == joint and r.moving.sum() > 10]
-    chosen = [r for r in rows if r.validate] or rows
-    return [(r.trial, (r.effort - design(r, terms) @ theta)[r.moving]) for r in chosen]
-
-
-def _proof(rig: RigModel, fit: DeclaredFit, few: Sequence[Term], before: Array, many: Sequence[Term], after: Array,
-           joint: str, fit_after: DeclaredFit | None = None) -> dict[str, Any]:  # fmt: skip
-    """Held-out effort error before and after, with an interval of its fall from resampled blocks."""
-    a, b = _residuals(fit, few, before, joint), _residuals(fit_after or fit, many, after, joint)
-    squares = np.array(
-        [[np.sum(p**2) for _, e in side for p in np.array_split(e, max(2, 24 // len(side)))] for side in (a, b)]
-    )
-    count = np.array([len(p) for _, e in a for p in np.array_split(e, max(2, 24 // len(a)))])
-    draw = np.random.default_rng(0).integers(0, len(count), (RESAMPLES, len(count)))
-    rms = np.sqrt(squares[:, draw].sum(2) / count[draw].sum(1))
-    fall = np.percentile(rms[0] - rms[1], [2.5, 97.5])
-    whole = np.sqrt(squares.sum(1) / count.sum())
-    floor = [
-        noise_std(r.extra["effort"]) * np.sqrt(min(1.0, 2 * r.cutoff_hz / r.rate_hz))
-        for r in fit.rows
-        if r.joint == joint
-    ]
-    return {"metric": "effort_rmse", "unit": rig.effort_unit(joint), "before": float(whole[0]), "after": float(whole[1]),
-            "noise_floor": float(np.median(floor)), "ci95_reduction": [float(fall[0]), float(fall[1])],
-            "held_out": [t for t, _ in a], "engine": "mujoco"}  # fmt: skip
 
 
 def _offset_first(rig: RigModel, fit: DeclaredFit, joint: str) -> tuple[Step | None, Term | None]:
@@ -263,7 +217,8 @@ def _off_axis(rig: RigModel, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple
         return None
     before, after = (solution(p, offsets) for p in sides)
     joints = sorted({r.joint for r in fit.rows})
-    proofs = {j: _proof(rig, fit, offsets, before, offsets, after, j, freed) for j in joints}
+    bench = Bench(rig)
+    proofs = {j: bench.proof(j, (fit, offsets, before), (freed, offsets, after)) for j in joints}
     best = max(joints, key=lambda j: 1 - proofs[j]["after"] / max(proofs[j]["before"], 1e-300))
     ratio = float(np.sqrt(np.mean([(p["after"] / p["before"]) ** 2 for p in proofs.values()])))
     if ratio >= 1 or proofs[best]["ci95_reduction"][0] <= 0:
@@ -278,16 +233,6 @@ def _off_axis(rig: RigModel, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple
     )
     return freed, Finding("gravity_load", ("gravity_load",), step.probability, (), where, words, moved, proofs[best],
                           {"native": True, "mjcf": "body/inertial/@pos", "urdf": "link/inertial/origin"})  # fmt: skip
-
-
-def _ratio(base_fit: DeclaredFit, base: Array, fit: DeclaredFit, kept: Sequence[Term], theta: Array) -> float:
-    """Root mean over joints of the squared ratio of held-out errors."""
-    ratios = []
-    for joint in {r.joint for r in fit.rows}:
-        before = np.concatenate([e for _, e in _residuals(base_fit, [], base, joint)])
-        after = np.concatenate([e for _, e in _residuals(fit, kept, theta, joint)])
-        ratios.append(np.sum(after**2) / max(np.sum(before**2), 1e-300))
-    return float(np.sqrt(np.mean(ratios)))
 
 
 def _joint_finding(rig: RigModel, fit: DeclaredFit, step: Step, term: Term, amplitude: Array, proof: dict) -> Finding:
@@ -319,7 +264,7 @@ def _diagnose_coupling(rig: RigModel, coupling: Any) -> tuple[list[Finding], lis
         fit = moved
         taken, steps, scores = compete(pose(fit), coupling_candidates(fit, coupling))
     rejected = [{"effect": s.term.candidate.key, "reason": "held-out error does not fall enough"} for s in scores]
-    found, _ = _prove(rig, fit, list(zip(steps, taken, strict=True)), [], rejected)
+    found, _ = _prove(Bench(rig, mujoco=False), fit, list(zip(steps, taken, strict=True)), [], rejected)
     named = []
     for f in found:
         proof = {**f.fit, "metric": "angle_rmse", "unit": rig.unit(coupling.dependent)}

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..session import Session
-from .balance import Rows, compile_model, declared_columns, trial_rows
+from .balance import compile_model
+from .inverse import apply_levels, effort_residuals
 from .model import RigModel, RigTrial, load_rig
 from .patch import read_effects
 from .states import choose_cutoff, differentiate, fill_gaps, low_pass, uniform_time
@@ -37,6 +38,7 @@ class JointResidual:
     samples: int
     time_s: Array = field(repr=False, default_factory=lambda: np.zeros(0))
     simulated: Array = field(repr=False, default_factory=lambda: np.zeros(0))
+    effort_samples: int = 0
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,7 @@ class RigResiduals:
         """Root mean square (or mean, of position_mae) over trials, weighted by samples; nan where there is none."""
         chosen = [r for r in self.joints if r.validate == validate and joint in (None, r.joint)]
         values = np.array([getattr(r, metric) for r in chosen])
-        weight = np.array([r.samples for r in chosen], float)
+        weight = np.array([r.effort_samples if metric == "effort_rmse" else r.samples for r in chosen], float)
         good = np.isfinite(values)
         if not good.any():
             return float("nan")
@@ -119,6 +121,7 @@ def simulate_trial(rig: RigModel, trial: RigTrial) -> tuple[Array, Array]:
 
     model = compile_model(rig, trial)
     data = mujoco.MjData(model)
+    apply_levels(model, rig, trial)
     effects = EffectStepper(model, read_effects(rig.xml))
     step = float(model.opt.timestep)
     grid = np.arange(0.0, trial.time_s[-1] + step, step)
@@ -188,23 +191,20 @@ def replay_rig(session: Session, model: bytes | RigModel | None = None, simulate
     Raises SessionError and DescriptionError as `load_rig` does.
     """
     rig = model if isinstance(model, RigModel) else load_rig(session, model)
-    columns = declared_columns(rig)
-    theta = np.array([c.value for c in columns])
+    efforts = {(r.trial, r.joint): r.error for r in effort_residuals(rig)}
     out: list[JointResidual] = []
     for trial in rig.trials:
-        rows = {r.joint: r for r in trial_rows(rig, trial, columns)}
         if not all(j in trial.position for j in rig.joints):
             continue
         time_s, simulated = simulate_trial(rig, trial) if simulate else (trial.time_s, None)
         for i, joint in enumerate(rig.joints):
-            out.append(
-                _residual(trial, joint, time_s, None if simulated is None else simulated[:, i], rows.get(joint), theta)
-            )
+            motion = None if simulated is None else simulated[:, i]
+            out.append(_residual(trial, joint, time_s, motion, efforts.get((trial.name, joint))))
     return RigResiduals(tuple(out))
 
 
 def _residual(
-    trial: RigTrial, joint: str, time_s: Array, simulated: Array | None, row: Rows | None, theta: Array
+    trial: RigTrial, joint: str, time_s: Array, simulated: Array | None, effort_error: Array | None
 ) -> JointResidual:
     recorded = fill_gaps(trial.time_s, trial.position[joint])
     rmse = mae = float("nan")
@@ -212,11 +212,11 @@ def _residual(
         error = simulated - recorded
         if np.isfinite(error).all() and np.abs(error).max() < 2 * np.ptp(recorded) + 1e-9:
             rmse, mae = float(np.sqrt(np.mean(error**2))), float(np.mean(np.abs(error)))
-    effort = float("nan")
-    if row is not None and row.moving.any():
-        effort = float(np.sqrt(np.mean((row.effort - row.columns @ theta)[row.moving] ** 2)))
+    effort, count = float("nan"), 0
+    if effort_error is not None and len(effort_error):
+        effort, count = float(np.sqrt(np.mean(effort_error**2))), len(effort_error)
     return JointResidual(trial.name, joint, trial.validate, rmse, mae, effort, len(recorded), time_s,
-                         np.zeros(0) if simulated is None else simulated)  # fmt: skip
+                         np.zeros(0) if simulated is None else simulated, count)  # fmt: skip
 
 
 def swing_vector(effects: list[Mapping[str, Any]]) -> Array:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -332,7 +333,7 @@ def _costs(swing: Swing, pairs: Sequence[tuple[Task, Array]]) -> Array:
     theta, lanes = _runs(pairs)
     square = np.sum(errors(swing, theta, lanes) ** 2, 0)
     edges = np.cumsum([0] + [len(task.stretches) for task, _ in pairs])
-    return np.array([square[a:b].sum() for a, b in zip(edges[:-1], edges[1:], strict=True)])
+    return np.array([square[a:b].sum() for a, b in pairwise(edges)])
 
 
 def _jacobians(swing: Swing, pairs: Sequence[tuple[Task, Array]], unit: Array, low: Array) -> list[tuple[Array, Array]]:

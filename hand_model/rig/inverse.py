@@ -1,0 +1,140 @@
+"""Effort of a rig's file at the recorded motion: mj_inverse, dry friction, and the effects that the file keeps.
+
+mj_inverse runs without constraints: the sign of friction and the projection of coupled joints are taken from the
+recording (virtual work), not from the solver. What MJCF has no attribute for stands in `custom/text` as records
+{"effect", "variant", "joint", "shape", "amplitude"}: columns of the catalogue, evaluated here at the recorded motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import DescriptionError
+from .balance import Column, Rows, compile_model, declared_columns, trial_rows
+from .candidates import Candidate, candidates
+from .declared import DeclaredFit
+from .model import RigModel, RigTrial
+from .patch import read_effects
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class EffortResidual:
+    """Recorded effort minus the file's (m,) [N m or N], moving samples only, of one joint in one trial."""
+
+    trial: str
+    joint: str
+    validate: bool
+    error: Array
+
+
+def effort_residuals(
+    rig: RigModel, rows: Sequence[Rows] | None = None, keep: frozenset[tuple[str, str]] | None = None
+) -> tuple[EffortResidual, ...]:
+    """Effort residuals of every balance of the rig, whose xml may be patched.
+
+    rows: balances of the same recordings made before (else made here, at the cut-off that the file keeps); keep:
+    (trial, joint) to look at. An effect is evaluated at the load of the file's own parameters.
+    """
+    records = read_effects(rig.xml)
+    columns = declared_columns(rig)
+    levels = {(r["joint"], k): v for r in records for k, v in r.get("frictionloss_levels", {}).items()}
+    theta = np.array([levels.get((c.name, c.part), c.value) for c in columns])
+    if rows is not None and not {c.label for c in columns} <= {c.label for r in rows[:1] for c in r.declared}:
+        rows = None  # the file declares more than the balances were made for
+    if rows is None:
+        cutoff = next((r["cutoff_hz"] for r in records if "cutoff_hz" in r), None)
+        rows = tuple(r for t in rig.trials for r in trial_rows(rig, t, columns, cutoff))
+    rows = tuple(r for r in rows if keep is None or (r.trial, r.joint) in keep)
+    fit = DeclaredFit(columns, theta, {}, _recolumned(rows, columns), 0.0, {})
+    terms = [(_rebuilt(rig, fit, r), r) for r in records if "effect" in r]
+    trials = {t.name: t for t in rig.trials}
+    by_trial = {t: [r for r in rows if r.trial == t] for t in dict.fromkeys(r.trial for r in rows)}
+    out = []
+    for name, mine in by_trial.items():
+        own = joint_efforts(rig, trials[name], mine[0])
+        for row in mine:
+            expected = row.filtered(sum(own[:, rig.joints.index(j)] * w for j, w in row.jacobian.items()))
+            for candidate, record in terms:
+                if candidate.joint == row.joint:
+                    amplitude = np.array([record["amplitude"][a[0]] for a in candidate.amplitudes])
+                    expected = expected + row.filtered(candidate.columns(row, record["shape"])) @ amplitude
+            grid = row.time_s[:: row.step]
+            for candidate, record in terms:
+                if candidate.joint == row.joint and candidate.delays:
+                    expected = np.interp(grid - record["shape"]["delay"], grid, expected)
+            out.append(EffortResidual(name, row.joint, row.validate, (row.effort - expected)[row.moving]))
+    return tuple(out)
+
+
+def joint_efforts(rig: RigModel, trial: RigTrial, row: Rows) -> Array:
+    """What each joint's drive has to give (n, joints) at the recorded states of a balance, by mj_inverse and friction."""
+    import mujoco
+
+    model = compile_model(rig, trial)
+    apply_levels(model, rig, trial)
+    data = mujoco.MjData(model)
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+    q, v, a = row.states
+    out = np.empty_like(q)
+    for k in range(len(q)):
+        data.qpos[:], data.qvel[:], data.qacc[:] = q[k], v[k], a[k]
+        mujoco.mj_inverse(model, data)
+        out[k] = data.qfrc_inverse
+    out += model.dof_frictionloss * np.clip(v / row.rest_speeds, -1.0, 1.0)
+    for drive in rig.drives:
+        if drive.joint in trial.live:
+            i, j = model.actuator(drive.name).id, rig.joints.index(drive.joint)
+            if drive.offset:
+                out[:, j] -= drive.gear * model.actuator_biasprm[i, 0]
+            if drive.kind == "voltage":
+                resistance, constant = model.actuator_gainprm[i, :2]
+                out[:, j] += constant**2 / resistance * drive.gear**2 * v[:, j]
+    return out
+
+
+def apply_levels(model: Any, rig: RigModel, trial: RigTrial) -> None:
+    """Put the fitted Coulomb level in place of the starting one that the trial sets, where the file keeps such levels."""
+    for record in read_effects(rig.xml):
+        for level, value in record.get("frictionloss_levels", {}).items():
+            start = trial.set.get(f"joint:{record['joint']}:frictionloss")
+            if start is not None and repr(float(np.atleast_1d(start)[0])) == level:
+                model.joint(record["joint"]).frictionloss[:] = value
+
+
+def level_records(columns: Sequence[Column], theta: Array) -> list[dict[str, Any]]:
+    """Fitted Coulomb levels of trials that set their own, as `apply_levels` reads them."""
+    levels: dict[str, dict[str, float]] = {}
+    for c, value in zip(columns, theta, strict=True):
+        if c.kind == "frictionloss" and c.part:
+            levels.setdefault(c.name, {})[c.part] = float(value)
+    return [{"joint": joint, "frictionloss_levels": each} for joint, each in levels.items()]
+
+
+def _recolumned(rows: Sequence[Rows], columns: Sequence[Column]) -> tuple[Rows, ...]:
+    """The rows with the columns that the file declares: a parameter fitted to zero is none of its columns."""
+    out = []
+    for row in rows:
+        if tuple(c.label for c in row.declared) == tuple(c.label for c in columns):
+            out.append(row)
+            continue
+        at: Mapping[str, int] = {c.label: i for i, c in enumerate(row.declared)}
+        pick = [at.get(c.label, -1) for c in columns]
+        blank = np.concatenate([row.full_columns, np.zeros((len(row.full_columns), 1))], 1)
+        carried = np.append(row.carried, False)
+        out.append(replace(row, full_columns=blank[:, pick], carried=carried[pick], declared=tuple(columns)))
+    return tuple(out)
+
+
+def _rebuilt(rig: RigModel, fit: DeclaredFit, record: Mapping[str, Any]) -> Candidate:
+    """The candidate that a record of the file names, at the loads of the file's parameters."""
+    for c in candidates(rig, fit, record["joint"]):
+        if (c.effect, c.variant) == (record["effect"], record["variant"]):
+            return c
+    raise DescriptionError(f'custom/text "hand_model": no effect "{record["effect"]}" at joint "{record["joint"]}"')
