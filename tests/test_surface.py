@@ -11,14 +11,15 @@ from hand_model import twin
 from hand_model.check import check
 from hand_model.compile import compile
 from hand_model.compile.surface import Surface as Compiled
-from hand_model.errors import IdentificationError
+from hand_model.errors import IdentificationError, MissingDependencyError
 from hand_model.hand import Coupling, Finger, Hand, Joint
 from hand_model.identify.surface import distance_to_mesh, identify_surfaces, with_surfaces
 from hand_model.identify.surface.mend import mended, rims
 from hand_model.identify.surface.refine import refined
-from hand_model.identify.surface.solid import CLOSED, LID, closed, convex_parts, hull, volume
-from hand_model.identify.surface.sweep import resampled
+from hand_model.identify.surface.solid import CLOSED, HULL, LID, closed, convex_parts, hull, volume
+from hand_model.identify.surface.sweep import displacement, resampled
 from hand_model.identify.surface.triangulate import HEIGHT_FIELD, carved, has_open3d, triangulated
+from hand_model.rotation import rotation_from_vector
 from hand_model.session import read_session
 
 RADII = np.array([0.03, 0.009, 0.0095])
@@ -165,6 +166,50 @@ def test_hull_of_few_corners_stays_inside_and_keeps_most_of_the_volume():
     corners, faces = hull(points, 64)
     assert len(corners) <= 64 and Compiled(corners, faces).watertight
     assert 0.85 < volume(corners, faces) / (4 / 3 * np.pi * RADII.prod()) < 1
+
+
+def test_points_without_triangles_become_their_hull():
+    points = np.random.default_rng(0).normal(0, 0.01, (50, 3))
+    vertices, faces, normals, _ = mended(points, np.zeros((0, 3), np.int64), np.tile([0.0, 0.0, 1.0], (50, 1)))
+    vertices, faces = refined(vertices, faces, normals)
+    vertices, faces, how = closed(vertices, faces, points, 0.005)
+    assert how == HULL and Compiled(vertices, faces).watertight
+
+
+@pytest.mark.skipif(has_open3d(), reason="Open3D is installed")
+def test_ball_pivoting_without_open3d_says_what_to_install():
+    points = np.random.default_rng(0).normal(0, 0.01, (50, 3))
+    with pytest.raises(MissingDependencyError, match=r"hand_model\[surface\]"):
+        triangulated(points, points, 0.005, pivoting=True)
+
+
+class _Seen:
+    """A recording of still markers, as far as a sweep looks at one."""
+
+    segment = "index/proximal"
+
+    def __init__(self, markers):
+        self.labels, self._markers = tuple(markers), markers
+
+    def mocap(self):
+        return self
+
+    def markers(self, labels):
+        return np.repeat(np.stack([self._markers[label] for label in labels])[None], 5, axis=0)
+
+
+def test_a_finger_that_the_probe_pushed_is_followed_by_its_markers(recorded):
+    truth, session = recorded
+    hand, turn, move = _known(truth), rotation_from_vector([0.05, -0.2, 0.1]), np.array([0.001, -0.002, 0.003])
+    rest, palm = truth.finger("index").joints[0].markers_palm, truth.palm_markers_palm
+    shape = np.stack([palm[label] for label in session.palm.labels])
+    lab, away = rotation_from_vector([1.0, 0.4, -0.7]), np.array([0.3, 0.1, 1.2])  # of the palm in the room
+    pushed = {label: turn @ p + move for label, p in rest.items()}
+    seen = _Seen({label: lab @ p + away for label, p in {**palm, **pushed}.items()})
+    found = displacement(seen, session, hand, shape)
+    assert np.allclose(found[0], turn, atol=1e-9) and np.allclose(found[1], move, atol=1e-9)
+    unseen = displacement(_Seen({label: lab @ p + away for label, p in palm.items()}), session, hand, shape)
+    assert np.all(unseen[0] == np.eye(3)) and np.all(unseen[1] == 0)
 
 
 @pytest.fixture(scope="module")

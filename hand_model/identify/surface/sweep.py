@@ -46,13 +46,13 @@ def swept(trials: Sequence[Trial], session: Session, probe: Probe, hand: Hand) -
     tips, shafts = [], []
     for trial in trials:
         tip, shaft = tip_and_shaft(trial, session, probe, shape)
-        turn, move = _displacement(trial, session, hand, shape)
+        turn, move = displacement(trial, session, hand, shape)
         tips.append((tip - move) @ turn)
         shafts.append(shaft @ turn)
     return np.concatenate(tips), np.concatenate(shafts)
 
 
-def _displacement(trial: Trial, session: Session, hand: Hand, shape: Array) -> tuple[Array, Array]:
+def displacement(trial: Trial, session: Session, hand: Hand, shape: Array) -> tuple[Array, Array]:
     """Rotation (3, 3) and shift (3,) [m] of the swept segment from rest, median over the trial; none for unseen markers."""
     finger, _, name = (trial.segment or "palm").partition("/")
     rest = {j.name: j.markers_palm for j in hand.finger(finger).joints}.get(name, {}) if name else {}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import MissingDependencyError
 from .distance import distance_to_mesh
 
 Array = NDArray[np.float64]
@@ -26,7 +27,7 @@ def has_open3d() -> bool:
     """Whether the extra for ball pivoting (`pip install hand_model[surface]`) is there and loads."""
     try:
         import open3d  # noqa: F401
-    except (ImportError, OSError):  # OSError: a system library that it needs (libgomp, libX11, libGL) is missing
+    except (ImportError, OSError):  # OSError: a system library that it needs (libEGL, libGL, libX11, libusb) is missing
         return False
     return True
 
@@ -35,8 +36,15 @@ def triangulated(points: Array, normals: Array, spacing_m: float, pivoting: bool
     """Faces (f, 3) over points (n, 3) [m] with outward unit normals (n, 3), and the method's name.
 
     spacing_m: distance of the points [m]. pivoting: ball pivoting (Bernardini et al. 1999); None: if Open3D is installed.
+    Raises MissingDependencyError where it is asked for and Open3D is not installed.
     """
-    if has_open3d() if pivoting is None else pivoting:
+    available = has_open3d() if pivoting is not False else False
+    if pivoting and not available:
+        raise MissingDependencyError(
+            "ball pivoting needs Open3D: pip install 'hand_model[surface]' (on a bare Linux also libegl1, libgl1, libx11-6, libusb-1.0-0); "
+            "without it surfaces come from the built-in Delaunay carving"
+        )
+    if available:
         return _pivoted(points, normals, spacing_m), PIVOTING
     for ball in (*BALLS[2:], 4.0, 6.0, 10.0):
         faces = carved(points, ball * spacing_m)
