@@ -74,12 +74,13 @@ def stroke_variance(balance: Balance, z: Array) -> float:
 
 
 def lack_of_fit(balance: Balance, prediction: Array, parameters: int, alpha: float) -> LackOfFit:
-    """Chi-square tests of cell means of the residual (steady samples) against the pure error, several groupings.
+    """Tests of cell means of the residual (steady samples) against how they vary from stroke to stroke, several groupings.
 
-    parameters: number of fitted coefficients, taken off the degrees of freedom of every grouping (conservative where
-    a grouping does not see them). alpha: false-alarm probability that `limit` stands for.
+    parameters: number of fitted coefficients, taken off the degrees of freedom of the grouping by strokes. alpha:
+    false-alarm probability that `limit` stands for. The null is that of a wild bootstrap with strokes as blocks
+    (Liu 1988), in closed form: it holds for noise that is coloured, differs over pose or speed, or comes in bursts.
     """
-    from scipy.stats import chi2
+    from scipy.stats import f
 
     z = (balance.effort - prediction) * balance.weight
     use = balance.steady
@@ -87,17 +88,48 @@ def lack_of_fit(balance: Balance, prediction: Array, parameters: int, alpha: flo
     best, excess = LackOfFit(1.0, 0.0, "", 0.0), 0.0
     cells = groupings(balance)
     for name, label in cells.items():
-        index = np.unique(label[use], return_inverse=True)[1]
-        count = np.bincount(index)
-        total = np.bincount(index, z[use])
-        keep = count >= 3
-        pairs, size = np.unique(np.stack([index, balance.stroke[use]]), axis=1, return_counts=True)
-        common = np.bincount(pairs[0], size.astype(float) ** 2, minlength=len(count))
-        variance = balance.inflation * count + unrest * common
-        statistic = float(np.sum(total[keep] ** 2 / variance[keep]))
-        degrees = max(int(keep.sum()) - (parameters if name != "stroke" else 2), 1)
-        excess = max(excess, statistic - degrees)
-        p = min(float(chi2.sf(statistic, degrees)) * len(cells), 1.0)
+        sums, count = _sums(label[use], balance.stroke[use], z[use])
+        keep = count.sum(1) >= 3
+        sums, count = sums[keep], count[keep]
+        variance = balance.inflation * count.sum(1) + unrest * (count**2).sum(1)
+        excess = max(excess, float(np.sum(sums.sum(1) ** 2 / variance)) - max(len(sums) - parameters, 1))
+        if name == "stroke":
+            freedom, many = max(len(sums) - 2, 1), max(count.shape[1] - parameters, 2)
+            ratio = float(np.sum(sums.sum(1) ** 2 / variance)) / freedom
+        else:
+            ratio, freedom, many = _against_strokes(sums, count, variance)
+        p = min(float(f.sf(ratio, freedom, many)) * len(cells), 1.0)
         if p < best.p or not best.telling:
-            best = LackOfFit(p, statistic / degrees, name, float(chi2.isf(alpha / len(cells), degrees)) / degrees)
+            best = LackOfFit(p, ratio, name, float(f.isf(alpha / len(cells), freedom, many)))
     return replace(best, excess=float(excess))
+
+
+def _sums(cell: NDArray[np.int64], stroke: NDArray[np.int64], z: Array) -> tuple[Array, Array]:
+    """Sum of z and number of samples (cells, strokes)."""
+    i, j = np.unique(cell, return_inverse=True)[1], np.unique(stroke, return_inverse=True)[1]
+    shape = (i.max() + 1, j.max() + 1) if len(i) else (0, 0)
+    flat = i * max(shape[1], 1) + j
+    size = shape[0] * shape[1]
+    return np.bincount(flat, z, size).reshape(shape), np.bincount(flat, minlength=size).reshape(shape).astype(float)
+
+
+def _against_strokes(sums: Array, count: Array, variance: Array) -> tuple[float, float, float]:
+    """Sum of squared cell means over its expectation if only the strokes differ, and its two degrees of freedom.
+
+    sums, count: (cells, strokes); variance: (cells,) scales of the cells. With strokes multiplied by random signs the sum is
+    a quadratic form, whose first two moments give the scale and the degrees of freedom (Satterthwaite 1946).
+    """
+    replicates = (count > 0).sum(1)
+    keep = replicates >= 3
+    if not keep.any():
+        return 0.0, 1.0, 1.0
+    sums, count, variance, replicates = sums[keep], count[keep], variance[keep], replicates[keep]
+    total = count.sum(1)
+    left = sums - count * (sums.sum(1) / total)[:, None]
+    # what taking the cell's mean out leaves of the variance of its strokes
+    left /= np.sqrt(1 - (count**2).sum(1) / total**2).clip(0.3)[:, None]
+    root = left / np.sqrt(variance)[:, None]
+    form = root @ root.T
+    expected = float(np.trace(form))
+    freedom = expected**2 / max(float(np.sum(form**2)), 1e-300)
+    return float(np.sum(sums.sum(1) ** 2 / variance)) / max(expected, 1e-300), freedom, max(float((count > 0).any(0).sum()) - 1, 1.0)
