@@ -259,7 +259,7 @@ def fit(
             if moved is None:
                 break
             q, own, cost, damping = moved
-    return _finish(data, linear, q, names, sigma, own, cost, controller)
+    return _finish(data, linear, q, names, sigma, own, cost, controller, bounds)
 
 
 def first_cost(
@@ -349,10 +349,10 @@ def _normal(
 
 def _finish(
     data: Sequence[MoveData], linear: tuple[list[Array], ...], q: Mapping[str, float], names: Sequence[str], sigma: tuple[float, float], own: Array, cost: float,
-    controller: str,
+    controller: str, bounds: Mapping[str, tuple[float, float]],
 ) -> OutputErrorFit:
     r, g, local, weights = linear
-    normal, _, _, score = _normal(data, r, g, local, own, q, names)
+    normal, gradient, _, score = _normal(data, r, g, local, own, q, names)
     k = len(names)
     meat = score.T @ score * len(score) / max(1, len(score) - 1)
     bread = np.linalg.pinv(normal, hermitian=True)
@@ -361,9 +361,25 @@ def _finish(
     squared = np.sum([np.sum(e.reshape(2, -1) ** 2, axis=1) for e in r], axis=0)
     chi2 = squared / (n - 0.5 * (k + 3 * len(data)))
     covariance = _conservative(bread * max(1.0, float(chi2.max())), bread @ meat @ bread)
+    left = _unresolved(normal, gradient, np.array([bounds.get(n, (-np.inf, np.inf)) for n in names]).reshape(-1, 2), np.array([q[n] for n in names]))
+    covariance = covariance + np.outer(left, left)
     return OutputErrorFit(
         dict(q), tuple(names), covariance, sigma, residual, tuple(data), own, cost, (float(chi2[0]), float(chi2[1])), controller
     )
+
+
+def _unresolved(normal: Array, gradient: Array, bounds: Array, values: Array) -> Array:
+    """The step (k,) that the linear model still asks for where the search ended: what a misfit with kinks (sticking) leaves open.
+
+    Parameters that are held by their bounds (k, 2) stay.
+    """
+    way = np.sign(gradient)
+    free = ~(((values <= bounds[:, 0] * 1.01 + 1e-12) & (way < 0)) | ((values >= bounds[:, 1] * 0.99) & (way > 0)))
+    step = np.zeros(len(values))
+    if free.any():
+        scale = np.sqrt(np.maximum(np.diag(normal)[free], 1e-30))
+        step[free] = np.linalg.lstsq(normal[np.ix_(free, free)] / np.outer(scale, scale), gradient[free] / scale, rcond=1e-8)[0] / scale
+    return step
 
 
 def _conservative(model: Array, sandwich: Array) -> Array:
