@@ -153,6 +153,14 @@ def solution(problem: Problem, terms: Sequence[Term]) -> Array:
     return consistent(fit.columns, fit.bodies, theta, *sums, *box) if len(fit.bodies) else theta
 
 
+def resampled(problem: Problem, terms: Sequence[Term], draws: int = 200) -> Array:
+    """All parameters (draws, P + J) on resampled sets of training blocks (block bootstrap, Kuensch 1989)."""
+    gram, moment, _, _ = normal(problem, terms)
+    box = limits(problem.fit, terms)
+    pick = np.random.default_rng(0).integers(0, len(gram), (draws, len(gram)))
+    return np.array([solve_bounded(gram[k].sum(0), moment[k].sum(0), *box) for k in pick])
+
+
 def _extended(problem: Problem, terms: Sequence[Term], new: Term, parts: tuple) -> tuple:
     """Normal equations with one more term, from those without it: only its own columns are multiplied out."""
     gram, moment, square, count = parts

@@ -16,7 +16,7 @@ from .replay import replay_rig
 from .states import noise_std
 from .swing import INDEX, PARAMETERS, STEP_S, Swing, Task, vector
 from .swing_build import build_swing, windows_s
-from .swing_compete import Round, Variant, compete_swing, fit_stages, free_declared
+from .swing_compete import LEAST_GAIN, Round, Variant, compete_swing, fit_stages, free_declared
 from .swing_patch import write_swing
 from .words import shares, statement
 
@@ -46,7 +46,8 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
     replays = [replay_rig(session, load_rig(session, x)) for x in files]
     held = bool(rig.select(True))  # without validation recordings the training ones measure, and the report says so
     figures = [r.figure("position_rmse", held) for r in replays]
-    holds = next((k for k in range(len(taken)) if figures[k + 1] >= figures[k]), len(taken))
+    enough = 1.0 - LEAST_GAIN  # what is worth a name in training is worth it here
+    holds = next((k for k in range(len(taken)) if figures[k + 1] > enough * figures[k]), len(taken))
     rejected = [{"effect": v.key, "reason": "error on validation trials does not fall"} for v in taken[holds:]]
     taken, rounds, figures = taken[:holds], rounds[:holds], figures[: holds + 1]
     means = [r.figure("position_mae", held) for r in replays]
@@ -57,7 +58,8 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
                  "held_out": [t.name for t in rig.select(held)], "engine": "mujoco"}  # fmt: skip
         found.append(_swing_finding(rig, variant, round_, swing, proof))
     lack = {"metric": "position_rmse", "unit": rig.unit(rig.joints[0]), "before": figures[0], "after": figures[-1],
-            "one_effect": figures[min(1, len(figures) - 1)], "mae_before": means[0], "mae_after": means[holds],
+            "one_effect": figures[min(1, len(figures) - 1)],
+            "two_effects": figures[min(2, len(figures) - 1)], "engine": "mujoco", "mae_before": means[0], "mae_after": means[holds],
             "noise_floor": _resolution(rig),
             "declared": {n: float(fits[0].theta[INDEX[n]]) for n in free}}  # fmt: skip
     return shares(found), rejected, lack, files[holds], files[0]
@@ -78,7 +80,7 @@ def _fall(before: Any, after: Any, held: bool) -> list[float]:
 
 def _swing_finding(rig: RigModel, variant: Variant, round_: Round, swing: Swing, proof: dict) -> Finding:
     joint = rig.joints[0]
-    parameters = {n: {"value": float(round_.fit.theta[INDEX[n]]), "unit": ""} for n in variant.start}
+    parameters = {n: {"value": float(round_.fit.theta[INDEX[n]]), "unit": "", "ci95": None} for n in variant.start}
     where = {"finger": None, "joint": joint, "actuator": (rig.drive(joint).name if rig.drive(joint) else None),
              "signal": "position", "marker": None, "trials": proof["held_out"],
              "share_of_mismatch": max(proof["before"] ** 2 - proof["after"] ** 2, 0.0)}  # fmt: skip

@@ -8,7 +8,7 @@ recording (virtual work), not from the solver. What MJCF has no attribute for st
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -26,12 +26,17 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class EffortResidual:
-    """Recorded effort minus the file's (m,) [N m or N], moving samples only, of one joint in one trial."""
+    """Recorded effort minus the file's (m,) [N m or N], moving samples only, of one joint in one trial.
+
+    row: its balance; expected: the file's effort at all samples of the thinned grid.
+    """
 
     trial: str
     joint: str
     validate: bool
     error: Array
+    row: Rows = field(repr=False)
+    expected: Array = field(repr=False)
 
 
 def effort_residuals(
@@ -69,7 +74,7 @@ def effort_residuals(
             for candidate, record in terms:
                 if candidate.joint == row.joint and candidate.delays:
                     expected = np.interp(grid - record["shape"]["delay"], grid, expected)
-            out.append(EffortResidual(name, row.joint, row.validate, (row.effort - expected)[row.moving]))
+            out.append(EffortResidual(name, row.joint, row.validate, (row.effort - expected)[row.moving], row, expected))
     return tuple(out)
 
 

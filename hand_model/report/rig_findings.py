@@ -1,0 +1,227 @@
+"""The report of a rig's diagnosis: what is missing, where it shows, and what it is worth on recordings held out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..rig.findings import Finding, RigFindings
+from ..rig.inverse import EffortResidual, effort_residuals
+from ..rig.model import RigModel, load_rig
+from ..rig.replay import simulate_trial
+from ..session import Session
+from .page import Element, Section, figures, key, listing, note, page, table
+from .pictures import POINTS
+from .style import INK, SERIES, drawing
+from .words import count
+
+Array = NDArray[np.float64]
+CELLS = (28, 20)  # of a map, along position and velocity
+BINS = 32
+PICTURES = 8
+BY_POSITION = frozenset({"nonlinear_spring", "end_stop_contact", "detent_load", "torque_ripple", "gravity_load",
+                         "position_dependent_friction", "elastoplastic_hysteresis", "viscoelastic_spring"})  # fmt: skip
+BY_TIME = frozenset({"thermal_friction_drift"})
+Pair = tuple[EffortResidual, EffortResidual]
+
+
+def write_rig_findings(session: Session, findings: RigFindings, folder: str | Path) -> Path:
+    """Write `report.html` beside the findings, whole or not at all; returns its path."""
+    target = Path(folder) / "report.html"
+    target.parent.mkdir(parents=True, exist_ok=True)
+    part = target.with_name(".report.html.part")
+    part.write_bytes(rig_findings_page(session, findings))
+    part.replace(target)
+    return target
+
+
+def rig_findings_page(session: Session, findings: RigFindings) -> bytes:
+    """The page as bytes."""
+    rig = load_rig(session)
+    swing = findings.lack_of_fit.get("metric") == "position_rmse"
+    pairs = [] if swing or findings.lack_of_fit.get("before") is None else _pairs(rig, findings)
+    sections = [Section("findings", "What is missing", _conclusion(findings), tuple(_findings(findings)))]
+    if pairs:
+        sections += [_map(rig, pairs), _effects(rig, findings, pairs), _validation(rig, pairs)]
+    if swing:
+        sections.append(_motion(rig, findings))
+    sections.append(Section("next", "Next", f"{findings.next_experiment or 'Nothing more is asked for.'}", _rest(findings)))
+    lead = (f"{session.path.name}: the declared model, fitted, against {count(len(rig.trials), 'trial')}; what is named below "
+            "was chosen on the training trials and measured on the others, by MuJoCo on the written files.")  # fmt: skip
+    return page(session.hand or session.path.name, lead, _tiles(findings), sections)
+
+
+def _tiles(findings: RigFindings) -> list[tuple[str, str]]:
+    lack, tiles = findings.lack_of_fit, [(findings.verdict, "verdict")]
+    if lack.get("before"):
+        tiles += [(f"{lack['after'] / lack['before']:.2f}", "held-out error, all effects over declared"),
+                  (f"{lack['one_effect'] / lack['before']:.2f}", "with the first effect alone")]  # fmt: skip
+    return tiles
+
+
+def _conclusion(findings: RigFindings) -> str:
+    if findings.lack_of_fit.get("before") is None:
+        return "No effort channel can be trusted: nothing is fitted, and nothing is claimed."
+    named = [f for f in findings.findings if f.model is not None]
+    if not named:
+        return "No effect known here lowers the error on the recordings held out."
+    names = ", ".join(dict.fromkeys(f.effect.replace("_", " ") for f in named))
+    return f"{count(len(named), 'departure')} from the declared model: {names}."
+
+
+def _findings(findings: RigFindings) -> list[Element]:
+    rows = []
+    for f in findings.findings:
+        known = "before" in f.fit
+        rows.append([f.where.get("joint") or "", f.effect.replace("_", " "),
+                     ", ".join(m.replace("_", " ") for m in f.members if m != f.effect) or "–", f"{f.probability:.2f}",
+                     f"{f.fit['before']:.4g}" if known else "–", f"{f.fit['after']:.4g}" if known else "–",
+                     f.fit.get("unit", "")])  # fmt: skip
+    head = ("joint", "effect", "not told from", "probability", "held-out error before", "after", "unit")
+    parts = [table(head, rows, "Each effect beside those above it at the same joint", text_columns=3)] if rows else []
+    return [*parts, listing([f.statement for f in findings.findings])] if rows else []
+
+
+def _pairs(rig: RigModel, findings: RigFindings) -> list[Pair]:
+    """Residuals of the declared and of the improved file, by joint and trial."""
+    known = set(findings.lack_of_fit.get("joints", {}))
+    sides = [effort_residuals(replace(rig, xml=xml)) for xml in (findings.declared_xml, findings.xml)]
+    after = {(r.trial, r.joint): r for r in sides[1]}
+    return [(r, after[r.trial, r.joint]) for r in sides[0] if r.joint in known and len(r.error) > 10]
+
+
+def _map(rig: RigModel, pairs: Sequence[Pair]) -> Section:
+    drawn = []
+    for joint in list(dict.fromkeys(a.joint for a, _ in pairs))[:PICTURES]:
+        mine = [p for p in pairs if p[0].joint == joint]
+        q, v, before = (np.concatenate(x) for x in zip(*[_states(a) for a, _ in mine], strict=True))
+        drawn.append((f"{joint}: declared model", _cells(q, v, before, before, rig, joint)))
+        improved = np.concatenate([b.error for _, b in mine])
+        drawn.append((f"{joint}: with what was found", _cells(q, v, improved, before, rig, joint)))
+    words = "Mean residual effort over position and velocity, all trials: what the declared model leaves has a shape."
+    return Section("map", "Map of the mismatch", words, (figures(*drawn), note(
+        "Red: more effort recorded than simulated; blue: less. Both pictures of a joint share one scale, shown by the bar.")))  # fmt: skip
+
+
+def _states(r: EffortResidual) -> tuple[Array, Array, Array]:
+    """Position, velocity and residual of the moving samples (k,)."""
+    row = r.row
+    return row.position[:: row.step][row.moving], row.velocity[:: row.step][row.moving], r.error
+
+
+def _cells(q: Array, v: Array, error: Array, scale: Array, rig: RigModel, joint: str) -> bytes:
+    sides = [np.linspace(*np.percentile(x, [0.5, 99.5]), n + 1) for x, n in zip((q, v), CELLS, strict=True)]
+    total, _, _ = np.histogram2d(q, v, sides, weights=error)
+    seen, _, _ = np.histogram2d(q, v, sides)
+    mean = np.where(seen > 0, total / np.maximum(seen, 1), np.nan)
+    limit = float(np.percentile(np.abs(scale), 95)) or 1.0
+    with drawing() as d:
+        mesh = d.axes.pcolormesh(*sides, mean.T, cmap="RdBu_r", vmin=-limit, vmax=limit)
+        d.figure.colorbar(mesh, ax=d.axes, label=f"[{rig.effort_unit(joint)}]", fraction=0.05)
+        d.axes.set_xlabel(f"position [{rig.unit(joint)}]")
+        d.axes.set_ylabel(f"velocity [{rig.unit(joint)}/s]")
+    return d.svg
+
+
+def _effects(rig: RigModel, findings: RigFindings, pairs: Sequence[Pair]) -> Section:
+    drawn = []
+    for f in [f for f in findings.findings if f.fit.get("metric") == "effort_rmse"][:PICTURES]:
+        mine = [p for p in pairs if p[0].joint == f.where["joint"]]
+        held = [p for p in mine if p[0].validate] or mine
+        if held:
+            drawn.append((f"{f.where['joint']}: {f.effect.replace('_', ' ')}", _through(f, held, rig)))
+    words = "Residual effort on held-out trials against what each effect acts through, mean and middle 80 % in bins."
+    body = (key(("c1", "declared model"), ("ink", "with what was found")), figures(*drawn)) if drawn else ()
+    return Section("effects", "Effects through the data", words if drawn else "No effect to show.", body)
+
+
+def _through(finding: Finding, held: Sequence[Pair], rig: RigModel) -> bytes:
+    joint, effect = finding.where["joint"], finding.effect
+    q, v, before = (np.concatenate(x) for x in zip(*[_states(a) for a, _ in held], strict=True))
+    after = np.concatenate([b.error for _, b in held])
+    time_s = np.concatenate([a.row.time_s[:: a.row.step][a.row.moving] for a, _ in held])
+    load = np.concatenate([a.expected[a.row.moving] for a, _ in held])
+    if effect in BY_POSITION:
+        x, label = q, f"position [{rig.unit(joint)}]"
+    elif effect in BY_TIME:
+        x, label = time_s, "time [s]"
+    elif effect == "load_dependent_friction":
+        x, label = load * np.sign(v), f"declared effort along the motion [{rig.effort_unit(joint)}]"
+    else:
+        x, label = v, f"velocity [{rig.unit(joint)}/s]"
+    with drawing() as d:
+        for values, colour in ((before, SERIES[0]), (after, INK)):
+            centre, low, mean, high = _binned(x, values)
+            d.axes.fill_between(centre, low, high, color=colour, alpha=0.18, linewidth=0)
+            d.axes.plot(centre, mean, color=colour)
+        d.axes.set_xlabel(label)
+        d.axes.set_ylabel(f"residual [{rig.effort_unit(joint)}]")
+    return d.svg
+
+
+def _binned(x: Array, y: Array) -> tuple[Array, Array, Array, Array]:
+    """Centres of bins with as many samples each, tenth percentile, mean and ninetieth of y."""
+    parts = [p for p in np.array_split(np.argsort(x), BINS) if len(p)]
+    low, high = (np.array([np.percentile(y[p], k) for p in parts]) for k in (10, 90))
+    return np.array([x[p].mean() for p in parts]), low, np.array([y[p].mean() for p in parts]), high
+
+
+def _validation(rig: RigModel, pairs: Sequence[Pair]) -> Section:
+    held = [p for p in pairs if p[0].validate] or list(pairs)
+    rows = [[a.trial, a.joint, f"{_rms(a.error):.4g}", f"{_rms(b.error):.4g}", f"{_rms(b.error) / max(_rms(a.error), 1e-300):.2f}",
+             rig.effort_unit(a.joint)] for a, b in held]  # fmt: skip
+    drawn = []
+    for a, b in list({a.joint: (a, b) for a, b in held}.values())[:PICTURES]:
+        grid = a.row.time_s[:: a.row.step]
+        keep = slice(None, None, max(1, len(grid) // POINTS))
+        with drawing() as d:
+            d.axes.plot(grid[keep], a.row.effort[keep], color=SERIES[1], linewidth=1.6)
+            d.axes.plot(grid[keep], a.expected[keep], color=SERIES[0], linewidth=0.9)
+            d.axes.plot(grid[keep], b.expected[keep], color=INK, linewidth=0.9)
+            d.axes.set_xlabel("time [s]")
+            d.axes.set_ylabel(f"effort [{rig.effort_unit(a.joint)}]")
+        drawn.append((f"{a.trial}, {a.joint}", d.svg))
+    head = ("trial", "joint", "declared", "with what was found", "ratio", "unit")
+    words = f"Effort by inverse dynamics of the two files on {count(len({a.trial for a, _ in held}), 'trial')} held out."
+    return Section("validation", "Before and after", words, (
+        table(head, rows, "Root mean square of the effort error, moving samples", text_columns=2),
+        key(("c2", "recorded"), ("c1", "declared model"), ("ink", "with what was found")), figures(*drawn)))  # fmt: skip
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
+
+
+def _motion(rig: RigModel, findings: RigFindings) -> Section:
+    joint, drawn, rows = rig.joints[0], [], []
+    for trial in rig.select(True) or rig.trials:
+        recorded = trial.position[joint]
+        sides = [simulate_trial(replace(rig, xml=x), trial)[1][:, 0] for x in (findings.declared_xml, findings.xml)]
+        errors = [_rms((s - recorded)[np.isfinite(recorded)]) for s in sides]
+        rows.append([trial.name, *(f"{e:.4g}" for e in errors), f"{errors[1] / max(errors[0], 1e-300):.2f}"])
+        keep = slice(None, None, max(1, len(recorded) // POINTS))
+        with drawing() as d:
+            d.axes.plot(trial.time_s[keep], recorded[keep], color=SERIES[1], linewidth=1.6)
+            for values, colour in zip(sides, (SERIES[0], INK), strict=True):
+                d.axes.plot(trial.time_s[keep], values[keep], color=colour, linewidth=0.9)
+            d.axes.set_xlabel("time [s]")
+            d.axes.set_ylabel(f"position [{rig.unit(joint)}]")
+        drawn.append((trial.name, d.svg))
+    words = "Motion simulated by MuJoCo in open loop over whole trials, from the recorded start."
+    return Section("validation", "Before and after", words, (
+        table(("trial", "declared", "with what was found", "ratio"), rows, f"Position rmse [{rig.unit(joint)}]"),
+        key(("c2", "recorded"), ("c1", "declared model"), ("ink", "with what was found")), figures(*drawn[:PICTURES])))  # fmt: skip
+
+
+def _rest(findings: RigFindings) -> tuple[Element, ...]:
+    said = [f"{u['where']['joint'] or 'the joint'}: {100 * u['share_of_mismatch']:.0f} % of the mismatch stays unexplained."
+            for u in findings.unexplained]  # fmt: skip
+    tried = sorted({r["effect"].split("@")[0].replace("_", " ") for r in findings.rejected})
+    return tuple(filter(None, [listing(said) if said else None, note(f"Tried and not taken: {', '.join(tried)}.") if tried else None]))
+
+
+__all__ = ["rig_findings_page", "write_rig_findings"]
