@@ -17,9 +17,13 @@ from .balance import Balance
 from .command import command_facts, command_findings, refused
 from .drive import drive_states, drive_trials, is_measured
 from .findings import Finding, Findings
-from .interval import held_out, parameter_intervals, variance_ratio
+from .interval import held_out, parameter_intervals, proven, variance_ratio
 from .name import ALPHA, Named, Naming, name_effects, polish, scan
 
+# How before and after were computed, said in the findings: no compiled file is involved until one is replayed.
+ENGINE = {"current": "inverse dynamics of the motor's balance, motion as recorded", "encoder": "encoder map, motion as recorded",
+          "markers": "linkage polynomial, motion as recorded"}
+UNWRITTEN = {"native": False, "mjcf": None, "urdf": "not expressible"}
 SMALL = 0.1  # share of the explained mismatch
 EXPLAINED_LEAST = 0.7  # of the explainable mismatch: below, the names are not believed
 
@@ -115,6 +119,7 @@ class Station:
 
     def __init__(self, signal: str, finger: str | None, actuator: str | None, joint: str | None, naming: Naming) -> None:
         self.signal, self.finger, self.actuator, self.joint, self.naming = signal, finger, actuator, joint, naming
+        self.proven = tuple(f for f in naming.found if proven(naming, naming.fit.terms.index(f.term)))
 
     @property
     def missing(self) -> bool:
@@ -130,15 +135,15 @@ class Station:
     @property
     def believed(self) -> bool:
         """Whether the names stand: the final model passes the test, or takes most of the mismatch away."""
-        return bool(self.naming.found) and (self.naming.after.p >= ALPHA or self.explained >= EXPLAINED_LEAST)
+        return bool(self.proven) and (self.naming.after.p >= ALPHA or self.explained >= EXPLAINED_LEAST)
 
     @property
     def kept(self) -> tuple[Named, ...]:
         """The effects that stand beside each other: where the whole still does not fit, the small ones may be no more than
         the form of the large one being another, and are left to the unexplained part."""
         if self.naming.after.p >= ALPHA:
-            return self.naming.found
-        return tuple(f for f in self.naming.found if f.share >= SMALL or f is self.naming.found[0])
+            return self.proven
+        return tuple(f for f in self.proven if f.share >= SMALL or f is self.proven[0])
 
     def line(self) -> str:
         """One line for a progress display."""
@@ -282,12 +287,10 @@ def _finding(station: Station, named: Named, share: float) -> tuple[float, Findi
     alternatives = tuple((r.name, float(p)) for r, p in zip(named.rivals, weights[:-1], strict=True)
                          if r.name != effect.name and p > 1e-3)[:4]
     unit = naming.balance.states[0].effort_unit
-    fit = {"metric": f"{station.signal}_rmse", "unit": unit, **held_out(naming, which), "engine": "balance"}
+    fit = {"metric": f"{station.signal}_rmse", "unit": unit, **held_out(naming, which), "engine": ENGINE[station.signal]}
     members = named.members if effect.name in named.members else (effect.name, *named.members)
-    native = getattr(effect, "native", None)
     recording = getattr(effect, "correction", None)
-    model = None if recording else {"native": native is not None, "mjcf": native,
-                                    "urdf": "not expressible: kept in hand.json"}
+    model = None if recording else dict(UNWRITTEN)
     weight = 0.5 * max(naming.declared.rss - naming.fit.rss, 0.0) * share
     return weight, Finding(effect.name, members, named.probability, alternatives, where,
                            effect.statement(where, values), parameters, fit, model, recording)

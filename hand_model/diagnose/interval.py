@@ -109,27 +109,44 @@ def _covariance(balance: Balance, fit: Fit, theta: Array, build: Any) -> Array:
 
 
 def held_out(naming: Naming, which: int, seed: int = 0) -> dict[str, Any]:
-    """Root-mean-square error on the validation recordings (steady samples), without and with the term `which`, the noise
-    floor, and a bootstrap interval over strokes of the reduction. Without validation recordings: on all recordings."""
+    """Root-mean-square error on recordings that took no part, without and with the term `which`, the noise floor, and a
+    bootstrap interval over strokes of the reduction.
+
+    Steady samples; all compared ones for a delay or a give, which act at starts and stops. `held_out` is empty where there
+    are no validation recordings or where the naming had to look at them: figures are then in-sample.
+    """
     balance, fit = naming.balance, naming.fit
     without = balance.fit(tuple(t for i, t in enumerate(fit.terms) if i != which))
-    use = ~balance.train & balance.steady
-    if not use.any():
-        use = balance.steady
+    effect = fit.terms[which].effect
+    seen = np.ones(len(balance.train), bool) if effect.warps or effect.replaces else balance.steady
+    use = ~balance.train & seen
+    untouched = bool(use.any())
+    if not untouched:
+        use = seen
     r0, r1 = ((balance.effort - f.prediction)[use] ** 2 for f in (without, fit))
     _, block = np.unique(balance.stroke[use], return_inverse=True)
     n, s0, s1 = (np.bincount(block, v) for v in (np.ones(use.sum()), r0, r1))
     pick = np.random.default_rng(seed).integers(0, len(n), (1000, len(n)))
     count = n[pick].sum(1)
     reduction = np.sqrt(s0[pick].sum(1) / count) - np.sqrt(s1[pick].sum(1) / count)
-    trials = [s.trial for s in balance.states if s.validate] if (~balance.train).any() else []
     return {
         "before": float(np.sqrt(r0.mean())),
         "after": float(np.sqrt(r1.mean())),
         "noise_floor": balance.sigma,
         "ci95_reduction": np.percentile(reduction, [2.5, 97.5]).tolist(),
-        "held_out": trials,
+        "held_out": [s.trial for s in balance.states if s.validate] if untouched else [],
     }
+
+
+def proven(naming: Naming, which: int) -> bool:
+    """Whether the term `which` lowers the error of recordings that took no part by more than their strokes scatter.
+
+    True where nothing can be asked: no untouched recording, or an event that belongs to one recording only.
+    """
+    if "trial" in naming.fit.terms[which].shape:
+        return True
+    proof = held_out(naming, which)
+    return not proof["held_out"] or proof["ci95_reduction"][0] > 0
 
 
 def variance_ratio(naming: Naming, fit: Fit) -> float:

@@ -71,10 +71,9 @@ def _finding(angles: FingerAngles, naming: MarkerNaming, name: str, body: int, l
     where = {"finger": angles.finger.name, "joint": joint, "actuator": None, "signal": "markers", "marker": label,
              "trials": trials, "region": None, "share_of_mismatch": share}
     fit = {"metric": "marker_rmse", "unit": "m", **_proof(naming), "noise_floor": naming.sigma_m,
-           "held_out": [], "engine": "chain"}
+           "held_out": [], "engine": "chain fitted to the markers, in-sample"}
     correction = CORRECTION.get(name)
-    model = None if correction else {"native": True, "mjcf": f"joint[@name='{angles.finger.name}_{joint}'] + tied joints",
-                                     "urdf": "not expressible: kept in hand.json"}
+    model = None if correction else {"native": False, "mjcf": None, "urdf": "not expressible"}
     return Finding(name, (name,), float(1 - np.exp(-min(main.evidence, 700))), (), where, text, parameters, fit, model, correction)
 
 
@@ -119,7 +118,7 @@ def _swaps(angles: FingerAngles) -> list[tuple[float, Finding]]:
              "share_of_mismatch": 1.0}
     parameters = {"begin": {"value": begin, "unit": "s"}, "end": {"value": end, "unit": "s"}}
     fit = {"metric": "marker_rmse", "unit": "m", "before": None, "after": None, "noise_floor": angles.noise_m,
-           "ci95_reduction": None, "held_out": [], "engine": "chain"}
+           "ci95_reduction": None, "held_out": [], "engine": "chain fitted to the markers, in-sample"}
     text = f"{' and '.join(names)} are exchanged from {begin:.1f} to {end:.1f} s of {trial}."
     return [(1e6, Finding("marker_swap", ("marker_swap",), 1.0, (), where, text, parameters, fit, None, CORRECTION["marker_swap"]))]
 
