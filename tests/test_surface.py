@@ -13,13 +13,14 @@ from hand_model.compile import compile
 from hand_model.compile.surface import Surface as Compiled
 from hand_model.errors import IdentificationError, MissingDependencyError
 from hand_model.hand import Coupling, Finger, Hand, Joint
+from hand_model.identify.probe import calibrated_probe
 from hand_model.identify.surface import distance_to_mesh, identify_surfaces, with_surfaces
 from hand_model.identify.surface.mend import mended, rims
 from hand_model.identify.surface.refine import refined
 from hand_model.identify.surface.solid import CLOSED, HULL, LID, closed, convex_parts, hull, volume
 from hand_model.identify.surface.sweep import displacement, resampled
 from hand_model.identify.surface.triangulate import HEIGHT_FIELD, carved, has_open3d, triangulated
-from hand_model.rotation import rotation_from_vector
+from hand_model.rotation import kabsch, rotation_from_vector
 from hand_model.session import read_session
 
 RADII = np.array([0.03, 0.009, 0.0095])
@@ -277,3 +278,12 @@ def test_a_short_sweep_leaves_the_fallback_and_says_so(recorded):
     assert all(not s.found and "fallback" in s.notes[0] and len(s.notes) == 1 for s in bare)
     hand = with_surfaces(_known(truth), bare)
     assert "surfaces" not in hand.extra and len(hand.notes) == len(bare)
+
+
+def test_a_probe_that_is_calibrated_on_the_moving_hand_has_its_tip_where_it_is(tmp_path):
+    truth = twin.bebionic("right", 12, ["index"])
+    plan = twin.Plan(flexion=("full",), validation=(), excitations=0, pivot=True)
+    twin.record(truth, tmp_path / "session", 12, (), plan)
+    probe = calibrated_probe(read_session(tmp_path / "session"))
+    _, off = kabsch(np.stack([truth.probe[label] for label in probe.labels]), probe.position_probe)
+    assert np.linalg.norm(off) < 4e-4

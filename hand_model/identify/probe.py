@@ -79,7 +79,8 @@ def probed_point(trial: Trial, session: Session, probe: Probe, palm_shape: Array
 def calibrated_probe(session: Session) -> Probe | None:
     """The session's probe; where its tip is not known, found from its `pivot` trials.
 
-    The tip stays put while the tool swings: R_f p + t_f = const, solved by least squares over all frames. Raises
+    The tip stays put while the tool swings: R_f p + t_f = const, solved by robust least squares over all frames, in the room and,
+    where the palm is seen, relative to it (the tip may stand on the hand): the smaller residual tells which. Raises
     IdentificationError where no pivot trial exists or the tool swings too little.
     """
     probe = session.probe
@@ -90,16 +91,42 @@ def calibrated_probe(session: Session) -> Probe | None:
         raise IdentificationError(f'{session.path}: the probe has no marker positions and there is no trial of kind "pivot"')
     tracks = [trial.mocap().markers(probe.labels) for trial in trials]
     shape = cluster_shape(np.concatenate(tracks))
+    tracks = [_probe_markers(track, Probe(probe.labels, shape)) for track in tracks]
+    found = [_pivot(shape, tracks, trials[0].name)]
+    if session.palm is not None and all(set(session.palm.labels) <= set(trial.mocap().labels) for trial in trials):
+        palms = [trial.mocap().markers(session.palm.labels) for trial in trials]
+        palm = cluster_shape(np.concatenate(palms))
+        poses = [kabsch(palm, track) for track in palms]
+        hidden = [~np.isfinite(track).all((1, 2)) for track in palms]
+        still = [np.einsum("nji,nmj->nmi", r, track - t[:, None]) for (r, t), track in zip(poses, tracks, strict=True)]
+        for track, gap in zip(still, hidden, strict=True):
+            track[gap] = np.nan
+        found.append(_pivot(shape, still, trials[0].name))
+    tip, _ = min(found, key=lambda f: f[1])
+    return Probe(probe.labels, shape - tip)
+
+
+def _pivot(shape: Array, tracks: list[Array], name: str) -> tuple[Array, float]:
+    """Tip (3,) [m] in the frame of shape, and the typical miss [m] of a frame; tracks: (n, m, 3) [m] of each trial."""
     rows, right = [], []
     for i, track in enumerate(tracks):
-        good = np.isfinite(track).all((1, 2))
+        good = np.isfinite(track).all(2).sum(1) >= min(4, len(shape))
+        if not good.any():
+            continue
         rotation, translation = kabsch(shape, track[good])
         hole = np.zeros((len(rotation), 3, 3 * len(tracks)))
         hole[:, :, 3 * i : 3 * i + 3] = -np.eye(3)
-        rows.append(np.concatenate([rotation, hole], axis=2).reshape(-1, 3 + 3 * len(tracks)))
-        right.append(-translation.reshape(-1))
-    design = np.concatenate(rows)
-    solution, _, _, singular = np.linalg.lstsq(design, np.concatenate(right), rcond=None)
-    if singular[-1] < 0.03 * np.sqrt(len(design) / 3):
-        raise IdentificationError(f'{session.path}: the probe swings too little in "{trials[0].name}" to find its tip; 40 deg or more')
-    return Probe(probe.labels, shape - solution[:3])
+        rows.append(np.concatenate([rotation, hole], axis=2))
+        right.append(-translation)
+    if not rows:
+        raise IdentificationError(f'trial "{name}": no frame shows the whole probe')
+    design, target = np.concatenate(rows), np.concatenate(right)
+    weight = np.ones(len(design))
+    for _ in range(20):  # Cauchy weights, frame by frame
+        root = np.sqrt(weight)[:, None]
+        solution, _, _, singular = np.linalg.lstsq((root[..., None] * design).reshape(-1, design.shape[2]), (root * target).reshape(-1), rcond=None)
+        miss = np.linalg.norm(design @ solution - target, axis=1)
+        weight = 1 / (1 + (miss / (2.4 * np.median(miss) + 1e-12)) ** 2)
+    if singular[-1] < 0.03 * np.sqrt(weight.sum()):
+        raise IdentificationError(f'trial "{name}": the probe swings too little to find its tip; 40 deg or more')
+    return solution[:3], float(np.median(miss))
