@@ -128,8 +128,14 @@ def _table(hand: Hand, plans: tuple[Plan, ...]) -> Mapping[str, Any]:
             for plan in plans
         ],
         "guessed_tips": {f: how for plan in plans for f, how in plan.guessed_tips.items()},
-        "inertia": {"origin": "fallback: capsules of uniform density, nothing measured", "density_kg_m3": DENSITY},
+        "inertia": {"origin": "fallback: capsules of uniform density, nothing measured", "density_kg_m3": DENSITY, **_probed(plans)},
     }
+
+
+def _probed(plans: tuple[Plan, ...]) -> Mapping[str, Any]:
+    """Links whose inertia is that of their watertight surface, if there are any."""
+    links = {k.name for plan in plans for k in plan.links if k.surface is not None and k.surface.watertight}
+    return {"of_probed_surfaces": sorted(links)} if links else {}
 
 
 def _swap(staging: Path, target: Path) -> None:
