@@ -22,9 +22,11 @@ def run(options: Namespace, say: Callable[[str], None]) -> int:
 
     session = read_session(options.session)
     if session.rig is not None:
+        from ..report.rig_findings import write_rig_findings
         from ..rig.diagnose import diagnose_rig
 
         findings = diagnose_rig(session, options.output, say)
+        write_rig_findings(session, findings, options.output)
     else:
         findings = diagnose(session, options.model, options.output, say)
     print(f"verdict: {findings.verdict}")

@@ -48,7 +48,7 @@ def rig_findings_page(session: Session, findings: RigFindings) -> bytes:
     if pairs:
         sections += [_map(rig, pairs), _effects(rig, findings, pairs), _validation(rig, pairs)]
     if swing:
-        sections.append(_motion(rig, findings))
+        sections += _motion(rig, findings)
     sections.append(Section("next", "Next", f"{findings.next_experiment or 'Nothing more is asked for.'}", _rest(findings)))
     lead = (f"{session.path.name}: the declared model, fitted, against {count(len(rig.trials), 'trial')}; what is named below "
             "was chosen on the training trials and measured on the others, by MuJoCo on the written files.")  # fmt: skip
@@ -82,7 +82,7 @@ def _findings(findings: RigFindings) -> list[Element]:
                      f"{f.fit['before']:.4g}" if known else "–", f"{f.fit['after']:.4g}" if known else "–",
                      f.fit.get("unit", "")])  # fmt: skip
     head = ("joint", "effect", "not told from", "probability", "held-out error before", "after", "unit")
-    parts = [table(head, rows, "Each effect beside those above it at the same joint", text_columns=3)] if rows else []
+    parts = [table(head, rows, "By share of the mismatch; each was measured beside those found before it", text_columns=3)] if rows else []
     return [*parts, listing([f.statement for f in findings.findings])] if rows else []
 
 
@@ -99,12 +99,13 @@ def _map(rig: RigModel, pairs: Sequence[Pair]) -> Section:
     for joint in list(dict.fromkeys(a.joint for a, _ in pairs))[:PICTURES]:
         mine = [p for p in pairs if p[0].joint == joint]
         q, v, before = (np.concatenate(x) for x in zip(*[_states(a) for a, _ in mine], strict=True))
-        drawn.append((f"{joint}: declared model", _cells(q, v, before, before, rig, joint)))
+        scale = f"± {_limit(before):.2g} {rig.effort_unit(joint)}"
+        drawn.append((f"{joint}: declared model ({scale})", _cells(q, v, before, before, rig, joint)))
         improved = np.concatenate([b.error for _, b in mine])
         drawn.append((f"{joint}: with what was found", _cells(q, v, improved, before, rig, joint)))
     words = "Mean residual effort over position and velocity, all trials: what the declared model leaves has a shape."
     return Section("map", "Map of the mismatch", words, (figures(*drawn), note(
-        "Red: more effort recorded than simulated; blue: less. Both pictures of a joint share one scale, shown by the bar.")))  # fmt: skip
+        "Red: more effort recorded than simulated; blue: less. Both pictures of a joint share the scale in brackets.")))  # fmt: skip
 
 
 def _states(r: EffortResidual) -> tuple[Array, Array, Array]:
@@ -113,15 +114,19 @@ def _states(r: EffortResidual) -> tuple[Array, Array, Array]:
     return row.position[:: row.step][row.moving], row.velocity[:: row.step][row.moving], r.error
 
 
+def _limit(values: Array) -> float:
+    """Colours saturate here."""
+    return float(np.percentile(np.abs(values), 95)) or 1.0
+
+
 def _cells(q: Array, v: Array, error: Array, scale: Array, rig: RigModel, joint: str) -> bytes:
     sides = [np.linspace(*np.percentile(x, [0.5, 99.5]), n + 1) for x, n in zip((q, v), CELLS, strict=True)]
+    limit = _limit(scale)
     total, _, _ = np.histogram2d(q, v, sides, weights=error)
     seen, _, _ = np.histogram2d(q, v, sides)
     mean = np.where(seen > 0, total / np.maximum(seen, 1), np.nan)
-    limit = float(np.percentile(np.abs(scale), 95)) or 1.0
     with drawing() as d:
-        mesh = d.axes.pcolormesh(*sides, mean.T, cmap="RdBu_r", vmin=-limit, vmax=limit)
-        d.figure.colorbar(mesh, ax=d.axes, label=f"[{rig.effort_unit(joint)}]", fraction=0.05)
+        d.axes.pcolormesh(*sides, mean.T, cmap="RdBu_r", vmin=-limit, vmax=limit)
         d.axes.set_xlabel(f"position [{rig.unit(joint)}]")
         d.axes.set_ylabel(f"velocity [{rig.unit(joint)}/s]")
     return d.svg
@@ -196,13 +201,17 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
 
 
-def _motion(rig: RigModel, findings: RigFindings) -> Section:
+def _motion(rig: RigModel, findings: RigFindings) -> list[Section]:
     joint, drawn, rows = rig.joints[0], [], []
+    states: list[Array] = []
     for trial in rig.select(True) or rig.trials:
         recorded = trial.position[joint]
         sides = [simulate_trial(replace(rig, xml=x), trial)[1][:, 0] for x in (findings.declared_xml, findings.xml)]
         errors = [_rms((s - recorded)[np.isfinite(recorded)]) for s in sides]
         rows.append([trial.name, *(f"{e:.4g}" for e in errors), f"{errors[1] / max(errors[0], 1e-300):.2f}"])
+        good = np.isfinite(recorded)
+        speed = np.gradient(recorded[good], trial.time_s[good])
+        states.append(np.stack([recorded[good], speed, *((recorded - s)[good] for s in sides)]))
         keep = slice(None, None, max(1, len(recorded) // POINTS))
         with drawing() as d:
             d.axes.plot(trial.time_s[keep], recorded[keep], color=SERIES[1], linewidth=1.6)
@@ -211,17 +220,24 @@ def _motion(rig: RigModel, findings: RigFindings) -> Section:
             d.axes.set_xlabel("time [s]")
             d.axes.set_ylabel(f"position [{rig.unit(joint)}]")
         drawn.append((trial.name, d.svg))
+    q, v, before, after = np.concatenate(states, 1)
+    scale = f"± {_limit(before):.2g} {rig.unit(joint)}"
+    maps = figures((f"declared model ({scale})", _cells(q, v, before, before, rig, joint)),
+                   (f"with what was found ({scale})", _cells(q, v, after, before, rig, joint)))  # fmt: skip
+    shape = Section("map", "Map of the mismatch", "Mean position error of the simulation over recorded position and velocity, "
+                    "trials held out.", (maps, note("Red: recorded ahead of simulated; blue: behind.")))  # fmt: skip
     words = "Motion simulated by MuJoCo in open loop over whole trials, from the recorded start."
-    return Section("validation", "Before and after", words, (
+    return [shape, Section("validation", "Before and after", words, (
         table(("trial", "declared", "with what was found", "ratio"), rows, f"Position rmse [{rig.unit(joint)}]"),
-        key(("c2", "recorded"), ("c1", "declared model"), ("ink", "with what was found")), figures(*drawn[:PICTURES])))  # fmt: skip
+        key(("c2", "recorded"), ("c1", "declared model"), ("ink", "with what was found")), figures(*drawn[:PICTURES])))]  # fmt: skip
 
 
 def _rest(findings: RigFindings) -> tuple[Element, ...]:
     said = [f"{u['where']['joint'] or 'the joint'}: {100 * u['share_of_mismatch']:.0f} % of the mismatch stays unexplained."
             for u in findings.unexplained]  # fmt: skip
     tried = sorted({r["effect"].split("@")[0].replace("_", " ") for r in findings.rejected})
-    return tuple(filter(None, [listing(said) if said else None, note(f"Tried and not taken: {', '.join(tried)}.") if tried else None]))
+    parts = [listing(said)] if said else []
+    return (*parts, *([note(f"Tried and not taken: {', '.join(tried)}.")] if tried else []))
 
 
 __all__ = ["rig_findings_page", "write_rig_findings"]
