@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 
 from hand_model.errors import HandModelError
+from hand_model.report.rig_findings import write_rig_findings
 from hand_model.rig import Findings, diagnose_rig
 from hand_model.session import read_session
 
@@ -22,21 +23,22 @@ def run(folder: Path, output: Path, only: list[str]) -> list[dict]:
         session = read_session(path)
         if session.rig is None:
             continue
-        began = time.perf_counter()
+        began, used = time.perf_counter(), time.process_time()
         try:
             findings = diagnose_rig(session, output / path.name)
         except HandModelError as error:
             records.append({"session": path.name, "refused": str(error)})
             continue
-        records.append(record(path.name, findings, time.perf_counter() - began))
-        print(f"{path.name}: {findings.verdict}, {records[-1]['seconds']:.0f} s", flush=True)
+        records.append(record(path.name, findings, time.perf_counter() - began, time.process_time() - used))
+        write_rig_findings(session, findings, output / path.name)
+        print(f"{path.name}: {findings.verdict}, {records[-1]['seconds']:.0f} s, of a processor {records[-1]['cpu_s']:.0f} s", flush=True)
     return records
 
 
-def record(name: str, findings: Findings, seconds: float) -> dict:
+def record(name: str, findings: Findings, seconds: float, cpu_s: float) -> dict:
     """What the table of the README needs of one diagnosis."""
     table = json.loads(findings.to_json())
-    return {"session": name, "verdict": findings.verdict, "seconds": seconds, "lack_of_fit": table["lack_of_fit"],
+    return {"session": name, "verdict": findings.verdict, "seconds": seconds, "cpu_s": cpu_s, "lack_of_fit": table["lack_of_fit"],
             "findings": [{k: f[k] for k in ("effect", "class", "probability", "statement", "fit")} for f in table["findings"]],
             "unexplained": table["unexplained"]}  # fmt: skip
 
@@ -66,10 +68,11 @@ def section(records: list[dict]) -> str:
 def _figure(lack: dict) -> str:
     if lack.get("before") is None:
         return "not fitted"
-    ratio = lack["after"] / lack["before"]
+    one, two, ratio = (lack[k] / lack["before"] for k in ("one_effect", "two_effects", "after"))
+    steps = f"x {ratio:.2f} (one effect a joint x {one:.2f}, two x {two:.2f})"
     if lack["metric"] == "effort_rmse":
-        return f"effort: x {ratio:.2f}"
-    return f"position in open loop: {lack['before']:.4f} to {lack['after']:.4f} {lack['unit']} (x {ratio:.2f})"
+        return f"effort: {steps}"
+    return f"position in open loop: {lack['before']:.4f} to {lack['after']:.4f} {lack['unit']}, {steps}"
 
 
 def main() -> None:

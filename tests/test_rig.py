@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from hand_model.errors import DescriptionError, SessionError
+from hand_model.report.rig_findings import write_rig_findings
 from hand_model.rig import diagnose_rig, fit_declared, load_rig, replay_rig
-from hand_model.rig.dynamics import inertial_columns, inertial_parameters
+from hand_model.rig.balance import Column
+from hand_model.rig.consistent import consistent, is_physical, parameters, pseudo_inertia
+from hand_model.rig.dynamics import INERTIAL, inertial_columns, inertial_parameters
 from hand_model.rig.patch import physical, read_effects, write_effects
 from hand_model.rig.solve import solve_bounded
 from hand_model.rig.swing import Lane, Swing, Task, errors, fit_together, simulate, vector
@@ -284,3 +289,62 @@ def test_a_passive_session_without_validation_is_diagnosed(tmp_path: Path) -> No
     findings = diagnose_rig(read_session(tmp_path))
     assert "quadratic_damping" in findings.findings[0].members
     assert findings.lack_of_fit["after"] < 0.5 * findings.lack_of_fit["before"]
+
+
+def test_bodies_of_a_solution_can_exist() -> None:
+    """Where least squares asks for a negative moment of inertia, the constrained solution has none, and fits no worse than
+    any physical body drawn at random; a solution that is physical already comes back untouched."""
+    declared = np.array([1.0, 0, 0, -0.3, 0.15, 0.15, 0.02, 0, 0, 0])
+    free = [i for i, v in enumerate(declared) if v]
+    columns = tuple(Column("inertial", "arm", INERTIAL[i], declared[i]) for i in free)
+    random = np.random.default_rng(4)
+    x = random.normal(size=(60, len(free)))
+    box = np.full(len(free), -np.inf), np.full(len(free), np.inf), np.zeros(len(free)), np.full(len(free), 1e-9)
+    for wrong, physical_ in ((0.0, True), (0.3, False)):
+        wanted = declared[free] - wrong * np.eye(len(free))[2]
+        theta = consistent(columns, declared[None], wanted, x.T @ x, x.T @ (x @ wanted), *box)
+        full = declared.copy()
+        full[free] = theta
+        assert is_physical(full)
+        if physical_:
+            assert np.array_equal(theta, wanted)
+            continue
+        cost = np.sum((x @ (theta - wanted)) ** 2)
+        for _ in range(200):
+            other = full.copy()
+            other[free] = theta * (1 + 0.05 * random.normal(size=len(free)))
+            if is_physical(other):
+                assert np.sum((x @ (other[free] - wanted)) ** 2) >= cost * (1 - 1e-6)
+
+
+def test_pseudo_inertia_is_there_and_back() -> None:
+    """Parameters to pseudo-inertia and back are the same."""
+    p = np.random.default_rng(0).normal(size=10)
+    assert np.allclose(parameters(pseudo_inertia(p)), p)
+
+
+def mirrored(table: np.ndarray) -> np.ndarray:
+    """Position and torque with the other sign: the same machine seen from behind."""
+    return table * [1, -1, -1]
+
+
+@pytest.mark.parametrize("change", [lambda x: x[::2], mirrored, lambda x: x[: len(x) // 2]], ids=["rate", "mirror", "half"])
+def test_first_effect_stays_when_the_recording_changes(planted_load: Path, tmp_path: Path, change: Any) -> None:
+    """Half the rate, mirrored signs, half the time: the same effect leads, with a coefficient near the planted one."""
+    folder = tmp_path / "s"
+    shutil.copytree(planted_load, folder)
+    for log in sorted((folder / "log").iterdir()):
+        table = change(np.loadtxt(log, delimiter=",", skiprows=1))
+        np.savetxt(log, table, delimiter=",", header="time,position,torque", comments="", fmt="%.9g")
+    first = diagnose_rig(read_session(folder)).findings[0]
+    assert first.effect == "load_dependent_friction"
+    assert next(v["value"] for k, v in first.parameters.items() if k.startswith("per_")) == pytest.approx(0.25, rel=0.3)
+
+
+def test_report_of_a_rig_shows_what_was_found(planted_load: Path, tmp_path: Path) -> None:
+    """One page with the map, the effect through the data, before and after; without outside resources."""
+    session = read_session(planted_load)
+    page = write_rig_findings(session, diagnose_rig(session), tmp_path / "out").read_text()
+    for anchor in ('id="findings"', 'id="map"', 'id="effects"', 'id="validation"', "load dependent friction"):
+        assert anchor in page
+    assert "http://" not in page.replace("http://www.w3.org", "")
