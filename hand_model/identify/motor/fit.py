@@ -241,14 +241,14 @@ def _fit_output_error(
     moves = [shortened(m, MOVE_S) for m in moves]
     base = _fit_controller(moves, start, sigma)
     fitted = CONTROLLERS[base.controller]
-    # a Stribeck rise is tried where either the regression or the misfit leaves room for one
-    if max(base.chi2) > 4.0 or (curved.excess_z < 2.0 and max(base.chi2) < 1.15):
+    # a Stribeck rise is tried where the regression, which knows no controller, leaves room for one
+    if max(base.chi2) > 4.0 or curved.excess_z < 2.0:
         return base, 0.0
     ratio = float(np.clip(1 + curved.static_excess / max(base.values["coulomb"], 1.0), 1.1, 3.0))
     fits = []
     for exponent in (1.0, 2.0):
         curve = {**base.values, "static_ratio": ratio, "stribeck_speed": 20.0, "stribeck_exponent": exponent}
-        fits.append(output_error.fit(moves, curve, (*fitted, *STRIBECK), sigma, BOUNDS, base.controller, own=base.own))
+        fits.append(output_error.fit(moves, curve, (*fitted, *STRIBECK), sigma, BOUNDS, base.controller, 6, base.own))
     best, other = sorted(fits, key=lambda f: f.cost)
     evidence = (base.cost - best.cost) / max(1.0, *best.chi2)
     if evidence < EVIDENCE or _is_at_bound(best):

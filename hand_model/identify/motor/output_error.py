@@ -25,6 +25,7 @@ TICK_S = 1e-3  # what instants of the controller's steps are known to: a current
 STEP_SHARE, OWN_STEP = 2e-2, (1e-3, 1e-2, 1e-3, 0.5)
 # a loop that holds its value for a step of 0 to 2 ms acts half a step after the value that is logged
 PRIOR = {"lead": (0.5 * TICK_S, 0.5 * TICK_S)}
+SEARCH = 1.3  # scatter of the end of the search among kinks over that of the linear model, on simulated drives (scripts/motor_accuracy.py)
 OWN_REACH = np.array([0.01, 0.3, 0.01, 10.0])  # of one step
 SETTLED = 0.6  # [%]: movement allowed over the samples before a move that starts from rest
 BEFORE = 12  # samples at rest that a move looks back to
@@ -165,12 +166,13 @@ def _steps(values: Mapping[str, float], names: Sequence[str]) -> Array:
 
 
 def _linearise(
-    data: Sequence[MoveData], q: Mapping[str, float], names: Sequence[str], own: Array, sigma: tuple[float, float], controller: str, step_s: float
+    data: Sequence[MoveData], q: Mapping[str, float], names: Sequence[str], own: Array, sigma: tuple[float, float], controller: str, step_s: float,
+    width_share: float = 1.0,
 ) -> tuple[list[Array], list[Array], list[Array], list[Array]]:
     """Whitened residuals (2n,), shared (2n, k) and own (2n, 4) Jacobian of every move, one batch of simulations; weights (n, 2)."""
     k = len(names)
     width = k + 1 + len(OWN_STEP)
-    steps = _steps(q, names)
+    steps, own_step = width_share * _steps(q, names), width_share * np.array(OWN_STEP)
     order = np.argsort([-m.time_s[-1] for m in data], kind="stable")
     ordered = [data[i] for i in order]
     values = {n: np.full(width, v) for n, v in q.items()}
@@ -179,7 +181,7 @@ def _linearise(
         values[n][1 + i] += steps[i]
     values = {n: np.tile(v, len(data)) for n, v in values.items()}
     owns = np.repeat(own[order], width, axis=0)
-    for i, small in enumerate(OWN_STEP):
+    for i, small in enumerate(own_step):
         owns[k + 1 + i :: width, i] += small
     t, p, u = simulate(_arrays(ordered, owns, width), values, step_s, controller)
     out_r: list = [None] * len(data)
@@ -191,7 +193,7 @@ def _linearise(
         weight = _weights(t, u[:, column * width], m.time_s, sigma)
         y = _sample(t, p[:, c], u[:, c], m.time_s, values["lead"][c] if "lead" in q else 0.0) * weight[:, :, None]  # (n, 2, width)
         out_r[i] = (np.stack([m.position, m.current], axis=1) * weight - y[:, :, 0]).T.ravel()
-        derivative = (y[:, :, 1:] - y[:, :, :1]) / np.append(steps, OWN_STEP)
+        derivative = (y[:, :, 1:] - y[:, :, :1]) / np.append(steps, own_step)
         derivative = derivative.transpose(1, 0, 2).reshape(-1, width - 1)
         out_g[i], out_l[i], out_w[i] = derivative[:, :k], derivative[:, k:], weight
     return out_r, out_g, out_l, out_w
@@ -249,15 +251,19 @@ def fit(
     samples = 2 * sum(len(m.time_s) for m in data)
     for step_s, rounds, enough, edge in ((COARSE_S, 8, 5.0, 0.5), (STEP_S, iterations, 0.3, 0.1)):
         damping, q = 1e-3, {**q, "edge": edge}  # a deadband that sets in softly has no kinks to be caught in
+        share = 1.0
         for i in range(rounds):
-            linear = _linearise(data, q, names, own, sigma, controller, step_s)
+            linear = _linearise(data, q, names, own, sigma, controller, step_s, share)
             cost = _misfit(linear[0], data, own, q)
             normal, gradient, blocks, _ = _normal(data, *linear[:3], own, q, names)
             if (expected := _expected(normal, gradient, blocks)) < enough or (i > 3 and cost > 20 * samples and expected > 0.5 * cost):
                 break
             moved = _step(data, q, names, own, linear[3], bounds, (normal, gradient, blocks), cost, damping, controller, step_s)
-            if moved is None:
-                break
+            if moved is None:  # caught at a kink: differences over another width see past it
+                if share != 1.0 or step_s == COARSE_S:
+                    break
+                share, damping = 0.3, 1e-1
+                continue
             q, own, cost, damping = moved
     return _finish(data, linear, q, names, sigma, own, cost, controller, bounds)
 
@@ -310,8 +316,11 @@ def _step(
     normal, gradient, blocks = system
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-30))
     tried, candidates = damping * 10.0 ** np.arange(-2, 5), []
+    free = _free(gradient, np.array([q[n] for n in names]), _limits(names, bounds))
+    system = (normal / np.outer(scale, scale))[np.ix_(free, free)]
     for strength in tried:
-        move = np.linalg.lstsq(normal / np.outer(scale, scale) + strength * np.eye(len(names)), gradient / scale, rcond=1e-12)[0] / scale
+        move = np.zeros(len(names))
+        move[free] = np.linalg.lstsq(system + strength * np.eye(free.sum()), (gradient / scale)[free], rcond=1e-12)[0] / scale[free]
         new_q = dict(q)
         for n, d in zip(names, move, strict=True):
             low, high = bounds.get(n, (-np.inf, np.inf))
@@ -361,8 +370,8 @@ def _finish(
     squared = np.sum([np.sum(e.reshape(2, -1) ** 2, axis=1) for e in r], axis=0)
     chi2 = squared / (n - 0.5 * (k + 3 * len(data)))
     covariance = _conservative(bread * max(1.0, float(chi2.max())), bread @ meat @ bread)
-    left = _unresolved(normal, gradient, np.array([bounds.get(n, (-np.inf, np.inf)) for n in names]).reshape(-1, 2), np.array([q[n] for n in names]))
-    covariance = covariance + np.outer(left, left)
+    left = _unresolved(normal, gradient, _limits(names, bounds), np.array([q[n] for n in names]))
+    covariance = SEARCH**2 * covariance + np.outer(left, left)
     return OutputErrorFit(
         dict(q), tuple(names), covariance, sigma, residual, tuple(data), own, cost, (float(chi2[0]), float(chi2[1])), controller
     )
@@ -373,13 +382,23 @@ def _unresolved(normal: Array, gradient: Array, bounds: Array, values: Array) ->
 
     Parameters that are held by their bounds (k, 2) stay.
     """
-    way = np.sign(gradient)
-    free = ~(((values <= bounds[:, 0] * 1.01 + 1e-12) & (way < 0)) | ((values >= bounds[:, 1] * 0.99) & (way > 0)))
+    free = _free(gradient, values, bounds)
     step = np.zeros(len(values))
     if free.any():
         scale = np.sqrt(np.maximum(np.diag(normal)[free], 1e-30))
         step[free] = np.linalg.lstsq(normal[np.ix_(free, free)] / np.outer(scale, scale), gradient[free] / scale, rcond=1e-8)[0] / scale
     return step
+
+
+def _limits(names: Sequence[str], bounds: Mapping[str, tuple[float, float]]) -> Array:
+    return np.array([bounds.get(n, (-np.inf, np.inf)) for n in names]).reshape(-1, 2)
+
+
+def _free(gradient: Array, values: Array, bounds: Array) -> NDArray[np.bool_]:
+    """Which of the values (k,) are not pressed against their bounds (k, 2) by the descent."""
+    low, high = bounds.T
+    margin = 1e-9 + 0.01 * np.abs(np.where(np.isfinite(low), low, 0.0))
+    return ~(((values <= low + margin) & (gradient < 0)) | ((values >= high - 1e-9 - 0.01 * np.abs(np.where(np.isfinite(high), high, 0.0))) & (gradient > 0)))
 
 
 def _conservative(model: Array, sandwich: Array) -> Array:
