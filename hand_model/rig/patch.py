@@ -1,7 +1,10 @@
 """Fitted numbers and named effects written into the rig's MJCF.
 
 What MuJoCo has an attribute for goes there. The rest is kept in the same file, as JSON in
-`custom/text[@name="hand_model"]`, and is applied by `replay.EffectStepper` (or the passive callback made from it).
+`custom/text[@name="hand_model"]`. Records with "swing" are applied by `replay.EffectStepper` while MuJoCo steps; records
+with "effect" and "amplitude" are columns at the recorded motion and are added by `inverse.effort_residuals` to what
+mj_inverse says (they are not applied in open loop); "cutoff_hz" is the filter of that balance; "frictionloss_levels" are
+Coulomb levels of trials that set their own.
 """
 
 from __future__ import annotations
