@@ -188,11 +188,14 @@ def _contact(fit: MotorFit, m: MoveData, time_s: Array, z: Array, alarm: int, na
     data = [shortened(m, float(m.time_s[alarm] + AFTER_S))]
     names = ("contact_stiffness", "contact_at", "contact_damping")
     bounds = {"contact_stiffness": (1e-3, 1e4), "contact_at": (m.origin, m.target), "contact_damping": (0.0, 0.1)}
-    for stiffness in (1.0, 6.0, 40.0):
+    seen = _stiffness(fit, m, z, began, at)
+    for stiffness in (40.0 if seen is None else float(np.clip(seen.value, 0.5, 60.0)), 6.0, 1.0):
         start = {**fit.simulated, "contact_stiffness": stiffness, "contact_at": at, "contact_damping": 0.01}
         one = output_error.fit(data, start, names, noise, bounds, fit.output_error.controller)
         if best is None or one.cost < best.cost:
             best = one
+        if max(best.chi2) < 1.5:
+            break
     # the free-motion parameters are known only so well too; the misfit of a spring that is not quite linear widens the interval
     value, sd = best.values["contact_stiffness"], float(np.sqrt(best.covariance[0, 0]))
     low, high = max(0.0, value - 1.96 * sd), value + 1.96 * sd
