@@ -181,13 +181,15 @@ def _prove(bench: Bench, fit: DeclaredFit, stories: Sequence[tuple[Step, Term]],
            rejected: list[dict[str, Any]]) -> tuple[list[Finding], list[Term]]:  # fmt: skip
     """Findings that hold on the validation recordings, one after the other beside `kept`; the rest goes to rejected."""
     kept, found = list(kept), []
+    few = settled(bench, fit, kept)
     for step, term in stories:
-        few, many = settled(bench, fit, kept), settled(bench, fit, [*kept, term])
+        many = settled(bench, fit, [*kept, term])
         proof = bench.proof(term.candidate.joint, (fit, *few), (fit, *many))
         if proof["ci95_reduction"][0] <= 0:
             rejected.append({"effect": term.candidate.key, "reason": "error on validation trials does not fall"})
             continue
         kept.append(term)
+        few = many
         last = slice(len(many[1]) - len(term.candidate.amplitudes), None)
         spread = None
         if proof["after"] <= FITS * proof["noise_floor"]:  # beside what does not fit, an interval would promise too much
