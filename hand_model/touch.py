@@ -17,7 +17,7 @@ from .errors import IdentificationError
 from .hand import Estimate
 from .identify.motor import MotorFit, identify_motor, output_error
 from .identify.motor.corrected import NAMES, balance, friction_state
-from .identify.motor.output_error import MoveData, moves_from_rest, shortened
+from .identify.motor.moves import MoveData, moves_from_rest, shortened
 from .identify.motor.recording import MotorTrial, actuator_trials, motor_trial
 from .session import Log, Session
 

@@ -201,3 +201,31 @@ def test_current_of_another_drive_is_not_explained(trials) -> None:
     wrong = MotorTrial(t.name, t.time_s, t.position, rng.normal(0, 40, len(t.time_s)), t.setpoint, t.speed, t.limit)
     found = fit_regression([wrong], 0.06)
     assert np.sqrt(found.covariance[2, 2]) > 1.0
+
+
+def test_cascade_controller_is_found_and_replayed(tmp_path: Path) -> None:
+    """A loop with integral action and a dead zone, in which the drive creeps between moves."""
+    from hand_model.twin import Plan, bebionic, record
+    from hand_model.twin.truth import Controller
+
+    truth = bebionic("right", None, ["index"])
+    cascade = Controller("cascade", 2.2, 0.6, 12.0, 110.0, 255.0)
+    truth = dataclasses.replace(truth, motors={"index": dataclasses.replace(truth.motors["index"], controller=cascade)})
+    record(truth, tmp_path / "session", 3, plan=Plan(joint_sides=("medial",), still_s=0.3))
+    session = read_session(tmp_path / "session")
+    fit = identify_motor(session, "index")
+    assert fit.output_error.controller == "cascade"
+    for name, wanted in TRUTH.items():
+        assert fit.motor.parameters[name].value == pytest.approx(wanted, rel=0.1), name
+    for trial in actuator_trials(session, "index", validate=True):
+        table = replay_table(predict(fit, trial.log(), trial.name), fit.sigma_current)
+        assert table["all"][0] < 1.0 and table["all"][2] < 1.15
+
+
+def test_current_is_predicted_from_the_motion_without_setpoints(session, fit) -> None:
+    trial = actuator_trials(session, "index", validate=True)[0]
+    log = trial.log()
+    blind = Log(log.time_s, {k: v for k, v in log.columns.items() if k in ("position", "current")}, log.path)
+    found = predict(fit, blind, trial.name)
+    assert np.array_equal(found.position, found.recorded_position)
+    assert found.rmse("cruise")[1] < 3 * fit.sigma_current  # starts and stops included, which the filter smears

@@ -65,3 +65,19 @@ def test_threshold_rises_with_correlation() -> None:
 def test_too_little_free_motion_is_refused(grasps) -> None:
     with pytest.raises(IdentificationError, match="at least 30"):
         touch.calibrate(grasps[2], [])
+
+
+def test_contact_is_found_without_a_controller(grasps) -> None:
+    """The current that the recorded motion does not explain betrays a stiff object whatever the controller does."""
+    import dataclasses
+
+    session, answer, fit, _ = grasps
+    blind = dataclasses.replace(fit, method="regression", output_error=None)
+    detector = touch.calibrate(blind, [(t.name, t.log()) for t in actuator_trials(session, "index")])
+    for trial in actuator_trials(session, "index", ("grasp",), None):
+        if trial.object == "block":
+            log, stem = trial.log(), Path(trial.name).stem
+            found = touch.detect(blind, detector, log, trial.name)
+            assert len(found) == 2
+            delay = np.interp(found[0].detected_s, log.time_s, answer.trials[stem].log_time_s) - answer.table["grasps"][stem]["contact_s"]
+            assert -0.1 < delay < 0.15

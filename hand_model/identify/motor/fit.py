@@ -15,7 +15,8 @@ from ...session import Session
 from . import output_error
 from .corrected import NAMES, Regression, fit_regression
 from .drive import CONTROLLERS, STRIBECK
-from .output_error import BEFORE, MoveData, OutputErrorFit, moves_from_rest, shortened
+from .moves import BEFORE, MoveData, moves_from_rest, shortened
+from .output_error import OutputErrorFit
 from .published import PublishedFit, fit_published, smear_share
 from .recording import MotorTrial, Scale, actuator_trials, check_trials, motor_trial, trial_scale
 

@@ -15,7 +15,7 @@ from . import output_error
 from .corrected import NAMES, balance
 from .drive import Moves, profile
 from .fit import MotorFit
-from .output_error import MoveData, moves_from_rest
+from .moves import MoveData, moves_from_rest
 from .recording import MotorTrial, motor_trial
 
 Array = NDArray[np.float64]

@@ -1,0 +1,92 @@
+"""The commanded moves of a log that start with the drive at rest, or creeping within its deadband."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .recording import MotorTrial
+
+Array = NDArray[np.float64]
+
+SETTLED = 0.6  # [%]: movement allowed over the samples before a move that starts from rest
+BEFORE = 12  # samples at rest that a move looks back to
+
+
+@dataclass(frozen=True)
+class MoveData:
+    """One move from rest: its samples, and what the command says.
+
+    Known only so well, and estimated with the fit: own = when the command took effect (within one sample of the log) [s], where
+    the drive rested [%], the speed [share of full] (logged in whole raw units), and the current that held it at rest [raw].
+    own_sd: (4,) standard deviations. velocity [%/s]: of a drive that creeps before the command; 0 at rest.
+    """
+
+    trial: str
+    index: int
+    time_s: Array
+    position: Array
+    current: Array
+    origin: float
+    target: float
+    limit: float
+    own: Array
+    own_sd: Array
+    velocity: float = 0.0
+
+
+def moves_from_rest(trial: MotorTrial, sigma: tuple[float, float], speed_full: float) -> tuple[MoveData, ...]:
+    """The commanded moves of a log that start with the drive at rest; empty where no setpoint is logged.
+
+    sigma: noise of position [%] and current [raw]. speed_full: raw full scale of the speed column.
+    """
+    if trial.setpoint is None:
+        return ()
+    t, p, sigma_position = trial.time_s, trial.position, sigma[0]
+    whole = trial.speed is not None and speed_full > 1 and np.allclose(trial.speed * speed_full, np.round(trial.speed * speed_full))
+    speed_sd = 1 / (np.sqrt(12) * speed_full) if whole else 1e-4
+    change = np.flatnonzero(np.diff(trial.setpoint) != 0)
+    ends = np.append(change[1:], len(t) - 1)
+    found = []
+    for i, j in zip(change, ends, strict=True):
+        look = slice(max(0, i - BEFORE + 1), i + 1)
+        if j - i < 8 or trial.setpoint[i + 1] == trial.setpoint[i] or (rest := _rest(t[look], p[look], sigma_position)) is None:
+            continue
+        held = trial.current[look]
+        speed = 1.0 if trial.speed is None else float(trial.speed[i + 1])
+        limit = np.inf if trial.limit is None else float(trial.limit[i + 1])
+        gap = float(t[i + 1] - t[i])
+        k = slice(i + 1, j + 1)
+        found.append(
+            MoveData(
+                trial.name, int(i), t[k] - t[i], p[k], trial.current[k], float(trial.setpoint[i]), float(trial.setpoint[i + 1]),
+                limit, np.array([0.5 * gap, rest[0], speed, held.mean()]),
+                np.array([max(gap / np.sqrt(12), 5e-3), rest[1], speed_sd, sigma[1] / np.sqrt(len(held))]), rest[2],
+            )
+        )  # fmt: skip
+    return tuple(found)
+
+
+def shortened(m: MoveData, end_s: float) -> MoveData:
+    """The move's samples up to `end_s` [s]."""
+    k = m.time_s <= end_s
+    return dataclasses.replace(m, time_s=m.time_s[k], position=m.position[k], current=m.current[k])
+
+
+def _rest(t: Array, p: Array, sigma: float) -> tuple[float, float, float] | None:
+    """Position [%] at the last of samples before a command, its deviation [%], and the velocity [%/s] of a steady creep.
+
+    0 where none is told from rest; None where the drive is not settled.
+    """
+    n = len(p)
+    if n < 4 or np.ptp(p) > SETTLED + 5 * sigma:
+        return None
+    x = t - t.mean()
+    slope, slope_sd = float(x @ p / (x @ x)), sigma / float(np.sqrt(x @ x))
+    creeps = abs(slope) > 4 * slope_sd
+    if np.sqrt(np.mean((p - p.mean() - slope * x) ** 2)) > 2 * sigma:
+        return None
+    return float(p.mean() + slope * x[-1]), 2 * sigma / np.sqrt(n), slope if creeps else 0.0
