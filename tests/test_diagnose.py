@@ -164,3 +164,42 @@ def test_shown_sessions(name: str, tmp_path: Path) -> None:
     named = [(f.effect, f.where["finger"], f.where["joint"]) for f in findings.findings]
     assert named == [(e["effect"], e["finger"], e["joint"]) for e in answer if e["effect"] != "none"]
     assert json.loads((tmp_path / "findings.json").read_text())["verdict"] == findings.verdict
+
+
+@pytest.mark.parametrize("burst", [False, True], ids=["coloured", "bursts"])
+def test_lack_of_fit_keeps_its_level_on_dirty_healthy_drives(burst: bool) -> None:
+    """Coloured noise that differs over the range, strokes that do not repeat, bursts of outliers: 24 drives, nominal 5 %."""
+    from hand_model.diagnose.lack_of_fit import lack_of_fit
+
+    alarms = 0
+    for seed in range(24):
+        rng = np.random.default_rng(100 + seed)
+
+        def dirt(state: DriveState, rng=rng) -> np.ndarray:
+            slow = np.interp(state.time_s, np.arange(0, 60, 0.6), rng.normal(0, 1.2, 100))
+            hit = np.zeros(len(state.time_s))
+            for at in rng.integers(0, len(hit), 5 if burst else 0):
+                hit[at : at + 12] = rng.normal(0, 15)
+            return slow * (1 + state.position / 100) + hit
+
+        balance = Balance(drive(seed, dirt, colour=0.4, trials=3))
+        alarms += lack_of_fit(balance, balance.fit().prediction, 5, 0.05).p < 0.05
+    assert alarms <= 4  # binomial(24, 0.05): more with probability 3 %
+
+
+def test_lack_of_fit_sees_what_repeats_from_stroke_to_stroke() -> None:
+    from hand_model.diagnose.lack_of_fit import lack_of_fit
+
+    bump = planted("detent_load", {"form": 0.0, "centre": 60.0, "width": 6.0}, [-8.0])
+    balance = Balance(drive(2, bump, colour=0.4, trials=3))
+    assert lack_of_fit(balance, balance.fit().prediction, 5, 0.003).p < 1e-4
+
+
+def test_held_out_is_empty_where_validation_took_part() -> None:
+    add = planted("detent_load", {"form": 0.0, "centre": 60.0, "width": 6.0}, [-10.0])
+    plain = name_effects(drive(3, add), catalogue("drive"))
+    assert held_out(plain, 0)["held_out"] == ["trial_3"] and held_out(plain, 0)["ci95_reduction"][0] > 0
+    from dataclasses import replace
+
+    everything = replace(plain, balance=Balance(plain.balance.states, everything=True))
+    assert held_out(everything, 0)["held_out"] == []

@@ -17,8 +17,10 @@ from .balance import Balance
 from .command import command_facts, command_findings, refused
 from .drive import drive_states, drive_trials, is_measured
 from .findings import Finding, Findings
+from .improve import read_model, write_improved
 from .interval import held_out, parameter_intervals, proven, variance_ratio
 from .name import ALPHA, Named, Naming, name_effects, polish, scan
+from .page import write_page
 
 # How before and after were computed, said in the findings: no compiled file is involved until one is replayed.
 ENGINE = {"current": "inverse dynamics of the motor's balance, motion as recorded", "encoder": "encoder map, motion as recorded",
@@ -32,11 +34,13 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
              say: Callable[[str], None] | None = None) -> Findings:
     """Say what physics is missing from the declared model of a recorded hand.
 
-    session: a session or its folder. model: a compiled folder or Hand (only its name is kept: the declared model is fitted
-    to the session itself). output: folder that gets `findings.json`. say: called with one line per result as it comes.
-    Raises SessionError for a session that breaks its format.
+    session: a session or its folder. model: a Hand, a .hand file or a compiled folder into which the effects are written
+    (what is missing is judged by the declared model fitted to the session itself). output: folder that gets `findings.json`,
+    `report.html` and, with a model, `model_before` and `model`, compiled. say: called with one line per result as it comes.
+    Raises SessionError for a session that breaks its format, HandFileError for a model that is none.
     """
     session = session if isinstance(session, Session) else read_session(session)
+    hand = None if model is None else read_model(model)
     tell = say or (lambda line: None)
     notes: list[str] = []
     found: list[tuple[float, Finding]] = []
@@ -54,6 +58,12 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
         tell(stations[-1].line())
     findings = assemble(stations, _once(found), notes)
     if output is not None:
+        if hand is not None and findings.findings:
+            currents = {s.actuator: s.naming for s in stations if s.signal == "current" and s.actuator is not None}
+            named = write_improved(hand, findings.findings, {a: n.fit.declared for a, n in currents.items()},
+                                   {a: n.balance.states for a, n in currents.items()}, Path(output))
+            findings = replace(findings, findings=named)
+        write_page(findings, stations, session.path.name, Path(output))
         findings.save(output)
     return findings
 

@@ -169,7 +169,8 @@ def rank(balance: Balance, effects: Iterable[Any], terms: tuple[Term, ...], fit:
     out = []
     for position, (_, start) in enumerate(rough):
         best = polish(balance, start, len(terms)) if position < refine else start
-        if _resolved(balance, best.terms[-1]):
+        needs = best.terms[-1].effect.needs
+        if _resolved(balance, best.terms[-1]) and best.declared.get(needs, 1.0) > 0:
             out.append((start.terms[-1].effect.name, best))
     scale = min((_scale(balance, f) for _, f in out), default=1.0)
     rivals = [Rival(name, evidence(balance, f, fit, scale), f) for name, f in out]

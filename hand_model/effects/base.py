@@ -123,6 +123,7 @@ class Effect:
     replaces: ClassVar[str | None] = None  # name of the declared column that `declared` changes
     warps: ClassVar[bool] = False
     clips: ClassVar[bool] = False
+    needs: ClassVar[str | None] = None  # declared column without which the effect is none (a ratio to a friction of zero)
     repeats: ClassVar[bool] = False  # may be named more than once in one balance, with other shapes
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
@@ -167,7 +168,7 @@ class Effect:
 
     def statement(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """A plain sentence from the name, the place and the parameters."""
-        listed = ", ".join(f"{key} {value:.4g}" for key, value in parameters.items())
+        listed = ", ".join(f"{key} {value:.4g}" for key, value in parameters.items() if np.isfinite(value))
         place = where.get("actuator") or where.get("finger")
         return f"{place}: {self.name.replace('_', ' ')} ({listed})."
 

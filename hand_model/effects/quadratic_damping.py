@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect
+from .mjcf import motor_joint
 
 
 class QuadraticDamping(Effect):
@@ -21,6 +23,14 @@ class QuadraticDamping(Effect):
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """v |v|, (n, 1)."""
         return (state.velocity * np.abs(state.velocity))[:, None]
+    def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
+        """Second coefficient of the joint's `damping`: MuJoCo's force is -(a v + b v |v| + c v^3)."""
+        found = motor_joint(root, where)
+        if found is None:
+            return None
+        joint, unit = found
+        joint.set("damping", f"{float((joint.get('damping') or '0').split()[0])!r} {unit * parameters['drag']!r}")
+        return f"joint[@name='{joint.get('name')}']/@damping"
 
 
 EFFECT = QuadraticDamping()

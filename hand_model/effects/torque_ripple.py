@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
+from .mjcf import free_name, motor_joint, section
 
 
 class TorqueRipple(Effect):
@@ -38,6 +40,19 @@ class TorqueRipple(Effect):
         """Amplitude, period and phase [rad]."""
         return {"amplitude": float(np.hypot(amplitude["sine"], amplitude["cosine"])), "period": shape["period"],
                 "phase": float(np.arctan2(amplitude["cosine"], amplitude["sine"]))}
+    def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
+        """A passive DC motor with cogging: its torque is -A sin(2 pi x / P + phase), what the drive must overcome."""
+        from lxml import etree
+
+        found = motor_joint(root, where)
+        if found is None:
+            return None
+        joint, unit = found
+        name = free_name(root, f"{where['actuator']}_ripple")
+        values = (unit * parameters["amplitude"], 2 * np.pi / parameters["period"], parameters["phase"] + np.pi)
+        etree.SubElement(section(root, "actuator"), "dcmotor", name=name, joint=joint.get("name"), input="none",
+                         motorconst="0 0", resistance="1", cogging=" ".join(repr(float(v)) for v in values))
+        return f"actuator/dcmotor[@name='{name}']"
 
 
 EFFECT = TorqueRipple()
