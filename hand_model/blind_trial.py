@@ -94,7 +94,7 @@ def record_one(seed: int, kind: str, effect: str | None, name: str, root: str) -
 
 def _diagnose(root: Path, name: str) -> str:
     done = subprocess.run([sys.executable, "-m", "hand_model.diagnose", str(root / "sessions" / name), str(root / "findings" / name)],
-                          capture_output=True, text=True)
+                          check=False, capture_output=True, text=True)
     if done.returncode:
         (root / "findings" / name).mkdir(parents=True, exist_ok=True)
         (root / "findings" / name / "findings.json").write_text(json.dumps({"verdict": "failed", "findings": []}))
@@ -123,8 +123,26 @@ def score_case(name: str, answer: Mapping[str, Any], findings: Mapping[str, Any]
     return {"case": name, "kind": kind, "truth": truth, "named": named, "verdict": findings["verdict"], "right": right,
             "placed": placed, "in_three": bool(truth) and truth[0] in named[:3],
             "in_class": bool(truth) and any(truth[0] in c for c in classes.values()),
+            "parameter_errors": _parameter_errors(hidden, findings["findings"]),
             "settings": [e.get("parameters", e.get("settings")) for e in hidden][:2],
             "parameters": [f["parameters"] for f in findings["findings"]][:2]}
+
+
+def _parameter_errors(hidden: Sequence[Mapping[str, Any]], found: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Per parameter that the answer and a finding of the same effect both name: relative error, and whether the interval
+    (None where none is given) holds the truth. Parameters that the two call by other names are left out."""
+    out: dict[str, dict[str, Any]] = {}
+    for finding in found:
+        truth = next((e.get("parameters") or {} for e in hidden if e["effect"] == finding["effect"]), {})
+        for name, entry in finding["parameters"].items():
+            if entry.get("value") is None or not truth.get(name):
+                continue
+            ci = entry.get("ci95")
+            out[f"{finding['effect']}.{name}"] = {
+                "error": abs(entry["value"] - truth[name]) / abs(truth[name]),
+                "covered": None if ci is None or None in ci else ci[0] <= truth[name] <= ci[1],
+            }
+    return out
 
 
 def _summary(digest: str, rows: Sequence[Mapping[str, Any]]) -> Trial:
@@ -142,6 +160,11 @@ def _summary(digest: str, rows: Sequence[Mapping[str, Any]]) -> Trial:
         "outside: no confident name": rate("outside"),
         "single: in a named class": rate("single", "in_class"),
     }
+    errors = [e for r in rows for e in r["parameter_errors"].values()]
+    rates["parameters: within 10 % or interval"] = (
+        sum(e["error"] <= 0.1 or bool(e["covered"]) for e in errors), len(errors))
+    rates["parameters: interval holds truth"] = (sum(bool(e["covered"]) for e in errors),
+                                                 sum(e["covered"] is not None for e in errors))
     confusion: Counter[tuple[str, str]] = Counter()
     for row in rows:
         if row["kind"] in ("single", "weak", "none", "outside"):

@@ -18,12 +18,15 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace, say: Callable[[str], None]) -> int:
-    """Run the trial and print the score."""
+    """Run the trial and print the score; the answers' hash and the progress go to stderr at once."""
+    import sys
+
     from ..blind_trial import blind_trial
     from ..errors import HandModelError
 
     if options.cases < 1:
         raise HandModelError(f"--cases {options.cases}: one or more are needed")
-    trial = blind_trial(options.cases, options.seed, options.output)
-    print(trial.table())
+    trial = blind_trial(options.cases, options.seed, options.output,
+                        say=lambda line: print(line, file=sys.stderr, flush=True))
+    print(f"answers.json SHA-256 {trial.sha256}\n\n{trial.table()}")
     return 0

@@ -11,8 +11,8 @@ SUMMARY = "say what physics is missing: where recording and declared model diffe
 def add_arguments(parser: ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("session", metavar="SESSION", help="folder with a session.toml, of a hand or a rig")
-    parser.add_argument("--model", metavar="DIR", help="a compiled hand or a .hand file")
-    parser.add_argument("--output", required=True, metavar="DIR", help="folder for findings.json")
+    parser.add_argument("--model", metavar="DIR", help="a compiled hand or a .hand file: the effects are written into it")
+    parser.add_argument("--output", required=True, metavar="DIR", help="folder for findings.json, report.html and, with --model, the improved model")
 
 
 def run(options: Namespace, say: Callable[[str], None]) -> int:

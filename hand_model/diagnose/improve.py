@@ -83,8 +83,10 @@ def _without(root: Any, finding: Finding) -> Any:
 
 def compiled_current(folder: Path, actuator: str, state: DriveState) -> Array | None:
     """Current (n,) [raw] that a compiled file needs for a recorded motion: inertia, friction, and MuJoCo's own passive and
-    actuator forces at the motor joint; None where no file has that motor or its friction needs a history (LuGre)."""
+    actuator forces at the motor joint; None where no file has that motor. A LuGre element counts with its steady sliding
+    friction, (Fc + (Fs - Fc) exp(-(v / vs)^2)) times the friction's direction: compare steady samples only."""
     import mujoco
+    from lxml import etree
 
     for file in sorted(f for f in folder.glob("*.xml") if not f.name.startswith("scene")):
         model = mujoco.MjModel.from_xml_path(str(file))
@@ -94,8 +96,15 @@ def compiled_current(folder: Path, actuator: str, state: DriveState) -> Array | 
             continue
         joint = model.actuator_trnid[drive, 0]
         dof, at = model.jnt_dofadr[joint], model.jnt_qposadr[joint]
-        if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, f"{actuator}_friction") >= 0:
-            return None
+        own = [i for i in range(model.nu) if model.actuator_trnid[i, 0] == joint and i != drive]
+        friction = np.full(len(state.time_s), float(model.dof_frictionloss[dof]))
+        for i in list(own):
+            name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, i)
+            element = etree.parse(str(file)).getroot().find(f"actuator/dcmotor[@name='{name}']")
+            if element is not None and element.get("lugre"):
+                _, _, coulomb, static, speed = (float(x) for x in element.get("lugre").split())
+                friction += coulomb + (static - coulomb) * np.exp(-((state.velocity / speed) ** 2))
+                own.remove(i)
         model.actuator_gainprm[drive] = model.actuator_biasprm[drive] = 0.0  # the drive itself is what is asked for
         data, out = mujoco.MjData(model), np.empty(len(state.time_s))
         for i, (x, v) in enumerate(zip(state.position, state.velocity, strict=True)):
@@ -103,8 +112,8 @@ def compiled_current(folder: Path, actuator: str, state: DriveState) -> Array | 
             mujoco.mj_fwdPosition(model, data)
             mujoco.mj_fwdVelocity(model, data)
             mujoco.mj_fwdActuation(model, data)
-            out[i] = -data.qfrc_passive[dof] - data.qfrc_actuator[dof]
-        out += model.dof_armature[dof] * state.acceleration + model.dof_frictionloss[dof] * state.direction
+            out[i] = -data.qfrc_passive[dof] - data.actuator_force[own].sum()
+        out += model.dof_armature[dof] * state.acceleration + friction * state.direction
         return out / model.numeric_data[model.numeric_adr[number]]
     return None
 
