@@ -1,34 +1,38 @@
-"""A second core for one call, where the platform can fork; elsewhere the call simply runs when its result is asked for."""
+"""The other cores for independent calls, where the platform can fork; elsewhere they simply run when their results are asked for."""
 
 from __future__ import annotations
 
 import multiprocessing
 import threading
 import warnings
-from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
 from typing import Any
+
+WORKERS = 2
 
 
 class Background:
-    """One call under way: `result()` waits for it and returns what it returned, or raises what it raised."""
+    """Calls of one function with several argument tuples, under way from construction on."""
 
-    def __init__(self, function: Callable[..., Any], *arguments: Any) -> None:
-        self._call = (function, arguments)
+    def __init__(self, function: Callable[..., Any], arguments: Sequence[tuple[Any, ...]]) -> None:
+        self._function, self._arguments = function, tuple(arguments)
         self._pool: ProcessPoolExecutor | None = None
+        self._futures: list[Future[Any]] = []
         # Forking is only safe while no other thread runs; spawning would import the caller's script again.
-        if "fork" in multiprocessing.get_all_start_methods() and threading.active_count() == 1:
+        if self._arguments and "fork" in multiprocessing.get_all_start_methods() and threading.active_count() == 1:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", DeprecationWarning)
-                self._pool = ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("fork"))
-                self._future = self._pool.submit(function, *arguments)
+                workers = min(WORKERS, len(self._arguments))
+                self._pool = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("fork"))
+                self._futures = [self._pool.submit(function, *call) for call in self._arguments]
 
-    def result(self) -> Any:
-        """The call's result."""
+    def results(self) -> Iterator[Any]:
+        """What the calls return, in order, each as soon as it is there; raises what a call raised."""
         if self._pool is None:
-            function, arguments = self._call
-            return function(*arguments)
+            yield from (self._function(*call) for call in self._arguments)
+            return
         try:
-            return self._future.result()
+            yield from (future.result() for future in self._futures)
         finally:
             self._pool.shutdown(wait=False, cancel_futures=True)

@@ -14,10 +14,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from .background import Background
 from .description import Description, Model, read_description
 from .errors import DescriptionError, IdentificationError, SessionError
 from .hand import Finger, Hand
-from .identify.chain import Chain, ChainData, Pose, marker_body
+from .identify.chain import Chain, ChainData, Pose
 from .identify.clock import Clock, align
 from .identify.finger import observations, sound_frames
 from .identify.likelihood import fit_poses
@@ -96,7 +97,7 @@ def replay(description: Description | str | Path, session: Session | str | Path,
     agreement = engine_agreement(description)
     say("engines agree within " + ", ".join(f"{name} {value:.1e} m" for name, value in agreement.items()))
     notes: list[str] = []
-    trials = []
+    calls = []
     for finger in description.hand.fingers:
         recorded = next((f for f in session.fingers if f.name == finger.name), None)
         if recorded is None:
@@ -106,12 +107,15 @@ def replay(description: Description | str | Path, session: Session | str | Path,
         chosen = held_out or session.select("flexion", finger.name)
         if not held_out:
             notes.append(f"{finger.name}: no flexion trial is kept for validation; replayed on those that may have been fitted")
-        for trial in chosen:
-            trials.append(replay_trial(description, session, finger, recorded, trial, notes))
-            say(f"{trial.name}: {summary(trials[-1])}")
-    if not trials:
+        calls += [(description, session, finger, recorded, trial) for trial in chosen]
+    if not calls:
         names = ", ".join(f.name for f in session.fingers)
         raise DescriptionError(f"{description.folder}: none of its fingers is recorded in {session.path} (recorded: {names or 'none'})")
+    trials = []
+    for result, remarks in Background(replay_trial, calls).results():
+        trials.append(result)
+        notes += remarks
+        say(f"{result.trial.name}: {summary(result)}")
     return Residuals(description, session, tuple(trials), agreement, tuple(notes))
 
 
@@ -172,9 +176,10 @@ def measure(hand: Hand, session: Session, recorded: RecordedFinger, trial: Trial
 
 
 def replay_trial(
-    description: Description, session: Session, finger: Finger, recorded: RecordedFinger, trial: Trial, notes: list[str]
-) -> TrialResiduals:
-    """Replay one flexion trial in all modes that its recording allows."""
+    description: Description, session: Session, finger: Finger, recorded: RecordedFinger, trial: Trial
+) -> tuple[TrialResiduals, tuple[str, ...]]:
+    """Replay one flexion trial in all modes that its recording allows; what it does not, in sentences."""
+    notes: list[str] = []
     data, pose, weight = measure(description.hand, session, recorded, trial)
     sound = sound_frames(data, weight)
     if sound.sum() < 20:
@@ -202,7 +207,7 @@ def replay_trial(
         residual["simulated"] = seen_palm - _simulated(model, finger, labels, time, paths["encoder"][:, 0])
     everywhere = np.all([np.isfinite(r[..., 0]) for r in residual.values()], axis=0)
     segments = tuple(finger.joints[k - 1].name for k in body)
-    return TrialResiduals(
+    residuals = TrialResiduals(
         trial=trial,
         finger=finger.name,
         labels=labels,
@@ -217,6 +222,7 @@ def replay_trial(
         residual_palm=residual,
         noise_m=_noise_alone(description.hand, session, data.position_world[:, moving], palm_only),
     )
+    return residuals, tuple(notes)
 
 
 def phases(time_s: Array, drive: Array) -> NDArray[np.str_]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -63,7 +63,7 @@ def identify_all(session: Session | str | Path, say: Callable[[str], None] = lam
         raise IdentificationError(f"{session.path}: a hand needs palm markers and at least one finger")
     notes = list(check_session(session))
     shape = palm_shape(session)
-    motors = Background(identify_motors, session)
+    motors = Background(identify_motors, [(replace(session, actuators=(actuator,)),) for actuator in session.actuators])
     fits = []
     with ThreadPoolExecutor(max_workers=2) as pool:  # most of the time is spent in numpy, which lets other threads run
         for fit in pool.map(lambda finger: identify_finger(session, finger, shape), session.fingers):
@@ -81,8 +81,7 @@ def identify_all(session: Session | str | Path, say: Callable[[str], None] = lam
         finger, table = _finger(fit, shape, frame, screws, notes)
         fingers.append(finger)
         published[finger.name] = table
-    found_motors, motor_notes = motors.result()
-    notes += motor_notes
+    found_motors = _motors(session, motors, notes)
     say(_motor_line(found_motors))
     rotation, origin = frame[0], frame[1]
     hand = Hand(
@@ -286,6 +285,14 @@ def _finger_line(fit: FingerFit) -> str:
     frames, noise = len(fit.fit.pose.angle_rad), 1e3 * fit.fit.noise_m
     arcs = np.rad2deg(np.ptp(np.quantile(fit.fit.pose.angle_rad[fit.good], [0.01, 0.99], axis=0), axis=0))
     return f"{frames} frames, marker noise {noise:.3f} mm, arcs " + ", ".join(f"{arc:.0f}" for arc in arcs) + " deg"
+
+
+def _motors(session: Session, under_way: Background, notes: list[str]) -> tuple[Motor, ...]:
+    found: dict[str, Motor] = {}
+    for motors, remarks in under_way.results():
+        found |= {motor.actuator: motor for motor in motors}
+        notes += remarks
+    return tuple(found[actuator.name] for actuator in session.actuators if actuator.name in found)
 
 
 def _motor_line(motors: tuple[Motor, ...]) -> str:
