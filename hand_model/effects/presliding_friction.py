@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
-from .mjcf import free_name, motor_joint, section
+from .mjcf import lugre_friction
 from .path import dahl
 
 
@@ -38,24 +38,10 @@ class PreslidingFriction(Effect):
         out = np.array(state.declared)
         out[:, state.declared_names.index("coulomb")] = dahl(state.position, shape["bristle_length"])
         return out
-    def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
-        """A passive DC motor's LuGre friction in place of the joint's `frictionloss` (force per bristle length, see compile)."""
-        from lxml import etree
 
-        found = motor_joint(root, where)
-        if found is None:
-            return None
-        joint, _ = found  # efforts are already the file's
-        coulomb = float(joint.attrib.get("frictionloss", "0"))
-        if coulomb <= 0:
-            return None
-        for key in ("frictionloss", "solreffriction", "solimpfriction"):
-            joint.attrib.pop(key, None)
-        name = free_name(root, f"{where['actuator']}_friction")
-        values = (coulomb / parameters["bristle_length"], 0.0, coulomb, coulomb, 20.0)
-        etree.SubElement(section(root, "actuator"), "dcmotor", name=name, joint=joint.get("name"), input="none",
-                         motorconst="0 0", resistance="1", lugre=" ".join(repr(float(v)) for v in values))
-        return f"actuator/dcmotor[@name='{name}']"
+    def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
+        """A passive DC motor's LuGre friction in place of the joint's `frictionloss`."""
+        return lugre_friction(root, where, parameters)
 
 
 EFFECT = PreslidingFriction()

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, speed_range
-from .mjcf import free_name, motor_joint, section
+from .mjcf import lugre_friction
 
 
 class StribeckFriction(Effect):
@@ -40,24 +40,10 @@ class StribeckFriction(Effect):
     def region(self, states: tuple[DriveState, ...], shape: Mapping[str, float]) -> dict[str, Any] | None:
         """Speeds below two Stribeck speeds hold 86 % of it."""
         return {"speed": [0.0, 2.0 * shape["stribeck_speed"]], "unit": f"{states[0].position_unit}/s"}
-    def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
-        """A passive DC motor's LuGre friction in place of the joint's `frictionloss` (force per bristle length, see compile)."""
-        from lxml import etree
 
-        found = motor_joint(root, where)
-        if found is None:
-            return None
-        joint, _ = found  # efforts are already the file's
-        coulomb = float(joint.attrib.get("frictionloss", "0"))
-        if coulomb <= 0:
-            return None
-        for key in ("frictionloss", "solreffriction", "solimpfriction"):
-            joint.attrib.pop(key, None)
-        name = free_name(root, f"{where['actuator']}_friction")
-        values = (coulomb / 0.1, 0.0, coulomb, coulomb * parameters["static_ratio"], parameters["stribeck_speed"])
-        etree.SubElement(section(root, "actuator"), "dcmotor", name=name, joint=joint.get("name"), input="none",
-                         motorconst="0 0", resistance="1", lugre=" ".join(repr(float(v)) for v in values))
-        return f"actuator/dcmotor[@name='{name}']"
+    def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
+        """A passive DC motor's LuGre friction in place of the joint's `frictionloss`."""
+        return lugre_friction(root, where, parameters)
 
 
 EFFECT = StribeckFriction()
