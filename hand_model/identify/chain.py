@@ -38,6 +38,10 @@ class ChainData:
         """The observations of some frames."""
         return ChainData(self.position_world[frames], self.body, self.labels)
 
+    def thinned(self, most: int) -> ChainData:
+        """At most that many frames, evenly spread."""
+        return self.take(np.unique(np.linspace(0, len(self.position_world) - 1, most).astype(int)))
+
 
 @dataclass(frozen=True)
 class Chain:

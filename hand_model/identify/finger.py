@@ -131,7 +131,7 @@ def _best_fit(data: ChainData, rest: NDArray[np.int64], palm_shape: Array) -> Ch
     fit = fit_chain(data, first)
     if fit.converged and (angle_noise_ratio(fit) < SHORT_ARC).all():
         return fit
-    few = data.take(np.unique(np.linspace(0, len(data.position_world) - 1, START_FRAMES).astype(int)))
+    few = data.thinned(START_FRAMES)
     tried = [fit_chain(few, start) for start in (fit.chain, *other_starts(data, rest, palm_shape, first))]
     costs = [robust_cost(t.residual_palm, fit.noise_m) for t in tried]
     best = int(np.argmin(costs))

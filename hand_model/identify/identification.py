@@ -178,8 +178,8 @@ def _finger(
         if degenerate:
             sd = axis_sd_deg(covariance)
             notes.append(f"{fit.finger.name} {segment.name}: the recorded arc ({arc:.0f} deg) does not determine the axis (sd {sd:.1f} deg)")
-        columns = [j for j in np.flatnonzero(fit.fit.data.body == k + 1)]
-        markers = {fit.fit.data.labels[j]: (turn @ fit.fit.chain.marker_palm[j] + move - origin) @ rotation for j in reversed(columns)}
+        columns = np.flatnonzero(fit.fit.data.body == k + 1)
+        markers = {fit.fit.data.labels[j]: (turn @ fit.fit.chain.marker_palm[j] + move - origin) @ rotation for j in columns[::-1]}
         joints.append(
             Joint(
                 name=segment.name,
@@ -191,7 +191,7 @@ def _finger(
                 degenerate=degenerate,
             )
         )
-        published[segment.name] = _published(fit, k, near, axis, centre, covariance, arc)
+        published[segment.name] = _published(fit, k, covariance, arc)
     return Finger(fit.finger.name, fit.finger.actuator, tuple(joints), maps, links), published
 
 
@@ -236,7 +236,7 @@ def _in_frame(covariance: Array, axis: Array, centre: Array, rotation: Array, or
     return (total + total.T) / 2
 
 
-def _published(fit: FingerFit, joint: int, near: Array, axis: Array, centre: Array, covariance: Array, arc_deg: float) -> dict[str, Any]:
+def _published(fit: FingerFit, joint: int, covariance: Array, arc_deg: float) -> dict[str, Any]:
     """What the published method gives on the same markers, as its distance from the likelihood's axis."""
     row: dict[str, Any] = {
         "arc_deg": float(arc_deg),

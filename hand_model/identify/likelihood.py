@@ -68,9 +68,7 @@ def fit_chain(data: ChainData, start: Chain, iterations: int = 20) -> ChainFit:
 
     data: observations. start: a chain within the basin (`start.start_chain`).
     """
-    n = len(data.position_world)
-    few = data.take(np.unique(np.linspace(0, n - 1, START_FRAMES).astype(int)))
-    chain = _optimise(few, start, iterations, ANNEALING)[0]
+    chain = _optimise(data.thinned(START_FRAMES), start, iterations, ANNEALING)[0]
     chain, pose, noise, converged = _optimise(data, chain, iterations)
     return _finish(data, chain, pose, noise, converged)
 
