@@ -18,7 +18,6 @@ from .findings import Finding
 Array = NDArray[np.float64]
 
 DECLARED = {"inertia": "inertia", "viscous": "viscous", "coulomb": "coulomb", "spring": "stiffness", "preload": "preload"}
-SCALE_DOUBT = 0.005  # relative difference of count ranges above which the motor's percent is not the diagnosis's
 
 
 def read_model(model: Any) -> Hand:

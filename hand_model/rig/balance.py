@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .dynamics import INERTIAL, inertial_columns, inertial_parameters
 from .model import RigModel, RigTrial, apply_overrides
-from .states import choose_cutoff, differentiate, fill_gaps, low_pass, noise_std, uniform_time, velocity_noise
+from .states import choose_cutoff, differentiate, fill_gaps, low_pass, uniform_time, velocity_noise
 
 Array = NDArray[np.float64]
 MAX_RATE_HZ = 250.0  # faster recordings are thinned to this: joints move below 50 Hz
@@ -276,8 +276,3 @@ def _tendon_column(model: Any, name: str, q: Array) -> Array:
     low, high = model.tendon_lengthspring[t]
     stretch = np.where(length > high, length - high, np.where(length < low, length - low, 0.0))
     return stretch[:, None] * coef
-
-
-def resolution(trial: RigTrial, joint: str) -> float:
-    """White noise of a joint's encoder [position unit]."""
-    return noise_std(fill_gaps(trial.time_s, trial.position[joint]))

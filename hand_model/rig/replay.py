@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,7 +14,6 @@ from .inverse import apply_levels, effort_residuals
 from .model import RigModel, RigTrial, load_rig
 from .patch import read_effects
 from .states import choose_cutoff, differentiate, fill_gaps, low_pass, uniform_time
-from .swing import INDEX, vector
 
 Array = NDArray[np.float64]
 
@@ -217,8 +215,3 @@ def _residual(
         effort, count = float(np.sqrt(np.mean(effort_error**2))), len(effort_error)
     return JointResidual(trial.name, joint, trial.validate, rmse, mae, effort, len(recorded), time_s,
                          np.zeros(0) if simulated is None else simulated, count)  # fmt: skip
-
-
-def swing_vector(effects: list[Mapping[str, Any]]) -> Array:
-    """Swing parameters that a file keeps, as a vector with all else neutral."""
-    return vector({k: v for e in effects for k, v in e.get("swing", {}).items() if k in INDEX})

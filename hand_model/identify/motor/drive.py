@@ -26,7 +26,6 @@ STEP_S = 2e-3
 SHARED = ("inertia", "viscous", "coulomb", "stiffness", "preload", "presliding", "bristle", "speed_full", "rise", "gain", "damping", "delay", "lead")
 CONTROLLERS = {"profile": (*SHARED, "fall"), "cascade": (*SHARED, "position_gain", "deadband")}
 STRIBECK = ("static_ratio", "stribeck_speed")
-CONTACT = ("contact_stiffness", "contact_at", "contact_damping")  # optional: an object met in flexion, [raw/%], [%], [s]
 
 
 @dataclass(frozen=True)

@@ -313,8 +313,3 @@ def _estimates(values: Mapping[str, float], names: Sequence[str], covariance: Ar
         n: Estimate(float(kept[n]), (float(kept[n] - 1.96 * sd[n]), float(kept[n] + 1.96 * sd[n])) if n in sd else None, UNITS[n], origin)
         for n in ordered
     }
-
-
-def with_notes(motor: Motor, *notes: str) -> Motor:
-    """The motor with further notes."""
-    return dataclasses.replace(motor, notes=(*motor.notes, *notes))
