@@ -111,15 +111,12 @@ def _motor(actuator: str, seed: int | None) -> MotorTruth:
     rng, shared = stream(seed, "motor", actuator), stream(seed, "controller")
     opened = round(shared.uniform(2000, 14000), -2) + round(rng.uniform(-40, 40))
     kind = "ramp" if shared.uniform() < 0.6 else "cascade"
-    gain = shared.uniform(16, 30) if kind == "ramp" else shared.uniform(1.6, 3.0)
-    controller = Controller(
-        kind,
-        gain,
-        shared.uniform(0.45, 0.8),
-        shared.uniform(9, 16),
-        shared.uniform(85, 140),
-        float(shared.choice([255, 255, 100])),
-    )
+    gain, damping = shared.uniform(16, 30) if kind == "ramp" else shared.uniform(1.6, 3.0), shared.uniform(0.45, 0.8)
+    integral, speed_full = shared.uniform(9, 16), shared.uniform(85, 140)
+    raw_full, more, give = float(shared.choice([255, 255, 100])), stream(seed, "profile"), 0.0
+    if kind == "ramp" and more.uniform() < 0.5:
+        kind, damping, give = "profile", more.uniform(1.5, 3.5), more.uniform(0.4, 0.8)
+    controller = Controller(kind, gain, damping, integral, speed_full, raw_full, more.uniform(700, 1200))
     return MotorTruth(
         actuator,
         float(opened),
@@ -130,6 +127,7 @@ def _motor(actuator: str, seed: int | None) -> MotorTruth:
         stiffness=0.23 * rng.uniform(0.8, 1.25),
         preload=9.0 * rng.uniform(0.7, 1.4),
         unrest=float(shared.choice([0.0, 0.0, 0.8])),
+        give=give * rng.uniform(0.9, 1.1),
         controller=controller,
     )
 

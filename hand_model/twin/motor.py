@@ -2,11 +2,12 @@
 
 inertia a = u - load(p, v, ...) - viscous v - friction, with |friction| <= level while it sticks and friction = level
 sign(v) while it slides. Viscous friction is integrated implicitly, the stop at a velocity reversal is an event of its
-own.
+own. A motor with give carries the friction on bristles instead (LuGre; Canudas de Wit et al. 1995, eq. 1-3).
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -28,7 +29,7 @@ class DriveNow:
     [raw].
 
     direction: of the motion, or of the push while sticking. transmitted: load behind the gearbox [raw]. gravity_palm:
-    unit vector of gravity in the palm frame.
+    unit vector of gravity in the palm frame. bristle: deflection [%] of the friction's bristles.
     """
 
     time_s: float = 0.0
@@ -41,6 +42,7 @@ class DriveNow:
     spring: float = 0.0
     slip: bool = True
     gravity_palm: Sequence[float] = (0.0, 0.0, -1.0)
+    bristle: float = 0.0
 
 
 Term = Callable[[DriveNow], float]
@@ -91,13 +93,24 @@ class Motion:
 
 def _controller(control: Controller, now: DriveNow, step_s: float) -> Callable[[float, float, float], float]:
     """The control law: (setpoint [%], speed limit [%/s], sensed position [%]) -> wanted current [raw]."""
-    state = [0.0, 0.0]  # ramp: the reference [%]; cascade: the integral [raw] and the wanted velocity [%/s]
+    # ramp: the reference [%]; profile: the reference and its speed [%/s]; cascade: the integral [raw], the wanted velocity
+    state = [0.0, 0.0]
 
     def ramp(setpoint: float, limit: float, sensed: float) -> float:
         wanted = setpoint - state[0]
         move = max(-limit * step_s, min(limit * step_s, wanted))
         state[0] += move
         return control.gain * (state[0] - sensed) + control.damping * (move / step_s - now.velocity)
+
+    def profile(setpoint: float, limit: float, sensed: float) -> float:
+        left, most = setpoint - state[0], control.acceleration * step_s
+        # as fast as it can still stop from, in whole steps
+        wanted = math.copysign(min(limit, math.sqrt(2.0 * control.acceleration * abs(left) + 0.25 * most**2) - 0.5 * most), left)
+        state[1] += max(-most, min(most, wanted - state[1]))
+        if abs(left) < abs(state[1]) * step_s:
+            state[0], state[1] = setpoint, 0.0
+        state[0] += state[1] * step_s
+        return control.gain * (state[0] - sensed) + control.damping * (state[1] - now.velocity)
 
     def cascade(setpoint: float, limit: float, sensed: float) -> float:
         error = setpoint - sensed
@@ -108,7 +121,7 @@ def _controller(control: Controller, now: DriveNow, step_s: float) -> Callable[[
             state[0] = max(-200.0, min(200.0, state[0] + control.integral * slip * step_s))
         return control.gain * slip + state[0]
 
-    return ramp if control.kind == "ramp" else cascade
+    return {"ramp": ramp, "profile": profile, "cascade": cascade}[control.kind]
 
 
 def simulate(
@@ -129,6 +142,8 @@ def simulate(
     time_s = np.arange(n) * step_s
     target, speed, limit = (column.tolist() for column in commands(program, time_s, terms.command_delay_s))
     now = DriveNow(position=start_percent)
+    if motor.give:  # at rest the bristles carry the preload, as a hard stick would
+        now.bristle = -motor.give * min(0.9, motor.preload / motor.coulomb)
     control = _controller(motor.controller, now, step_s)
     to_speed = motor.controller.speed_full / motor.controller.speed_raw_full
     gravity = None if gravity_palm is None else gravity_palm.tolist()
@@ -186,7 +201,9 @@ def _step(
     for term in terms.friction:
         level += term(now)
     level = max(0.0, level)
-    if v == 0.0 and abs(drive) <= level:
+    if motor.give and level > 0.0:
+        new, friction = _bristles(motor, now, drive, level, step_s)
+    elif v == 0.0 and abs(drive) <= level:
         new, friction = 0.0, drive
     else:
         friction = direction * level
@@ -198,3 +215,17 @@ def _step(
     for advance in terms.advance:
         advance(now, step_s)
     return p, v, (new - v) / step_s, current, load, friction
+
+
+def _bristles(motor: MotorTruth, now: DriveNow, drive: float, level: float, step_s: float) -> tuple[float, float]:
+    """Velocity after the step [%/s] and friction [raw] of bristles that slide at `level` [raw]; moves the bristles."""
+    stiffness = motor.coulomb / motor.give
+    damping = 0.3 * math.sqrt(stiffness * motor.inertia)
+    wear = abs(now.velocity) * now.bristle * stiffness / level  # what sliding takes off the bristles' rate
+    reach = step_s * stiffness + damping
+    push = drive - stiffness * now.bristle + reach * wear
+    new = (now.velocity + step_s * push / motor.inertia) / (1.0 + step_s * (motor.viscous + reach) / motor.inertia)
+    rate = new - wear
+    friction = stiffness * now.bristle + reach * rate
+    now.bristle = max(-level / stiffness, min(level / stiffness, now.bristle + step_s * rate))
+    return new, friction

@@ -42,11 +42,11 @@ class FingerTruth:
 
 @dataclass(frozen=True)
 class Controller:
-    """Position controller of a drive. kind: "ramp" (PD on a reference of limited speed) or "cascade" (position, speed
-    with integral).
+    """Position controller of a drive. kind: "ramp" (PD on a reference of limited speed), "profile" (the same, its
+    acceleration limited too) or "cascade" (position, speed with integral).
 
-    gain [raw/%] and damping [raw s/%] of the ramp, or of the speed loop [raw s/%] with integral [raw/%]; speed_full:
-    speed [%/s] at the raw speed 255.
+    gain [raw/%] and damping [raw s/%] of ramp and profile, or of the speed loop [raw s/%] with integral [raw/%];
+    speed_full: speed [%/s] at the raw speed 255; acceleration: of the profile [%/s^2].
     """
 
     kind: str = "ramp"
@@ -55,6 +55,7 @@ class Controller:
     integral: float = 12.0
     speed_full: float = 118.0
     speed_raw_full: float = 255.0
+    acceleration: float = 900.0
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ class MotorTruth:
     of the range.
 
     unrest: standard deviation [raw] of a slow random load, so that repeated cycles differ by more than measurement
-    noise.
+    noise. give: distance [%] over which bristles carry the Coulomb friction before it slides; zero for a hard stick.
     """
 
     actuator: str
@@ -75,6 +76,7 @@ class MotorTruth:
     stiffness: float = 0.23
     preload: float = 9.0
     unrest: float = 0.0
+    give: float = 0.0
     controller: Controller = field(default_factory=Controller)
 
     def counts(self, percent: Array) -> Array:

@@ -88,6 +88,8 @@ def quadratic(draw: Draw) -> Influence:
 def presliding(draw: Draw) -> Influence:
     """The Coulomb friction is carried by a bristle that gives way over a small distance before it slides."""
     give = max(0.05, draw.size("give_percent", 0.4, 0.9))
+    if draw.motor.give:  # a drive that gives anyway gives more
+        give = draw.note("give_percent", draw.motor.give * (1.0 + 2.0 * give))
     level = draw.motor.coulomb
     damping = 0.0 if draw.form == "dahl" else draw.uniform("bristle_damping_raw", 0.01, 0.04) * level / give
     bristle = [0.0, 0.0]  # deflection [%] and its rate [%/s]
