@@ -49,7 +49,9 @@ def test_the_script_remakes_them_byte_by_byte(tmp_path):
         # The truth has more digits than a session's files: another processor rounds the last of them otherwise.
         made, kept = (flat(json.loads((f / f"{name}.answer.json").read_text())) for f in (tmp_path, want))
         assert made.keys() == kept.keys()
-        assert all(made[k] == pytest.approx(kept[k], rel=1e-12, abs=1e-15) for k in kept)
+        assert [v for v in made.values() if isinstance(v, str)] == [v for v in kept.values() if isinstance(v, str)]
+        numbers = [k for k, v in kept.items() if isinstance(v, (int, float))]
+        assert [made[k] for k in numbers] == pytest.approx([kept[k] for k in numbers], rel=1e-12, abs=1e-15)
 
 
 def test_every_package_is_in_the_wheel():
