@@ -15,7 +15,8 @@ from hand_model.rig import diagnose_rig, fit_declared, load_rig, replay_rig
 from hand_model.rig.balance import Column
 from hand_model.rig.consistent import consistent, is_physical, parameters, pseudo_inertia
 from hand_model.rig.dynamics import INERTIAL, inertial_columns, inertial_parameters
-from hand_model.rig.patch import physical, read_effects, write_effects
+from hand_model.rig.mjcf import read_effects, write_effects
+from hand_model.rig.physical import physical
 from hand_model.rig.solve import solve_bounded
 from hand_model.rig.swing import Lane, Swing, Task, errors, fit_together, simulate, vector
 from hand_model.session import read_session

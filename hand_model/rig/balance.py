@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .dynamics import INERTIAL, inertial_columns, inertial_parameters
-from .model import RigModel, RigTrial, apply_overrides
+from .model import RigModel, RigTrial
+from .overrides import body_names, compile_model
 from .states import choose_cutoff, differentiate, fill_gaps, low_pass, uniform_time, velocity_noise
 
 Array = NDArray[np.float64]
@@ -48,7 +49,7 @@ class Rows:
 
     Full-rate grid (n,): time_s, states, extra channels (never filtered: an effect reads them as they are), full_columns
     (n, P), carried (P,) bool and load_known (n,): of what the joint carries besides its own drive and friction. Filtered and thinned (m,): effort, columns (m, P), moving (bool).
-    states: position, velocity, acceleration (n, joints) of the whole rig; rest_speeds (joints,); jacobian: joint -> (n,),
+    effort: recorded, less what the trial's own bodies add to the declared ones. states: position, velocity, acceleration (n, joints) of the whole rig; rest_speeds (joints,); jacobian: joint -> (n,),
     what hangs on this joint by couplings, itself included; declared: the columns' names.
     """
 
@@ -91,16 +92,6 @@ class Rows:
     def expected(self, theta: Array) -> Array:
         """Effort (n,) of the joint's own drive that the declared parameters theta (P,) ask for at this motion."""
         return self.full_columns @ theta - self.load_known
-
-
-def compile_model(rig: RigModel, trial: RigTrial | None = None) -> Any:
-    """The rig's mjModel, with a trial's overrides applied."""
-    import mujoco
-
-    model = mujoco.MjModel.from_xml_string(rig.xml.decode())
-    if trial is not None:
-        apply_overrides(model, trial.set)
-    return model
 
 
 def declared_columns(rig: RigModel, off_axis: bool = False) -> tuple[Column, ...]:
@@ -173,6 +164,7 @@ def trial_rows(
     grid, channels = grid[::thin], {k: c[::thin] for k, c in channels.items()}
     rate = rate / thin
     values = _column_values(rig, trial, model, columns, q, v, a, sign)
+    own = _own_bodies(rig, trial, model, q, v, a)
     step = max(1, int(np.ceil(len(grid) / MAX_SAMPLES)), int(rate / (6 * cutoff)))
     external = np.array([c.kind in ("inertial", "spring", "stiffness") for c in columns])
     rows = []
@@ -181,7 +173,7 @@ def trial_rows(
         if any(effort[j] is None for j in jacobian):
             continue
         i = rig.joints.index(joint)
-        y = sum(effort[j] * w for j, w in jacobian.items())
+        y = sum((effort[j] - own[:, rig.joints.index(j)]) * w for j, w in jacobian.items())
         x = sum(values[:, rig.joints.index(j)] * w[:, None] for j, w in jacobian.items())
         rows.append(
             Rows(trial.name, joint, trial.validate, grid, q[:, i], v[:, i], a[:, i],
@@ -190,6 +182,14 @@ def trial_rows(
                  {"effort": y, **channels}, x, external, y - effort[joint], step, (q, v, a), rest, jacobian, columns)
         )  # fmt: skip
     return tuple(rows)
+
+
+def _own_bodies(rig: RigModel, trial: RigTrial, model: Any, q: Array, v: Array, a: Array) -> Array:
+    """Effort (n, joints) of what the trial's own bodies (weights, lengths) have over the declared ones: it is known."""
+    if not body_names(trial.set):
+        return np.zeros(q.shape)
+    change = inertial_parameters(model) - inertial_parameters(compile_model(rig))
+    return np.einsum("njbp,bp->nj", inertial_columns(model, q, v, a, np.array(model.opt.gravity)), change)
 
 
 def _thinned(values: Array, rate: float, skip: int) -> Array:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .balance import Column
 from .dynamics import INERTIAL
-from .patch import physical
+from .physical import physical
 
 Array = NDArray[np.float64]
 LOWER = np.tril_indices(4)

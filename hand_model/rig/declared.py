@@ -8,9 +8,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .balance import Column, Rows, compile_model, declared_columns, trial_rows
+from .balance import Column, Rows, declared_columns, trial_rows
 from .dynamics import inertial_parameters
 from .model import RigModel, RigTrial
+from .overrides import compile_model
 from .solve import solve_bounded
 
 Array = NDArray[np.float64]

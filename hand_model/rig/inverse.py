@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DescriptionError
-from .balance import Column, Rows, compile_model, declared_columns, trial_rows
+from .balance import Column, Rows, declared_columns, trial_rows
 from .candidates import Candidate, candidates
 from .declared import DeclaredFit
+from .mjcf import read_effects
 from .model import RigModel, RigTrial
-from .patch import read_effects
+from .overrides import compile_model
 
 Array = NDArray[np.float64]
 
@@ -82,7 +83,7 @@ def joint_efforts(rig: RigModel, trial: RigTrial, row: Rows) -> Array:
     """What each joint's drive has to give (n, joints) at the recorded states of a balance, by mj_inverse and friction."""
     import mujoco
 
-    model = compile_model(rig, trial)
+    model = compile_model(rig, trial, bodies=False)  # the balance has taken the trial's own bodies from the effort
     apply_levels(model, rig, trial)
     data = mujoco.MjData(model)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)

@@ -217,25 +217,3 @@ def _map_trial(trial: Trial, quantity: Mapping[str, tuple], drives: tuple[Drive,
     extra = {c: v[keep] for c, v in log.columns.items() if c not in quantity and np.isfinite(v).any()}
     return RigTrial(trial.name, trial.validate, time_s, maps["position"], maps["velocity"], effort, voltage,
                     maps["setpoint"], extra, dict(trial.set), live)  # fmt: skip
-
-
-def apply_overrides(model: Any, overrides: Mapping[str, Any]) -> None:
-    """Set what the laboratory changed between recordings ("kind:name:attribute" = value) on a compiled mjModel.
-
-    Raises SessionError where an override names nothing in the model.
-    """
-    for key, value in overrides.items():
-        kind, _, rest = key.partition(":")
-        if kind == "option":
-            getattr(model.opt, rest)[:] = value
-            continue
-        name, _, attribute = rest.partition(":")
-        try:
-            view = getattr(model, kind)(name)
-            attribute_array = getattr(view, _VIEW.get((kind, attribute), attribute))
-        except (AttributeError, KeyError):
-            raise SessionError(f'set "{key}": the model has no such {kind} or attribute') from None
-        attribute_array[:] = value
-
-
-_VIEW = {("body", "pos"): "pos", ("joint", "ref"): "qpos0"}

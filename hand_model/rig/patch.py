@@ -9,7 +9,6 @@ Coulomb levels of trials that set their own.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -17,42 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DescriptionError
-from .balance import Column, compile_model
+from .balance import Column
 from .dynamics import INERTIAL, inertial_parameters
+from .mjcf import find, number, parse, serialise
 from .model import RigModel
+from .overrides import compile_model
+from .physical import physical
 
 Array = NDArray[np.float64]
-TEXT = "hand_model"
-
-
-def parse(xml: bytes) -> Any:
-    """The MJCF tree, comments kept."""
-    from lxml import etree
-
-    try:
-        return etree.fromstring(xml)
-    except etree.XMLSyntaxError as error:
-        raise DescriptionError(f"the rig's MJCF is not XML: {error}") from None
-
-
-def serialise(root: Any) -> bytes:
-    """The tree as bytes, the same for the same tree."""
-    from lxml import etree
-
-    return etree.tostring(root, encoding="utf-8", xml_declaration=False) + b"\n"
-
-
-def number(*values: float) -> str:
-    """Numbers with all their digits, blank between."""
-    return " ".join(repr(float(v)) for v in values)
-
-
-def find(root: Any, tag: str, name: str) -> Any:
-    """The element <tag name="name">; raises DescriptionError where there is none."""
-    for element in root.iter(tag):
-        if element.get("name") == name:
-            return element
-    raise DescriptionError(f'the rig\'s MJCF has no {tag} "{name}"')
 
 
 def write_declared(rig: RigModel, columns: Sequence[Column], theta: Array) -> bytes:
@@ -119,25 +90,6 @@ def _write_bodies(root: Any, model: Any, values: Mapping[tuple[str, str, str], f
             inertial.set("fullinertia", number(i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]))
 
 
-def physical(p: Array) -> tuple[float, Array, Array]:
-    """Mass [kg], centre (3,) [m], inertia about it (3, 3) [kg m2] of parameters (10,), the nearest that a body can have.
-
-    Moments that the motion does not show may be contradicted by those it does: they are raised until each principal
-    moment is at most the sum of the other two (triangle inequality; Traversaro et al. 2016).
-    """
-    mass = max(float(p[0]), 1e-6)
-    centre = p[1:4] / mass
-    about = np.array([[p[4], p[7], p[8]], [p[7], p[5], p[9]], [p[8], p[9], p[6]]])
-    inertia = about - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-    level, axes = np.linalg.eigh(0.5 * (inertia + inertia.T))
-    level = np.maximum(level, 1e-9 * max(level.max(), 1e-9))
-    excess = level[2] - level[0] - level[1]
-    if excess > 0:
-        level[:2] += 0.5 * excess * (1 + 1e-9)
-    inertia = axes @ np.diag(level) @ axes.T
-    return mass, centre, inertia
-
-
 def write_couplings(xml: bytes, polycoef: Mapping[str, Array]) -> bytes:
     """The MJCF with the polynomials (5,) of named equality joints."""
     root = parse(xml)
@@ -146,27 +98,3 @@ def write_couplings(xml: bytes, polycoef: Mapping[str, Array]) -> bytes:
             if element.get("name") in polycoef:
                 element.set("polycoef", number(*polycoef[element.get("name")]))
     return serialise(root)
-
-
-def write_effects(xml: bytes, effects: Sequence[Mapping[str, Any]]) -> bytes:
-    """The MJCF with effects that have no attribute kept as JSON in custom/text; [] removes them."""
-    root = parse(xml)
-    for section in root.findall("custom"):
-        for text in [t for t in section.findall("text") if t.get("name") == TEXT]:
-            section.remove(text)
-        if not len(section):
-            root.remove(section)
-    if effects:
-        from lxml import etree
-
-        section = etree.SubElement(root, "custom")
-        etree.SubElement(section, "text", name=TEXT, data=json.dumps(list(effects), sort_keys=True))
-    return serialise(root)
-
-
-def read_effects(xml: bytes) -> list[dict[str, Any]]:
-    """Effects that `write_effects` kept in an MJCF."""
-    for text in parse(xml).iter("text"):
-        if text.get("name") == TEXT:
-            return json.loads(text.get("data"))
-    return []

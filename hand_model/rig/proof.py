@@ -15,8 +15,10 @@ from numpy.typing import NDArray
 from .compete import Term, design
 from .declared import DeclaredFit
 from .inverse import EffortResidual, effort_residuals, level_records
+from .mjcf import write_effects
 from .model import RigModel
-from .patch import write_declared, write_effects
+from .overrides import body_records
+from .patch import write_declared
 from .states import noise_std
 
 Array = NDArray[np.float64]
@@ -42,7 +44,7 @@ class Bench:
         p = len(fit.columns)
         cutoffs = {r.cutoff_hz for r in fit.rows}
         analysis = [{"cutoff_hz": cutoffs.pop()}] if len(cutoffs) == 1 else []
-        records = [*analysis, *level_records(fit.columns, theta[:p]), *term_records(terms, theta[p:])]
+        records = [*analysis, *body_records(self.rig), *level_records(fit.columns, theta[:p]), *term_records(terms, theta[p:])]
         return write_effects(write_declared(self.rig, fit.columns, theta[:p]), records)
 
     def residuals(self, fit: DeclaredFit, terms: Sequence[Term], theta: Array, joint: str) -> list[tuple[str, Array]]:

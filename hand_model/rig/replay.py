@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..session import Session
-from .balance import compile_model
 from .inverse import apply_levels, effort_residuals
+from .mjcf import read_effects
 from .model import RigModel, RigTrial, load_rig
-from .patch import read_effects
+from .overrides import compile_model
 from .states import choose_cutoff, differentiate, fill_gaps, low_pass, uniform_time
+from .supply import supply_deviation
 
 Array = NDArray[np.float64]
 
@@ -100,14 +101,22 @@ class EffectStepper:
             shaft = float(data.qfrc_actuator[joint])
             damping = get("load_speed", 0.0) * abs(external) + get("damping_asymmetry", 0.0) * np.sign(v)
             data.qfrc_passive[joint] -= damping * v
-            low = np.exp(-((v / get("stribeck_speed", 1.0)) ** 2))
-            more = (get("load_gear", 0.0) * abs(external - shaft) + get("load_motor", 0.0) * abs(shaft)
-                    + get("load_external", 0.0) * abs(external) + get("motor_squared", 0.0) * shaft**2
-                    + get("external_squared", 0.0) * external**2 + get("asymmetry", 0.0) * np.sign(v)
-                    + low * (get("static_excess", 0.0) + get("load_gear_low", 0.0) * abs(external - shaft)
-                             + get("load_motor_low", 0.0) * abs(shaft) + get("load_external_low", 0.0) * abs(external)))  # fmt: skip
+            more = (get("load_gear", 0.0) * abs(external - shaft) + get("asymmetry", 0.0) * np.sign(v)
+                    + abs(get("load_external", 0.0) * external - get("load_motor", 0.0) * shaft)
+                    + _low_speed(e, v, external, shaft))  # fmt: skip
             # the bound takes effect in the next step: the constraint of this one stands already
             model.dof_frictionloss[joint] = max(self.coulomb[joint] + more, 1e-9)
+
+
+def _low_speed(e: dict[str, float], v: float, external: float, shaft: float) -> float:
+    """Dry friction that standing still adds, by load, at joint velocity v under external and shaft effort."""
+    get = e.get
+    level = (get("static_excess", 0.0) + get("load_gear_low", 0.0) * abs(external - shaft)
+             + abs(get("load_external_low", 0.0) * external - get("load_motor_low", 0.0) * shaft))  # fmt: skip
+    if external * shaft < 0:
+        drives = abs(shaft) > abs(external)
+        level += get("external_squared", 0.0) * external**2 if drives else get("motor_squared", 0.0) * shaft**2
+    return level * np.exp(-(abs(v / get("stribeck_speed", 1.0)) ** get("stribeck_exponent", 2.0)))
 
 
 def simulate_trial(rig: RigModel, trial: RigTrial) -> tuple[Array, Array]:
@@ -164,11 +173,7 @@ def _controls(rig: RigModel, trial: RigTrial, model: Any, effects: EffectStepper
     """Control of every actuator (n, nu) on the simulation's grid, late and sagging where the file says so."""
     out = np.zeros((len(grid), model.nu))
     at = grid - effects.delay_s()
-    supply = np.zeros(len(grid))
-    for channel in ("supply", "voltage_supply", "bus_voltage"):
-        if channel in trial.extra:
-            level = fill_gaps(trial.time_s, trial.extra[channel])
-            supply = np.interp(grid, trial.time_s, level / np.mean(level) - 1.0)
+    supply = np.interp(grid, trial.time_s, supply_deviation(rig, trial))
     for drive in rig.drives:
         a = model.actuator(drive.name).id
         if drive.joint in trial.voltage:

@@ -21,24 +21,28 @@ STEP_S = 2e-3
 # All physics the simulator knows. Declared first; the rest is zero (or neutral) unless an effect is being tried.
 PARAMETERS = (
     "inertia", "gain", "back_emf", "damping", "coulomb",  # declared
-    "static_excess", "stribeck_speed",  # + static_excess exp(-(v / vs)^2)
-    "load_gear", "load_motor", "load_external",  # + k |tau_external - tau_motor|, k |tau_motor|, k |tau_external|
-    "load_gear_low", "load_motor_low", "load_external_low",  # the same, times exp(-(v / vs)^2)
-    "motor_squared", "external_squared",  # + k tau^2
+    "static_excess", "stribeck_speed", "stribeck_exponent",  # + static_excess exp(-|v / vs|^a)
+    "load_gear", "load_motor", "load_external",  # + k |tau_external - tau_motor|, |k_e tau_external - k_m tau_motor|
+    "load_gear_low", "load_motor_low", "load_external_low",  # the same, times exp(-|v / vs|^a)
+    "motor_squared", "external_squared",  # + k tau^2 of the larger of opposed efforts, times exp(-|v / vs|^a)
     "load_speed",  # damping that grows with |tau_external|
     "asymmetry", "damping_asymmetry", "drag", "offset", "lateral", "stiffness",
     "sag", "supply", "delay",
 )  # fmt: skip
 INDEX = {name: i for i, name in enumerate(PARAMETERS)}
 DECLARED = PARAMETERS[:5]
+NEUTRAL = {"stribeck_speed": 1.0, "stribeck_exponent": 2.0}  # what is not zero where an effect is absent
+LOW_SPEED = ("static_excess", "load_gear_low", "load_motor_low", "load_external_low", "motor_squared", "external_squared")
 
 
 @dataclass(frozen=True)
 class Lane:
     """One stretch of one trial to be simulated: drive and measured position on an even grid of the swing's step_s.
 
-    drive (n,): recorded voltage, or effort, or zeros; live: drive connected; position (n,) [rad or m]; start: (q, v);
-    supply (n,): relative deviation of the supply from its mean; used (n,): weights 0 or 1 (recorded, not padded).
+    drive (n,): recorded voltage, or effort, or zeros; live: the trial's gear over the declared one (zero: disconnected);
+    position (n,) [rad or m]; start: (q, v); supply (n,): relative deviation of the supply from its mean; used (n,):
+    weights 0 or 1 (recorded, not padded). Of the trial's own bodies: more_inertia [kg m2 or kg] than declared, sine and
+    cosine of its weight (None: the swing's); coulomb_scale: its own Coulomb level over the declared one.
     """
 
     trial: str
@@ -50,6 +54,8 @@ class Lane:
     supply: Array
     used: Array
     coulomb_scale: float = 1.0
+    more_inertia: float = 0.0
+    weight: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +77,7 @@ class Swing:
 def vector(values: Mapping[str, float]) -> Array:
     """Parameter vector from names; what is not named is neutral."""
     out = np.zeros(len(PARAMETERS))
-    out[INDEX["stribeck_speed"]] = 1.0
-    for name, value in values.items():
+    for name, value in {**NEUTRAL, **values}.items():
         out[INDEX[name]] = value
     return out
 
@@ -122,27 +127,29 @@ def _run(swing: Swing, theta: Array, lanes: Array, steps: int, residual: bool) -
     """Positions, or residuals, (steps, L); an effect that no run has costs nothing."""
     p = {name: np.ascontiguousarray(theta[:, i]) for name, i in INDEX.items()}
     has = {name: bool(np.any(values)) for name, values in p.items()}
-    has["level"] = any(has[k] for k in ("load_gear_low", "load_motor_low", "load_external_low"))
+    has["low"] = any(has[k] for k in LOW_SPEED)
+    has["exponent"] = bool(np.any(p["stribeck_exponent"] != NEUTRAL["stribeck_exponent"]))
     chosen = [swing.lanes[i] for i in lanes]
     live = np.array([c.live for c in chosen])
     q, v = np.array([c.start for c in chosen]).T.copy()
     h = swing.step_s
-    p["hi"] = h / p["inertia"]
+    p["hi"] = h / (p["inertia"] + np.array([c.more_inertia for c in chosen]))
     p["coulomb"] = p["coulomb"] * np.array([c.coulomb_scale for c in chosen])
-    p["emf"] = p["back_emf"] * live
+    p["emf"] = p["back_emf"] * live**2
     p["inverse"] = 1.0 / p["stribeck_speed"]
-    lateral = swing.cosine + p["lateral"]
+    sine, cosine = np.array([c.weight or (swing.sine, swing.cosine) for c in chosen]).T
+    lateral = cosine + p["lateral"]
     bends = bool(np.any(lateral))
     position, used = _stacked(swing)[2:4]
     drive = _drive(swing, theta, lanes, has) if swing.driven else None
     # Semi-implicit Euler is leapfrog when the velocity starts half a step early: second order instead of first.
     if not swing.driven:
-        v = v + 0.5 * p["hi"] * (swing.sine * np.sin(q) + lateral * np.cos(q))
+        v = v + 0.5 * p["hi"] * (sine * np.sin(q) + lateral * np.cos(q))
     out = np.empty((steps, len(lanes)))
     with np.errstate(all="ignore"):
         for k in range(steps):
             out[k] = (q - position[k, lanes]) * used[k, lanes] if residual else q
-            external = -swing.sine * np.sin(q)
+            external = -sine * np.sin(q)
             if bends:
                 external -= lateral * np.cos(q)
             if has["stiffness"]:
@@ -174,18 +181,12 @@ def _friction(p: Mapping[str, Array], has: Mapping[str, bool], v: Array, externa
     shaft = 0.0 if motor is None else motor - p["emf"] * v
     if has["load_gear"]:
         friction = friction + p["load_gear"] * np.abs(external - shaft)
-    if has["load_motor"]:
-        friction = friction + p["load_motor"] * np.abs(shaft)
-    if has["load_external"]:
-        friction = friction + p["load_external"] * np.abs(external)
-    if has["level"] or has["static_excess"]:
-        level = p["static_excess"]
-        if has["level"]:
-            level = (level + p["load_gear_low"] * np.abs(external - shaft) + p["load_motor_low"] * np.abs(shaft)
-                     + p["load_external_low"] * np.abs(external))  # fmt: skip
-        friction = friction + level * np.exp(-((v * p["inverse"]) ** 2))
-    if has["motor_squared"] or has["external_squared"]:
-        friction = friction + p["motor_squared"] * shaft**2 + p["external_squared"] * external**2
+    if has["load_motor"] or has["load_external"]:
+        friction = friction + np.abs(p["load_external"] * external - p["load_motor"] * shaft)
+    if has["low"]:
+        ratio = v * p["inverse"]
+        decay = np.exp(-(np.abs(ratio) ** p["stribeck_exponent"] if has["exponent"] else ratio**2))
+        friction = friction + _low_speed(p, has, external, shaft) * decay
     if has["load_speed"]:
         b = b + p["load_speed"] * np.abs(external)
     if has["drag"]:
@@ -195,6 +196,20 @@ def _friction(p: Mapping[str, Array], has: Mapping[str, bool], v: Array, externa
     if has["damping_asymmetry"]:
         b = b + p["damping_asymmetry"] * np.sign(v)
     return friction, b
+
+
+def _low_speed(p: Mapping[str, Array], has: Mapping[str, bool], external: Array, shaft: Array | float) -> Array:
+    """Dry friction (L,) that standing still adds (Stribeck), by load."""
+    level = p["static_excess"]
+    if has["load_gear_low"]:
+        level = level + p["load_gear_low"] * np.abs(external - shaft)
+    if has["load_motor_low"] or has["load_external_low"]:
+        level = level + np.abs(p["load_external_low"] * external - p["load_motor_low"] * shaft)
+    if has["motor_squared"] or has["external_squared"]:
+        drives = np.abs(shaft) > np.abs(external)
+        square = np.where(drives, p["external_squared"] * external**2, p["motor_squared"] * shaft**2)
+        level = level + square * (external * shaft < 0)
+    return level
 
 
 def _drive(swing: Swing, theta: Array, lanes: Array, has: Mapping[str, bool]) -> Callable[[int], Array]:
@@ -237,7 +252,7 @@ class Fitted:
     evaluations: int
 
 
-LOW = {"inertia": 1e-9, "stribeck_speed": 1e-3, "asymmetry": -np.inf, "damping_asymmetry": -np.inf, "offset": -np.inf,
+LOW = {"inertia": 1e-9, "stribeck_speed": 1e-3, "stribeck_exponent": 0.3, "asymmetry": -np.inf, "damping_asymmetry": -np.inf, "offset": -np.inf,
        "lateral": -np.inf, "stiffness": -np.inf, "supply": 0.0, "delay": 0.0, "load_speed": 0.0}  # fmt: skip
 
 
@@ -250,7 +265,7 @@ def typical(swing: Swing) -> Array:
     wet = max(i.get("damping", 0.0), 0.1 * dry / speed)
     share = dry / weight
     size = {"inertia": i["inertia"], "gain": i.get("gain", 1.0), "back_emf": i.get("back_emf", 1.0), "damping": wet,
-            "coulomb": dry, "static_excess": dry, "stribeck_speed": 0.1 * speed, "motor_squared": share / weight,
+            "coulomb": dry, "static_excess": dry, "stribeck_speed": 0.1 * speed, "stribeck_exponent": 0.5, "motor_squared": share / weight,
             "external_squared": share / weight, "load_speed": wet / weight, "asymmetry": dry, "drag": wet / speed,
             "damping_asymmetry": wet, "offset": dry, "lateral": dry, "stiffness": dry,
             "sag": 0.1 / weight, "supply": 0.5, "delay": 0.01}  # fmt: skip

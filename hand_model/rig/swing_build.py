@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from .balance import compile_model
 from .declared import DeclaredFit
 from .dynamics import inertial_columns, inertial_parameters
 from .model import RigModel, RigTrial
+from .overrides import compile_model
 from .states import choose_cutoff, differentiate, fill_gaps, low_pass, uniform_time
+from .supply import supply_deviation
 from .swing import STEP_S, Lane, Swing
 
 # A trial is fitted in stretches (multiple shooting, Bock 1981), in periods of the free swing: short ones where a drive
@@ -38,11 +41,7 @@ def build_swing(rig: RigModel, fit: DeclaredFit, step_s: float = STEP_S, longest
     """
     model = compile_model(rig)
     joint = rig.joints[0]
-    zero, right = np.zeros((1, 1)), np.full((1, 1), np.pi / 2)
-    theta = inertial_parameters(model)
-    gravity = np.array(model.opt.gravity)
-    weight = [float(np.sum(inertial_columns(model, q, zero, zero, gravity)[0, 0] * theta)) for q in (zero, right)]
-    inertia = float(np.sum(inertial_columns(model, zero, zero, zero + 1, 0 * gravity)[0, 0] * theta))
+    sine, cosine, inertia = _rigid(model)
     drive = rig.drive(joint)
     initial = {
         "inertia": inertia + float(model.dof_armature[0]),
@@ -53,7 +52,15 @@ def build_swing(rig: RigModel, fit: DeclaredFit, step_s: float = STEP_S, longest
         initial["gain"] = drive.gain
         initial["back_emf"] = next((c.value for c in fit.columns if c.kind == "back_emf"), 0.0)
     lanes = tuple(lane for t in rig.trials for lane in _stretches(rig, t, step_s, longest_s))
-    return Swing(lanes, weight[1], weight[0], initial, drive is not None, step_s)
+    return Swing(lanes, sine, cosine, initial, drive is not None, step_s)
+
+
+def _rigid(model: Any) -> tuple[float, float, float]:
+    """Weight (sine, cosine: effort that holds it at a quarter turn, at zero) and the bodies' inertia about the joint."""
+    zero, right = np.zeros((1, 1)), np.full((1, 1), np.pi / 2)
+    theta, gravity = inertial_parameters(model), np.array(model.opt.gravity)
+    cosine, sine = (float(np.sum(inertial_columns(model, q, zero, zero, gravity)[0, 0] * theta)) for q in (zero, right))
+    return sine, cosine, float(np.sum(inertial_columns(model, zero, zero, zero + 1, 0 * gravity)[0, 0] * theta))
 
 
 def _stretches(rig: RigModel, trial: RigTrial, step_s: float, longest_s: float) -> list[Lane]:
@@ -69,18 +76,19 @@ def _stretches(rig: RigModel, trial: RigTrial, step_s: float, longest_s: float) 
     position = np.interp(fine, trial.time_s, fill_gaps(trial.time_s, trial.position[joint]))
     voltage = trial.voltage.get(joint)
     drive = np.zeros(len(fine)) if voltage is None else np.interp(fine, trial.time_s, fill_gaps(trial.time_s, voltage))
-    supply = np.zeros(len(fine))
-    for channel in ("supply", "voltage_supply", "bus_voltage"):
-        if channel in trial.extra:
-            level = fill_gaps(trial.time_s, trial.extra[channel])
-            supply = np.interp(fine, trial.time_s, level / np.mean(level) - 1.0)
+    supply = np.interp(fine, trial.time_s, supply_deviation(rig, trial))
     pieces = max(1, int(np.ceil(fine[-1] / longest_s)))
     size = len(fine) // pieces
+    declared, own = compile_model(rig), compile_model(rig, trial)
+    rigid, nominal = _rigid(own), _rigid(declared)
     live = 1.0 if joint in trial.live else 0.0
+    if live and (drive_ := rig.drive(joint)) is not None and drive_.gear:
+        live = float(own.actuator(drive_.name).gear[0]) / drive_.gear
+    level = float(own.dof_frictionloss[0] / declared.dof_frictionloss[0]) if declared.dof_frictionloss[0] else 1.0
     out = []
     for k in range(pieces):
         s = slice(k * size, (k + 1) * size if k < pieces - 1 else len(fine))
         start = (float(np.interp(fine[s.start], grid, smooth)), float(np.interp(fine[s.start], grid, velocity)))
         out.append(Lane(trial.name, trial.validate, drive[s], live, position[s], start, supply[s],
-                        np.ones(len(position[s]))))  # fmt: skip
+                        np.ones(len(position[s])), level, rigid[2] - nominal[2], rigid[:2]))  # fmt: skip
     return out

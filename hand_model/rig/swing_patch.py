@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
+from .dynamics import inertial_columns, inertial_parameters
+from .mjcf import find, number, parse, serialise, write_effects
 from .model import RigModel
-from .patch import _actuator, find, number, parse, serialise, write_effects
-from .swing import DECLARED, INDEX, PARAMETERS, Swing
+from .overrides import body_records, compile_model
+from .patch import _actuator
+from .swing import DECLARED, INDEX, LOW_SPEED, NEUTRAL, PARAMETERS, Swing
 
 Array = NDArray[np.float64]
 # Dry friction is a soft constraint in MuJoCo; left at its defaults a joint creeps while it should stick.
@@ -42,32 +47,49 @@ def write_swing(rig: RigModel, swing: Swing, theta: Array) -> bytes:
         motor = _actuator(root, drive.name)
         motor.set("motorconst", number(constant, constant))
         motor.set("resistance", number(constant * drive.gear / value["gain"]))
-    kept = [{"joint": joint, "swing": effects}] if effects else []
+    kept = [*body_records(rig), *_levels(rig, value["coulomb"])]
+    kept += [{"joint": joint, "swing": effects}] if effects else []
     return write_effects(serialise(root), kept)
 
 
 def _matters(name: str, value: float, all_values: dict[str, float]) -> bool:
-    if name == "stribeck_speed":
-        return any(all_values[k] for k in ("static_excess", "load_gear_low", "load_motor_low", "load_external_low"))
+    if name in NEUTRAL:
+        return any(all_values[k] for k in LOW_SPEED)
     return value != 0.0
 
 
 def _body_inertia(rig: RigModel) -> float:
-    from .balance import compile_model
-    from .dynamics import inertial_columns, inertial_parameters
-
     model = compile_model(rig)
     zero = np.zeros((1, 1))
     return float(np.sum(inertial_columns(model, zero, zero, zero + 1, np.zeros(3))[0, 0] * inertial_parameters(model)))
 
 
-def _scale_inertia(root, missing: float) -> None:
-    """Take the excess out of the bodies' inertia about their own centres, as far as it goes."""
+def _scale_inertia(root: Any, missing: float) -> None:
+    """Less inertia (missing < 0) at the same weight: out of the body's own about its centre as far as that goes, then by
+    a shorter lever of a larger mass."""
     for inertial in root.iter("inertial"):
         own = np.array([float(x) for x in inertial.get("diaginertia", "").split()])
-        if len(own) == 3:
-            inertial.set("diaginertia", number(*np.maximum(own + missing, 1e-9)))
+        if len(own) != 3:
             return
+        least = np.maximum(own + missing, 1e-3 * own)
+        inertial.set("diaginertia", number(*least))
+        missing -= float(np.mean(least - own))
+        mass, lever = float(inertial.get("mass")), np.array([float(x) for x in inertial.get("pos", "0 0 0").split()])
+        whole = mass * float(lever @ lever)
+        share = (whole + missing) / whole if whole else 1.0
+        if 0 < share < 1 - 1e-9:
+            inertial.set("mass", number(mass / share))
+            inertial.set("pos", number(*(share * lever)))
+        return
+
+
+def _levels(rig: RigModel, coulomb: float) -> list[dict[str, Any]]:
+    """Coulomb levels of trials that set their own, in the ratio in which they are declared."""
+    joint, declared = rig.joints[0], float(compile_model(rig).dof_frictionloss[0])
+    given = {float(np.atleast_1d(t.set[k])[0]) for t in rig.trials for k in [f"joint:{joint}:frictionloss"] if k in t.set}
+    if not given or not declared:
+        return []
+    return [{"joint": joint, "frictionloss_levels": {repr(v): coulomb * v / declared for v in sorted(given)}}]
 
 
 __all__ = ["PARAMETERS", "write_swing"]
