@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from .hand import Hand as Hand
     from .hand import load_hand as load_hand
     from .identify import identify as identify
+    from .passive import effects_on as effects_on
     from .replay import Residuals as Residuals
     from .replay import replay as replay
     from .report import write_report as write_report
@@ -72,6 +73,7 @@ _HOME = {
     "Hand": "hand",
     "load_hand": "hand",
     "identify": "identify",
+    "effects_on": "passive",
     "Residuals": "replay",
     "replay": "replay",
     "write_report": "report",

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect
+from .law import Law
 
 
 class AsymmetricViscousFriction(Effect):
@@ -28,6 +29,11 @@ class AsymmetricViscousFriction(Effect):
         half, viscous = amplitude["half_difference"], declared.get("viscous", np.nan)
         return {"viscous_flexion": viscous + half, "viscous_extension": viscous - half,
                 "ratio": (viscous + half) / (viscous - half) if viscous != half else np.inf}
+
+    def law(self, parameters: Mapping[str, float]) -> Law:
+        """Half the difference of the coefficients times |v|."""
+        half = 0.5 * (parameters["viscous_flexion"] - parameters["viscous_extension"])
+        return lambda now: half * abs(now.velocity)
 
 
 EFFECT = AsymmetricViscousFriction()

@@ -19,6 +19,8 @@ from typing import Any, ClassVar, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from .law import Law
+
 Array = NDArray[np.float64]
 Amplitude = tuple[str, str, float, float]
 
@@ -173,7 +175,11 @@ class Effect:
         return f"{place}: {self.name.replace('_', ' ')} ({listed})."
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
-        """Not native: the passive-force callback applies it."""
+        """Not native: the passive-force callback applies it, where there is a law."""
+        return None
+
+    def law(self, parameters: Mapping[str, float]) -> Law | None:
+        """What the passive-force callback applies (`hand_model.effects_on`); None where MJCF holds it, or nothing can."""
         return None
 
 

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from .base import Effect
+from .mjcf import delay, motor_joint
 
 
 class CommandDelay(Effect):
@@ -10,6 +14,14 @@ class CommandDelay(Effect):
 
     name = "command_delay"
     station = "command"
+
+    def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
+        """The delay of the motor's actuator."""
+        found = motor_joint(root, where)
+        if found is None:
+            return None
+        drive = next(a for a in root.iterfind("actuator/general") if a.get("name") == where["actuator"])
+        return delay(root, drive, parameters["delay"])
 
 
 EFFECT = CommandDelay()

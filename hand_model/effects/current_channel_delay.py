@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape
+from .mjcf import delay, motor_sensor
 
 
 class CurrentChannelDelay(Effect):
@@ -30,6 +32,11 @@ class CurrentChannelDelay(Effect):
             return columns
         then = state.time_s - shape["delay"]
         return np.stack([np.interp(then, state.time_s, column) for column in columns.T], axis=-1)
+
+    def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
+        """The delay of the sensor of the motor's current, or of its encoder where the current is read early."""
+        found = motor_sensor(root, where, "current" if parameters["delay"] >= 0 else "encoder")
+        return None if found is None else delay(root, found, abs(parameters["delay"]))
 
 
 EFFECT = CurrentChannelDelay()

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape
+from .mjcf import motor_joint, motor_sensor
 
 
 class CurrentSaturation(Effect):
@@ -28,6 +30,14 @@ class CurrentSaturation(Effect):
     def clip(self, prediction: Array, shape: Mapping[str, float]) -> Array:
         """The prediction within the limits."""
         return np.clip(prediction, -shape["limit"], shape["limit"])
+
+    def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
+        """The cutoff of the sensor of the motor's current: the motion goes on, so what clips is the reading."""
+        found, place = motor_sensor(root, where, "current"), motor_joint(root, where)
+        if found is None or place is None:
+            return None
+        found.set("cutoff", repr(place[1] * parameters["limit"]))
+        return f"sensor/actuatorfrc[@name='{found.get('name')}']/@cutoff"
 
 
 EFFECT = CurrentSaturation()

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
+from .law import Law, Moment
 
 
 class DetentLoad(Effect):
@@ -37,6 +39,17 @@ class DetentLoad(Effect):
         """Two widths about the centre."""
         c, w = shape["centre"], shape["width"]
         return {"position": [c - 2 * w, c + 2 * w], "unit": states[0].position_unit}
+
+    def law(self, parameters: Mapping[str, float]) -> Law:
+        """A bell over position, or its slope."""
+        centre, width, height = (parameters[k] for k in ("centre", "width", "load"))
+
+        def load(now: Moment) -> float:
+            u = (now.position - centre) / width
+            bell = math.exp(-0.5 * u * u)
+            return height * (bell if parameters["form"] < 0.5 else u * bell * math.exp(0.5))
+
+        return load
 
 
 EFFECT = DetentLoad()

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
+from .mjcf import bristle_friction, joint_tendon, motor_joint
 from .path import dahl, jenkins
 
 
@@ -30,6 +32,17 @@ class ElastoplasticHysteresis(Effect):
         """State along the recorded path, (n, 1), in [-1, 1]."""
         operator = jenkins if shape["form"] < 0.5 else dahl
         return operator(state.position, shape["reach"])[:, None]
+
+    def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
+        """Form 0: a tendon along the motor joint that yields. Form 1: the bristle of a passive DC motor's LuGre friction."""
+        found = motor_joint(root, where)
+        if found is None:
+            return None
+        joint, unit = found
+        load, reach = unit * parameters["yield_load"], parameters["reach"]
+        if parameters["form"] >= 0.5:
+            return bristle_friction(root, joint, f"{where['actuator']}_hysteresis", (load / reach, 0.0, load, load, 1.0))
+        return joint_tendon(root, joint, f"{where['actuator']}_hysteresis", stiffness=load / reach, springyield=reach)
 
 
 EFFECT = ElastoplasticHysteresis()

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape
+from .law import Law, Moment
 
 
 class GravityLoad(Effect):
@@ -31,6 +33,17 @@ class GravityLoad(Effect):
         angle = shape["sweep"] * state.position / 100.0
         gx, gz = state.extra["gravity_x"] / 9.81, state.extra["gravity_z"] / 9.81
         return np.stack([gz * np.cos(angle) - gx * np.sin(angle), gx * np.cos(angle) + gz * np.sin(angle)], axis=-1)
+
+    def law(self, parameters: Mapping[str, float]) -> Law:
+        """Gravity in the palm's frame, turned with the finger."""
+        along, across, sweep = (parameters[k] for k in ("along", "across", "sweep"))
+
+        def load(now: Moment) -> float:
+            angle = sweep * now.position / 100.0
+            gx, gz = now.gravity_palm[0] / 9.81, now.gravity_palm[2] / 9.81
+            return along * (gz * math.cos(angle) - gx * math.sin(angle)) + across * (gx * math.cos(angle) + gz * math.sin(angle))
+
+        return load
 
 
 EFFECT = GravityLoad()

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect
+from .law import Law
 
 
 class LoadDependentFriction(Effect):
@@ -28,6 +29,10 @@ class LoadDependentFriction(Effect):
         """Friction per unit of load (coefficient), from friction per position and the spring's stiffness."""
         spring = declared.get("spring", np.nan)
         return {"load_coefficient": amplitude["per_load"] / spring if spring else np.nan, "per_load": amplitude["per_load"]}
+
+    def law(self, parameters: Mapping[str, float]) -> Law:
+        """Friction in proportion to the position: the spring's load."""
+        return lambda now: parameters["per_load"] * now.direction * now.position
 
 
 EFFECT = LoadDependentFriction()

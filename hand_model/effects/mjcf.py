@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+SHORT_BRISTLE = 0.1  # in the joint's unit, percent: Coulomb friction to any encoder here
+
 
 def motor_joint(root: Any, where: Mapping[str, Any]) -> tuple[Any, float] | None:
     """The motor joint (coordinate in percent) of `where["actuator"]` in an MJCF tree (lxml), and the file's effort per raw
@@ -33,26 +35,83 @@ def free_name(root: Any, name: str) -> str:
 
 
 def lugre_friction(root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
-    """Replace the motor joint's `frictionloss` by the LuGre friction of a passive `dcmotor`; its path, or None without friction.
+    """Give the motor joint the LuGre friction of a passive `dcmotor`, in place of its `frictionloss` or of such an element that is
+    there; its path, or None without friction.
 
-    parameters: bristle_length (give before sliding) and stribeck_speed in the joint's unit, static_ratio (static over Coulomb
-    friction); what is not given is a short bristle without excess.
+    parameters: bristle_length (give before sliding) and stribeck_speed in the joint's unit; coulomb_ratio and static_ratio (sliding
+    and static friction over the Coulomb friction that is there). What is not given stays, or is a short bristle without excess.
     """
+    found = motor_joint(root, where)
+    if found is None:
+        return None
+    joint, _ = found  # efforts are already the file's
+    name = f"{where['actuator']}_friction"
+    there = next((m for m in root.iterfind("actuator/dcmotor") if m.get("name") == name), None)
+    if there is not None:
+        bristle, _, coulomb, static, speed = (float(x) for x in there.get("lugre").split())
+        length = coulomb / bristle
+        there.getparent().remove(there)
+    else:
+        coulomb = static = float(joint.attrib.get("frictionloss", "0"))
+        length, speed = SHORT_BRISTLE, 20.0
+    if coulomb <= 0:
+        return None
+    for key in ("frictionloss", "solreffriction", "solimpfriction"):
+        joint.attrib.pop(key, None)
+    sliding = coulomb * parameters.get("coulomb_ratio", 1.0)
+    static = max(sliding, coulomb * parameters.get("static_ratio", static / coulomb))
+    stiffness = coulomb / parameters.get("bristle_length", length)
+    return bristle_friction(root, joint, name, (stiffness, 0.0, sliding, static, parameters.get("stribeck_speed", speed)))
+
+
+def joint_tendon(root: Any, joint: Any, name: str, **attributes: Any) -> str:
+    """A fixed tendon along one joint, its length the joint's coordinate; its path."""
+    return fixed_tendon(root, free_name(root, name), {joint.get("name"): 1.0}, **attributes)
+
+
+def fixed_tendon(root: Any, name: str, coefficients: Mapping[str, float], **attributes: Any) -> str:
+    """A fixed tendon, its length the sum of coefficient times joint; attributes: numbers or tuples of them. Its path."""
+    from lxml import etree
+
+    texts = {k: " ".join(repr(float(x)) for x in (v if isinstance(v, tuple) else (v,))) for k, v in attributes.items()}
+    tendon = etree.SubElement(section(root, "tendon"), "fixed", {"name": name, **texts})
+    for joint, coefficient in coefficients.items():
+        etree.SubElement(tendon, "joint", joint=joint, coef=repr(float(coefficient)))
+    return f"tendon/fixed[@name='{name}']"
+
+
+def bristle_friction(root: Any, joint: Any, name: str, lugre: tuple[float, ...]) -> str:
+    """A passive DC motor with LuGre friction (bristle stiffness and damping, Coulomb and static level, Stribeck speed); its path."""
+    from lxml import etree
+
+    free = free_name(root, name)
+    motor = {"name": free, "joint": joint.get("name"), "input": "none", "motorconst": "0 0", "resistance": "1",
+             "lugre": " ".join(repr(float(v)) for v in lugre)}
+    etree.SubElement(section(root, "actuator"), "dcmotor", motor)
+    return f"actuator/dcmotor[@name='{free}']"
+
+
+def motor_sensor(root: Any, where: Mapping[str, Any], kind: str) -> Any:
+    """The sensor `<actuator>_current` (the drive's force) or `<actuator>_encoder` (the motor joint's position), made where it is
+    missing; None where the file has no such motor."""
     from lxml import etree
 
     found = motor_joint(root, where)
     if found is None:
         return None
-    joint, _ = found  # efforts are already the file's
-    coulomb = float(joint.attrib.get("frictionloss", "0"))
-    if coulomb <= 0:
-        return None
-    for key in ("frictionloss", "solreffriction", "solimpfriction"):
-        joint.attrib.pop(key, None)
-    name = free_name(root, f"{where['actuator']}_friction")
-    bristle, speed = parameters.get("bristle_length", 0.1), parameters.get("stribeck_speed", 20.0)
-    values = (coulomb / bristle, 0.0, coulomb, coulomb * parameters.get("static_ratio", 1.0), speed)
-    lugre = " ".join(repr(float(v)) for v in values)
-    motor = {"name": name, "joint": joint.get("name"), "input": "none", "motorconst": "0 0", "resistance": "1", "lugre": lugre}
-    etree.SubElement(section(root, "actuator"), "dcmotor", motor)
-    return f"actuator/dcmotor[@name='{name}']"
+    name = f"{where['actuator']}_{kind}"
+    sensor = next((s for s in root.iterfind("sensor/*") if isinstance(s.tag, str) and s.get("name") == name), None)
+    if sensor is None:
+        tag, key, value = {"current": ("actuatorfrc", "actuator", where["actuator"]),
+                           "encoder": ("jointpos", "joint", found[0].get("name"))}[kind]
+        sensor = etree.SubElement(section(root, "sensor"), tag, {"name": free_name(root, name), key: value})
+    return sensor
+
+
+def delay(root: Any, element: Any, delay_s: float) -> str:
+    """Give an actuator or a sensor a delay [s], and as many remembered samples as it takes; its path."""
+    option = root.find("option")
+    step = float(option.get("timestep", "0.002")) if option is not None else 0.002
+    element.set("delay", repr(float(delay_s)))
+    element.set("nsample", str(int(delay_s / step) + 2))
+    return f"{element.getparent().tag}/{element.tag}[@name='{element.get('name')}']/@delay"

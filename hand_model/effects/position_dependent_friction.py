@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
+from .law import Law, Moment
 
 
 class PositionDependentFriction(Effect):
@@ -40,6 +42,16 @@ class PositionDependentFriction(Effect):
         """Two widths about the centre."""
         c, w = shape["centre"], shape["width"]
         return {"position": [c - 2 * w, c + 2 * w], "unit": states[0].position_unit}
+
+    def law(self, parameters: Mapping[str, float]) -> Law:
+        """Friction under a bell, read where the bristles are."""
+        centre, width, extra = (parameters[k] for k in ("centre", "width", "extra_friction"))
+
+        def load(now: Moment) -> float:
+            u = (now.position - now.direction * now.give - centre) / width
+            return extra * now.direction * math.exp(-0.5 * u * u)
+
+        return load
 
 
 EFFECT = PositionDependentFriction()

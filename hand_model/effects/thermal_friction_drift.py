@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape
+from .law import Law
 
 
 class ThermalFrictionDrift(Effect):
@@ -33,6 +35,11 @@ class ThermalFrictionDrift(Effect):
                    declared: Mapping[str, float]) -> dict[str, float]:
         """Cold excess as a ratio to the warm Coulomb friction, and the warm-up time."""
         return {**amplitude, **shape, "ratio": amplitude["cold_excess"] / declared.get("coulomb", np.nan)}
+
+    def law(self, parameters: Mapping[str, float]) -> Law:
+        """Friction that fades with the time since the simulation began: the drive is cold then."""
+        excess, tau = parameters["cold_excess"], parameters["warm_up_time"]
+        return lambda now: excess * now.direction * math.exp(-now.time_s / tau)
 
 
 EFFECT = ThermalFrictionDrift()

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape
+from .law import Law, Moment
 from .path import lowpass
 
 
@@ -29,6 +31,20 @@ class ViscoelasticSpring(Effect):
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """x minus its low pass, (n, 1)."""
         return (state.position - lowpass(state.time_s, state.position, shape["relaxation_time"]))[:, None]
+
+    def law(self, parameters: Mapping[str, float]) -> Law:
+        """A Maxwell branch that starts relaxed: stiffness times the position beyond its low pass."""
+        stiffness, tau = parameters["stiffness"], parameters["relaxation_time"]
+        last: list[float] = []  # position and low pass of the last step
+
+        def load(now: Moment) -> float:
+            if not last:
+                last[:] = [now.position, now.position]
+            mean = 0.5 * (last[0] + now.position)
+            last[:] = [now.position, mean + (last[1] - mean) * math.exp(-now.step_s / tau)] if now.step_s else last
+            return stiffness * (now.position - last[1])
+
+        return load
 
 
 EFFECT = ViscoelasticSpring()

@@ -1,0 +1,110 @@
+"""Inverse dynamics of a compiled motor: what current its file needs for a recorded motion, by MuJoCo, step by step.
+
+The MJCF is reduced to the motor joint with what acts on it (friction, spring, tendons, passive motors, sensors); effects that
+the file cannot hold act through the passive-force callback, as a user would turn them on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..effects.base import DriveState
+from ..effects.mjcf import motor_joint
+from ..hand import Hand, load_hand
+from ..passive import effects_on
+
+Array = NDArray[np.float64]
+
+STEP_S = 0.002
+KEPT = ("compiler", "option", "custom", "worldbody", "tendon", "actuator", "sensor")
+
+
+@dataclass(frozen=True)
+class CompiledMotor:
+    """One motor of a compiled folder. root: its reduced MJCF (lxml). unit: effort per raw unit. joint: name of its joint."""
+
+    root: Any
+    actuator: str
+    joint: str
+    unit: float
+    hand: Hand
+
+
+def read_motor(folder: Path, actuator: str) -> CompiledMotor | None:
+    """The motor `actuator` of a compiled folder; None where none of its files has one."""
+    from lxml import etree
+
+    for file in sorted(f for f in folder.glob("*.xml") if not f.name.startswith("scene")):
+        root = etree.parse(str(file)).getroot()
+        found = motor_joint(root, {"actuator": actuator})
+        if found is not None:
+            joint, unit = found[0].get("name"), found[1]
+            return CompiledMotor(reduced(root, actuator, found[0]), actuator, joint, unit, load_hand(folder / "hand.json"))
+    return None
+
+
+def reduced(root: Any, actuator: str, joint: Any) -> Any:
+    """`root` with nothing left but the motor's own body, tendons, actuators and sensors; changes it and returns it."""
+    name = joint.get("name")
+    link, palm = joint.getparent(), joint.getparent().getparent()
+    for section in list(root):
+        if section.tag not in KEPT:
+            root.remove(section)
+    for element in [e for e in palm if e is not link]:
+        palm.remove(element)
+    for element in [e for e in root.find("worldbody") if e is not palm]:
+        element.getparent().remove(element)
+    for tendon in root.findall("tendon/*"):
+        if {j.get("joint") for j in tendon} != {name}:
+            tendon.getparent().remove(tendon)
+    for element in root.findall("actuator/*"):
+        if element.get("joint") != name:
+            element.getparent().remove(element)
+    for element in root.findall("sensor/*"):
+        if element.get("joint") != name and element.get("actuator") != actuator:
+            element.getparent().remove(element)
+    return root
+
+
+def current_along(motor: CompiledMotor, state: DriveState) -> Array:
+    """Current (n,) [raw] that a compiled motor needs for the motion of `state`, as its sensor would read it.
+
+    mj_inverse at every step of 2 ms; the states of friction, tendons and effects come from stepping along the same motion.
+    """
+    import mujoco
+    from lxml import etree
+
+    model = mujoco.MjModel.from_xml_string(etree.tostring(motor.root).decode())
+    model.opt.timestep = STEP_S
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_LIMIT)  # noise reaches a little beyond the range
+    drive = model.actuator(motor.actuator).id
+    model.actuator_gainprm[drive] = model.actuator_biasprm[drive] = 0.0  # the drive itself is what is asked for
+    grid = np.arange(state.time_s[0], state.time_s[-1] + STEP_S, STEP_S)
+    path = [np.interp(grid, state.time_s, x) for x in (state.position, state.velocity, state.acceleration)]
+    data, out = mujoco.MjData(model), np.empty(len(grid))
+    own = np.delete(np.arange(len(data.actuator_force)), drive)  # passive motors have no control: nu does not count them
+    data.time, data.qpos[0] = state.elapsed_s[0], path[0][0]
+    data.plastic[:] = path[0][0]  # springs that yield start relaxed
+    with effects_on(model, motor.hand):
+        for i, (x, v, a) in enumerate(zip(*path, strict=True)):
+            data.qpos[0], data.qvel[0], data.qacc[0] = x, v, a
+            mujoco.mj_inverse(model, data)
+            mujoco.mj_fwdActuation(model, data)
+            out[i] = data.qfrc_inverse[0] - data.actuator_force[own].sum()
+            mujoco.mj_step(model, data)
+    return _read(motor, np.interp(state.time_s, grid, out), state.time_s) / motor.unit
+
+
+def _read(motor: CompiledMotor, effort: Array, time_s: Array) -> Array:
+    """The effort (n,) through the sensor of the motor's current: its delay against the encoder's, and its cutoff."""
+    sensors = {s.get("name"): s for s in motor.root.iterfind("sensor/*")}
+    current, encoder = (sensors.get(f"{motor.actuator}_{kind}") for kind in ("current", "encoder"))
+    late = sum(sign * float(s.get("delay", 0.0)) for sign, s in ((1, current), (-1, encoder)) if s is not None)
+    effort = np.interp(time_s - late, time_s, effort) if late else effort
+    cutoff = np.inf if current is None else float(current.get("cutoff", 0.0)) or np.inf
+    return np.clip(effort, -cutoff, cutoff)

@@ -1,0 +1,180 @@
+"""Effects that MJCF has no element for, applied by MuJoCo's passive-force callback: one line turns them on.
+
+    model = mujoco.MjModel.from_xml_path("bebionic_left/bebionic_left.xml")
+    hand_model.effects_on(model, "bebionic_left")
+
+Parameters come from `hand.json` beside the MJCF. Loads of a drive are forces on its motor joint; a follower that departs from
+its map moves the target of its equality. Python is called in every step: some ten microseconds per effect.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from .effects import effect
+from .effects.law import Bristle, Law, Moment
+from .errors import DescriptionError
+from .hand import Effect, Hand, load_hand
+
+LEAST_GIVE = 0.1  # [%]: the bristle of a motor whose file has plain Coulomb friction
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where one effect acts in a model. actuator, joint: ids of the motor and its joint, in the unit [effort per raw].
+    equality: id of the follower's equality, None for a load on the motor joint. give: bristle length [%]."""
+
+    effect: Effect
+    actuator: int
+    joint: int
+    unit: float
+    equality: int | None
+    give: float
+
+
+class Memory:
+    """What the laws remember of one simulation (one MjData)."""
+
+    def __init__(self, places: tuple[Place, ...]) -> None:
+        self.time_s = 0.0
+        self.laws: tuple[Law, ...] = tuple(_law(p.effect) for p in places)
+        self.bristles = tuple(Bristle(p.give) for p in places)
+
+
+class EffectsOn:
+    """Effects that are switched on for one model; `off()`, or leaving a `with` block, switches them off.
+
+    names: of the effects that the callback applies (those that the MJCF holds are on anyway).
+    """
+
+    def __init__(self, model: Any, places: tuple[Place, ...]) -> None:
+        self.places, self.signature = places, int(model.signature)
+        self.names = tuple(p.effect.effect for p in places)
+        self.memories: dict[int, Memory] = {}
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.off()
+
+    def off(self) -> None:
+        """Switch them off; other models keep theirs."""
+        _ON.pop(self.signature, None)
+        _install()
+
+    def apply(self, model: Any, data: Any) -> None:
+        """Add the effects' forces at the state in `data`; called by MuJoCo within mj_step, mj_forward and mj_inverse."""
+        memory = self.memories.get(data._address)
+        if memory is None or data.time < memory.time_s:  # another simulation, or this one begun again
+            memory = self.memories[data._address] = Memory(self.places)
+            memory.time_s = data.time
+        step = data.time - memory.time_s
+        memory.time_s = data.time
+        for place, law, bristle in zip(self.places, memory.laws, memory.bristles, strict=True):
+            if place.equality is None:
+                dof = model.jnt_dofadr[place.joint]
+                data.qfrc_passive[dof] -= place.unit * law(_moment(model, data, place, step, bristle))
+            else:
+                _move_target(data, place.equality, law(_follower(model, data, place, step)))
+
+
+def effects_on(model: Any, folder: str | Path | Hand) -> EffectsOn:
+    """Switch on, for a mujoco.MjModel, the effects of its hand that MJCF cannot hold; every mj_step applies them from here on.
+
+    folder: the compiled folder that the model was loaded from (its `hand.json` is read), a .hand file, or a Hand. Returns an
+    object that switches them off. Raises HandFileError where there is no hand, DescriptionError where the model is not a
+    mujoco.MjModel. Compiled copies of one file share the effects.
+    """
+    if not hasattr(model, "signature"):
+        raise DescriptionError(f"effects_on needs a mujoco.MjModel, not a {type(model).__name__}")
+    hand = folder if isinstance(folder, Hand) else load_hand(Path(folder) / "hand.json" if Path(folder).is_dir() else folder)
+    places = tuple(p for e in hand.effects if _law(e) is not None for p in [_place(model, hand, e)] if p is not None)
+    on = EffectsOn(model, places)
+    if places:
+        _ON[on.signature] = on
+        _install()
+    return on
+
+
+_ON: dict[int, EffectsOn] = {}  # by the signature of the model
+
+
+def _install() -> None:
+    """MuJoCo has one callback per process: it finds the model's own effects."""
+    import mujoco
+
+    mujoco.set_mjcb_passive(_passive if _ON else None)
+
+
+def _passive(model: Any, data: Any) -> None:
+    on = _ON.get(int(model.signature))
+    if on is not None:
+        on.apply(model, data)
+
+
+def _law(found: Effect) -> Law | None:
+    return effect(found.effect).law({name: e.value for name, e in found.parameters.items()})
+
+
+def _place(model: Any, hand: Hand, found: Effect) -> Place | None:
+    """Where an effect acts in this model; None where the model has no such motor (the other position of a thumb)."""
+    import mujoco
+
+    def identity(kind: Any, name: str) -> int:
+        return int(mujoco.mj_name2id(model, kind, name))
+
+    kinds = mujoco.mjtObj
+    name = found.where.get("actuator")
+    actuator = identity(kinds.mjOBJ_ACTUATOR, str(name))
+    number = identity(kinds.mjOBJ_NUMERIC, f"{name}_effort_per_raw")
+    if actuator < 0 or number < 0:
+        return None
+    joint = int(model.actuator_trnid[actuator, 0])
+    station = effect(found.effect).station
+    equality = None
+    if station != "drive":
+        follower = identity(kinds.mjOBJ_JOINT, f"{found.where.get('finger')}_{found.where.get('joint')}")
+        of = {"encoder": model.eq_obj2id == joint, "linkage": model.eq_obj1id == follower}[station]
+        rows = np.flatnonzero(of & (model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)))
+        if not len(rows):
+            return None
+        equality = int(rows[0])
+    motor = next((m for m in hand.motors if m.actuator == name), None)
+    give = 0.0 if motor is None or "presliding" not in motor.parameters else motor.parameters["presliding"].value
+    unit = float(model.numeric_data[model.numeric_adr[number]])
+    return Place(found, actuator, joint, unit, equality, max(give, LEAST_GIVE))
+
+
+def _moment(model: Any, data: Any, place: Place, step: float, bristle: Callable[[float], float]) -> Moment:
+    position = float(data.qpos[model.jnt_qposadr[place.joint]])
+    velocity = float(data.qvel[model.jnt_dofadr[place.joint]])
+    palm = data.xmat[model.body_parentid[model.jnt_bodyid[place.joint]]].reshape(3, 3)
+    return Moment(data.time, step, position, velocity, bristle(position), place.give,
+                  float(data.actuator_force[place.actuator]) / place.unit, palm.T @ model.opt.gravity)
+
+
+def _follower(model: Any, data: Any, place: Place, step: float) -> Moment:
+    driver = int(model.eq_obj2id[place.equality])
+    scale = 1.0 if driver == place.joint else np.pi / 180  # the map's driver is in percent, or in radians for degrees
+    position = float(data.qpos[model.jnt_qposadr[driver]])
+    slope = np.polynomial.polynomial.polyval(position, model.eq_data[place.equality, 1:5] * np.arange(1, 5))
+    return Moment(data.time, step, position / scale, float(data.qvel[model.jnt_dofadr[driver]]) / scale, 0.0, place.give,
+                  float(data.actuator_force[place.actuator]) / place.unit, np.zeros(3), float(slope) * scale)
+
+
+def _move_target(data: Any, equality: int, shift_rad: float) -> None:
+    """Move the target of a joint equality: its violation counts from there. The reference acceleration is computed after this
+    callback, within the same step."""
+    import mujoco
+
+    rows = np.flatnonzero((data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)) & (data.efc_id == equality))
+    data.efc_pos[rows] -= shift_rad
+
+
+__all__ = ["EffectsOn", "effects_on"]
