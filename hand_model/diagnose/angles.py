@@ -20,11 +20,13 @@ from ..identify.repair import Swap
 from ..identify.start import start_chain
 from ..session import Finger, Mocap, Session, Trial
 from .drive import count_range
-from .motion import estimate_motion, local_quadratic
+from .motion import Motion, estimate_motion, local_quadratic
 
 Array = NDArray[np.float64]
 
 LEARN_FRAMES = 1500  # of each recording, evenly spaced: enough for a chain, all frames are posed with it
+LOAD_S = 0.05  # bandwidth of a smoothed current
+DEPARTURES_S = (0.1, 0.25, 0.6, 1.5)  # bandwidths of what a joint departs from its encoder's map
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,10 @@ def finger_angles(session: Session, finger: Finger, shape: Array) -> FingerAngle
 
 
 def linkage_states(angles: FingerAngles, joint: int = 1, steps: Sequence[tuple[int, float]] = ()) -> tuple[DriveState, ...]:
-    """Balance of a follower: its angle [deg] against a quartic of its driver's angle [deg], one state per recording."""
+    """Balance of a follower: its angle [deg] against a quartic of its driver's angle [deg], one state per recording.
+
+    The driver's angle is smoothed (see `_smoothed`): noise in a regressor would bend the map and hide small departures.
+    """
     states = []
     name = angles.finger.segments[joint].name
     scale = max(float(np.rad2deg(np.nanmax(np.abs(r.angle_rad[:, joint - 1])))) for r in angles.records)
@@ -91,61 +96,124 @@ def linkage_states(angles: FingerAngles, joint: int = 1, steps: Sequence[tuple[i
         if good.sum() < 200:
             continue
         t, q = record.mocap.time_s[good], np.rad2deg(record.angle_rad[good])
-        motion = estimate_motion(t, q[:, joint - 1])
-        # The declared columns take the angle as it was read, so that its noise stays white; at rest that noise is all there
-        # is to see, and regressing on it would show a slope that is not there.
-        raw = q[:, joint - 1]
+        log = _at_frames(record, t)
+        driver, velocity, acceleration, sure = _smoothed(t, q[:, joint - 1], log)
         stepped, more = _stepped(index, t, steps)
-        declared = np.concatenate([np.stack([(raw / scale) ** k for k in range(5)], axis=-1), stepped], axis=1)
-        follower = np.where(motion.moving, q[:, joint], np.nan)
-        extra = {"trial_index": np.full(len(t), float(index)), "load": _load(record, t)}
-        extra["slope"] = _slope(motion.position, raw, q[:, joint], motion.moving, 4)
-        states.append(DriveState(record.trial.name, f"{angles.finger.name}/{name}", t, motion.position, motion.velocity,
-                                 motion.acceleration, follower, declared, "deg", "deg", _known(extra), (*_names(4), *more), record.trial.validate))
+        declared = np.concatenate([np.stack([(driver / scale) ** k for k in range(5)], axis=-1), stepped], axis=1)
+        follower = np.where(sure, q[:, joint], np.nan)
+        extra = {"trial_index": np.full(len(t), float(index)), "load": None if log is None else log.load,
+                 "scale": np.full(len(t), scale), "slope": _slope(driver, driver, q[:, joint], sure, 4)}
+        states.append(DriveState(record.trial.name, f"{angles.finger.name}/{name}", t, driver, velocity, acceleration, follower,
+                                 declared, "deg", "deg", _known(extra), (*_names(4), *more), record.trial.validate))
     return tuple(states)
 
 
 def encoder_states(
     angles: FingerAngles, low: float, high: float, steps: Sequence[tuple[int, float]] = ()
 ) -> tuple[DriveState, ...]:
-    """Balance of the encoder: proximal angle [deg] against a cubic of position [%], at the log's samples.
+    """Balance of the encoder: proximal angle [deg] against a cubic of position [%], at the mocap's frames.
 
     low, high: counts at 0 and 100 %. Each recording has its own clock offset, as a column of the velocity; the clocks'
     rates are taken as equal (another rate is an effect).
     """
-    from ..identify.clock import align
-
     records = [r for r in angles.records if r.trial.log_path is not None]
     states = []
     for index, record in enumerate(records):
-        log = record.trial.log()
-        clock = align(record.mocap.time_s, record.angle_rad[:, 0], log.time_s, log.column("position"), record.trial.name)
-        middle = 0.5 * (log.time_s[0] + log.time_s[-1])
-        shift = float(np.interp(middle, clock.log_time(record.mocap.time_s), record.mocap.time_s)) - middle
-        seen = np.isfinite(log.column("position")) & np.r_[True, np.diff(log.time_s) > 0]
-        t = log.time_s[seen]
-        motion = estimate_motion(t, 100 * (log.column("position")[seen] - low) / (high - low))
         good = np.isfinite(record.angle_rad[:, 0])
-        at = t + shift
-        q = np.interp(at, record.mocap.time_s[good], np.rad2deg(record.angle_rad[good, 0]))
-        near = np.interp(at, record.mocap.time_s, good.astype(float)) > 0.999
-        inside = (at > record.mocap.time_s[0]) & (at < record.mocap.time_s[-1]) & near
-        x = motion.position / 100
+        t, q = record.mocap.time_s[good], np.rad2deg(record.angle_rad[good, 0])
+        log = _at_frames(record, t, drifting=False)
+        if log is None:
+            continue
+        x, velocity = 100 * (log.counts - low) / (high - low), 100 * log.speed / (high - low)
+        slope = _slope(x, x, q, log.inside, 3)
         offsets = np.zeros((len(t), len(records)))
-        offsets[:, index] = motion.velocity
-        declared = np.concatenate([np.stack([x**k for k in range(4)], axis=-1), offsets], axis=1)
-        stepped, more = _stepped(index, at, steps)
-        declared = np.concatenate([declared, stepped], axis=1)
-        current = log.columns.get("current")
-        extra = {"trial_index": np.full(len(t), float(index)), "clock_s": t - middle}
-        if current is not None and np.isfinite(current).all():
-            extra["load"] = local_quadratic(t, current[seen], 0.05)[0]
-        effort = np.where(inside, q, np.nan)
-        extra["slope"] = _slope(motion.position, motion.position, q, inside, 3)
-        states.append(DriveState(record.trial.name, angles.finger.name, t, motion.position, motion.velocity, motion.acceleration,
-                                 effort, declared, "%", "deg", extra,
+        offsets[:, index] = slope * velocity
+        stepped, more = _stepped(index, t, steps)
+        declared = np.concatenate([np.stack([(x / 100) ** k for k in range(4)], axis=-1), offsets, stepped], axis=1)
+        extra = {"trial_index": np.full(len(t), float(index)), "load": log.load, "scale": np.full(len(t), 100.0), "slope": slope}
+        states.append(DriveState(record.trial.name, angles.finger.name, t, x, velocity, 100 * log.acceleration / (high - low),
+                                 np.where(log.inside, q, np.nan), declared, "%", "deg", _known(extra),
                                  (*_names(3), *(f"offset_{i}" for i in range(len(records))), *more), record.trial.validate))
     return tuple(states)
+
+
+@dataclass(frozen=True)
+class _Log:
+    """A log at mocap frames: counts, speed, acceleration [counts, s], load [raw] or None, inside: where it was running. (n,)."""
+
+    counts: Array
+    speed: Array
+    acceleration: Array
+    load: Array | None
+    inside: NDArray[np.bool_]
+
+
+def _at_frames(record: FlexionAngles, time_s: Array, drifting: bool = True) -> _Log | None:
+    """The log of a recording at mocap times (n,) [s]; None without a log. drifting: with the clock's own rate, where it has one."""
+    from ..identify.clock import align
+
+    if record.trial.log_path is None:
+        return None
+    log = record.trial.log()
+    seen = np.isfinite(log.column("position")) & np.r_[True, np.diff(log.time_s) > 0]
+    at, counts = log.time_s[seen], log.column("position")[seen]
+    clock = align(record.mocap.time_s, record.angle_rad[:, 0], at, counts, record.trial.name)
+    then = clock.log_time(time_s)
+    if not drifting:
+        middle = 0.5 * (time_s[0] + time_s[-1])
+        then = time_s + float(clock.log_time(np.array([middle]))[0]) - middle
+    motion = estimate_motion(at, counts)
+    current = log.columns.get("current")
+    load = None
+    if current is not None and np.isfinite(current[seen]).sum() > 20:
+        known = np.isfinite(current[seen])
+        load = np.interp(then, at, _transmitted(at, np.interp(at, at[known], current[seen][known]), motion))
+    x, v, a = (np.interp(then, at, y) for y in (motion.position, motion.velocity, motion.acceleration))
+    return _Log(x, v, a, load, (then > at[0]) & (then < at[-1]))
+
+
+def _transmitted(time_s: Array, current: Array, motion: Motion) -> Array:
+    """Load (n,) [raw] that a motor passes on: its smoothed current without what accelerates it (least squares while it moves)."""
+    v, use = motion.velocity, motion.moving
+    columns = np.stack([motion.acceleration, v, np.sign(v), motion.position, np.ones_like(v)], axis=-1)
+    inertia = max(float(np.linalg.lstsq(columns[use], current[use], rcond=1e-12)[0][0]), 0.0) if use.sum() > 50 else 0.0
+    return local_quadratic(time_s, current - inertia * motion.acceleration, LOAD_S)[0]
+
+
+def _smoothed(time_s: Array, angle: Array, log: _Log | None) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+    """Angle, velocity, acceleration (n,) of a joint with little noise, and where they are sure.
+
+    With a log: a cubic of the encoder, which is far quieter than one frame's markers, plus what the angle departs from it,
+    smoothed. Without: the angle by local quadratics, sure only while it moves (at rest its noise would be all there is).
+    """
+    if log is None:
+        motion = estimate_motion(time_s, angle)
+        return motion.position, motion.velocity, motion.acceleration, motion.moving
+    use = log.inside
+    middle, half = float(np.mean(log.counts[use])), float(np.ptp(log.counts[use])) / 2
+    u = (log.counts - middle) / half
+    fitted = np.polynomial.Polynomial.fit(u[use], angle[use], 3)
+    slope = fitted.deriv()(u) / half
+    departure, rate = _least_error(time_s, angle - fitted(u))
+    return fitted(u) + departure, slope * log.speed + rate, slope * log.acceleration, use
+
+
+def _least_error(time_s: Array, values: Array) -> tuple[Array, Array]:
+    """Values smoothed over time and their rate (n,), at the bandwidth with the least leave-one-out error (Stone 1974)."""
+    step = float(np.median(np.diff(time_s)))
+    tried = []
+    for bandwidth in DEPARTURES_S:
+        count = max(1, int(bandwidth / step / 6))  # samples averaged first: six to a bandwidth lose nothing
+        block = np.arange(len(values)) // count
+        size = np.bincount(block)
+        t, y = np.bincount(block, time_s) / size, np.bincount(block, values) / size
+        impulse = np.zeros(len(y))
+        impulse[len(y) // 2] = 1 / count
+        own = float(local_quadratic(t, impulse, bandwidth)[0][len(y) // 2])
+        smooth, rate = (np.interp(time_s, t, x) for x in local_quadratic(t, y, bandwidth)[:2])
+        tried.append((float(np.mean((values - smooth) ** 2)) / (1 - own) ** 2, smooth, rate))
+    _, smooth, rate = min(tried, key=lambda x: x[0])
+    return smooth, rate
 
 
 def _stepped(record: int, time_s: Array, steps: Sequence[tuple[int, float]]) -> tuple[Array, tuple[str, ...]]:
@@ -168,20 +236,6 @@ def _names(order: int) -> tuple[str, ...]:
 
 def _known(extra: dict[str, Array | None]) -> dict[str, Array]:
     return {name: values for name, values in extra.items() if values is not None}
-
-
-def _load(record: FlexionAngles, time_s: Array) -> Array | None:
-    """Smoothed motor current at mocap times, where a log with current is there."""
-    from ..identify.clock import align
-
-    if record.trial.log_path is None:
-        return None
-    log = record.trial.log()
-    current = log.columns.get("current")
-    if current is None or not np.isfinite(current).all() or not np.isfinite(log.column("position")).all():
-        return None
-    clock = align(record.mocap.time_s, record.angle_rad[:, 0], log.time_s, log.column("position"), record.trial.name)
-    return np.interp(clock.log_time(time_s), log.time_s, local_quadratic(log.time_s, current, 0.05)[0])
 
 
 def ranges_of_counts(session: Session) -> dict[str, tuple[float, float]]:

@@ -8,28 +8,31 @@ from typing import Any
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
+from .driven import driven
 
 
 class CouplingDeadband(Effect):
-    """Below a proximal angle the distal angle stays where the coupling has it there."""
+    """distal = coupling(max(proximal, until)), the corner rounded: s ln(1 + exp((q - until) / s)) of the motion passes."""
 
     name = "coupling_deadband"
     station = "linkage"
+    replaces = "power_1"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """Proximal angle at which the distal segment starts to move."""
+        """Proximal angle at which the distal segment starts to move, and the width of the corner."""
         low, high = position_range(states)
-        span = high - low
-        return (Shape("until", states[0].position_unit, low + 0.01 * span, low + 0.5 * span,
-                      tuple(low + span * np.linspace(0.03, 0.45, 12))),)
+        span, unit = high - low, states[0].position_unit
+        return (Shape("until", unit, low + 0.01 * span, low + 0.5 * span, tuple(low + span * np.linspace(0.03, 0.45, 12))),
+                Shape("corner", unit, 1e-4 * span, 0.05 * span, (0.002 * span, 0.015 * span)))
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
-        """Slope that is missing below."""
-        return (("slope", "1", 0.0, np.inf),)
+        """No amplitude: the coupling is fitted anew beyond the deadband."""
+        return ()
 
-    def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """max(0, until - q), (n, 1): what the polynomial would have gone further down."""
-        return np.maximum(shape["until"] - state.position, 0.0)[:, None]
+    def declared(self, state: DriveState, shape: Mapping[str, float]) -> Array:
+        """The coupling's columns of the angle that passes."""
+        until, corner = shape["until"], shape["corner"]
+        return driven(state, lambda q: until + corner * np.logaddexp(0.0, (q - until) / corner))
 
     def region(self, states: tuple[DriveState, ...], shape: Mapping[str, float]) -> dict[str, Any] | None:
         """From the start of the range to where it moves."""

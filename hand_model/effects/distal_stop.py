@@ -8,28 +8,31 @@ from typing import Any
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
+from .driven import driven
 
 
 class DistalStop(Effect):
-    """Above a proximal angle the distal angle stays."""
+    """distal = coupling(min(proximal, from)), with a share of the motion passing beyond where the stop gives."""
 
     name = "distal_stop"
     station = "linkage"
+    replaces = "power_1"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """Proximal angle at which the distal segment stops."""
+        """Proximal angle at which the distal segment stops, and the share of the motion that passes beyond."""
         low, high = position_range(states)
         span = high - low
         return (Shape("from", states[0].position_unit, high - 0.5 * span, high - 0.01 * span,
-                      tuple(high - span * np.linspace(0.03, 0.45, 12))),)
+                      tuple(high - span * np.linspace(0.03, 0.45, 12))),
+                Shape("passing", "1", 0.0, 0.5, (0.0, 0.2)))
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
-        """Slope that is missing above."""
-        return (("slope", "1", 0.0, np.inf),)
+        """No amplitude: the coupling is fitted anew before the stop."""
+        return ()
 
-    def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """-max(0, q - from), (n, 1)."""
-        return -np.maximum(state.position - shape["from"], 0.0)[:, None]
+    def declared(self, state: DriveState, shape: Mapping[str, float]) -> Array:
+        """The coupling's columns of the angle that passes."""
+        return driven(state, lambda q: np.where(q > shape["from"], shape["from"] + shape["passing"] * (q - shape["from"]), q))
 
     def region(self, states: tuple[DriveState, ...], shape: Mapping[str, float]) -> dict[str, Any] | None:
         """From where it stops to the end of the range."""

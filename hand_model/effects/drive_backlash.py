@@ -7,33 +7,30 @@ from collections.abc import Mapping
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
-from .path import jenkins
+from .driven import driven, soft_play
 
 
 class DriveBacklash(Effect):
-    """What follows lags by half the gap, taken on the encoder position: map(x - gap/2 * play state)."""
+    """What follows is driven through a play: angle = map(play(encoder)); the lag and the travel that crosses it are one gap."""
 
     name = "drive_backlash"
     station = "encoder"
+    replaces = "power_1"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """Travel of the encoder position that crosses the play."""
+        """Full width of the gap on the driver's side; form 0: hard ends, form 1: ends that give (half to one and a half gap)."""
         low, high = position_range(states)
         span = high - low
-        return (Shape("crossing", states[0].position_unit, 0.002 * span, 0.15 * span, tuple(span * np.geomspace(0.004, 0.1, 7))),)
+        return (Shape("gap", states[0].position_unit, 1e-4 * span, 0.15 * span, tuple(span * np.geomspace(0.002, 0.1, 8))),
+                Shape("form", "1", 0.0, 1.0, (0.0, 1.0)))
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
-        """Half the lost motion of the encoder position, always a lag."""
-        return (("half_play", "%", 0.0, np.inf),)
+        """No amplitude: the map is fitted anew behind the gap."""
+        return ()
 
-    def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """Minus the play's state in [-1, 1] along the path, times the slope of the map that follows it, (n, 1)."""
-        return -(state.slope * jenkins(state.position, shape["crossing"] / 2))[:, None]
-
-    def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
-                   declared: Mapping[str, float]) -> dict[str, float]:
-        """Whole lost motion (as seen: twice the lag), and the travel that crosses it."""
-        return {"play": 2 * amplitude["half_play"], "crossing": shape["crossing"]}
+    def declared(self, state: DriveState, shape: Mapping[str, float]) -> Array:
+        """The map's columns of the position behind the gap."""
+        return driven(state, lambda x: soft_play(x, shape["gap"], 0.5 * shape["form"]))
 
 
 EFFECT = DriveBacklash()

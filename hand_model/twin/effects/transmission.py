@@ -16,8 +16,8 @@ FRICTION_BEHIND = 0.5  # share of the drive's friction that sits behind the elas
 
 def carried_load(motion: Motion) -> Array:
     """Load (n,) [raw] that passes through the transmission, relative to the rest at the trial's start."""
-    friction = np.where(motion.velocity == 0.0, motion.friction, np.abs(motion.friction) * np.sign(motion.velocity))
-    force = motion.load + FRICTION_BEHIND * (friction + 0.145 * motion.velocity)
+    # Friction as it acts: bristles hold on while the drive creeps back, so its sign is not the velocity's.
+    force = motion.load + FRICTION_BEHIND * (motion.friction + 0.145 * motion.velocity)
     width = 20  # 20 ms: the elastic part has its own small damping
     smooth = np.convolve(np.pad(force, (width - 1, 0), mode="edge"), np.full(width, 1.0 / width), mode="valid")
     return smooth - smooth[0]

@@ -1,0 +1,53 @@
+"""A map whose driver is changed before it: lost motion, a dead band, a stop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from .base import Array, DriveState
+from .path import strokes
+
+
+def driven(state: DriveState, change: Callable[[Array], Array]) -> Array:
+    """Declared columns (n, k) with the powers of the driver taken of `change(driver)`, driver in the state's position unit.
+
+    The columns "power_0", "power_1", ... are powers of driver / extra["scale"]; further columns stay. Changes follow one
+    another: the driver is what the present columns hold.
+    """
+    if "power_1" not in state.declared_names:
+        return state.declared
+    scale = state.extra["scale"]
+    first = state.declared_names.index("power_1")
+    driver = change(state.declared[:, first] * scale) / scale
+    out = np.array(state.declared)
+    for column, name in enumerate(state.declared_names):
+        if name.startswith("power_"):
+            out[:, column] = driver ** int(name.removeprefix("power_"))
+    return out
+
+
+def play(path: Array, gap: float, threshold: float | None = None) -> Array:
+    """Play operator (n,): follows a path half the `gap` [path unit] behind, and stays while the path crosses the gap.
+
+    The gap starts closed on the side from which the first stroke opens it (a hand at rest, pulled open by its spring).
+    """
+    x = np.asarray(path, float)
+    out = np.empty(len(x))
+    at = x[0] + 0.5 * gap
+    for a, b, d in strokes(x, threshold):
+        if d > 0:
+            out[a:b] = np.maximum(np.maximum.accumulate(x[a:b]) - 0.5 * gap, at)
+        elif d < 0:
+            out[a:b] = np.minimum(np.minimum.accumulate(x[a:b]) + 0.5 * gap, at)
+        else:
+            out[a:b] = at
+        at = out[b - 1]
+    return out
+
+
+def soft_play(path: Array, gap: float, softness: float) -> Array:
+    """Play with give at its ends: the mean of plays of (1 - softness), one and (1 + softness) times the gap."""
+    gaps = (gap,) if softness <= 0 else ((1 - softness) * gap, gap, (1 + softness) * gap)
+    return np.mean([play(path, g) for g in gaps], axis=0)
