@@ -20,6 +20,7 @@ from ..identify.repair import Swap
 from ..identify.start import start_chain
 from ..session import Finger, Mocap, Session, Trial
 from .drive import count_range
+from .excursions import with_excursions
 from .motion import Motion, estimate_motion, local_quadratic
 
 Array = NDArray[np.float64]
@@ -134,7 +135,7 @@ def encoder_states(
         states.append(DriveState(record.trial.name, angles.finger.name, t, x, velocity, 100 * log.acceleration / (high - low),
                                  np.where(log.inside, q, np.nan), declared, "%", "deg", _known(extra),
                                  (*_names(3), *(f"offset_{i}" for i in range(len(records))), *more), record.trial.validate))
-    return tuple(states)
+    return with_excursions(states)
 
 
 @dataclass(frozen=True)

@@ -11,30 +11,47 @@ from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
 
 
 class SpringDecoupling(Effect):
-    """Near the open end the actuator opens further and the finger does not follow."""
+    """The finger runs ahead of its actuator: for a while, wherever it is, or in every cycle near the open end."""
 
     name = "spring_decoupling"
     station = "encoder"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """Encoder position below which the finger stays behind."""
+        """form 0: for a while, "ahead" in `extra`; form 1: below an encoder position, at which the finger stays behind."""
         low, high = position_range(states)
         span = high - low
-        return (Shape("below", states[0].position_unit, low + 0.01 * span, low + 0.6 * span,
-                      tuple(low + span * np.linspace(0.03, 0.5, 12))),)
+        return (Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),
+                Shape("below", states[0].position_unit, low + 0.01 * span, low + 0.6 * span,
+                      tuple(low + span * np.linspace(0.03, 0.5, 12))))
+
+    def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
+        """One start for what passes, several for the open end."""
+        below = self.shapes(states)[1].starts
+        return [{"form": 0.0, "below": below[0]}, *({"form": 1.0, "below": b} for b in below)]
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
-        """Angle per position that the finger stays behind."""
-        return (("slope", "deg/position", 0.0, np.inf),)
+        """Share of the seen excursion (form 0), or angle per position that the finger stays behind (form 1)."""
+        return (("lead", "1", 0.0, np.inf),)
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """max(0, below - x), (n, 1)."""
+        """The excursions, or max(0, below - x), (n, 1)."""
+        if shape["form"] == 0.0:
+            return state.extra.get("ahead", np.zeros(len(state.time_s)))[:, None]
         return np.maximum(shape["below"] - state.position, 0.0)[:, None]
 
     def region(self, states: tuple[DriveState, ...], shape: Mapping[str, float]) -> dict[str, Any] | None:
-        """From the open end to where it follows again."""
+        """The whiles [s] by trial, or from the open end to where it follows again."""
+        if shape["form"] == 0.0:
+            return {"time": {s.trial: _spans(s) for s in states if _spans(s)}, "unit": "s"}
         low, _ = position_range(states)
         return {"position": [low, shape["below"]], "unit": states[0].position_unit}
+
+
+def _spans(state: DriveState) -> list[list[float]]:
+    """[begin, end] [s of the trial] of every while in which the finger is ahead."""
+    here = state.extra.get("ahead", np.zeros(len(state.time_s))) > 0
+    edges = np.flatnonzero(np.diff(np.r_[False, here, False].astype(int)))
+    return [[float(state.time_s[a]), float(state.time_s[b - 1])] for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 EFFECT = SpringDecoupling()
