@@ -165,7 +165,7 @@ def test_native_elements_are_not_written_where_there_is_no_motor() -> None:
 
 
 @pytest.mark.parametrize(("name", "parameters", "lugre"), [
-    ("stribeck_friction", {"static_ratio": 1.8, "stribeck_speed": 18.0}, [350.0, 0.0, 36.372, 56.476, 20.556]),
+    ("stribeck_friction", {"static_ratio": 1.8, "stribeck_speed": 18.0, "static_excess": 28.0}, [350.0, 0.0, 36.372, 56.476, 20.556]),
     ("presliding_friction", {"bristle_length": 7.0}, [5.0, 0.0, 35.0, 35.0, 20.0])])
 def test_lugre_replaces_the_joints_friction(name, parameters, lugre) -> None:
     mujoco = pytest.importorskip("mujoco")

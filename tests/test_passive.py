@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-
 import numpy as np
 import pytest
 
@@ -40,7 +39,7 @@ DRIVE = [
     ("position_dependent_friction", {"centre": 45.0, "width": 7.0}, {"extra_friction": 20.0}, 0.02),
     ("presliding_friction", {"bristle_length": 6.0}, {}, 0.02),
     ("quadratic_damping", {}, {"drag": 0.002}, 0.01),
-    ("stribeck_friction", {"stribeck_speed": 18.0}, {"static_excess": 25.0}, 0.1),
+    ("stribeck_friction", {"stribeck_speed": 18.0}, {"static_excess": 25.0}, 0.06),
     ("thermal_friction_drift", {"warm_up_time": 30.0}, {"cold_excess": 12.0}, 0.02),
     ("torque_ripple", {"period": 9.0}, {"sine": 4.0, "cosine": 3.0}, 0.01),
     ("viscoelastic_spring", {"relaxation_time": 1.2}, {"stiffness": 0.3}, 0.01),

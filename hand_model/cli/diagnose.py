@@ -11,8 +11,10 @@ SUMMARY = "say what physics is missing: where recording and declared model diffe
 def add_arguments(parser: ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("session", metavar="SESSION", help="folder with a session.toml, of a hand or a rig")
-    parser.add_argument("--model", metavar="DIR", help="a compiled hand or a .hand file: the effects are written into it")
-    parser.add_argument("--output", required=True, metavar="DIR", help="folder for findings.json, report.html and, with --model, the improved model")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--model", metavar="DIR", help="a compiled hand or a .hand file into which the effects are written (default: identified here)")
+    which.add_argument("--no-model", action="store_true", help="write no model: findings and report only")
+    parser.add_argument("--output", required=True, metavar="DIR", help="folder for findings.json, report.html and the improved model")
 
 
 def run(options: Namespace, say: Callable[[str], None]) -> int:
@@ -28,7 +30,7 @@ def run(options: Namespace, say: Callable[[str], None]) -> int:
         findings = diagnose_rig(session, options.output, say)
         write_rig_findings(session, findings, options.output)
     else:
-        findings = diagnose(session, options.model, options.output, say)
+        findings = diagnose(session, False if options.no_model else options.model, options.output, say)
     print(f"verdict: {findings.verdict}")
     for finding in findings.findings:
         print(f"- {finding.statement}")

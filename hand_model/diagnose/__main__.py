@@ -15,7 +15,7 @@ def main(arguments: list[str]) -> int:
     for session, output in zip(arguments[::2], arguments[1::2], strict=True):
         begin = time.perf_counter()
         try:
-            diagnose(session, output=output)
+            diagnose(session, model=False, output=output)
         except HandModelError as error:
             Findings("unexplained", {}, {}, notes=(str(error),)).save(output)
         print(f"{session} {time.perf_counter() - begin:.1f} s", flush=True)

@@ -11,7 +11,8 @@ import numpy as np
 
 from ..effects import catalogue
 from ..effects.base import DriveState
-from ..errors import IdentificationError
+from ..errors import HandModelError, IdentificationError
+from ..hand import Hand
 from ..session import Finger, Session, read_session
 from .balance import Balance
 from .command import command_facts, command_findings, refused
@@ -35,12 +36,13 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
     """Say what physics is missing from the declared model of a recorded hand.
 
     session: a session or its folder. model: a Hand, a .hand file or a compiled folder into which the effects are written
-    (what is missing is judged by the declared model fitted to the session itself). output: folder that gets `findings.json`,
-    `report.html` and, with a model, `model_before` and `model`, compiled. say: called with one line per result as it comes.
+    (what is missing is judged by the declared model fitted to the session itself); None identifies the session's own, False
+    writes none. output: folder that gets `findings.json`, `report.html` and, where physics was named, `model_before` and `model`,
+    compiled. say: called with one line per result as it comes.
     Raises SessionError for a session that breaks its format, HandFileError for a model that is none.
     """
     session = session if isinstance(session, Session) else read_session(session)
-    hand = None if model is None else read_model(model)
+    hand = read_model(model) if model not in (None, False) else None
     tell = say or (lambda line: None)
     notes: list[str] = []
     found: list[tuple[float, Finding]] = []
@@ -58,14 +60,28 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
         tell(stations[-1].line())
     findings = assemble(stations, _once(found), notes)
     if output is not None:
-        if hand is not None and findings.findings:
-            currents = {s.actuator: s.naming for s in stations if s.signal == "current" and s.actuator is not None}
-            named = write_improved(hand, findings.findings, {a: n.fit.declared for a, n in currents.items()},
-                                   {a: n.balance.states for a, n in currents.items()}, Path(output))
-            findings = replace(findings, findings=named)
+        if model is not False:
+            findings = _modelled(findings, session, hand, stations, Path(output), tell)
         write_page(findings, stations, session.path.name, Path(output))
         findings.save(output)
     return findings
+
+
+def _modelled(findings: Findings, session: Session, hand: Hand | None, stations: list[Station], output: Path,
+              tell: Callable[[str], None]) -> Findings:
+    """The findings with the model that holds them written; without a `hand` the session's own is identified."""
+    from ..identify import identify
+    from .angles import ranges_of_counts
+
+    if not any(f.correction is None for f in findings.findings):
+        return findings
+    try:
+        hand = identify(session) if hand is None else hand
+        tell(f"writing {output / 'model'}")
+        named = write_improved(hand, findings.findings, stations, ranges_of_counts(session), output)
+    except HandModelError as error:
+        return replace(findings, notes=(*findings.notes, f"no model was written: {error}"))
+    return replace(findings, findings=named)
 
 
 def _encoder_corrections(stations: list[Station]) -> dict[str, Callable[[Any], Any]]:

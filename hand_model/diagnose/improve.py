@@ -1,23 +1,24 @@
-"""The improved model: the hand with its named effects, compiled, and the proof by the compiled files' own forces."""
+"""The improved model: the hand as declared and with its named effects, both compiled; what the files' replay proves."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.polynomial import Polynomial
 
 from ..effects import effect
-from ..effects.base import DriveState
-from ..hand import Effect, Estimate, Hand, load_hand
+from ..hand import Coupling, Effect, EncoderMap, Estimate, Finger, Hand, Motor, load_hand
 from .findings import Finding
+from .prove import proved
 
-Array = NDArray[np.float64]
-
-DECLARED = {"inertia": "inertia", "viscous": "viscous", "coulomb": "coulomb", "spring": "stiffness", "preload": "preload"}
+MOTOR = {"inertia": ("inertia", "raw s^2/%"), "viscous": ("viscous", "raw s/%"), "coulomb": ("coulomb", "raw"),
+         "spring": ("stiffness", "raw/%"), "preload": ("preload", "raw")}
+STIFFNESS_LEAST = 1e-6  # raw/%: a preload is written as a spring under tension
+DRIVE_KEPT = ("gain", "damping")  # of an identified motor, beside what the balance fits
 
 
 def read_model(model: Any) -> Hand:
@@ -28,23 +29,59 @@ def read_model(model: Any) -> Hand:
     return load_hand(path / "hand.json" if path.is_dir() else path)
 
 
-def improved(hand: Hand, findings: Sequence[Finding], declared: Mapping[str, Mapping[str, float]]) -> Hand:
-    """The hand with the findings that are physics of its fingers; motors that have one get the jointly fitted coefficients.
+def as_fitted(hand: Hand, stations: Sequence[Any], counts: Mapping[str, tuple[float, float]],
+              fit: Callable[[Any], Any]) -> Hand:
+    """The hand with the coefficients of a fit of each station: motors, encoder maps, couplings.
 
-    declared: actuator -> coefficients of the declared model fitted beside the effects, [raw, %].
+    stations: those to take over. counts: actuator -> counts at 0 and 100 %. fit: naming -> its declared fit, or the one with effects.
     """
+    motors = {m.actuator: m for m in hand.motors}
+    fingers = {f.name: f for f in hand.fingers}
+    for station in stations:
+        declared = fit(station.naming).declared
+        if station.signal == "current":
+            motors[station.actuator] = _motor(station, declared, counts[station.actuator], motors.get(station.actuator))
+        elif station.signal == "encoder":
+            fingers[station.finger] = _with_map(fingers[station.finger], declared, counts[station.actuator])
+        elif station.joint is not None:
+            fingers[station.finger] = _with_coupling(fingers[station.finger], station, declared)
+    return replace(hand, motors=tuple(motors.values()), fingers=tuple(fingers.values()))
+
+
+def _motor(station: Any, declared: Mapping[str, float], counts: tuple[float, float], was: Motor | None) -> Motor:
+    states = station.naming.balance.states
+    values = {MOTOR[k][0]: Estimate(float(v), None, MOTOR[k][1], "diagnosis") for k, v in declared.items() if k in MOTOR}
+    values["stiffness"] = replace(values["stiffness"], value=max(values["stiffness"].value, STIFFNESS_LEAST))
+    if values["coulomb"].value > 0:
+        give = float(np.max(states[0].extra.get("give", np.zeros(1))))
+        values["presliding"] = Estimate(give, None, "%", "diagnosis, common to the session's drives")
+    if was is not None:
+        values |= {k: was.parameters[k] for k in DRIVE_KEPT if k in was.parameters}
+    return Motor(station.actuator, *counts, values, station.naming.balance.sigma, tuple(s.trial for s in states))
+
+
+def _with_map(finger: Finger, declared: Mapping[str, float], counts: tuple[float, float]) -> Finger:
+    """The encoder map of the proximal joint: proximal angle [deg] over the share of the range becomes radians."""
+    coefficients = np.deg2rad([v for k, v in declared.items() if k.startswith("power_")])
+    return replace(finger, encoder_maps=(EncoderMap(*counts, coefficients, {}, {}), *finger.encoder_maps[1:]))
+
+
+def _with_coupling(finger: Finger, station: Any, declared: Mapping[str, float]) -> Finger:
+    """The coupling of one joint: follower [deg] over powers of driver [deg] / scale becomes radians."""
+    scale = float(station.naming.balance.states[0].extra["scale"][0])
+    powers = [v for k, v in declared.items() if k.startswith("power_")]
+    coefficients = Polynomial(np.deg2rad(powers))(Polynomial([0.0, np.rad2deg(1.0) / scale])).coef
+    couplings = [c if c.follower != station.joint else Coupling(c.driver, c.follower, coefficients, {}, {})
+                 for c in finger.couplings]
+    return replace(finger, couplings=tuple(couplings))
+
+
+def with_effects(hand: Hand, findings: Sequence[Finding]) -> Hand:
+    """The hand with the findings that are physics of its fingers."""
     physics = [f for f in findings if f.correction is None and f.where.get("finger") in {x.name for x in hand.fingers}]
     effects = tuple(Effect(f.effect, dict(f.where), {k: _estimate(v) for k, v in f.parameters.items() if np.isfinite(v["value"])})
-                    for f in physics)
-    touched = {f.where.get("actuator") for f in physics if f.where.get("signal") == "current"}
-    motors = []
-    for motor in hand.motors:
-        values = declared.get(motor.actuator, {}) if motor.actuator in touched else {}
-        fresh = {DECLARED[k]: Estimate(float(v), None, motor.parameters[DECLARED[k]].unit, "diagnosis, beside its effects")
-                 for k, v in values.items() if DECLARED.get(k) in motor.parameters}
-        kept = {k: v for k, v in motor.parameters.items() if not fresh or k not in ("static_ratio", "stribeck_speed", "presliding")}
-        motors.append(replace(motor, parameters={**kept, **fresh}))
-    return replace(hand, effects=(*hand.effects, *effects), motors=tuple(motors))
+                    for f in physics if effect(f.effect).of_the_hand)
+    return replace(hand, effects=(*hand.effects, *effects))
 
 
 def _estimate(entry: Mapping[str, Any]) -> Estimate:
@@ -52,109 +89,61 @@ def _estimate(entry: Mapping[str, Any]) -> Estimate:
     return Estimate(float(entry["value"]), None if ci is None else (float(ci[0]), float(ci[1])), str(entry["unit"]), "diagnosis")
 
 
-def written(folder: Path, finding: Finding) -> str | None:
-    """Path of the element that holds a finding in the compiled folder's files, None where no file holds it."""
+def written(folder: Path, finding: Finding) -> dict[str, Any]:
+    """`model` of a finding: where the compiled folder holds it, {"native", "mjcf", "urdf", "callback"}."""
     from lxml import etree
 
     values = {k: v["value"] for k, v in finding.parameters.items()}
-    for file in sorted(folder.glob("*.xml")):
-        if file.name.startswith("scene"):
-            continue
-        root = etree.parse(str(file)).getroot()
-        # the element's path is what writing it once more into a copy of the file without it would give
-        place = effect(finding.effect).write_mjcf(_without(root, finding), finding.where, values)
-        if place is not None:
-            return place
-    return None
-
-
-def _without(root: Any, finding: Finding) -> Any:
-    """A scratch tree in which the finding's own element is absent, so that its name is free."""
-    for kind in ("ripple", "stop", "friction"):
-        name = f"{finding.where.get('actuator')}_{kind}"
-        for element in [e for e in root.iter() if isinstance(e.tag, str) and e.get("name") == name]:
-            if element.tag == "dcmotor" and element.get("lugre"):
-                joint = next(j for j in root.find("worldbody").iter("joint") if j.get("name") == element.get("joint"))
-                joint.set("frictionloss", element.get("lugre").split()[2])
-            element.getparent().remove(element)
-    return root
-
-
-def compiled_current(folder: Path, actuator: str, state: DriveState) -> Array | None:
-    """Current (n,) [raw] that a compiled file needs for a recorded motion: inertia, friction, and MuJoCo's own passive and
-    actuator forces at the motor joint; None where no file has that motor. A LuGre element counts with its steady sliding
-    friction, (Fc + (Fs - Fc) exp(-(v / vs)^2)) times the friction's direction: compare steady samples only."""
-    import mujoco
-    from lxml import etree
-
+    kind = effect(finding.effect)
+    urdf = "not expressible: kept in hand.json"
+    if not kind.of_the_hand:
+        return {"native": False, "mjcf": None, "urdf": "not expressible", "callback": None, "note": kind.unwritten}
+    if kind.law(values) is not None:
+        call = "hand_model.effects_on(model, folder)"
+        return {"native": False, "mjcf": None, "urdf": urdf, "callback": call}
     for file in sorted(f for f in folder.glob("*.xml") if not f.name.startswith("scene")):
-        model = mujoco.MjModel.from_xml_path(str(file))
-        drive = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator)
-        number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, f"{actuator}_effort_per_raw")
-        if drive < 0 or number < 0:
-            continue
-        joint = model.actuator_trnid[drive, 0]
-        dof, at = model.jnt_dofadr[joint], model.jnt_qposadr[joint]
-        own = [i for i in range(model.nu) if model.actuator_trnid[i, 0] == joint and i != drive]
-        friction = np.full(len(state.time_s), float(model.dof_frictionloss[dof]))
-        for i in list(own):
-            name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, i)
-            element = etree.parse(str(file)).getroot().find(f"actuator/dcmotor[@name='{name}']")
-            if element is not None and element.get("lugre"):
-                _, _, coulomb, static, speed = (float(x) for x in element.get("lugre").split())
-                friction += coulomb + (static - coulomb) * np.exp(-((state.velocity / speed) ** 2))
-                own.remove(i)
-        model.actuator_gainprm[drive] = model.actuator_biasprm[drive] = 0.0  # the drive itself is what is asked for
-        data, out = mujoco.MjData(model), np.empty(len(state.time_s))
-        for i, (x, v) in enumerate(zip(state.position, state.velocity, strict=True)):
-            data.qpos[at], data.qvel[dof] = x, v
-            mujoco.mj_fwdPosition(model, data)
-            mujoco.mj_fwdVelocity(model, data)
-            mujoco.mj_fwdActuation(model, data)
-            out[i] = -data.qfrc_passive[dof] - data.actuator_force[own].sum()
-        out += model.dof_armature[dof] * state.acceleration + friction * state.direction
-        return out / model.numeric_data[model.numeric_adr[number]]
-    return None
+        place = kind.write_mjcf(etree.parse(str(file)).getroot(), finding.where, values)
+        if place is not None:  # numbered where the file has one of that name: it was written the first time
+            return {"native": True, "mjcf": _first_name(place), "urdf": urdf, "callback": None}
+    return {"native": False, "mjcf": None, "urdf": urdf, "callback": None, "note": kind.unwritten}
 
 
-def replayed(before: Path, after: Path, finding: Finding, states: Sequence[DriveState]) -> dict[str, Any] | None:
-    """`fit` of a drive finding from the two compiled files on the recordings kept out; None where they cannot tell."""
-    kept = [s for s in states if s.validate] or list(states)
-    squares: tuple[list[Array], list[Array]] = ([], [])
-    for state in kept:
-        use = np.isfinite(state.effort) & (state.extra.get("steady", np.ones(len(state.time_s))) > 0)
-        for folder, into in zip((before, after), squares, strict=True):
-            current = compiled_current(folder, str(finding.where["actuator"]), state)
-            if current is None:
-                return None
-            into.append((state.effort - current)[use] ** 2)
-    rmse = [float(np.sqrt(np.concatenate(s).mean())) for s in squares]
-    return {**finding.fit, "before": rmse[0], "after": rmse[1], "ci95_reduction": None,
-            "held_out": [s.trial for s in kept if s.validate], "engine": "mujoco: forces of the compiled motor joint, motion as recorded"}
+def _first_name(place: str) -> str:
+    import re
+
+    return re.sub(r"_\d+'\]", "']", place)
 
 
-def write_improved(model: Any, findings: Sequence[Finding], declared: Mapping[str, Mapping[str, float]],
-                   states: Mapping[str, Sequence[DriveState]], output: Path) -> tuple[Finding, ...]:
-    """Compile `model` with its effects into `output`/model; the findings, saying where each is written and what the files'
-    replay gives. The model as it was goes to `output`/model_before."""
+def write_improved(hand: Hand, findings: Sequence[Finding], stations: Sequence[Any], counts: Mapping[str, tuple[float, float]],
+                   output: Path) -> tuple[Finding, ...]:
+    """Compile the hand as declared into `output`/model_before and with its effects into `output`/model; the findings, saying
+    where each is written and what replaying the two says.
+
+    Raises HandModelError where the hand cannot be compiled. Nothing is written where no finding is physics of the hand.
+    """
     from ..compile import compile
 
-    hand = read_model(model)
-    new = improved(hand, findings, declared)
-    if not new.effects:
+    touched = [s for s in stations if any(_of(f, s) for f in findings if f.correction is None)]
+    before = as_fitted(hand, touched, counts, lambda naming: naming.declared)
+    after = with_effects(as_fitted(hand, touched, counts, lambda naming: naming.fit), findings)
+    if not any(f.correction is None for f in findings):
         return tuple(findings)
-    compile(hand, output / "model_before")
-    compile(new, output / "model")
+    compile(before, output / "model_before")
+    compile(after, output / "model")
     out = []
     for finding in findings:
-        if finding.correction is not None:
-            out.append(finding)
-            continue
-        place = written(output / "model", finding)
-        finding = replace(finding, model={"native": place is not None, "mjcf": place, "urdf": "not expressible: kept in hand.json"})
-        drive = states.get(str(finding.where.get("actuator")))
-        if place is not None and drive and finding.where.get("signal") == "current":
-            fit = replayed(output / "model_before", output / "model", finding, drive)
-            finding = finding if fit is None else replace(finding, fit=fit)
+        if finding.correction is None:
+            finding = replace(finding, model=written(output / "model", finding))
+            station = next((s for s in stations if _of(finding, s)), None)
+            finding = replace(finding, fit=proved(finding, station, output / "model_before", output / "model"))
         out.append(finding)
     return tuple(out)
+
+
+def _of(finding: Finding, station: Any) -> bool:
+    """Whether a finding was named at a station."""
+    named = {f.term.effect.name for f in station.naming.found}
+    return finding.effect in named and finding.where.get("finger") == station.finger and (
+        station.signal != "markers" or finding.where.get("joint") == station.joint)
+
+

@@ -10,6 +10,8 @@ class CommandAsMeasurement(Effect):
 
     name = "command_as_measurement"
     station = "command"
+    of_the_hand = False
+    unwritten = "the channel is refused: there is nothing to model"
 
 
 EFFECT = CommandAsMeasurement()

@@ -14,6 +14,7 @@ class CommandDelay(Effect):
 
     name = "command_delay"
     station = "command"
+    unwritten = "shown by events: the answer to a command, not an error along a motion"
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """The delay of the motor's actuator."""

@@ -10,6 +10,7 @@ class DriveSag(Effect):
 
     name = "drive_sag"
     station = "command"
+    unwritten = "the controller's speed under load is no force: the command must be slowed by whoever gives it"
 
 
 EFFECT = DriveSag()

@@ -37,6 +37,7 @@ class EndStopContact(Effect):
         low, high = position_range(states)
         ends = [shape["begin"], high] if shape["side"] >= 0 else [low, shape["begin"]]
         return {"position": ends, "unit": states[0].position_unit}
+
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """A fixed tendon along the motor joint that is slack until the stop begins: the same line of force, exact in MuJoCo."""
         from lxml import etree

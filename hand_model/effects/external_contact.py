@@ -13,6 +13,8 @@ class ExternalContact(Effect):
     """F = k max(0, x - x0) in that trial only: an elastic obstacle that was not always there."""
 
     name = "external_contact"
+    of_the_hand = False
+    unwritten = "an obstacle of one recording is no part of the hand"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """Which trial (index into the states) and where the contact begins."""

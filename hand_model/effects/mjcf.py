@@ -64,6 +64,15 @@ def lugre_friction(root: Any, where: Mapping[str, Any], parameters: Mapping[str,
     return bristle_friction(root, joint, name, (stiffness, 0.0, sliding, static, parameters.get("stribeck_speed", speed)))
 
 
+def add_damping(joint: Any, linear: float, quadratic: float) -> bool:
+    """Add to a joint's `damping`, whose force is -(a v + b v |v| + c v^3); False, and nothing done, where `a` would fall below zero."""
+    a, b, c = ([float(x) for x in (joint.get("damping") or "0").split()] + [0.0, 0.0])[:3]
+    if a + linear < 0:
+        return False
+    joint.set("damping", " ".join(repr(x) for x in (a + linear, b + quadratic, c)))
+    return True
+
+
 def joint_tendon(root: Any, joint: Any, name: str, **attributes: Any) -> str:
     """A fixed tendon along one joint, its length the joint's coordinate; its path."""
     return fixed_tendon(root, free_name(root, name), {joint.get("name"): 1.0}, **attributes)

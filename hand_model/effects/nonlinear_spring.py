@@ -23,6 +23,7 @@ class NonlinearSpring(Effect):
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """x^3, (n, 1), x in the drive's unit."""
         return (state.position**3)[:, None]
+
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """`stiffness` and `springref`: k x + p + c x^3 around its root r, MuJoCo's force is -(a y + b y^2 + c y^3), y = x - r."""
         found = motor_joint(root, where)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect
-from .mjcf import motor_joint
+from .mjcf import add_damping, motor_joint
 
 
 class QuadraticDamping(Effect):
@@ -23,13 +23,14 @@ class QuadraticDamping(Effect):
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """v |v|, (n, 1)."""
         return (state.velocity * np.abs(state.velocity))[:, None]
+
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """Second coefficient of the joint's `damping`: MuJoCo's force is -(a v + b v |v| + c v^3)."""
         found = motor_joint(root, where)
         if found is None:
             return None
         joint, unit = found
-        joint.set("damping", f"{float((joint.get('damping') or '0').split()[0])!r} {unit * parameters['drag']!r}")
+        add_damping(joint, 0.0, unit * parameters["drag"])
         return f"joint[@name='{joint.get('name')}']/@damping"
 
 

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, speed_range
-from .mjcf import lugre_friction, motor_joint
+from .mjcf import add_damping, lugre_friction, motor_joint
 
-# exp(-u) is c + e exp(-(u / w)^2) to 4 % (root mean square, 0.2 < u < 6): what sliding friction, excess and speed become.
-GAUSSIAN = (0.049, 0.718, 1.142)
+# exp(-u) is c + e exp(-(u / w)^2) + d u + f u^2 to 1.3 % (root mean square, 0.25 < u < 9); without damping c, e, w to 4 %.
+DAMPED = (0.2158, 0.5383, 1.0763, -0.0663, 0.0049)
+PLAIN = (0.049, 0.718, 1.142, 0.0, 0.0)
 
 
 class StribeckFriction(Effect):
@@ -38,20 +39,25 @@ class StribeckFriction(Effect):
                    declared: Mapping[str, float]) -> dict[str, float]:
         """Static friction as a ratio to Coulomb friction, and the Stribeck speed."""
         coulomb = declared.get("coulomb") or np.nan  # without Coulomb friction there is no ratio
-        return {"static_ratio": 1 + amplitude["static_excess"] / coulomb, "stribeck_speed": shape["stribeck_speed"]}
+        return {"static_ratio": 1 + amplitude["static_excess"] / coulomb, "stribeck_speed": shape["stribeck_speed"],
+                "static_excess": amplitude["static_excess"]}
 
     def region(self, states: tuple[DriveState, ...], shape: Mapping[str, float]) -> dict[str, Any] | None:
         """Speeds below two Stribeck speeds hold 86 % of it."""
         return {"speed": [0.0, 2.0 * shape["stribeck_speed"]], "unit": f"{states[0].position_unit}/s"}
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
-        """A passive DC motor's LuGre friction, whose rise is exp(-(v / vs)^2): the nearest to exp(-|v| / vs)."""
-        if motor_joint(root, where) is None:
+        """A passive DC motor's LuGre friction, whose rise is exp(-(v / vs)^2), and damping: the nearest to exp(-|v| / vs)."""
+        found = motor_joint(root, where)
+        if found is None:
             return None
-        excess = parameters["static_ratio"] - 1
-        sliding = 1 + GAUSSIAN[0] * excess
-        return lugre_friction(root, where, {"coulomb_ratio": sliding, "static_ratio": sliding + GAUSSIAN[1] * excess,
-                                            "stribeck_speed": GAUSSIAN[2] * parameters["stribeck_speed"]})
+        joint, unit = found
+        excess, speed = parameters["static_ratio"] - 1, parameters["stribeck_speed"]
+        load = unit * parameters["static_excess"]
+        damped = add_damping(joint, DAMPED[3] * load / speed, DAMPED[4] * load / speed**2)
+        c, e, w = (DAMPED if damped else PLAIN)[:3]
+        return lugre_friction(root, where, {"coulomb_ratio": 1 + c * excess, "static_ratio": 1 + (c + e) * excess,
+                                            "stribeck_speed": w * speed})
 
 
 EFFECT = StribeckFriction()

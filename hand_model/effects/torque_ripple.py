@@ -40,6 +40,7 @@ class TorqueRipple(Effect):
         """Amplitude, period and phase [rad]."""
         return {"amplitude": float(np.hypot(amplitude["sine"], amplitude["cosine"])), "period": shape["period"],
                 "phase": float(np.arctan2(amplitude["cosine"], amplitude["sine"]))}
+
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """A passive DC motor with cogging: its torque is -A sin(2 pi x / P + phase), what the drive must overcome."""
         from lxml import etree
