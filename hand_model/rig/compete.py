@@ -16,13 +16,13 @@ from .balance import Rows
 from .candidates import Candidate
 from .consistent import consistent
 from .declared import DeclaredFit, bounds, prior
+from .evidence import weigh
 from .solve import solve_bounded
 
 Array = NDArray[np.float64]
-FOLDS, RESAMPLES = 6, 600
+FOLDS = 6
+FEW = 4  # recordings from which on whole ones are left out
 LEAST_SHARE = 0.05  # of the declared model's held-out residual variance: less is not worth a name
-NEAR = 1.02  # errors within this factor are a tie, and the one with fewer parameters wins (Occam)
-LEAST_PROBABILITY = 0.95
 MOST_TERMS = 4
 
 
@@ -56,17 +56,18 @@ class Step:
 
 @dataclass(frozen=True)
 class Problem:
-    """Training rows cut into blocks. base: fit with scale; fold (B,): which fold leaves a block out."""
+    """Training rows cut into blocks. fit: with scale; fold (B,): which fold leaves a block out; group (B,): its recording."""
 
     fit: DeclaredFit
     rows: tuple[Rows, ...]
     block: tuple[Array, ...]
     fold: Array
+    group: Array
 
 
 def pose(fit: DeclaredFit, joint: str | None = None) -> Problem:
-    """Cut the training recordings (of one joint, or all) into at least a dozen blocks; where there are few recordings,
-    neighbouring blocks go to different folds, else whole recordings do."""
+    """Cut the training recordings (of one joint, or all) into at least a dozen blocks. Whole recordings are left out where
+    there are several, as the validation trials are; else neighbouring blocks go to different folds."""
     rows = tuple(r for r in fit.rows if not r.validate and joint in (None, r.joint) and r.moving.sum() > 10)
     trials = list(dict.fromkeys(r.trial for r in rows))
     each = int(np.clip(np.ceil(18 / max(len(trials), 1)), 2, 18))
@@ -75,10 +76,9 @@ def pose(fit: DeclaredFit, joint: str | None = None) -> Problem:
         n = len(r.effort)
         block.append(first[r.trial] + np.minimum(np.arange(n) * each // n, each - 1))
     count = each * len(trials)
-    fold = np.arange(count) % min(FOLDS, count)
-    if len(trials) >= FOLDS:  # whole recordings are left out where there are enough of them
-        fold = (np.arange(count) // each) % FOLDS
-    return Problem(fit, rows, tuple(block), fold)
+    group = np.arange(count) // each
+    fold = group % FOLDS if len(trials) >= FEW else np.arange(count) % min(FOLDS, count)
+    return Problem(fit, rows, tuple(block), fold, group)
 
 
 def term_columns(row: Rows, term: Term) -> Array:
@@ -224,7 +224,7 @@ def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ..
         none, _ = held_out(problem, terms, parts)
         taken = {t.candidate.key for t in terms}
         scores = [score(problem, terms, c, parts) for c in rivals if c.key not in taken]
-        step = judge(none, scores, whole)
+        step = judge(none, scores, whole, problem.group)
         if step is None:
             break
         terms = (*terms, step.winner.term)
@@ -232,27 +232,18 @@ def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ..
     return terms, tuple(steps), tuple(scores)
 
 
-def judge(none: Array, scores: Sequence[Score], whole: float) -> Step | None:
+def judge(none: Array, scores: Sequence[Score], whole: float, group: Array) -> Step | None:
     """The winner of a round, or None where no candidate beats "nothing" (none (B,)) beyond doubt and by enough of the
     declared model's error (whole)."""
     if not scores:
         return None
-    errors = np.array([s.error for s in scores])
-    best = int(np.argmin(errors.sum(1)))
-    random = np.random.default_rng(0)
-    draw = random.integers(0, len(none), (RESAMPLES, len(none)))
-    resampled = errors[:, draw].sum(2)
-    probability = float(np.mean(resampled[best] < none[draw].sum(1)))
-    if none.sum() - errors[best].sum() < LEAST_SHARE * whole or probability < LEAST_PROBABILITY:
+    said = weigh(none, np.array([s.error for s in scores]), [_size(s.term) for s in scores], group)
+    if said is None or none.sum() - scores[said.best].error.sum() < LEAST_SHARE * whole:
         return None
-    close = [k for k in range(len(scores)) if np.mean(resampled[best] < resampled[k]) < LEAST_PROBABILITY]
-    close.sort(key=lambda k: errors[k].sum())
-    size = {k: len(scores[k].term.shape) + len(scores[k].term.candidate.amplitudes) for k in close}
-    tied = [k for k in close if errors[k].sum() <= NEAR * errors[best].sum()]
-    chosen = min(tied, key=lambda k: (size[k], errors[k].sum()))
-    wins = np.bincount(np.argmin(resampled, 0), minlength=len(scores)) / RESAMPLES
-    order = np.argsort(-wins)
-    rivals = tuple((scores[i].term.candidate.key, float(wins[i])) for i in order if wins[i] > 0.005)
-    equals = tuple(dict.fromkeys(scores[k].term.candidate.effect for k in close))
-    gain = 1.0 - errors[chosen].sum() / max(none.sum(), 1e-300)
-    return Step(scores[chosen], probability, rivals, float(gain), equals)
+    rivals = tuple((scores[i].term.candidate.key, float(said.wins[i])) for i in np.argsort(-said.wins) if said.wins[i] > 0.005)
+    equals = tuple(dict.fromkeys(scores[k].term.candidate.effect for k in said.close))
+    return Step(scores[said.chosen], said.probability, rivals, said.gain, equals)
+
+
+def _size(term: Term) -> int:
+    return len(term.shape) + len(term.candidate.amplitudes)

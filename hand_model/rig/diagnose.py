@@ -185,7 +185,7 @@ def _prove(bench: Bench, fit: DeclaredFit, stories: Sequence[tuple[Step, Term]],
     for step, term in stories:
         many = settled(bench, fit, [*kept, term])
         proof = bench.proof(term.candidate.joint, (fit, *few), (fit, *many))
-        if proof["ci95_reduction"][0] <= 0:
+        if not proof["after"] < proof["before"]:
             rejected.append({"effect": term.candidate.key, "reason": "error on validation trials does not fall"})
             continue
         kept.append(term)
@@ -240,7 +240,7 @@ def _off_axis(rig: RigModel, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple
     shape = Candidate(
         "gravity_load", "centres of mass off their axes", "*", (), ({},), lambda r, s: np.zeros((len(r.time_s), 0))
     )
-    step = judge(errors[0], [Score(Term(shape, {}), errors[1], 0.0)], errors[0].sum())
+    step = judge(errors[0], [Score(Term(shape, {}), errors[1], 0.0)], errors[0].sum(), sides[0].group)
     if step is None:
         return None
     before, after = (solution(p, offsets) for p in sides)

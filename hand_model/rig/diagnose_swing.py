@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,11 +12,12 @@ from ..session import Session
 from .declared import DeclaredFit
 from .findings import Finding
 from .model import RigModel, load_rig
-from .replay import replay_rig
+from .replay import RigResiduals, replay_rig
 from .states import noise_std
-from .swing import INDEX, PARAMETERS, STEP_S, Swing, Task, vector
+from .swing import INDEX, PARAMETERS, STEP_S, Fitted, Swing, Task, parameter_units, vector
 from .swing_build import build_swing, windows_s
-from .swing_compete import LEAST_GAIN, Round, Variant, compete_swing, fit_stages, free_declared
+from .swing_compete import Round, Variant, compete_swing, fit_stages, free_declared
+from .swing_interval import intervals
 from .swing_patch import write_swing
 from .words import shares, statement
 
@@ -34,35 +35,49 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
     say(f"{rig.name}: {', '.join(v.key for v in taken) or 'nothing'}")
     # Last, at the step of the replay; a free swing over whole recordings, for its phase is known well enough by now.
     fine = [build_swing(rig, fit, STEP_S, w) for w in (windows if stages[0].driven else (*windows[1:], np.inf))]
-    sets = [tuple(dict.fromkeys((*free, *(n for v in taken[:k] for n in v.start)))) for k in range(len(taken) + 1)]
-    last = rounds[-1].fit if rounds else declared
-    starts = [declared.theta] + [
-        np.where(np.isin(PARAMETERS, s), last.theta, vector(stages[0].initial)) for s in sets[1:]
-    ]
-    fits = fit_stages(fine, [Task(s, t, ()) for s, t in zip(sets, starts, strict=True)], 8)
-    rounds = tuple(replace(r, fit=f) for r, f in zip(rounds, fits[1:], strict=True))
-    swing = fine[0]
-    files = [write_swing(rig, swing, f.theta) for f in fits]
-    replays = [replay_rig(session, load_rig(session, x)) for x in files]
     held = bool(rig.select(True))  # without validation recordings the training ones measure, and the report says so
-    figures = [r.figure("position_rmse", held) for r in replays]
-    enough = 1.0 - LEAST_GAIN  # what is worth a name in training is worth it here
-    holds = next((k for k in range(len(taken)) if figures[k + 1] > enough * figures[k]), len(taken))
-    rejected = [{"effect": v.key, "reason": "error on validation trials does not fall"} for v in taken[holds:]]
-    taken, rounds, figures = taken[:holds], rounds[:holds], figures[: holds + 1]
-    means = [r.figure("position_mae", held) for r in replays]
+    kept, rejected = list(zip(taken, rounds, strict=True)), []
+    while True:
+        chain = _chain(rig, session, held, fine, declared.theta, [v for v, _ in kept], kept[-1][1].fit.theta if kept else None)
+        figures = [c.replay.figure("position_rmse", held) for c in chain]
+        worse = next((k for k in range(len(kept)) if not figures[k + 1] < figures[k]), None)
+        if worse is None:
+            break
+        rejected.append({"effect": kept.pop(worse)[0].key, "reason": "error on validation trials does not fall"})
     found = []
-    for k, (variant, round_) in enumerate(zip(taken, rounds, strict=True)):
+    for k, (variant, round_) in enumerate(kept):
         proof = {"metric": "position_rmse", "unit": rig.unit(rig.joints[0]), "before": figures[k], "after": figures[k + 1],
-                 "noise_floor": _resolution(rig), "ci95_reduction": _fall(replays[k], replays[k + 1], held),
+                 "noise_floor": _resolution(rig), "ci95_reduction": _fall(chain[k].replay, chain[k + 1].replay, held),
                  "held_out": [t.name for t in rig.select(held)], "engine": "mujoco"}  # fmt: skip
-        found.append(_swing_finding(rig, variant, round_, swing, proof))
+        found.append(_swing_finding(rig, variant, round_, fine[0], chain[-1], proof))
+    means = [c.replay.figure("position_mae", held) for c in (chain[0], chain[-1])]
     lack = {"metric": "position_rmse", "unit": rig.unit(rig.joints[0]), "before": figures[0], "after": figures[-1],
             "one_effect": figures[min(1, len(figures) - 1)],
-            "two_effects": figures[min(2, len(figures) - 1)], "engine": "mujoco", "mae_before": means[0], "mae_after": means[holds],
+            "two_effects": figures[min(2, len(figures) - 1)], "engine": "mujoco", "mae_before": means[0], "mae_after": means[1],
             "noise_floor": _resolution(rig),
-            "declared": {n: float(fits[0].theta[INDEX[n]]) for n in free}}  # fmt: skip
-    return shares(found), rejected, lack, files[holds], files[0]
+            "declared": {n: float(chain[0].fit.theta[INDEX[n]]) for n in free}}  # fmt: skip
+    return shares(found), rejected, lack, chain[-1].xml, chain[0].xml
+
+
+@dataclass(frozen=True)
+class Link:
+    """The declared model with the first so many effects: free parameters, their fit, the file, and its replay."""
+
+    free: tuple[str, ...]
+    fit: Fitted
+    xml: bytes
+    replay: RigResiduals
+
+
+def _chain(rig: RigModel, session: Session, held: bool, stages: list[Swing], declared: np.ndarray, taken: list[Variant],
+           last: np.ndarray | None) -> list[Link]:  # fmt: skip
+    """The declared model, with the first effect, with the first two, ...: all fitted in one batch, written and replayed."""
+    free, start = free_declared(stages[0]), vector(stages[0].initial)
+    sets = [tuple(dict.fromkeys((*free, *(n for v in taken[:k] for n in v.start)))) for k in range(len(taken) + 1)]
+    starts = [declared] + [np.where(np.isin(PARAMETERS, s), last, start) for s in sets[1:]]
+    fits = fit_stages(stages, [Task(s, t, ()) for s, t in zip(sets, starts, strict=True)], 8)
+    files = [write_swing(rig, stages[0], f.theta) for f in fits]
+    return [Link(s, f, x, replay_rig(session, load_rig(session, x), efforts=False, validate=held)) for s, f, x in zip(sets, fits, files, strict=True)]
 
 
 def _resolution(rig: RigModel) -> float:
@@ -78,9 +93,13 @@ def _fall(before: Any, after: Any, held: bool) -> list[float]:
     return [float(x) for x in np.percentile(fall, [2.5, 97.5])]
 
 
-def _swing_finding(rig: RigModel, variant: Variant, round_: Round, swing: Swing, proof: dict) -> Finding:
+def _swing_finding(rig: RigModel, variant: Variant, round_: Round, swing: Swing, link: Link, proof: dict) -> Finding:
+    """parameters: beside all effects that were kept (link), with intervals."""
     joint = rig.joints[0]
-    parameters = {n: {"value": float(round_.fit.theta[INDEX[n]]), "unit": "", "ci95": None} for n in variant.start}
+    ends = intervals(swing, link.free, link.fit.theta)
+    units = parameter_units(rig.unit(joint), rig.effort_unit(joint))
+    parameters = {n: {"value": float(link.fit.theta[INDEX[n]]), "unit": units.get(n, "1"), "ci95": list(ends[n])}
+                  for n in variant.start}  # fmt: skip
     where = {"finger": None, "joint": joint, "actuator": (rig.drive(joint).name if rig.drive(joint) else None),
              "signal": "position", "marker": None, "trials": proof["held_out"],
              "share_of_mismatch": max(proof["before"] ** 2 - proof["after"] ** 2, 0.0)}  # fmt: skip

@@ -188,21 +188,22 @@ def _controls(rig: RigModel, trial: RigTrial, model: Any, effects: EffectStepper
     return out
 
 
-def replay_rig(session: Session, model: bytes | RigModel | None = None, simulate: bool = True) -> RigResiduals:
-    """Replay every trial of a rig session on its own file, or on `model` (MJCF bytes, or a RigModel).
+def replay_rig(session: Session, model: bytes | RigModel | None = None, simulate: bool = True,
+               efforts: bool = True, validate: bool | None = None) -> RigResiduals:  # fmt: skip
+    """Replay the trials of a rig session on its own file, or on `model` (MJCF bytes, or a RigModel).
 
-    Raises SessionError and DescriptionError as `load_rig` does.
+    simulate, efforts: which of the two comparisons to make; validate: only trials that do, or do not (None: all). Raises SessionError and DescriptionError as `load_rig` does.
     """
     rig = model if isinstance(model, RigModel) else load_rig(session, model)
-    efforts = {(r.trial, r.joint): r.error for r in effort_residuals(rig)}
+    known = {(r.trial, r.joint): r.error for r in effort_residuals(rig)} if efforts else {}
     out: list[JointResidual] = []
     for trial in rig.trials:
-        if not all(j in trial.position for j in rig.joints):
+        if validate not in (None, trial.validate) or not all(j in trial.position for j in rig.joints):
             continue
         time_s, simulated = simulate_trial(rig, trial) if simulate else (trial.time_s, None)
         for i, joint in enumerate(rig.joints):
             motion = None if simulated is None else simulated[:, i]
-            out.append(_residual(trial, joint, time_s, motion, efforts.get((trial.name, joint))))
+            out.append(_residual(trial, joint, time_s, motion, known.get((trial.name, joint))))
     return RigResiduals(tuple(out))
 
 

@@ -35,6 +35,15 @@ NEUTRAL = {"stribeck_speed": 1.0, "stribeck_exponent": 2.0}  # what is not zero 
 LOW_SPEED = ("static_excess", "load_gear_low", "load_motor_low", "load_external_low", "motor_squared", "external_squared")
 
 
+def parameter_units(angle: str, effort: str) -> dict[str, str]:
+    """Unit of every parameter that is no pure number; angle: "rad" or "m", effort: "N m" or "N"."""
+    wet = f"{effort} s/{angle}"
+    units = dict.fromkeys(("coulomb", "static_excess", "asymmetry", "offset", "lateral"), effort)
+    units |= dict.fromkeys(("damping", "back_emf", "damping_asymmetry"), wet) | dict.fromkeys(("sag", "motor_squared", "external_squared"), f"1/({effort})")
+    return units | {"stribeck_speed": f"{angle}/s", "stiffness": f"{effort}/{angle}", "load_speed": f"s/{angle}",
+                    "drag": f"{effort} s^2/{angle}^2", "delay": "s"}  # fmt: skip
+
+
 @dataclass(frozen=True)
 class Lane:
     """One stretch of one trial to be simulated: drive and measured position on an even grid of the swing's step_s.
@@ -349,6 +358,12 @@ def _costs(swing: Swing, pairs: Sequence[tuple[Task, Array]]) -> Array:
     square = np.sum(errors(swing, theta, lanes) ** 2, 0)
     edges = np.cumsum([0] + [len(task.stretches) for task, _ in pairs])
     return np.array([square[a:b].sum() for a, b in pairwise(edges)])
+
+
+def jacobian(swing: Swing, task: Task, theta: Array) -> tuple[Array, Array]:
+    """Residuals (n,) of a task at theta, stretch after stretch, and their slopes (n, free) in units of `typical`."""
+    low = np.array([LOW.get(name, 0.0) for name in PARAMETERS])
+    return _jacobians(swing, [(task, theta)], typical(swing), low)[0]
 
 
 def _jacobians(swing: Swing, pairs: Sequence[tuple[Task, Array]], unit: Array, low: Array) -> list[tuple[Array, Array]]:

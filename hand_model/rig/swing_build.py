@@ -17,6 +17,7 @@ from .swing import STEP_S, Lane, Swing
 # A trial is fitted in stretches (multiple shooting, Bock 1981), in periods of the free swing: short ones where a drive
 # keeps the motion going, for then the cost is smooth; longer ones where damping is all there is to see.
 DRIVEN_PERIODS, FREE_PERIODS = (1.3,), (2.5, 10.0)
+LEAST_STRETCHES = 4  # some to fit, some to leave out
 
 
 def windows_s(rig: RigModel, fit: DeclaredFit) -> tuple[float, ...]:
@@ -24,7 +25,8 @@ def windows_s(rig: RigModel, fit: DeclaredFit) -> tuple[float, ...]:
     swing = build_swing(rig, fit, 1e-2, np.inf)
     weight = max(abs(swing.sine), abs(swing.cosine))
     period = 2 * np.pi * np.sqrt(swing.initial["inertia"] / weight) if weight > 0 else 1.0
-    return tuple(k * period for k in (DRIVEN_PERIODS if swing.driven else FREE_PERIODS))
+    longest = sum(float(t.time_s[-1]) for t in rig.select(False)) / LEAST_STRETCHES
+    return tuple(min(k * period, longest) for k in (DRIVEN_PERIODS if swing.driven else FREE_PERIODS))
 
 
 def can_swing(rig: RigModel) -> bool:

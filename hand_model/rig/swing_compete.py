@@ -12,11 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .evidence import weigh
 from .swing import DECLARED, INDEX, Fitted, Swing, Task, errors, fit_together, vector
 
 Array = NDArray[np.float64]
-FOLDS, RESAMPLES, SHORTLIST = 4, 600, 5
-LEAST_GAIN, LEAST_PROBABILITY, MOST_TERMS, NEAR = 0.025, 0.95, 4, 1.01
+FOLDS, SHORTLIST = 4, 5
+LEAST_GAIN, MOST_TERMS = 0.025, 4
+BETTER = 1.01  # an exchange of variants has to pay
 PARTS = 4  # a recording's error is resampled in so many parts
 
 
@@ -118,7 +120,7 @@ def compete_swing(stages: Sequence[Swing], declared: Fitted) -> tuple[tuple[Vari
     """Forward selection; returns the variants taken and the rounds, each with the fit of all taken so far."""
     swing = stages[-1]
     train = tuple(int(i) for i in swing.train())
-    folds = _folds(train)
+    folds = _folds(swing, train)
     taken: tuple[Variant, ...] = ()
     current, rounds = declared, []
     while len(taken) < MOST_TERMS:
@@ -130,7 +132,8 @@ def compete_swing(stages: Sequence[Swing], declared: Fitted) -> tuple[tuple[Vari
         best = _several(swing, [Task(tasks[k].free, fits[k].theta, train) for k in order])
         none, scores = _left_out(swing, folds, (Task(free, current.theta, train), current),
                                  [(tasks[k], f) for k, f in zip(order, best, strict=True)])  # fmt: skip
-        found = _judge(none, scores, [rivals[k] for k in order], [len(tasks[k].free) for k in order])
+        group = np.array([name for _, left in folds for i in left for name in [swing.lanes[i].trial] * PARTS])
+        found = _judge(none, scores, [rivals[k] for k in order], [len(tasks[k].free) for k in order], group)
         if found is None:
             break
         taken, current = (*taken, rivals[order[found[0]]]), best[found[0]]
@@ -161,7 +164,7 @@ def _exchanged(
         tasks.append(Task(_free(swing, group), theta, ()))
     fits = fit_stages(stages, tasks, 12)
     best = min(range(len(sets)), key=lambda k: fits[k].cost)
-    return (sets[best], fits[best]) if NEAR * fits[best].cost < current.cost else (taken, current)
+    return (sets[best], fits[best]) if BETTER * fits[best].cost < current.cost else (taken, current)
 
 
 def _several(swing: Swing, tasks: Sequence[Task], starts: int = 2, iterations: int = 8) -> list[Fitted]:
@@ -178,11 +181,15 @@ def _several(swing: Swing, tasks: Sequence[Task], starts: int = 2, iterations: i
     return [min(fits[k * starts : (k + 1) * starts], key=lambda f: f.cost) for k in range(len(tasks))]
 
 
-def _folds(train: Sequence[int]) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
-    """(kept, left out) stretches; every fold leaves out some of every recording, as the validation set leaves a whole one."""
-    count = min(FOLDS, len(train))
-    return [(tuple(i for k, i in enumerate(train) if k % count != f), tuple(i for k, i in enumerate(train) if k % count == f))
-            for f in range(count)]  # fmt: skip
+def _folds(swing: Swing, train: Sequence[int]) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
+    """(kept, left out) stretches: whole recordings are left out where there are several, as the validation trials are; else
+    every fold leaves out some of every recording."""
+    trials = {name: k for k, name in enumerate(dict.fromkeys(swing.lanes[i].trial for i in train))}
+    whole = len(trials) >= FOLDS
+    count = FOLDS if whole else min(FOLDS, len(train))
+    fold = [(trials[swing.lanes[i].trial] if whole else k) % count for k, i in enumerate(train)]
+    return [(tuple(i for i, g in zip(train, fold, strict=True) if g != f),
+             tuple(i for i, g in zip(train, fold, strict=True) if g == f)) for f in range(count)]  # fmt: skip
 
 
 def _free(swing: Swing, taken: Sequence[Variant]) -> tuple[str, ...]:
@@ -213,22 +220,12 @@ def _left_out(
 
 
 def _judge(
-    none: Array, scores: list[Array], rivals: Sequence[Variant], sizes: Sequence[int]
+    none: Array, scores: list[Array], rivals: Sequence[Variant], sizes: Sequence[int], group: Array
 ) -> tuple[int, Round] | None:
     """Index of the winner and what the round says, or None where nothing beats "none" beyond doubt."""
-    errors_ = np.array(scores)
-    draw = np.random.default_rng(0).integers(0, len(none), (RESAMPLES, len(none)))
-    resampled, base = errors_[:, draw].sum(2), none[draw].sum(1)
-    best = int(np.argmin(errors_.sum(1)))
-    close = [k for k in range(len(scores)) if np.mean(resampled[best] < resampled[k]) < LEAST_PROBABILITY]
-    probability = float(np.mean(resampled[best] < base))
-    if none.sum() - errors_[best].sum() < LEAST_GAIN * none.sum() or probability < LEAST_PROBABILITY:
+    said = weigh(none, np.array(scores), sizes, group)
+    if said is None or none.sum() - scores[said.best].sum() < LEAST_GAIN * none.sum():
         return None
-    wins = np.bincount(np.argmin(resampled, 0), minlength=len(scores)) / RESAMPLES
-    order = np.argsort(-wins)
-    same = tuple(dict.fromkeys(rivals[k].effect for k in sorted(close, key=lambda k: errors_[k].sum())))
-    tied = [k for k in close if errors_[k].sum() <= NEAR * errors_[best].sum()]
-    best = min(tied, key=lambda k: (sizes[k], errors_[k].sum()))
-    gain = 1.0 - errors_[best].sum() / none.sum()
-    return best, Round(rivals[best], probability, float(gain),
-                       tuple((rivals[k].key, float(wins[k])) for k in order if wins[k] > 0.005), same)  # fmt: skip
+    same = tuple(dict.fromkeys(rivals[k].effect for k in said.close))
+    wins = tuple((rivals[k].key, float(said.wins[k])) for k in np.argsort(-said.wins) if said.wins[k] > 0.005)
+    return said.chosen, Round(rivals[said.chosen], said.probability, said.gain, wins, same)

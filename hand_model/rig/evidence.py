@@ -1,0 +1,69 @@
+"""What held-out errors of rivals say, from resampled recordings: who is better beyond doubt, who is simply as good.
+
+Cluster bootstrap (Davison & Hinkley 1997, sec. 3.8): whole recordings are drawn where there are enough of them, since
+blocks of one recording share what is peculiar to it; else blocks. A tie goes to the simpler rival within one standard
+error of the best (Breiman et al. 1984).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+RESAMPLES = 600
+BEYOND_DOUBT = 0.95
+ENOUGH = 6  # recordings from which on they are drawn whole
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """best, chosen: indices among those that beat nothing beyond doubt (chosen is the simplest as good as the best);
+    probability: of the chosen one against nothing; wins (rivals,): share of resamples in which each is best of all; close:
+    not told from the best, in order of error; gain: share of the error of "nothing" that the chosen one takes away."""
+
+    best: int
+    chosen: int
+    probability: float
+    wins: Array
+    close: tuple[int, ...]
+    gain: float
+
+
+def multiplicities(group: Array, count: int = RESAMPLES, seed: int = 0) -> Array:
+    """How often each block is drawn (count, blocks); group (blocks,): recording of each block."""
+    random = np.random.default_rng(seed)
+    names, unit = np.unique(group, return_inverse=True)
+    if len(names) < ENOUGH:
+        unit = np.arange(len(group))
+    total = int(unit.max()) + 1
+    drawn = random.integers(0, total, (count, total))
+    return np.stack([np.bincount(row, minlength=total) for row in drawn]).astype(float)[:, unit]
+
+
+def weigh(none: Array, errors: Array, sizes: Sequence[int], group: Array) -> Verdict | None:
+    """Compare rivals (errors (rivals, blocks), sizes: parameters) with each other and with "nothing" (none (blocks,)); None
+    where nothing is beaten by none of them beyond doubt."""
+    draws = multiplicities(group)
+    resampled, base, total = errors @ draws.T, draws @ none, errors.sum(1)
+    against = np.mean(resampled < base, 1)
+    sure = [k for k in range(len(errors)) if against[k] >= BEYOND_DOUBT]
+    if not sure:
+        return None
+    best = min(sure, key=lambda k: total[k])
+    close = [k for k in sure if np.mean(resampled[best] < resampled[k]) < BEYOND_DOUBT]
+    close.sort(key=lambda k: total[k])
+    spread = [float(np.std(resampled[k] - resampled[best])) for k in range(len(errors))]
+    tied = [k for k in close if total[k] - total[best] <= spread[k]]
+    chosen = min(tied, key=lambda k: (sizes[k], total[k]))
+    return Verdict(
+        best,
+        chosen,
+        float(against[chosen]),
+        np.bincount(np.argmin(resampled, 0), minlength=len(errors)) / len(draws),
+        tuple(close),
+        float(1.0 - total[chosen] / max(none.sum(), 1e-300)),
+    )
