@@ -139,12 +139,14 @@ def _place(model: Any, hand: Hand, found: Effect) -> Place | None:
     station = effect(found.effect).station
     equality = None
     if station != "drive":
-        follower = identity(kinds.mjOBJ_JOINT, f"{found.where.get('finger')}_{found.where.get('joint')}")
-        of = {"encoder": model.eq_obj2id == joint, "linkage": model.eq_obj1id == follower}[station]
-        rows = np.flatnonzero(of & (model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)))
-        if not len(rows):
+        if station == "encoder":
+            equality = identity(kinds.mjOBJ_EQUALITY, f"{name}_map")
+        else:
+            follower = identity(kinds.mjOBJ_JOINT, f"{found.where.get('finger')}_{found.where.get('joint')}")
+            rows = np.flatnonzero((model.eq_obj1id == follower) & (model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)))
+            equality = int(rows[0]) if follower >= 0 and len(rows) else -1
+        if equality < 0:
             return None
-        equality = int(rows[0])
     motor = next((m for m in hand.motors if m.actuator == name), None)
     give = 0.0 if motor is None or "presliding" not in motor.parameters else motor.parameters["presliding"].value
     unit = float(model.numeric_data[model.numeric_adr[number]])
@@ -161,7 +163,7 @@ def _moment(model: Any, data: Any, place: Place, step: float, bristle: Callable[
 
 def _follower(model: Any, data: Any, place: Place, step: float) -> Moment:
     driver = int(model.eq_obj2id[place.equality])
-    scale = 1.0 if driver == place.joint else np.pi / 180  # the map's driver is in percent, or in radians for degrees
+    scale = 1.0 if effect(place.effect.effect).station == "encoder" else np.pi / 180  # percent, or radians for degrees
     position = float(data.qpos[model.jnt_qposadr[driver]])
     slope = np.polynomial.polynomial.polyval(position, model.eq_data[place.equality, 1:5] * np.arange(1, 5))
     return Moment(data.time, step, position / scale, float(data.qvel[model.jnt_dofadr[driver]]) / scale, 0.0, place.give,

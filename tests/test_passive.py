@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from hand_model.effects import catalogue, effect
 from hand_model.effects.base import DriveState
 from hand_model.effects.path import dahl, travelled
-from hand_model.hand import Effect, Estimate, Hand, Motor
+from hand_model.hand import Effect, EncoderMap, Estimate, Finger, Hand, Joint, Motor
 
 mujoco = pytest.importorskip("mujoco")
 etree = pytest.importorskip("lxml.etree")
@@ -46,6 +48,9 @@ DRIVE = [
 ]
 # Nothing of them is a force of the drive: an obstacle of one recording, a controller's speed, what is read of a command.
 NOT_OF_THE_DRIVE = {"external_contact"}
+# An encoder's own error and a clock are no motion of the finger; one that runs ahead is pushed by something else.
+NOT_OF_A_MAP = {"encoder_periodic_error", "clock_drift", "spring_decoupling"}
+MOTOR_NAMES = {"inertia": "inertia", "viscous": "viscous", "coulomb": "coulomb", "spring": "stiffness", "preload": "preload"}
 
 
 def state(elapsed_s: float = 5.0) -> DriveState:
@@ -62,11 +67,16 @@ def state(elapsed_s: float = 5.0) -> DriveState:
     return DriveState("log/a.csv", "index", t, x, v, a, 0 * x, declared, declared_names=tuple(DECLARED), extra=extra)
 
 
+def every(found, amplitude: dict[str, float]) -> dict[str, float]:
+    """All amplitudes of an effect, zero where none is given."""
+    return {a[0]: amplitude.get(a[0], 0.0) for a in found.amplitudes()}
+
+
 def predicted(name: str, shape: dict[str, float], amplitude: dict[str, float], now: DriveState) -> np.ndarray:
     """Current (n,) [raw] of the declared model with the effect, by the effect's own columns."""
     found = effect(name)
     columns = np.concatenate([found.declared(now, shape), found.columns(now, shape)], axis=1)
-    current = found.warp(now, columns, shape) @ np.array([*DECLARED.values(), *amplitude.values()])
+    current = found.warp(now, columns, shape) @ np.array([*DECLARED.values(), *every(found, amplitude).values()])
     return found.clip(current, shape) if found.clips else current
 
 
@@ -74,7 +84,7 @@ def motor_with(name: str, shape: dict[str, float], amplitude: dict[str, float]):
     """The compiled motor with the effect written into it, and its hand."""
     from hand_model.diagnose.inverse import CompiledMotor
 
-    values = effect(name).parameters(shape, amplitude, DECLARED)
+    values = effect(name).parameters(shape, every(effect(name), amplitude), DECLARED)
     root = etree.fromstring(MOTOR)
     place = effect(name).write_mjcf(root, {"actuator": "index"}, values)
     assert (place is None) != (effect(name).law(values) is None)  # either the file holds it or the callback applies it
@@ -101,5 +111,72 @@ def test_written_and_replayed_effect_is_the_effects_own_column(name, shape, ampl
         assert np.quantile(error, 0.99) < tolerance * size + 0.3  # friction turns over within steps of 2 ms
 
 
-def test_every_drive_effect_is_replayed() -> None:
+FINGER = """<mujoco><compiler angle="radian"/><option timestep="0.001" integrator="implicitfast"/><worldbody><body name="palm">
+<body name="index_proximal_link"><inertial pos="0.02 0 0" mass="0.01" diaginertia="1e-6 1e-6 1e-6"/>
+<joint name="index_proximal" type="hinge" axis="0 1 0" armature="1e-4" damping="1e-3"/>
+<body name="index_distal_link" pos="0.04 0 0"><inertial pos="0.01 0 0" mass="0.005" diaginertia="1e-6 1e-6 1e-6"/>
+<joint name="index_distal" type="hinge" axis="0 1 0"/></body></body></body></worldbody>
+<equality><joint name="index_linkage" joint1="index_distal" joint2="index_proximal" polycoef="0.02 0.7 0.15 0 0" solref="0.002 1"
+ solimp="0.9999 0.9999 0.001 0.5 2"/></equality></mujoco>"""
+ENCODER, LINKAGE = np.array([0.02, 1.1, 0.25, -0.1]), np.array([0.02, 0.7, 0.15, 0.0, 0.0])  # rad over the share of the range; over rad
+KINEMATIC = [
+    ("drive_backlash", {"gap": 2.5, "form": 0.0}, {}),
+    ("series_elasticity", {"form": 0.0}, {"compliance": 0.02}),
+    ("series_elasticity", {"form": 1.0}, {"compliance": 0.02}),
+    ("linkage_backlash", {"gap": 2.0, "form": 0.0}, {}),
+    ("linkage_compliance", {"form": 0.0}, {"compliance": 0.03}),
+    ("linkage_compliance", {"form": 1.0}, {"compliance": 0.02}),
+    ("coupling_deadband", {"until": 15.0, "corner": 0.1}, {}),
+    ("distal_stop", {"from": 50.0, "passing": 0.0}, {}),
+    ("distal_stop", {"from": 50.0, "passing": 0.2}, {}),
+]
+
+
+def kinematic_state(station: str) -> DriveState:
+    """The same motion, as the percent of an encoder or the degrees of a proximal joint, under a load."""
+    now = state()
+    x = now.position if station == "encoder" else 0.72 * now.position
+    scale = 100.0 if station == "encoder" else 70.0
+    declared = np.stack([(x / scale) ** k for k in range(4 if station == "encoder" else 5)], axis=-1)
+    polynomial = np.polynomial.Polynomial(ENCODER if station == "encoder" else LINKAGE)
+    u, per = (x / 100, 0.01) if station == "encoder" else (np.deg2rad(x), np.deg2rad(1.0))
+    extra = {"scale": 0 * x + scale, "load": now.declared @ np.array(list(DECLARED.values())),
+             "slope": np.rad2deg(polynomial.deriv()(u)) * per}
+    return DriveState("log/a.csv", "index", now.time_s, x, now.velocity, now.acceleration, np.rad2deg(polynomial(u)), declared,
+                      "%" if station == "encoder" else "deg", "deg", extra, tuple(f"power_{k}" for k in range(declared.shape[1])))
+
+
+@pytest.mark.parametrize(("name", "shape", "amplitude"), KINEMATIC, ids=[f"{d[0]}_{i}" for i, d in enumerate(KINEMATIC)])
+def test_written_finger_moves_as_the_effect_predicts(name, shape, amplitude, tmp_path) -> None:
+    from hand_model.compile.motor import write_motors
+    from hand_model.diagnose.forward import follower_along
+
+    station, now = effect(name).station, kinematic_state(effect(name).station)
+    joint = "proximal" if station == "encoder" else "distal"
+    where = {"finger": "index", "joint": joint, "actuator": "index"}
+    values = effect(name).parameters(shape, amplitude, {})
+    found = Effect(name, where, {k: Estimate(v, None, "", "") for k, v in values.items()})
+    motor = Motor("index", 0.0, 100.0, {MOTOR_NAMES[k]: Estimate(v, None, "", "") for k, v in DECLARED.items()}, 1.0, ())
+    hinge = Joint("proximal", np.array([0, 1.0, 0]), np.zeros(3), np.zeros((6, 6)), (0.0, 1.4), {})
+    finger = Finger("index", "index", (hinge, replace(hinge, name="distal")), (EncoderMap(0.0, 100.0, ENCODER, {}, {}),))
+    hand = Hand("h", "left", {}, {}, (finger,), 1e-4, {}, (motor,), (found,))
+    root = etree.fromstring(FINGER)
+    write_motors(root, hand)
+    place = effect(name).write_mjcf(root, where, values)
+    assert (place is None) != (effect(name).law(values) is None)
+    (tmp_path / "index.xml").write_bytes(etree.tostring(root))
+    hand.save(tmp_path / "hand.json")
+    moved = np.rad2deg(follower_along(tmp_path, now, where, station))
+    per = np.array([now.extra["scale"][0] ** k for k in range(now.declared.shape[1])])
+    unit = 0.01 if station == "encoder" else np.deg2rad(1.0)
+    powers = np.rad2deg(ENCODER if station == "encoder" else LINKAGE) * per * unit ** np.arange(len(per))
+    columns = effect(name).columns(now, shape)
+    wanted = effect(name).declared(now, shape) @ powers + columns @ np.array(list(amplitude.values()) if columns.shape[1] else [])
+    size = np.abs(wanted - now.effort).max()
+    assert size > 0.5
+    assert np.quantile(np.abs(moved - wanted), 0.95) < 0.05 * size + 0.03  # fast reversals: the finger follows on its nominal spring
+
+
+def test_every_effect_of_a_force_or_a_map_is_replayed() -> None:
     assert {d[0] for d in DRIVE} | NOT_OF_THE_DRIVE == {e.name for e in catalogue("drive")}
+    assert {d[0] for d in KINEMATIC} | NOT_OF_A_MAP == {e.name for e in (*catalogue("encoder"), *catalogue("linkage"))}

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ..effects.input import map_of, settle
 from ..hand import Finger, Hand, Motor
 from .xml import child, comment, number, vector
 
@@ -55,6 +56,7 @@ def complete_keyframes(root: Any, hand: Hand) -> None:
             rotor, lever = _own_joints(root, motor.actuator)
             pose[rotor] = control[motor.actuator] = percent
             pose[lever] = float(np.polynomial.polynomial.polyval(percent, angle))
+        settle(root, pose)
         key.set("qpos", vector([pose[n] for n in joints]))
         if actuators:
             key.set("ctrl", vector([control[n] for n in actuators]))
@@ -78,7 +80,7 @@ def _joint(root: Any, finger: Finger) -> Any:
 def _own_joints(root: Any, actuator: str) -> tuple[str, str]:
     """Names of the motor joint and of the lever of a written actuator."""
     rotor = next(a for a in root.iterfind("actuator/*") if isinstance(a.tag, str) and a.get("name") == actuator).get("joint")
-    return rotor, next(e for e in root.iterfind("equality/joint") if e.get("joint2") == rotor).get("joint1")
+    return rotor, map_of(root, {"actuator": actuator}, "encoder").get("joint1")
 
 
 def _free(root: Any, name: str) -> str:

@@ -17,6 +17,7 @@ from .findings import Finding
 Array = NDArray[np.float64]
 
 INVERSE = "mujoco: mj_inverse of the compiled motor along the recorded motion"
+FORWARD = "mujoco: the compiled finger simulated, its driver on the recorded path"
 RESAMPLES = 1000
 
 
@@ -25,21 +26,46 @@ def proved(finding: Finding, station: Any, before: Path, after: Path) -> dict[st
 
     station: where it was named, None for what was read from events.
     """
-    if station is None or station.signal != "current" or not effect(finding.effect).of_the_hand:
-        return {**finding.fit, "note": effect(finding.effect).unwritten or "not replayed"}
+    kind = effect(finding.effect)
+    if station is None or not kind.of_the_hand or kind.unwritten:
+        return {**finding.fit, "note": kind.unwritten or "read from events, not from a balance"}
+    states = kept_out(station.naming.balance.states)
+    replay = _currents if station.signal == "current" else _angles
+    errors = [replay(station, finding, folder, fit, states)
+              for folder, fit in ((before, station.naming.declared), (after, station.naming.fit))]
+    if errors[0] is None or errors[1] is None:
+        return {**finding.fit, "note": "no compiled file has its motor or its joint"}
+    every = bool(kind.warps or kind.replaces)
+    used = [_used(s, every) for s in states]
+    r0, r1 = ([e[u] for e, u in zip(error, used, strict=True)] for error in errors)
+    blocks = [_blocks(s)[u] for s, u in zip(states, used, strict=True)]
+    return {**finding.fit, **reduction(r0, r1, blocks), "engine": INVERSE if station.signal == "current" else FORWARD,
+            "held_out": [s.trial for s in states if s.validate]}
+
+
+def _currents(station: Any, finding: Finding, folder: Path, fit: Any, states: Sequence[DriveState]) -> list[Array] | None:
+    """Current recorded minus what the compiled motor needs (n,) [raw], per recording."""
     from .inverse import current_along, read_motor
 
-    motors = [read_motor(folder, station.actuator) for folder in (before, after)]
-    if None in motors:
-        return {**finding.fit, "note": f'no compiled file has a motor "{station.actuator}"'}
-    states = kept_out(station.naming.balance.states)
-    every = effect(finding.effect).warps or effect(finding.effect).replaces
-    errors: list[list[Array]] = []
-    for motor in motors:
-        errors.append([(s.effort - current_along(motor, s))[_used(s, bool(every))] for s in states])
-    blocks = [_blocks(s)[_used(s, bool(every))] for s in states]
-    return {**finding.fit, **reduction(errors[0], errors[1], blocks), "engine": INVERSE,
-            "held_out": [s.trial for s in states if s.validate]}
+    motor = read_motor(folder, station.actuator)
+    return None if motor is None else [s.effort - current_along(motor, s) for s in states]
+
+
+def _angles(station: Any, finding: Finding, folder: Path, fit: Any, states: Sequence[DriveState]) -> list[Array] | None:
+    """Angle recorded minus that of the compiled joint (n,) [deg], per recording; less what belongs to the recording itself, its
+    clock's offset and steps of slipped markers."""
+    from .forward import follower_along
+
+    out = []
+    where = {"finger": station.finger, "joint": station.joint, "actuator": station.actuator}
+    for state in states:
+        moved = follower_along(folder, state, where, "encoder" if station.signal == "encoder" else "linkage")
+        if moved is None:
+            return None
+        own = [i for i, name in enumerate(state.declared_names) if not name.startswith("power_")]
+        nuisance = state.declared[:, own] @ np.array([fit.declared[state.declared_names[i]] for i in own])
+        out.append(state.effort - nuisance - np.rad2deg(moved))
+    return out
 
 
 def kept_out(states: Sequence[DriveState]) -> tuple[DriveState, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
 from .driven import driven
+from .input import map_of, write_bound
 
 
 class CouplingDeadband(Effect):
@@ -38,6 +40,11 @@ class CouplingDeadband(Effect):
         """From the start of the range to where it moves."""
         low, _ = position_range(states)
         return {"position": [low, shape["until"]], "unit": states[0].position_unit}
+
+    def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
+        """An input joint behind the driver that does not go below where the motion begins."""
+        equality = map_of(root, where, self.station)
+        return None if equality is None else write_bound(root, equality, -1, math.radians(parameters["until"]))
 
 
 EFFECT = CouplingDeadband()

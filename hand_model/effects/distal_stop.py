@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
 from .driven import driven
+from .input import map_of, write_bound
 
 
 class DistalStop(Effect):
@@ -38,6 +40,12 @@ class DistalStop(Effect):
         """From where it stops to the end of the range."""
         _, high = position_range(states)
         return {"position": [shape["from"], high], "unit": states[0].position_unit}
+
+    def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
+        """An input joint behind the driver that does not go beyond the stop, save for what passes."""
+        equality = map_of(root, where, self.station)
+        at = math.radians(parameters["from"])
+        return None if equality is None else write_bound(root, equality, 1, at, parameters["passing"])
 
 
 EFFECT = DistalStop()

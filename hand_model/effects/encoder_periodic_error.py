@@ -15,6 +15,7 @@ class EncoderPeriodicError(Effect):
     name = "encoder_periodic_error"
     repeats = True  # further harmonics
     station = "encoder"
+    unwritten = "the reading of the encoder is not what a simulation moves: kept in hand.json, the log is corrected in a copy"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """Period, dense in wavenumber."""

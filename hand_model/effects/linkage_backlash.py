@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
 from .driven import driven, soft_play
+from .input import map_of, write_play
 
 
 class LinkageBacklash(Effect):
@@ -31,6 +34,11 @@ class LinkageBacklash(Effect):
     def declared(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """The map's columns of the position behind the gap."""
         return driven(state, lambda x: soft_play(x, shape["gap"], 0.5 * shape["form"]))
+
+    def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
+        """An input joint behind the driver, within the gap."""
+        equality = map_of(root, where, self.station)
+        return None if equality is None else write_play(root, equality, math.radians(parameters["gap"]))
 
 
 EFFECT = LinkageBacklash()

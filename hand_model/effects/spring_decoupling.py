@@ -15,6 +15,7 @@ class SpringDecoupling(Effect):
 
     name = "spring_decoupling"
     station = "encoder"
+    unwritten = "the finger runs ahead under a force from outside, which no recording holds; the compiled push tendon lets it"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """form 0: for a while, "ahead" in `extra`; form 1: below an encoder position, at which the finger stays behind."""

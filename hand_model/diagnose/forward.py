@@ -1,0 +1,151 @@
+"""Forward replay of a compiled hand: one joint on its recorded path, everything behind it moved by the file's own elements.
+
+Contact and gravity are off (the pose of the palm is not the question), limits, tendons and equalities on; effects that the file
+cannot hold act through the passive-force callback, the motor's load being the recorded one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..effects.base import DriveState
+from ..effects.input import SUFFIX
+from ..engines.mujoco import HOLD, on_linkages
+from ..hand import load_hand
+from ..passive import effects_on
+
+Array = NDArray[np.float64]
+
+STEP_S = 0.002
+
+
+def follower_along(folder: Path, state: DriveState, where: Mapping[str, Any], station: str) -> Array | None:
+    """Angle (n,) [rad] of a joint of a compiled folder while its driver moves as in `state`; None where no file has both.
+
+    where: "finger", "joint" and "actuator" of a finding. station "encoder": the driver is the motor, in percent, and the joint stands
+    behind its lever. "linkage": the driver is the joint's own, in degrees.
+    """
+    import mujoco
+
+    for file in sorted(f for f in folder.glob("*.xml") if not f.name.startswith("scene")):
+        model = mujoco.MjModel.from_xml_path(str(file))
+        follower = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, f"{where['finger']}_{where['joint']}")
+        driver = _driver(model, str(where["actuator"]), follower, station)
+        if driver is not None:
+            path = state.position if station == "encoder" else np.deg2rad(state.position)
+            return _roll(model, load_hand(folder / "hand.json"), state, str(where["actuator"]), driver, path, follower)
+    return None
+
+
+def _driver(model: Any, actuator_name: str, follower: int, station: str) -> int | None:
+    """Id of the joint that is put on the recorded path."""
+    import mujoco
+
+    if follower < 0:
+        return None
+    if station == "encoder":
+        actuator = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator_name)
+        joint = int(model.actuator_trnid[actuator, 0]) if actuator >= 0 else -1
+        # a nominal actuator acts on the finger itself: such a file has no motor
+        return joint if joint >= 0 and joint != follower else None
+    rows = np.flatnonzero((model.eq_obj1id == follower) & (model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)))
+    return _behind_inputs(model, int(model.eq_obj2id[rows[0]])) if len(rows) else None
+
+
+def _behind_inputs(model: Any, joint: int) -> int:
+    """The joint that an input joint follows, over any number of inputs."""
+    while SUFFIX in model.joint(joint).name:
+        tendon = next(t for t in range(model.ntendon) if model.wrap_objid[model.tendon_adr[t] + 1] == joint
+                      and model.tendon_num[t] == 2)
+        joint = int(model.wrap_objid[model.tendon_adr[tendon]])
+    return joint
+
+
+def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, path: Array, follower: int) -> Array:
+    import mujoco
+    from scipy.interpolate import PchipInterpolator
+
+    model.opt.timestep = STEP_S
+    model.opt.gravity[:] = 0
+    model.opt.tolerance = 1e-16  # of forces on inertias a millionth of the held one
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    held = {driver}
+    for actuator in range(len(model.actuator_trnid)):
+        joint = int(model.actuator_trnid[actuator, 0])
+        held.add(joint)  # motors whose finger is moved otherwise rest where they are
+        if mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator) == motor:
+            model.actuator_gainprm[actuator, 0] = _unit(model, motor)
+            model.actuator_biasprm[actuator] = 0.0
+            model.actuator_ctrllimited[actuator] = 0
+    address, dof = model.jnt_qposadr[list(held)], model.jnt_dofadr[list(held)]
+    model.dof_armature[dof] = HOLD
+    at, rate = model.jnt_qposadr[driver], model.jnt_dofadr[driver]
+    spline = PchipInterpolator(state.time_s, path)
+    grid = np.arange(state.time_s[0], state.time_s[-1] + STEP_S, STEP_S)
+    position, velocity = spline(grid.clip(None, state.time_s[-1])), spline(grid.clip(None, state.time_s[-1]), 1)
+    load = np.interp(grid, state.time_s, state.extra.get("load", np.zeros(len(state.time_s))))
+    data, out = mujoco.MjData(model), np.empty(len(grid))
+    data.qpos[at] = position[0]
+    data.qpos[:] = _started(model, data.qpos, driver)
+    rest = data.qpos[address].copy()
+    with effects_on(model, hand):
+        for i, (x, v, f) in enumerate(zip(position, velocity, load, strict=True)):
+            data.qpos[address], data.qvel[dof] = rest, 0.0
+            data.qpos[at], data.qvel[rate] = x, v
+            data.ctrl[:] = f  # of other motors, which rest on their places, it does not matter
+            out[i] = data.qpos[model.jnt_qposadr[follower]]
+            mujoco.mj_step(model, data)
+    return np.interp(state.time_s, grid, out)
+
+
+def _unit(model: Any, motor: str) -> float:
+    """Effort per raw unit of current of a motor."""
+    import mujoco
+
+    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, f"{motor}_effort_per_raw")
+    return float(model.numeric_data[model.numeric_adr[number]]) if number >= 0 else 1.0
+
+
+def _started(model: Any, qpos: Array, driver: int) -> Array:
+    """qpos (nq,) with inputs at the end of their tendons' ranges that a first stroke finds closed, followers on their maps."""
+    out = on_linkages(model, qpos)
+    for joint in range(model.njnt):
+        if SUFFIX in model.joint(joint).name and _behind_inputs(model, joint) == driver:
+            out[model.jnt_qposadr[joint]] = _within(model, out, joint, driver)
+    out = on_linkages(model, out)
+    return _pushed(model, out)
+
+
+def _within(model: Any, qpos: Array, joint: int, driver: int) -> float:
+    """Coordinate of an input joint: the driver's plus half the gap of its play, within the tendons that bound it."""
+    low, high, gap = -np.inf, np.inf, 0.0
+    for t in range(model.ntendon):
+        parts = slice(model.tendon_adr[t], model.tendon_adr[t] + model.tendon_num[t])
+        joints, coefficients = model.wrap_objid[parts].tolist(), model.wrap_prm[parts]
+        if joint not in joints or not model.tendon_limited[t]:
+            continue
+        own = coefficients[joints.index(joint)]
+        rest = sum(c * qpos[model.jnt_qposadr[j]] for j, c in zip(joints, coefficients, strict=True) if j != joint)
+        ends = sorted((model.tendon_range[t] - rest) / own)
+        low, high = max(low, ends[0]), min(high, ends[1])
+        if np.ptp(model.tendon_range[t]) < 1e5:
+            gap = float(np.ptp(ends))
+    return float(np.clip(qpos[model.jnt_qposadr[driver]] + 0.5 * gap, low, high))
+
+
+def _pushed(model: Any, qpos: Array) -> Array:
+    """qpos (nq,) with every finger on its lever, and what follows it on its maps."""
+    import mujoco
+
+    out = qpos.copy()
+    for t in range(model.ntendon):
+        name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_TENDON, t) or ""
+        if name.endswith("_push"):
+            finger, lever = model.wrap_objid[model.tendon_adr[t]], model.wrap_objid[model.tendon_adr[t] + 1]
+            out[model.jnt_qposadr[finger]] = max(out[model.jnt_qposadr[finger]], out[model.jnt_qposadr[lever]])
+    return on_linkages(model, out)

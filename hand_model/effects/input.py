@@ -1,0 +1,118 @@
+"""An input joint in a compiled MJCF: what an equality's driver becomes before the equality's polynomial takes it.
+
+Lost motion, a dead band and a stop are changes of the driver: follower = map(input), with the input tied to the driver by
+tendons with a one- or two-sided range. The input is a joint without mass worth mentioning, on a body of its own on the palm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from .mjcf import fixed_tendon, free_name, motor_joint
+
+HOLD = 2e-4  # friction that keeps a loose part where it is [N m per unit of the driver]; the weight of a finger may move it
+INERTIA = 1e-7  # of an input joint, that of a compiled lever
+YIELD_RATE = 150.0  # rad/s: of a follower on the spring that lets a stop hold it back, as of a finger on its actuator
+HARD = {"solreflimit": (0.002, 1.0), "solimplimit": (0.9999, 0.9999, 0.001, 0.5, 2.0)}
+FRICTION = {"solreffriction": "0.004 1", "solimpfriction": "0.9999 0.9999 0.001 0.5 2"}
+SUFFIX = "_input"
+
+
+def map_of(root: Any, where: Mapping[str, Any], station: str) -> Any:
+    """The joint equality that maps a driver to the place's follower: of the lever ("encoder") or of a joint ("linkage"); None
+    where the file has none."""
+    if station == "encoder":
+        found = motor_joint(root, where)
+        wanted = None if found is None else (lambda e: _source(root, e.get("joint2")) == found[0].get("name"))
+    else:
+        follower = f"{where.get('finger')}_{where.get('joint')}"
+        wanted = lambda e: e.get("joint1") == follower
+    return None if wanted is None else next((e for e in root.iterfind("equality/joint") if wanted(e)), None)
+
+
+def _source(root: Any, joint: str) -> str:
+    """The joint behind a chain of inputs."""
+    while joint.endswith(SUFFIX) or SUFFIX + "_" in joint:
+        tendon = next(t for t in root.iterfind("tendon/fixed") if t.findall("joint")[-1].get("joint") == joint)
+        joint = tendon.find("joint").get("joint")
+    return joint
+
+
+def _put_between(root: Any, equality: Any) -> tuple[str, str]:
+    """Put an input joint between an equality and its driver; names of driver and input."""
+    from lxml import etree
+
+    driver = equality.get("joint2")
+    name = free_name(root, f"{equality.get('name')}{SUFFIX}")
+    palm = root.find("worldbody").find("body")
+    body = etree.SubElement(palm, "body", name=free_name(root, f"{name}_link"))
+    etree.SubElement(body, "inertial", pos="0 0 0", mass="1e-9", diaginertia="1e-9 1e-9 1e-9")
+    etree.SubElement(body, "joint", name=name, type="hinge", pos="0 0 0", axis="0 0 1", ref="0", limited="false",
+                     armature=repr(INERTIA))
+    equality.set("joint2", name)
+    return driver, name
+
+
+def write_play(root: Any, equality: Any, gap: float) -> str:
+    """The input lags by half the `gap` [driver's unit] and stays while the driver crosses it; path of the tendon."""
+    driver, name = _put_between(root, equality)
+    joint = next(j for j in root.find("worldbody").iter("joint") if j.get("name") == name)
+    joint.set("frictionloss", repr(HOLD))
+    for key, value in FRICTION.items():
+        joint.set(key, value)
+    return _limit(root, f"{name}_gap", {driver: 1.0, name: -1.0}, -0.5 * gap, 0.5 * gap)
+
+
+def write_bound(root: Any, equality: Any, side: int, at: float, passing: float = 0.0) -> str:
+    """The input follows the driver up to `at` (side 1) or down to it (side -1), and a share `passing` of the motion beyond;
+    a spring holds it on the driver elsewhere. `at` in the driver's unit. Path of the tendon that bounds it."""
+    driver, name = _put_between(root, equality)
+    inertia = _inertia(root, equality)
+    next(j for j in root.find("worldbody").iter("joint") if j.get("name") == name).set("armature", repr(inertia))
+    spring = {"stiffness": inertia * YIELD_RATE**2, "damping": 2 * inertia * YIELD_RATE, "springlength": 0.0}
+    ends = (0.0, 1e6) if side > 0 else (-1e6, 0.0)  # driver - input: the input is never beyond the driver
+    _limit(root, f"{name}_follow", {driver: 1.0, name: -1.0}, *ends, **spring)
+    bound = (1 - passing) * at
+    ends = (-1e6, bound) if side > 0 else (bound, 1e6)
+    return _limit(root, f"{name}_stop", {driver: -passing, name: 1.0}, *ends)
+
+
+def _limit(root: Any, name: str, coefficients: Mapping[str, float], low: float, high: float, **more: Any) -> str:
+    place = fixed_tendon(root, free_name(root, name), coefficients, range=(low, high), **HARD, **more)
+    root.find("tendon")[-1].set("limited", "true")
+    return place
+
+
+def _inertia(root: Any, equality: Any) -> float:
+    """Nominal inertia of an equality's follower, at its driver [kg m^2]."""
+    joint = next(j for j in root.find("worldbody").iter("joint") if j.get("name") == equality.get("joint1"))
+    inertial = joint.getparent().find("inertial")
+    position = np.array([float(x) for x in inertial.get("pos").split()])
+    slope = max(abs(float(equality.get("polycoef").split()[1])), 1e-3)
+    return (float(inertial.get("mass")) * float(position @ position) + 1e-6) * slope**2
+
+
+def settle(root: Any, pose: dict[str, float]) -> None:
+    """Put every input joint of `pose` (joint -> coordinate, changed in place) within its tendons, near its driver, and every
+    follower on its map."""
+    tendons = [(float(t.get("range").split()[0]), float(t.get("range").split()[1]),
+                {j.get("joint"): float(j.get("coef")) for j in t.findall("joint")})
+               for t in root.iterfind("tendon/fixed") if t.get("range")]
+    for equality in root.iterfind("equality/joint"):
+        driver = equality.get("joint2")
+        if driver not in pose:
+            continue
+        if SUFFIX in driver:
+            source = _source(root, driver)
+            low, high = -np.inf, np.inf
+            for a, b, joints in tendons:
+                if driver in joints:
+                    rest = sum(c * pose[j] for j, c in joints.items() if j != driver)
+                    ends = sorted(((a - rest) / joints[driver], (b - rest) / joints[driver]))
+                    low, high = max(low, ends[0]), min(high, ends[1])
+            pose[driver] = float(np.clip(pose[source], low, high))
+            coefficients = [float(x) for x in equality.get("polycoef").split()]
+            pose[equality.get("joint1")] = float(np.polynomial.polynomial.polyval(pose[driver], coefficients))
