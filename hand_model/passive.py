@@ -27,7 +27,8 @@ LEAST_GIVE = 0.1  # [%]: the bristle of a motor whose file has plain Coulomb fri
 @dataclass(frozen=True)
 class Place:
     """Where one effect acts in a model. actuator, joint: ids of the motor and its joint, in the unit [effort per raw].
-    equality: id of the follower's equality, None for a load on the motor joint. give: bristle length [%]."""
+    equality: id of the follower's equality, None for a load on the motor joint. give: bristle length [%]. plane: (2, 3) unit vectors in
+    the palm, along the open finger and where flexion takes it."""
 
     effect: Effect
     actuator: int
@@ -35,6 +36,7 @@ class Place:
     unit: float
     equality: int | None
     give: float
+    plane: Any
 
 
 class Memory:
@@ -150,15 +152,32 @@ def _place(model: Any, hand: Hand, found: Effect) -> Place | None:
     motor = next((m for m in hand.motors if m.actuator == name), None)
     give = 0.0 if motor is None or "presliding" not in motor.parameters else motor.parameters["presliding"].value
     unit = float(model.numeric_data[model.numeric_adr[number]])
-    return Place(found, actuator, joint, unit, equality, max(give, LEAST_GIVE))
+    return Place(found, actuator, joint, unit, equality, max(give, LEAST_GIVE), _plane(model, str(name)))
+
+
+def _plane(model: Any, actuator: str) -> Any:
+    """Unit vectors (2, 3) in the palm, in the plane of the finger's first joint; the palm's x and y where the model has a motor alone."""
+    import mujoco
+
+    push = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TENDON, f"{actuator}_push")
+    if push < 0:
+        return np.eye(3)[:2]
+    joint = int(model.wrap_objid[model.tendon_adr[push]])
+    body = int(model.jnt_bodyid[joint])
+    axis, tips = model.jnt_axis[joint], [model.site_pos[s] for s in range(model.nsite) if model.site_bodyid[s] == body]
+    arms = [model.body_pos[b] for b in range(model.nbody) if model.body_parentid[b] == body] + tips + [model.body_ipos[body]]
+    along = arms[0] - axis * (axis @ arms[0])
+    along = along / max(float(np.linalg.norm(along)), 1e-9)
+    return np.stack([along, np.cross(axis, along)])
 
 
 def _moment(model: Any, data: Any, place: Place, step: float, bristle: Callable[[float], float]) -> Moment:
     position = float(data.qpos[model.jnt_qposadr[place.joint]])
     velocity = float(data.qvel[model.jnt_dofadr[place.joint]])
     palm = data.xmat[model.body_parentid[model.jnt_bodyid[place.joint]]].reshape(3, 3)
+    along, across = (float(g) for g in place.plane @ (palm.T @ model.opt.gravity))
     return Moment(data.time, step, position, velocity, bristle(position), place.give,
-                  float(data.actuator_force[place.actuator]) / place.unit, palm.T @ model.opt.gravity)
+                  float(data.actuator_force[place.actuator]) / place.unit, along, across)
 
 
 def _follower(model: Any, data: Any, place: Place, step: float) -> Moment:
@@ -167,7 +186,7 @@ def _follower(model: Any, data: Any, place: Place, step: float) -> Moment:
     position = float(data.qpos[model.jnt_qposadr[driver]])
     slope = np.polynomial.polynomial.polyval(position, model.eq_data[place.equality, 1:5] * np.arange(1, 5))
     return Moment(data.time, step, position / scale, float(data.qvel[model.jnt_dofadr[driver]]) / scale, 0.0, place.give,
-                  float(data.actuator_force[place.actuator]) / place.unit, np.zeros(3), float(slope) * scale)
+                  float(data.actuator_force[place.actuator]) / place.unit, 0.0, 0.0, float(slope) * scale)
 
 
 def _move_target(data: Any, equality: int, shift_rad: float) -> None:

@@ -17,7 +17,7 @@ etree = pytest.importorskip("lxml.etree")
 
 GIVE, UNIT = 0.8, 2.0
 DECLARED = {"inertia": 0.012, "viscous": 0.15, "coulomb": 35.0, "spring": 0.22, "preload": 9.0}
-MOTOR = f"""<mujoco><compiler angle="radian"/><option gravity="3 0 -9" integrator="implicitfast" timestep="0.002"/><worldbody><body name="palm">
+MOTOR = f"""<mujoco><compiler angle="radian"/><option gravity="3 -9 0" integrator="implicitfast" timestep="0.002"/><worldbody><body name="palm">
  <body><inertial pos="0 0 0" mass="1e-9" diaginertia="1e-9 1e-9 1e-9"/><joint name="index_motor" axis="0 0 1" limited="false" damping="{UNIT * 0.15}"
  stiffness="{UNIT * 0.22}" springref="{-9 / 0.22}" armature="{UNIT * 0.012}"/></body></body></worldbody>
  <custom><numeric name="index_effort_per_raw" data="{UNIT}"/></custom>
@@ -42,7 +42,7 @@ DRIVE = [
     ("presliding_friction", {"bristle_length": 6.0}, {}, 0.02),
     ("quadratic_damping", {}, {"drag": 0.002}, 0.01),
     ("stribeck_friction", {"stribeck_speed": 18.0}, {"static_excess": 25.0}, 0.06),
-    ("thermal_friction_drift", {"warm_up_time": 30.0}, {"cold_excess": 12.0}, 0.02),
+    ("thermal_friction_drift", {"form": 0.0, "warm_up_time": 30.0, "cooling_time": 90.0}, {"cold_excess": 12.0}, 0.02),
     ("torque_ripple", {"period": 9.0}, {"sine": 4.0, "cosine": 3.0}, 0.01),
     ("viscoelastic_spring", {"relaxation_time": 1.2}, {"stiffness": 0.3}, 0.01),
 ]
@@ -63,7 +63,8 @@ def state(elapsed_s: float = 5.0) -> DriveState:
     smooth = np.convolve(np.pad(np.interp(fine, knots, level), 400, mode="edge"), kernel / kernel.sum(), mode="valid")
     x, v, a = (np.interp(t, fine, y) for y in (smooth, np.gradient(smooth, fine), np.gradient(np.gradient(smooth, fine), fine)))
     declared = np.stack([a, v, dahl(x, GIVE), x, np.ones_like(x)], axis=-1)
-    extra = {"bandwidth_s": 0 * t, "give": 0 * t + GIVE, "elapsed": t + elapsed_s, "gravity_x": 0 * t + 3.0, "gravity_z": 0 * t - 9.0}
+    extra = {"bandwidth_s": 0 * t, "give": 0 * t + GIVE, "elapsed": t + elapsed_s, "gravity_along": 0 * t + 3.0,
+             "gravity_across": 0 * t - 9.0, "gravity_x": 0 * t + 3.0, "gravity_z": 0 * t - 9.0}
     return DriveState("log/a.csv", "index", t, x, v, a, 0 * x, declared, declared_names=tuple(DECLARED), extra=extra)
 
 

@@ -6,16 +6,17 @@ the file cannot hold act through the passive-force callback, as a user would tur
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..effects import effect
 from ..effects.base import DriveState
 from ..effects.mjcf import motor_joint
-from ..hand import Hand, load_hand
+from ..hand import Estimate, Hand, load_hand
 from ..passive import effects_on
 
 Array = NDArray[np.float64]
@@ -90,14 +91,27 @@ def current_along(motor: CompiledMotor, state: DriveState) -> Array:
     own = np.delete(np.arange(len(data.actuator_force)), drive)  # passive motors have no control: nu does not count them
     data.time, data.qpos[0] = state.elapsed_s[0], path[0][0]
     data.plastic[:] = path[0][0]  # springs that yield start relaxed
-    with effects_on(model, motor.hand):
+    if "gravity_along" in state.extra:  # a motor without its finger has the plane of the finger in x and y
+        gravity = np.stack([np.interp(grid, state.time_s, state.extra[f"gravity_{k}"]) for k in ("along", "across")], axis=-1)
+    else:
+        gravity = np.broadcast_to(model.opt.gravity[:2], (len(grid), 2))
+    with effects_on(model, started(motor.hand, state)):
         for i, (x, v, a) in enumerate(zip(*path, strict=True)):
+            model.opt.gravity[:2] = gravity[i]
             data.qpos[0], data.qvel[0], data.qacc[0] = x, v, a
             mujoco.mj_inverse(model, data)
             mujoco.mj_fwdActuation(model, data)
             out[i] = data.qfrc_inverse[0] - data.actuator_force[own].sum()
             mujoco.mj_step(model, data)
     return _read(motor, np.interp(state.time_s, grid, out), state.time_s) / motor.unit
+
+
+def started(hand: Hand, state: DriveState) -> Hand:
+    """The hand with its effects as they stand when a recording begins (a drive that is warm by then)."""
+    effects = tuple(replace(e, parameters={**e.parameters, **{
+        k: Estimate(v, None, "1", "recording") for k, v in effect(e.effect).started(state, {k: x.value for k, x in e.parameters.items()}).items()}})
+        for e in hand.effects)
+    return replace(hand, effects=effects)
 
 
 def _read(motor: CompiledMotor, effort: Array, time_s: Array) -> Array:

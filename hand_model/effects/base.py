@@ -180,6 +180,10 @@ class Effect:
         """Not native: the passive-force callback applies it, where there is a law."""
         return None
 
+    def started(self, state: DriveState, parameters: Mapping[str, float]) -> dict[str, float]:
+        """Parameters that only a recording knows: what went before it. None here."""
+        return {}
+
     def law(self, parameters: Mapping[str, float]) -> Law | None:
         """What the passive-force callback applies (`hand_model.effects_on`); None where MJCF holds it, or nothing can."""
         return None

@@ -35,13 +35,13 @@ class GravityLoad(Effect):
         return np.stack([gz * np.cos(angle) - gx * np.sin(angle), gx * np.cos(angle) + gz * np.sin(angle)], axis=-1)
 
     def law(self, parameters: Mapping[str, float]) -> Law:
-        """Gravity in the palm's frame, turned with the finger."""
+        """Gravity in the finger's plane, turned with the finger."""
         along, across, sweep = (parameters[k] for k in ("along", "across", "sweep"))
 
         def load(now: Moment) -> float:
             angle = sweep * now.position / 100.0
-            gx, gz = now.gravity_palm[0] / 9.81, now.gravity_palm[2] / 9.81
-            return along * (gz * math.cos(angle) - gx * math.sin(angle)) + across * (gx * math.cos(angle) + gz * math.sin(angle))
+            x, y = now.gravity_along / 9.81, now.gravity_across / 9.81
+            return along * (y * math.cos(angle) - x * math.sin(angle)) + across * (x * math.cos(angle) + y * math.sin(angle))
 
         return load
 

@@ -6,18 +6,13 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True)
 class Moment:
     """One instant of a drive. time_s: since the simulation began [s]. step_s: since the last instant [s], zero where the same
     instant is asked again. position [%], velocity [%/s]. direction: of friction in [-1, 1], a bristle of length `give` [%].
-    load: what the motor delivers [raw]. gravity_palm: (3,) [m/s^2]. Of a follower: position in the driver's unit [%] or [deg],
-    slope of its map there [rad per that unit]."""
+    load: what the motor delivers [raw]. gravity_along, gravity_across: in the plane of the finger's first joint, along the open finger
+    and where flexion takes it [m/s^2]. Of a follower: position in the driver's unit [%] or [deg], slope of its map there [rad per that unit]."""
 
     time_s: float
     step_s: float
@@ -26,7 +21,8 @@ class Moment:
     direction: float
     give: float
     load: float
-    gravity_palm: Array
+    gravity_along: float
+    gravity_across: float
     slope: float = 0.0
 
 

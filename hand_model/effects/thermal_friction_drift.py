@@ -8,7 +8,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape
-from .law import Law
+from .law import Law, Moment
+
+MOVING = 1.0  # %/s: below, a drive is at rest
 
 
 class ThermalFrictionDrift(Effect):
@@ -36,10 +38,25 @@ class ThermalFrictionDrift(Effect):
         """Cold excess as a ratio to the warm Coulomb friction, and the warm-up time."""
         return {**amplitude, **shape, "ratio": amplitude["cold_excess"] / declared.get("coulomb", np.nan)}
 
+    def started(self, state: DriveState, parameters: Mapping[str, float]) -> dict[str, float]:
+        """Share of the excess that is left when a recording begins."""
+        if parameters.get("form", 0.0) < 0.5:
+            return {"cold": math.exp(-float(state.elapsed_s[0]) / parameters["warm_up_time"])}
+        cold = 1.0
+        for moved, rest in state.extra["history"]:
+            cold = 1 - (1 - cold * math.exp(-moved / parameters["warm_up_time"])) * math.exp(-rest / parameters["cooling_time"])
+        return {"cold": cold}
+
     def law(self, parameters: Mapping[str, float]) -> Law:
-        """Friction that fades with the time since the simulation began: the drive is cold then."""
-        excess, tau = parameters["cold_excess"], parameters["warm_up_time"]
-        return lambda now: excess * now.direction * math.exp(-now.time_s / tau)
+        """Friction that fades while time passes (form 0) or while the drive moves (form 1); cold to begin with."""
+        cold = [parameters.get("cold", 1.0)]
+
+        def load(now: Moment) -> float:
+            if parameters.get("form", 0.0) < 0.5 or abs(now.velocity) > MOVING:
+                cold[0] *= math.exp(-now.step_s / parameters["warm_up_time"])
+            return parameters["cold_excess"] * now.direction * cold[0]
+
+        return load
 
 
 EFFECT = ThermalFrictionDrift()
