@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rig.findings import Finding, RigFindings
+from ..rig.findings import CouplingResidual, Finding, RigFindings
 from ..rig.inverse import EffortResidual, effort_residuals
 from ..rig.model import RigModel, load_rig
 from ..rig.replay import simulate_trial
@@ -49,6 +49,8 @@ def rig_findings_page(session: Session, findings: RigFindings) -> bytes:
         sections += [_map(rig, pairs), _effects(rig, findings, pairs), _validation(rig, pairs)]
     if swing:
         sections += _motion(rig, findings)
+    if findings.couplings:
+        sections.append(_couplings(findings.couplings))
     sections.append(Section("next", "Next", f"{findings.next_experiment or 'Nothing more is asked for.'}", _rest(findings)))
     lead = (f"{session.path.name}: the declared model, fitted, against {count(len(rig.trials), 'trial')}; what is named below "
             "was chosen on the training trials and measured on the others, by MuJoCo on the written files.")  # fmt: skip
@@ -120,15 +122,20 @@ def _limit(values: Array) -> float:
 
 
 def _cells(q: Array, v: Array, error: Array, scale: Array, rig: RigModel, joint: str) -> bytes:
+    unit = rig.unit(joint)
+    return _field(q, v, error, _limit(scale), f"position [{unit}]", f"velocity [{unit}/s]")
+
+
+def _field(q: Array, v: Array, error: Array, limit: float, across: str, up: str) -> bytes:
+    """Mean error in cells of q and v, red above and blue below, colours full at limit."""
     sides = [np.linspace(*np.percentile(x, [0.5, 99.5]), n + 1) for x, n in zip((q, v), CELLS, strict=True)]
-    limit = _limit(scale)
     total, _, _ = np.histogram2d(q, v, sides, weights=error)
     seen, _, _ = np.histogram2d(q, v, sides)
     mean = np.where(seen > 0, total / np.maximum(seen, 1), np.nan)
     with drawing() as d:
         d.axes.pcolormesh(*sides, mean.T, cmap="RdBu_r", vmin=-limit, vmax=limit)
-        d.axes.set_xlabel(f"position [{rig.unit(joint)}]")
-        d.axes.set_ylabel(f"velocity [{rig.unit(joint)}/s]")
+        d.axes.set_xlabel(across)
+        d.axes.set_ylabel(up)
     return d.svg
 
 
@@ -158,13 +165,18 @@ def _through(finding: Finding, held: Sequence[Pair], rig: RigModel) -> bytes:
         x, label = load * np.sign(v), f"declared effort along the motion [{rig.effort_unit(joint)}]"
     else:
         x, label = v, f"velocity [{rig.unit(joint)}/s]"
+    return _sides(x, label, before, after, f"residual [{rig.effort_unit(joint)}]")
+
+
+def _sides(x: Array, label: str, before: Array, after: Array, up: str) -> bytes:
+    """Residual before and after against x: mean and middle 80 % in bins."""
     with drawing() as d:
         for values, colour in ((before, SERIES[0]), (after, INK)):
             centre, low, mean, high = _binned(x, values)
             d.axes.fill_between(centre, low, high, color=colour, alpha=0.18, linewidth=0)
             d.axes.plot(centre, mean, color=colour)
         d.axes.set_xlabel(label)
-        d.axes.set_ylabel(f"residual [{rig.effort_unit(joint)}]")
+        d.axes.set_ylabel(up)
     return d.svg
 
 
@@ -195,6 +207,36 @@ def _validation(rig: RigModel, pairs: Sequence[Pair]) -> Section:
     return Section("validation", "Before and after", words, (
         table(head, rows, "Root mean square of the effort error, moving samples", text_columns=2),
         key(("c2", "recorded"), ("c1", "declared model"), ("ink", "with what was found")), figures(*drawn)))  # fmt: skip
+
+
+def _couplings(residuals: Sequence[CouplingResidual]) -> Section:
+    """Angles against angles: map before and after, residual through the load (or the velocity), one recording in time."""
+    drawn, rows = [], []
+    for c in residuals:
+        scale = f"± {_limit(c.before):.2g} {c.unit}"
+        for words, values in ((f"declared polynomial ({scale})", c.before), ("with what was found", c.after)):
+            drawn.append((f"{c.coupling}: {words}", _field(c.position, c.velocity, values, _limit(c.before),
+                                                           "position upstream", "velocity upstream")))  # fmt: skip
+        x, label = (c.velocity, "velocity upstream") if c.load is None else (c.load, "load [N m or N]")
+        drawn.append((f"{c.coupling}: residual", _sides(x, label, c.before, c.after, f"residual [{c.unit}]")))
+        one = c.trial == c.trial[0]
+        keep = np.flatnonzero(one)[:: max(1, int(one.sum()) // POINTS)]
+        with drawing() as d:
+            d.axes.plot(c.time_s[keep], c.before[keep], color=SERIES[0], linewidth=1.0)
+            d.axes.plot(c.time_s[keep], c.after[keep], color=INK, linewidth=1.0)
+            d.axes.set_xlabel("time [s]")
+            d.axes.set_ylabel(f"residual [{c.unit}]")
+        drawn.append((f"{c.coupling}: {c.trial[0]}", d.svg))
+        for name in dict.fromkeys(c.trial):
+            mine = c.trial == name
+            a, b = _rms(c.before[mine]), _rms(c.after[mine])
+            rows.append([str(name), c.coupling, f"{a:.4g}", f"{b:.4g}", f"{b / max(a, 1e-300):.2f}", c.unit])
+    words = ("What the angle of one encoder leaves of the next along the transmission, on the trials held out: lost motion turns "
+             "over with the direction, stretch follows the load.")  # fmt: skip
+    head = ("trial", "coupling", "declared polynomial", "with what was found", "ratio", "unit")
+    return Section("couplings", "Between the encoders", words, (
+        key(("c1", "declared polynomial"), ("ink", "with what was found")), figures(*drawn),
+        table(head, rows, "Root mean square of the angle error", text_columns=2)))  # fmt: skip
 
 
 def _rms(values: Array) -> float:

@@ -16,13 +16,13 @@ from .channels import ChannelIssue, check_balance, check_channels
 from .compete import Score, Step, Term, compete, held_out, judge, normal, pose, resampled, solution
 from .declared import DeclaredFit, fit_declared
 from .diagnose_swing import diagnose_swing
-from .findings import Finding, RigFindings
+from .findings import CouplingResidual, Finding, RigFindings
 from .model import RigModel, load_rig
 from .patch import write_couplings
 from .proof import Bench
 from .states import fill_gaps
 from .swing_build import can_swing
-from .transmission import coupling_candidates, fit_coupling, zero_shift
+from .transmission import angle_residual, coupling_candidates, fit_coupling, zero_shift
 from .words import shares, statement
 
 Array = NDArray[np.float64]
@@ -53,9 +53,11 @@ def diagnose_rig(session: Session, output: str | Path | None = None,
         result = _diagnose_balance(rig, fit, say)
     parts, rejected, lack, xml, declared_xml = result
     found += parts
+    angles = []
     for coupling in rig.couplings:
-        more, said = _diagnose_coupling(rig, coupling)
+        more, said, residual = _diagnose_coupling(rig, coupling)
         found += more
+        angles += [residual] if residual is not None else []
         rejected = [*rejected, *said]
         say(f"{rig.name}: coupling {coupling.name}")
     lack = dict(lack)
@@ -79,6 +81,7 @@ def diagnose_rig(session: Session, output: str | Path | None = None,
         declared=declared,
         xml=xml,
         declared_xml=declared_xml,
+        couplings=tuple(angles),
     )  # fmt: skip
     if output is not None:
         findings.write(output)
@@ -286,17 +289,19 @@ def _joint_finding(rig: RigModel, fit: DeclaredFit, step: Step, term: Term, ampl
 # --- couplings -------------------------------------------------------------------------------------------------------
 
 
-def _diagnose_coupling(rig: RigModel, coupling: Any) -> tuple[list[Finding], list[dict[str, Any]]]:
+def _diagnose_coupling(
+    rig: RigModel, coupling: Any
+) -> tuple[list[Finding], list[dict[str, Any]], CouplingResidual | None]:
     fit = fit_coupling(rig, coupling)
     if fit is None:
-        return [], []
+        return [], [], None
     taken, steps, scores = compete(pose(fit), coupling_candidates(fit, coupling))
     moved = zero_shift(fit, solution(pose(fit), taken), taken)
     if moved is not None:
         fit = moved
         taken, steps, scores = compete(pose(fit), coupling_candidates(fit, coupling))
     rejected = [{"effect": s.term.candidate.key, "reason": "held-out error does not fall enough"} for s in scores]
-    found, _ = _prove(Bench(rig, mujoco=False), fit, list(zip(steps, taken, strict=True)), [], rejected)
+    found, kept = _prove(Bench(rig, mujoco=False), fit, list(zip(steps, taken, strict=True)), [], rejected)
     named = []
     for f in found:
         proof = {**f.fit, "metric": "angle_rmse", "unit": rig.unit(coupling.dependent)}
@@ -307,7 +312,7 @@ def _diagnose_coupling(rig: RigModel, coupling: Any) -> tuple[list[Finding], lis
         if moved is not None:
             words += " The zero between the two encoders differs between recordings and was taken out of each."
         named.append(replace(f, fit=proof, where=where, statement=words))
-    return shares(named), rejected
+    return shares(named), rejected, angle_residual(rig, coupling, fit, kept)
 
 
 # --- verdict -----------------------------------------------------------------------------------------------------------

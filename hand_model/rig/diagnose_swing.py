@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from ..background import Background
 from ..session import Session
 from .declared import DeclaredFit
 from .findings import Finding
@@ -34,11 +35,13 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
     taken, rounds = compete_swing(stages, declared)
     say(f"{rig.name}: {', '.join(v.key for v in taken) or 'nothing'}")
     # Last, at the step of the replay; a free swing over whole recordings, for its phase is known well enough by now.
-    fine = [build_swing(rig, fit, STEP_S, w) for w in (windows if stages[0].driven else (*windows[1:], np.inf))]
+    fine = build_swing(rig, fit, STEP_S, windows[-1] if stages[0].driven else np.inf)
     held = bool(rig.select(True))  # without validation recordings the training ones measure, and the report says so
+    known: dict[tuple[str, ...], Link] = {}
     kept, rejected = list(zip(taken, rounds, strict=True)), []
     while True:
-        chain = _chain(rig, session, held, fine, declared.theta, [v for v, _ in kept], kept[-1][1].fit.theta if kept else None)
+        _chain(known, rig, session, held, fine, declared.theta, [v for v, _ in kept], kept[-1][1].fit.theta if kept else None)
+        chain = [known[tuple(v.key for v, _ in kept[:k])] for k in range(len(kept) + 1)]
         figures = [c.replay.figure("position_rmse", held) for c in chain]
         worse = next((k for k in range(len(kept)) if not figures[k + 1] < figures[k]), None)
         if worse is None:
@@ -49,7 +52,7 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
         proof = {"metric": "position_rmse", "unit": rig.unit(rig.joints[0]), "before": figures[k], "after": figures[k + 1],
                  "noise_floor": _resolution(rig), "ci95_reduction": _fall(chain[k].replay, chain[k + 1].replay, held),
                  "held_out": [t.name for t in rig.select(held)], "engine": "mujoco"}  # fmt: skip
-        found.append(_swing_finding(rig, variant, round_, fine[0], chain[-1], proof))
+        found.append(_swing_finding(rig, variant, round_, fine, chain[-1], proof))
     means = [c.replay.figure("position_mae", held) for c in (chain[0], chain[-1])]
     lack = {"metric": "position_rmse", "unit": rig.unit(rig.joints[0]), "before": figures[0], "after": figures[-1],
             "one_effect": figures[min(1, len(figures) - 1)],
@@ -69,15 +72,25 @@ class Link:
     replay: RigResiduals
 
 
-def _chain(rig: RigModel, session: Session, held: bool, stages: list[Swing], declared: np.ndarray, taken: list[Variant],
-           last: np.ndarray | None) -> list[Link]:  # fmt: skip
-    """The declared model, with the first effect, with the first two, ...: all fitted in one batch, written and replayed."""
-    free, start = free_declared(stages[0]), vector(stages[0].initial)
-    sets = [tuple(dict.fromkeys((*free, *(n for v in taken[:k] for n in v.start)))) for k in range(len(taken) + 1)]
-    starts = [declared] + [np.where(np.isin(PARAMETERS, s), last, start) for s in sets[1:]]
-    fits = fit_stages(stages, [Task(s, t, ()) for s, t in zip(sets, starts, strict=True)], 8)
-    files = [write_swing(rig, stages[0], f.theta) for f in fits]
-    return [Link(s, f, x, replay_rig(session, load_rig(session, x), efforts=False, validate=held)) for s, f, x in zip(sets, fits, files, strict=True)]
+def _chain(known: dict[tuple[str, ...], Link], rig: RigModel, session: Session, held: bool, swing: Swing, declared: np.ndarray,
+           taken: Sequence[Variant], last: np.ndarray | None) -> None:  # fmt: skip
+    """Add to `known` the declared model, with the first effect, with the first two, ...: fitted in one batch, written and
+    replayed."""
+    free, start = free_declared(swing), vector(swing.initial)
+    parts = [tuple(taken[:k]) for k in range(len(taken) + 1) if tuple(v.key for v in taken[:k]) not in known]
+    if not parts:
+        return
+    sets = [tuple(dict.fromkeys((*free, *(n for v in part for n in v.start)))) for part in parts]
+    starts = [np.where(np.isin(PARAMETERS, s), last, start) if part else declared for s, part in zip(sets, parts, strict=True)]
+    fits = fit_stages([swing], [Task(s, t, ()) for s, t in zip(sets, starts, strict=True)], 8)
+    files = [write_swing(rig, swing, f.theta) for f in fits]
+    replays = Background(_replayed, [(session, x, held) for x in files]).results()
+    for part, s, f, x, r in zip(parts, sets, fits, files, replays, strict=True):
+        known[tuple(v.key for v in part)] = Link(s, f, x, r)
+
+
+def _replayed(session: Session, xml: bytes, held: bool) -> RigResiduals:
+    return replay_rig(session, load_rig(session, xml), efforts=False, validate=held)
 
 
 def _resolution(rig: RigModel) -> float:

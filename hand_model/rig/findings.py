@@ -7,20 +7,45 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..diagnose.findings import Finding, Findings
 
-__all__ = ["Finding", "Findings", "RigFindings"]
+__all__ = ["CouplingResidual", "Finding", "Findings", "RigFindings"]
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CouplingResidual:
+    """What one angle leaves of another on the recordings held out: samples (n,) of the independent joint's position and
+    velocity, of the load that a named stretch acts through (None: none is named), of the residual before and after.
+
+    trial (n,): which recording each sample belongs to; time_s (n,) [s]; unit: of the residual.
+    """
+
+    coupling: str
+    dependent: str
+    unit: str
+    trial: NDArray[np.str_]
+    time_s: Array
+    position: Array
+    velocity: Array
+    load: Array | None
+    before: Array
+    after: Array
 
 
 @dataclass(frozen=True)
 class RigFindings(Findings):
     """What a rig's diagnosis says. session: its name; declared: fitted declared parameters; declared_xml, xml: the MJCF
-    with those, and with the effects that were found as well."""
+    with those, and with the effects that were found as well; couplings: angle residuals, for pictures."""
 
     session: str = ""
     declared: Mapping[str, float] = field(default_factory=dict)
     xml: bytes = field(default=b"", repr=False)
     declared_xml: bytes = field(default=b"", repr=False)
+    couplings: tuple[CouplingResidual, ...] = field(default=(), repr=False)
 
     def to_dict(self) -> dict[str, Any]:
         """The whole as the format has it, with the session's name and the declared parameters."""

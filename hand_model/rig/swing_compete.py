@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..background import Background
 from .evidence import weigh
-from .swing import DECLARED, INDEX, Fitted, Swing, Task, errors, fit_together, vector
+from .swing import DECLARED, INDEX, LOW_SPEED, Fitted, Swing, Task, errors, fit_together, vector
 
 Array = NDArray[np.float64]
 FOLDS, SHORTLIST = 4, 5
@@ -106,13 +107,26 @@ def _blocks(swing: Swing, theta: Array, lanes: Sequence[int]) -> Array:
     return np.array(out)
 
 
+def fit_apart(swing: Swing, tasks: Sequence[Task], iterations: int = 14) -> list[Fitted]:
+    """`fit_together` in two halves, one a core: tasks that need low-speed friction together, since all runs of a batch pay
+    for what one of them has."""
+    cost = [len(t.stretches) * (len(t.free) + 1) for t in tasks]
+    order = sorted(range(len(tasks)), key=lambda k: bool(set(LOW_SPEED) & set(tasks[k].free)))
+    done = np.cumsum([cost[k] for k in order])
+    half = int(np.searchsorted(done, 0.5 * done[-1])) + 1
+    halves = [h for h in (order[:half], order[half:]) if h]
+    calls = Background(fit_together, [(swing, [tasks[k] for k in h], iterations) for h in halves])
+    fits = {k: f for h, result in zip(halves, calls.results(), strict=True) for k, f in zip(h, result, strict=True)}
+    return [fits[k] for k in range(len(tasks))]
+
+
 def fit_stages(stages: Sequence[Swing], tasks: Sequence[Task], iterations: int = 10) -> list[Fitted]:
     """Every task on one stage after the other, each from where the last ended; stages differ in their stretches."""
     fits: list[Fitted] = []
     for k, swing in enumerate(stages):
         train = tuple(int(i) for i in swing.train())
         start = [t.start for t in tasks] if k == 0 else [f.theta for f in fits]
-        fits = fit_together(swing, [Task(t.free, s, train) for t, s in zip(tasks, start, strict=True)], iterations)
+        fits = fit_apart(swing, [Task(t.free, s, train) for t, s in zip(tasks, start, strict=True)], iterations)
     return fits
 
 
@@ -177,7 +191,7 @@ def _several(swing: Swing, tasks: Sequence[Task], starts: int = 2, iterations: i
             theta = task.start.copy()
             theta[free] *= np.exp(random.normal(0.0, 0.3, len(free))) if k else 1.0
             more.append(replace(task, start=theta))
-    fits = fit_together(swing, more, iterations)
+    fits = fit_apart(swing, more, iterations)
     return [min(fits[k * starts : (k + 1) * starts], key=lambda f: f.cost) for k in range(len(tasks))]
 
 
@@ -211,7 +225,7 @@ def _left_out(
     """Block errors of "none" and of each rival on the recordings left out."""
     everyone = [none, *rivals]
     tasks = [replace(task, start=fit.theta, stretches=kept) for task, fit in everyone for kept, _ in folds]
-    fits = fit_together(swing, tasks, 5)
+    fits = fit_apart(swing, tasks, 5)
     out = []
     for k in range(len(everyone)):
         parts = [_blocks(swing, fits[k * len(folds) + f].theta, left) for f, (_, left) in enumerate(folds)]

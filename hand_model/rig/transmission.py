@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from ..effects.path import jenkins
 from .balance import Column, Rows
 from .candidates import Candidate
-from .compete import Term, design
+from .compete import Term, design, pose, solution
 from .declared import DeclaredFit, _robust_fit
+from .findings import CouplingResidual
 from .model import Coupling, RigModel, RigTrial
 from .states import choose_cutoff, differentiate, fill_gaps, low_pass, uniform_time, velocity_noise
 
@@ -100,8 +101,21 @@ def zero_shift(fit: DeclaredFit, theta: Array, terms: Sequence[Term]) -> Declare
     return _robust_fit(fit.columns, tuple(rows), fit.cutoff_hz)
 
 
+def angle_residual(rig: RigModel, coupling: Coupling, fit: DeclaredFit, terms: Sequence[Term]) -> CouplingResidual:
+    """Residual angle of the polynomial alone and with the terms, on the recordings held out (on all where none is)."""
+    sides = [(t, solution(pose(fit), t)) for t in ((), terms)]
+    rows = [r for r in fit.rows if r.validate] or list(fit.rows)
+    before, after = ([(r.effort - design(r, t) @ theta)[r.moving] for r in rows] for t, theta in sides)
+    channel = next((f"effort:{t.candidate.variant.split()[-1]}" for t in terms if "load at" in t.candidate.variant), None)
+    load = None if channel is None else np.concatenate([_load(r, channel)[r.moving] for r in rows])
+    trial = np.concatenate([np.full(int(r.moving.sum()), r.trial) for r in rows])
+    time_s, position, velocity = (np.concatenate([getattr(r, k)[r.moving] for r in rows]) for k in ("time_s", "position", "velocity"))
+    return CouplingResidual(coupling.name, coupling.dependent, rig.unit(coupling.dependent), trial, time_s, position, velocity,
+                            load, np.concatenate(before), np.concatenate(after))  # fmt: skip
+
+
 def _load(row: Rows, channel: str) -> Array:
     return row.extra.get(channel, np.zeros(len(row.time_s)))
 
 
-__all__ = ["coupling_candidates", "coupling_columns", "fit_coupling", "zero_shift"]
+__all__ = ["angle_residual", "coupling_candidates", "coupling_columns", "fit_coupling", "zero_shift"]

@@ -1,0 +1,146 @@
+"""Rigs whose trials differ: own weights and lengths, supplies; what resampled recordings say; intervals of simulated fits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hand_model.errors import SessionError
+from hand_model.rig import fit_declared, load_rig, replay_rig
+from hand_model.rig.compete import pose, solution
+from hand_model.rig.evidence import multiplicities, weigh
+from hand_model.rig.overrides import apply_overrides, compile_model
+from hand_model.rig.proof import Bench
+from hand_model.rig.supply import supply_channel, supply_deviation
+from hand_model.rig.swing import INDEX, Task, fit_together, simulate, vector
+from hand_model.rig.swing_build import build_swing
+from hand_model.rig.swing_interval import intervals
+from hand_model.rig.swing_patch import write_swing
+from hand_model.session import read_session
+
+BENCH = """<mujoco model="bench"><compiler angle="radian"/><option timestep="0.001" gravity="0 0 -9.81"/>
+<worldbody><body name="arm"><joint name="hinge" axis="0 -1 0" armature="0.002" damping="0.01" frictionloss="0.02"/>
+<inertial pos="0 0 -0.1" mass="0.5" diaginertia="1e-5 1e-5 1e-5"/></body></worldbody>
+<actuator>{drive}</actuator></mujoco>
+"""
+VOLTAGE = '<dcmotor name="motor" joint="hinge" motorconst="0.35 0.35" resistance="3.4"/>'
+TORQUE = '<motor name="motor" joint="hinge"/>'
+OWN = 'set = { "body:arm:mass" = 0.9, "body:arm:ipos" = [0, 0, -0.15] }\n'
+WEIGHTS = ((0.5, 0.1), (0.9, 0.15), (0.5, 0.1), (0.9, 0.15))
+
+
+def session(folder: Path, drive: str, column: str, logs: list[np.ndarray], header: str) -> Path:
+    """A bench with two weights on two lengths, by turns; the last trial validates."""
+    (folder / "log").mkdir(parents=True)
+    (folder / "rig.xml").write_text(BENCH.format(drive=drive))
+    quantity = "ctrl" if drive == VOLTAGE else "force"
+    text = ('format = "hand-session/1"\n[hand]\nname = "bench"\n[rig]\nmodel = "rig.xml"\n[signals]\n'
+            f'position = "joint:hinge:position"\n{column} = "actuator:motor:{quantity}"\n')  # fmt: skip
+    for k, table in enumerate(logs):
+        np.savetxt(folder / f"log/{k}.csv", table, delimiter=",", header=header, comments="", fmt="%.10g")
+        text += f'[[trial]]\nkind = "motion"\nlog = "log/{k}.csv"\n' + (OWN if k % 2 else "")
+        text += 'purpose = "validate"\n' if k == len(logs) - 1 else ""
+    (folder / "session.toml").write_text(text)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def torque_bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Torque by the true balance; the arm itself weighs 0.05 kg more than declared, at its end, in every trial."""
+    logs, t = [], np.arange(0, 8, 0.005)
+    for k, (mass, length) in enumerate(WEIGHTS):
+        w = 2 * np.pi * (0.5 + 0.1 * k)
+        q, v, a = (0.9 * x for x in (np.sin(w * t), w * np.cos(w * t), -w * w * np.sin(w * t)))
+        moment, inertia = mass * length + 0.05 * 0.1, mass * length**2 + 0.05 * 0.01 + 1e-5 + 0.002
+        torque = inertia * a + 9.81 * moment * np.sin(q) + 0.02 * v + 0.03 * np.sign(v)
+        logs.append(np.stack([t, q, torque], 1))
+    return session(tmp_path_factory.mktemp("weights") / "s", TORQUE, "torque", logs, "time,position,torque")
+
+
+def test_own_weights_of_trials_are_known_and_the_rest_is_fitted(torque_bench: Path) -> None:
+    """One fit to recordings with two weights: the arm's excess moment comes out, and no trial is left unexplained."""
+    fit = fit_declared(load_rig(read_session(torque_bench)))
+    value = {c.label: t for c, t in zip(fit.columns, fit.theta, strict=True)}
+    assert value["inertial:arm:hz"] == pytest.approx(-(0.05 + 0.05 * 0.1), rel=0.01)
+    assert max(fit.quality.values()) < 0.03
+
+
+def test_a_fitted_file_keeps_the_trials_own_weights(torque_bench: Path) -> None:
+    """The written file replays trials of both weights as well as the fit does: what was fitted is added to what is set."""
+    rig = load_rig(read_session(torque_bench))
+    fit = fit_declared(rig)
+    xml = Bench(rig).file(fit, (), solution(pose(fit), ()))
+    replayed = replay_rig(read_session(torque_bench), xml, simulate=False)
+    size = {r.trial: np.sqrt(np.mean(r.effort**2)) for r in fit.rows}
+    assert all(r.effort_rmse < 0.03 * size[r.trial] for r in replayed.joints)
+    moment = [m.body_mass[1] * m.body_ipos[1, 2] for m in (compile_model(replace(rig, xml=xml), t) for t in rig.trials)]
+    assert moment == pytest.approx([-(m * x + 0.005) for m, x in WEIGHTS], rel=0.01)
+
+
+def test_simulated_fit_uses_each_trials_weight_and_covers_the_truth(tmp_path: Path) -> None:
+    """Voltage-driven, two weights: inertia, gain and friction return, the truth lies within their intervals, and MuJoCo
+    on the written file moves as recorded."""
+    truth = vector({"inertia": 0.0085, "gain": 0.13, "back_emf": 0.05, "damping": 0.012, "coulomb": 0.03, "load_gear": 0.1})
+    t, random = np.arange(0, 5, 0.002), np.random.default_rng(0)
+    volts = [2.5 * np.sin(2.2 * t + k) + 1.5 * np.sin(5.1 * t + 2 * k) for k in range(4)]
+    table = [np.stack([t, 0 * t, u], 1) for u in volts]
+    blank = session(tmp_path / "blank", VOLTAGE, "voltage", table, "time,position,voltage")
+    rig = load_rig(read_session(blank))
+    q = simulate(swing := build_swing(rig, fit_declared(rig)), np.repeat(truth[None], 4, 0), np.arange(4))
+    assert [lane.more_inertia for lane in swing.lanes[:2]] == pytest.approx([0.0, 0.9 * 0.15**2 - 0.5 * 0.01])
+    n = len(q)
+    table = [np.stack([t[:n], q[:, k] + 5e-4 * random.standard_normal(n), volts[k][:n]], 1) for k in range(4)]
+    folder = session(tmp_path / "s", VOLTAGE, "voltage", table, "time,position,voltage")
+    rig = load_rig(read_session(folder))
+    swing = build_swing(rig, fit_declared(rig), 2e-3, 1.0)
+    free = ("inertia", "gain", "back_emf", "damping", "coulomb", "load_gear")
+    fit = fit_together(swing, [Task(free, vector(swing.initial), tuple(swing.train()))], 30)[0]
+    assert [fit.theta[INDEX[n]] for n in free] == pytest.approx([truth[INDEX[n]] for n in free], rel=0.1)
+    ends = intervals(swing, free, fit.theta)
+    assert sum(low <= truth[INDEX[n]] <= high for n, (low, high) in ends.items()) >= len(free) - 1
+    replayed = replay_rig(read_session(folder), write_swing(rig, swing, truth), efforts=False)
+    assert replayed.figure("position_rmse", True) < 0.05 * np.std(q[:, 3])
+
+
+def test_overrides_reach_what_mjcf_names() -> None:
+    """Scalars of option, servo gains, references; what the model lacks, or cannot take, is refused by name."""
+    import mujoco
+
+    servo = BENCH.format(drive='<position name="motor" joint="hinge" kp="10"/>')
+    model = mujoco.MjModel.from_xml_string(servo)
+    apply_overrides(model, {"option:timestep": 0.002, "actuator:motor:kp": 7.0, "joint:hinge:damping": 0.5, "option:gravity": [0, 0, 0]})
+    assert model.opt.timestep == 0.002 and model.actuator_gainprm[0, 0] == 7.0 and model.actuator_biasprm[0, 1] == -7.0
+    assert model.dof_damping[0] == 0.5 and not model.opt.gravity.any()
+    for key, value in (("body:leg:mass", 1.0), ("joint:hinge:mass", 1.0), ("option:gravity", [0, 0])):
+        with pytest.raises(SessionError, match=key):
+            apply_overrides(model, {key: value})
+
+
+def test_supply_is_relative_to_the_session(torque_bench: Path) -> None:
+    """Two recordings at 7 V and 8 V deviate to either side of their mean; a session without a supply has none."""
+    rig = load_rig(read_session(torque_bench))
+    assert supply_channel(rig) is None and not supply_deviation(rig, rig.trials[0]).any()
+    own = [replace(t, extra={"input_volts": np.full(len(t.time_s), v)}) for t, v in zip(rig.trials[:2], (7.0, 8.0), strict=True)]
+    rig = replace(rig, trials=tuple(own))
+    assert [supply_deviation(rig, t)[0] for t in rig.trials] == pytest.approx([-1 / 15, 1 / 15])
+
+
+def test_whole_recordings_are_drawn_where_there_are_enough() -> None:
+    """All blocks of a recording come together, and every draw has as many recordings as there are."""
+    group = np.repeat(np.arange(8), 3)
+    draws = multiplicities(group)
+    assert (draws.reshape(len(draws), 8, 3).std(2) == 0).all() and (draws.sum(1) == len(group)).all()
+    assert multiplicities(np.repeat([0, 1], 5)).reshape(-1, 2, 5).std(2).any()
+
+
+def test_evidence_takes_the_simplest_of_equals_and_nothing_from_noise() -> None:
+    """A rival that helps one recording alone is no evidence; of two as good as each other the smaller is chosen."""
+    group, none = np.repeat(np.arange(8), 4), np.ones(32)
+    lucky = np.where(group == 0, 0.1, 1.0 + 0.01 * (-1.0) ** np.arange(32))
+    assert weigh(none, np.array([lucky]), [1], group) is None
+    noise = 0.05 * np.array([np.tile([1, -1, -1, 1], 8), np.tile([-1, 1, 1, -1], 8)])
+    said = weigh(none, np.array([0.5, 0.5])[:, None] + noise, [3, 1], group)
+    assert said.chosen == 1 and said.probability == 1.0 and set(said.close) == {0, 1}
