@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..effects import effect
 from ..hand import Hand
 from .clearance import SHARE_A_JOINT
 from .plan import Plan
@@ -38,6 +39,7 @@ def readme(hand: Hand, plans: tuple[Plan, ...]) -> str:
         _joints(hand),
         _linkages(plans),
         _motors(hand),
+        _effects(hand),
         _surfaces(plans),
         _keyframes(plans),
         _known_issues(hand, plans),
@@ -146,6 +148,25 @@ def _motors(hand: Hand) -> str:
         for name, e in parameters.items():
             interval = "-" if e.ci95 is None else f"{e.ci95[0]:.4g} to {e.ci95[1]:.4g}"
             rows.append(f"| {owner} | {name} | {e.value:.4g} | {interval} | {e.unit} | {e.origin} |")
+    return "\n".join(rows) + "\n"
+
+
+def _effects(hand: Hand) -> str:
+    """Where each effect is applied: by the MJCF, by the passive-force callback, or by nothing but hand.json."""
+    if not hand.effects:
+        return ""
+    rows = ["## Where the effects are\n", "| effect | of | MJCF | callback | URDF |", "| --- | --- | --- | --- | --- |"]
+    called = False
+    for found in hand.effects:
+        kind = effect(found.effect)
+        law = kind.law({name: e.value for name, e in found.parameters.items()}) is not None
+        place = " ".join(str(found.where[k]) for k in ("finger", "joint") if found.where.get(k))
+        held = f"no: {kind.unwritten}" if kind.unwritten and not law else "no" if law else "yes"
+        rows.append(f"| {found.effect} | {place} | {held} | {'yes' if law else 'not needed' if held == 'yes' else 'no'} | no: hand.json |")
+        called |= law
+    if called:
+        rows += ["\nEffects of the callback act once it is switched on, in every `mj_step` from then on:\n", "```python",
+                 "model = mujoco.MjModel.from_xml_path(mjcf)", "hand_model.effects_on(model, folder)  # this folder", "```"]
     return "\n".join(rows) + "\n"
 
 

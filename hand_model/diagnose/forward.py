@@ -84,6 +84,7 @@ def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, pat
             model.actuator_ctrllimited[actuator] = 0
     address, dof = model.jnt_qposadr[list(held)], model.jnt_dofadr[list(held)]
     model.dof_armature[dof] = HOLD
+    mujoco.mj_setConst(model, mujoco.MjData(model))
     at, rate = model.jnt_qposadr[driver], model.jnt_dofadr[driver]
     spline = PchipInterpolator(state.time_s, path)
     grid = np.arange(state.time_s[0], state.time_s[-1] + STEP_S, STEP_S)

@@ -17,7 +17,7 @@ from .prove import proved
 
 MOTOR = {"inertia": ("inertia", "raw s^2/%"), "viscous": ("viscous", "raw s/%"), "coulomb": ("coulomb", "raw"),
          "spring": ("stiffness", "raw/%"), "preload": ("preload", "raw")}
-STIFFNESS_LEAST = 1e-6  # raw/%: a preload is written as a spring under tension
+LEAST = {"stiffness": 1e-6, "inertia": 2e-3}  # [raw, %]: a preload needs a spring; bristles without inertia cannot be simulated
 DRIVE_KEPT = ("gain", "damping")  # of an identified motor, beside what the balance fits
 
 
@@ -51,7 +51,7 @@ def as_fitted(hand: Hand, stations: Sequence[Any], counts: Mapping[str, tuple[fl
 def _motor(station: Any, declared: Mapping[str, float], counts: tuple[float, float], was: Motor | None) -> Motor:
     states = station.naming.balance.states
     values = {MOTOR[k][0]: Estimate(float(v), None, MOTOR[k][1], "diagnosis") for k, v in declared.items() if k in MOTOR}
-    values["stiffness"] = replace(values["stiffness"], value=max(values["stiffness"].value, STIFFNESS_LEAST))
+    values |= {k: replace(values[k], value=least, origin="least that can be simulated") for k, least in LEAST.items() if values[k].value < least}
     if values["coulomb"].value > 0:
         give = float(np.max(states[0].extra.get("give", np.zeros(1))))
         values["presliding"] = Estimate(give, None, "%", "diagnosis, common to the session's drives")
@@ -89,8 +89,8 @@ def _estimate(entry: Mapping[str, Any]) -> Estimate:
     return Estimate(float(entry["value"]), None if ci is None else (float(ci[0]), float(ci[1])), str(entry["unit"]), "diagnosis")
 
 
-def written(folder: Path, finding: Finding) -> dict[str, Any]:
-    """`model` of a finding: where the compiled folder holds it, {"native", "mjcf", "urdf", "callback"}."""
+def written(before: Path, finding: Finding) -> dict[str, Any]:
+    """`model` of a finding, {"native", "mjcf", "urdf", "callback"}: where the files of the folder `before`, which hold no effect, get it."""
     from lxml import etree
 
     values = {k: v["value"] for k, v in finding.parameters.items()}
@@ -101,17 +101,11 @@ def written(folder: Path, finding: Finding) -> dict[str, Any]:
     if kind.law(values) is not None:
         call = "hand_model.effects_on(model, folder)"
         return {"native": False, "mjcf": None, "urdf": urdf, "callback": call}
-    for file in sorted(f for f in folder.glob("*.xml") if not f.name.startswith("scene")):
+    for file in sorted(f for f in before.glob("*.xml") if not f.name.startswith("scene")):
         place = kind.write_mjcf(etree.parse(str(file)).getroot(), finding.where, values)
-        if place is not None:  # numbered where the file has one of that name: it was written the first time
-            return {"native": True, "mjcf": _first_name(place), "urdf": urdf, "callback": None}
+        if place is not None:
+            return {"native": True, "mjcf": place, "urdf": urdf, "callback": None}
     return {"native": False, "mjcf": None, "urdf": urdf, "callback": None, "note": kind.unwritten}
-
-
-def _first_name(place: str) -> str:
-    import re
-
-    return re.sub(r"_\d+'\]", "']", place)
 
 
 def write_improved(hand: Hand, findings: Sequence[Finding], stations: Sequence[Any], counts: Mapping[str, tuple[float, float]],
@@ -133,7 +127,7 @@ def write_improved(hand: Hand, findings: Sequence[Finding], stations: Sequence[A
     out = []
     for finding in findings:
         if finding.correction is None:
-            finding = replace(finding, model=written(output / "model", finding))
+            finding = replace(finding, model=written(output / "model_before", finding))
             station = next((s for s in stations if _of(finding, s)), None)
             finding = replace(finding, fit=proved(finding, station, output / "model_before", output / "model"))
         out.append(finding)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..effects import effect
 from ..effects.base import DriveState
 from ..effects.mjcf import motor_joint
+from ..engines.mujoco import HOLD
 from ..hand import Estimate, Hand, load_hand
 from ..passive import effects_on
 
@@ -87,6 +88,8 @@ def current_along(motor: CompiledMotor, state: DriveState) -> Array:
     model.actuator_gainprm[drive] = model.actuator_biasprm[drive] = 0.0  # the drive itself is what is asked for
     grid = np.arange(state.time_s[0], state.time_s[-1] + STEP_S, STEP_S)
     path = [np.interp(grid, state.time_s, x) for x in (state.position, state.velocity, state.acceleration)]
+    inertia, model.dof_armature[0] = model.dof_armature[0] - HOLD, HOLD  # what is on a given path need not be stable by itself
+    mujoco.mj_setConst(model, mujoco.MjData(model))
     data, out = mujoco.MjData(model), np.empty(len(grid))
     own = np.delete(np.arange(len(data.actuator_force)), drive)  # passive motors have no control: nu does not count them
     data.time, data.qpos[0] = state.elapsed_s[0], path[0][0]
@@ -101,7 +104,7 @@ def current_along(motor: CompiledMotor, state: DriveState) -> Array:
             data.qpos[0], data.qvel[0], data.qacc[0] = x, v, a
             mujoco.mj_inverse(model, data)
             mujoco.mj_fwdActuation(model, data)
-            out[i] = data.qfrc_inverse[0] - data.actuator_force[own].sum()
+            out[i] = data.qfrc_inverse[0] + inertia * a - data.actuator_force[own].sum()
             mujoco.mj_step(model, data)
     return _read(motor, np.interp(state.time_s, grid, out), state.time_s) / motor.unit
 
