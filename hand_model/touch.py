@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from .errors import IdentificationError
 from .hand import Estimate
 from .identify.motor import MotorFit, identify_motor, output_error
-from .identify.motor.corrected import NAMES, balance, friction_state
+from .identify.motor.balance import NAMES, balance, friction_state
 from .identify.motor.moves import MoveData, moves_from_rest, shortened
 from .identify.motor.recording import MotorTrial, actuator_trials, motor_trial
 from .session import Log, Session

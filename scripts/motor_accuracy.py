@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from hand_model.identify.motor import identify_motor
-from hand_model.identify.motor.corrected import NAMES
+from hand_model.identify.motor.balance import NAMES
 from hand_model.identify.motor.predict import predict
 from hand_model.identify.motor.recording import actuator_trials
 from hand_model.session import read_session

@@ -221,11 +221,12 @@ def _bristles(motor: MotorTruth, now: DriveNow, drive: float, level: float, step
     """Velocity after the step [%/s] and friction [raw] of bristles that slide at `level` [raw]; moves the bristles."""
     stiffness = motor.coulomb / motor.give
     damping = 0.3 * math.sqrt(stiffness * motor.inertia)
-    wear = abs(now.velocity) * now.bristle * stiffness / level  # what sliding takes off the bristles' rate
-    reach = step_s * stiffness + damping
-    push = drive - stiffness * now.bristle + reach * wear
-    new = (now.velocity + step_s * push / motor.inertia) / (1.0 + step_s * (motor.viscous + reach) / motor.inertia)
-    rate = new - wear
-    friction = stiffness * now.bristle + reach * rate
-    now.bristle = max(-level / stiffness, min(level / stiffness, now.bristle + step_s * rate))
+    half = 0.5 * step_s
+    # midpoint rule: a step that is late in the bristles adds to inertia and friction at every stop
+    free = motor.inertia * now.velocity + half * (drive - stiffness * now.bristle)  # its sign is that of the motion
+    share = 1.0 - math.copysign(now.bristle, now.bristle * free) * stiffness / level  # of the motion that bends the bristles
+    reach = half * stiffness + damping
+    middle = free / (motor.inertia + half * (motor.viscous + reach * share))
+    new, friction = 2.0 * middle - now.velocity, stiffness * now.bristle + reach * share * middle
+    now.bristle = max(-level / stiffness, min(level / stiffness, now.bristle + step_s * share * middle))
     return new, friction

@@ -13,12 +13,13 @@ from ...errors import IdentificationError
 from ...hand import Estimate, Motor
 from ...session import Session
 from . import output_error
-from .corrected import NAMES, Regression, fit_regression
+from .balance import NAMES
 from .drive import CONTROLLERS, STRIBECK
 from .moves import BEFORE, MoveData, moves_from_rest, shortened
 from .output_error import OutputErrorFit
 from .published import PublishedFit, fit_published, smear_share
 from .recording import MotorTrial, Scale, actuator_trials, check_trials, motor_trial, trial_scale
+from .weak_form import Regression, fit_regressions
 
 Array = NDArray[np.float64]
 
@@ -64,6 +65,7 @@ BOUNDS = {
 }
 MOVE_S = 2.5  # of a move that is simulated: the rest of a slow one says little more
 LACK_OF_FIT = 1.5  # residual variance over the noise's, above which output error does not describe the recording
+REGRESSION_MISFIT = 4.0  # the same for the regression; noise with a memory of a sample or two reaches 3
 EVIDENCE = 16.0  # fall of the misfit (in variances, two parameters and two shapes tried): once in about a thousand by chance
 
 
@@ -170,8 +172,7 @@ def fit_motor(trials: Sequence[MotorTrial], scale: Scale, actuator: str = "motor
     sigma_p = max(float(np.median([white_noise(t.position, t.time_s) for t in trials])), 0.3 / scale.counts_per_percent)
     sigma_u = max(float(np.median([white_noise(t.current, t.time_s) for t in trials])), 0.3)
     sigma_u = max(sigma_u, rest_noise(trials, (sigma_p, sigma_u), scale.speed_full))
-    plain = fit_regression(trials, sigma_p)
-    curved = fit_regression(trials, sigma_p, stribeck=True)
+    plain, curved = fit_regressions(trials, sigma_p, sigma_u)
     published, alike, smear = fit_published(trials), fit_published(trials, both_sides=True), smear_share(trials)
     moves = [m for t in trials for m in moves_from_rest(t, (sigma_p, sigma_u), scale.speed_full)]
     best, evidence = None, 0.0
@@ -185,6 +186,12 @@ def fit_motor(trials: Sequence[MotorTrial], scale: Scale, actuator: str = "motor
         stribeck = "static_ratio" in names
     else:
         values, names, covariance, stribeck = _from_regression(plain, curved)
+        if min(plain.misfit, curved.misfit) > REGRESSION_MISFIT:
+            names, covariance = (), np.empty((0, 0))
+            notes.append(
+                f"the balance of currents does not explain the strokes either (residual variance {plain.misfit:.1f} in units of the noise): "
+                "parameters are given without intervals"
+            )
         if best is None:
             notes.append("no moves from rest with logged setpoints: controller not identified, setpoints do not predict the motion")
         else:
@@ -303,10 +310,10 @@ def _from_regression(plain: Regression, curved: Regression) -> tuple[dict[str, f
 
 
 def _estimates(values: Mapping[str, float], names: Sequence[str], covariance: Array, accepted: bool) -> dict[str, Estimate]:
-    origin = "output error of the simulated drive" if accepted else "regression, both sides filtered alike"
+    origin = "output error of the simulated drive" if accepted else "regression in weak form"
     sd = dict(zip(names, np.sqrt(np.maximum(np.diag(covariance), 0)), strict=True))
     kept = values if accepted else {n: v for n, v in values.items() if n in NAMES or n in STRIBECK}
-    if "static_ratio" not in names:
+    if accepted and "static_ratio" not in names:
         kept = {n: v for n, v in kept.items() if not n.startswith(("static", "stribeck")) or n in names}
     ordered = [*NAMES, *(n for n in kept if n not in NAMES)]
     return {

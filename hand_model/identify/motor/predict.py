@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...errors import IdentificationError
 from ...session import Log
 from . import output_error
-from .corrected import NAMES, balance
+from .balance import NAMES, balance
 from .drive import Moves, profile
 from .fit import MotorFit
 from .moves import MoveData, moves_from_rest

@@ -1,0 +1,275 @@
+"""The regression done right: the balance in weak form on every stroke, so that nothing recorded is ever differentiated.
+
+current = inertia a + viscous v + coulomb z + stiffness p + preload (+ rise z exp(-|v| / speed)) is multiplied by B-splines that vanish at
+both ends of a stroke and integrated by parts (modulating functions, Shinbrot 1957; Preisig & Rippin 1993): position and current pass through the
+same splines. At an end the drive stands still and friction turns round, at an instant known to about a sample; as the splines
+vanish there, an error of it counts only in second order. A rest is not used: friction there is known only within its bounds. Friction builds up from what it
+held at rest over a distance (Dahl 1968). The encoder's noise in the regressors is simulated at the recorded instants and taken off
+(errors in variables; Fuller 1987, ch. 2); the covariance is the jackknife over strokes. Needs no setpoint and no controller.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import IdentificationError
+from .recording import MotorTrial
+
+Array = NDArray[np.float64]
+
+GIVE = (0.02, 0.3, 0.6, 1.0)  # [%], distances tried first; the least of them is Coulomb's friction to any encoder here
+STRIBECK = (6.0, 10.0, 15.0, 22.0, 32.0, 45.0)  # [%/s], profiled
+INERTIA = 0.0125  # [raw s^2/%] of a typical finger drive, only to choose how dense the splines are
+WINDOW = 5  # samples that tell motion from rest
+EVIDENCE = 16.0  # fall of the misfit for which a give of the friction is believed
+
+
+@dataclass(frozen=True)
+class Regression:
+    """values (5,) of balance.NAMES; covariance (5, 5), a jackknife over strokes; misfit: residual variance over that of the
+    current's noise; give [%]: distance over which friction turns round; static_excess [raw] and stribeck_speed [%/s]; excess_z: the excess over its standard error."""
+
+    values: Array
+    covariance: Array
+    misfit: float
+    give: float = GIVE[0]
+    static_excess: float = 0.0
+    stribeck_speed: float = 20.0
+    excess_z: float = 0.0
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """A stretch of motion in one direction (sign), from begin_s to end_s [s], positions there [%], the current that held the drive
+    before it [raw] (None where it did not come from rest), and its samples' slice. slides: friction has turned round from the start."""
+
+    sign: float
+    begin_s: float
+    end_s: float
+    begin: float
+    end: float
+    hold: float | None
+    samples: slice
+    slides: bool = False
+
+
+@dataclass(frozen=True)
+class _Projected:
+    """A stroke on its splines, whitened: project (k, n) from n grid points; fixed (k, 2) acceleration and velocity; position, current
+    (interpolated between samples; held_current: from those inside only) and speed (n,) on the grid; noise (3, 3) expected in the products
+    of acceleration, velocity and position."""
+
+    stroke: Stroke
+    project: Array
+    fixed: Array
+    position: Array
+    current: Array
+    held_current: Array
+    speed: Array
+    noise: Array
+
+
+def fit_regressions(trials: Sequence[MotorTrial], sigma_position: float, sigma_current: float) -> tuple[Regression, Regression]:
+    """Least squares on all strokes, without a Stribeck rise and with one, whose speed is profiled over a grid.
+
+    sigma_position [%], sigma_current [raw]: noise of one sample. Raises IdentificationError with fewer than six strokes.
+    """
+    moved = [strokes(t, sigma_position) for t in trials]
+    parts = _projected(trials, moved, sigma_position, sigma_current)
+    if len(parts) < 6:
+        names = ", ".join(t.name for t in trials)
+        raise IdentificationError(f"{names}: {len(parts)} strokes are long enough to be told from noise; at least six, both ways, are needed")
+    parts = _without_outliers(parts)
+    if (give := _give(parts)) > GIVE[0]:  # how friction builds up is a model of its own, and takes the place of inertia: only what slides
+        sliding = [[_settled(t, s, 2.5 * give + 2 * sigma_position) for s in found] for t, found in zip(trials, moved, strict=True)]
+        parts = _without_outliers(_projected(trials, sliding, sigma_position, sigma_current))
+    noise = sigma_current**2 * float(np.median(np.concatenate([np.diff(t.time_s) for t in trials])))
+    fits = [(*_solve(parts, speed), speed) for speed in (None, *STRIBECK)]
+    values, covariance, square, _ = fits[0]
+    # what the current does between the last sample outside a stroke and the first inside is not recorded
+    shift = _solve([replace(q, current=q.held_current) for q in parts], None)[0] - values
+    unrecorded = np.outer(shift, shift) / 4
+    plain = Regression(values, covariance + unrecorded, square / noise, give)
+    values, covariance, square, speed = min(fits[1:], key=lambda f: f[2])
+    excess = float(values[5])
+    curved = Regression(values[:5], covariance[:5, :5] + unrecorded, square / noise, give, excess, speed, excess / float(np.sqrt(covariance[5, 5])))
+    return plain, curved
+
+
+def strokes(t: MotorTrial, sigma: float) -> list[Stroke]:
+    """Strokes of a trial: where a line through the samples before and one through those after both move the same way."""
+    time, p = t.time_s, t.position
+    back, back_sd = _slope(time, p, sigma, -1)
+    ahead, ahead_sd = _slope(time, p, sigma, 1)
+    sign = np.where((back > 3 * back_sd) & (ahead > 3 * ahead_sd), 1, np.where((back < -3 * back_sd) & (ahead < -3 * ahead_sd), -1, 0))
+    cuts = np.r_[0, np.flatnonzero(np.diff(sign) != 0) + 1, len(sign)]
+    runs = [(a, b) for a, b in itertools.pairwise(cuts) if sign[a] != 0 and b - a >= 4 and abs(p[b - 1] - p[a]) > 6 * sigma]
+    found = []
+    for i, (a, b) in enumerate(runs):
+        before = runs[i - 1][1] if i else 0
+        after = runs[i + 1][0] if i + 1 < len(runs) else len(time)
+        begin_s, begin, hold = _end(t, sigma, range(a, before, -1))
+        end_s, end, _ = _end(t, sigma, range(b - 1, after - 1))
+        found.append(Stroke(float(sign[a]), begin_s, end_s, begin, end, hold, slice(a, b)))
+    return found
+
+
+def _slope(time: Array, p: Array, sigma: float, way: int) -> tuple[Array, Array]:
+    """Slope [%/s] of the line through each sample and those before (way -1) or after it, and its standard deviation."""
+    first = np.clip(np.arange(len(time)) - (WINDOW - 1 if way < 0 else 0), 0, len(time) - WINDOW)
+    index = first[:, None] + np.arange(WINDOW)
+    x = time[index] - time[index].mean(axis=1, keepdims=True)
+    square = np.sum(x * x, axis=1)
+    return np.sum(x * p[index], axis=1) / square, sigma / np.sqrt(square)
+
+
+def _end(t: MotorTrial, sigma: float, outwards: range) -> tuple[float, float, float | None]:
+    """Instant [s] and position [%] at which a stroke begins or ends, and the current [raw] in the rest beyond it.
+
+    outwards: samples from the stroke's last sure one to the neighbouring stroke. From rest the square root of the way travelled is linear in time,
+    which leads back to the instant; without one the stroke ends at its last sure sample.
+    """
+    time, p, k = t.time_s, t.position, np.array(outwards, int)
+    if len(k) < 6 or np.ptp(p[k[3:11]]) > 6 * sigma + 0.3:
+        i = outwards.start
+        return float(time[i]), float(p[i]), None
+    rest = float(np.median(p[k[3:11]]))
+    near = np.abs(p[k] - rest) < 2.5 * sigma
+    m = int(k[max(int(np.argmax(near)) - 1, 0)]) if near.any() else int(k[0])
+    inner = m - outwards.step
+    s, s_inner = np.sqrt(abs(p[m] - rest)), np.sqrt(abs(p[inner] - rest))
+    instant = time[m] - s * (time[inner] - time[m]) / max(s_inner - s, 1e-9)
+    beyond = time[np.clip(m + 2 * outwards.step, 0, len(time) - 1)]
+    instant = float(np.clip(instant, min(beyond, time[m]), max(beyond, time[m])))
+    held = k[(time[k] - instant) * outwards.step > 0][:6]
+    return instant, rest, float(t.current[held].mean()) if len(held) >= 3 else None
+
+
+def _settled(t: MotorTrial, s: Stroke, travel: float) -> Stroke:
+    """The stroke from where it has gone `travel` [%] on, which friction takes to turn round."""
+    k = np.arange(s.samples.start, s.samples.stop)
+    k = k[np.abs(t.position[k] - s.begin) > travel]
+    if len(k) == 0:
+        return replace(s, begin_s=s.end_s)
+    return replace(s, begin_s=float(t.time_s[k[0]]), begin=float(t.position[k[0]]), hold=None, slides=True)
+
+
+def _projected(trials: Sequence[MotorTrial], moved: Sequence[Sequence[Stroke]], sigma: float, sigma_current: float) -> list[_Projected]:
+    """Every stroke that is long enough on its splines; knots as dense as the noise lets accelerations be seen."""
+    parts, rng = [], np.random.default_rng(0)
+    for t, found in zip(trials, moved, strict=True):
+        interval = float(np.median(np.diff(t.time_s)))
+        spacing = max(2.5 * interval, np.pi * float(np.sqrt(INERTIA * sigma / sigma_current)))
+        parts += [_project(t, s, sigma, spacing, interval / 6, rng) for s in found if s.end_s - s.begin_s > 4 * spacing]
+    return parts
+
+
+def _project(t: MotorTrial, s: Stroke, sigma: float, spacing: float, step: float, rng: np.random.Generator) -> _Projected:
+    from scipy.interpolate import BSpline, make_interp_spline
+    from scipy.linalg import cholesky, solve_triangular
+
+    k = np.arange(max(s.samples.start - 3, 0), min(s.samples.stop + 3, len(t.time_s)))
+    k = k[(t.time_s[k] > s.begin_s + 1e-4) & (t.time_s[k] < s.end_s - 1e-4)]
+    at = np.r_[s.begin_s, t.time_s[k], s.end_s]
+    knots = np.linspace(s.begin_s, s.end_s, int((s.end_s - s.begin_s) / spacing) + 1)
+    knots = np.r_[[s.begin_s] * 3, knots, [s.end_s] * 3]
+    grid = np.linspace(s.begin_s, s.end_s, int((s.end_s - s.begin_s) / step) + 2)
+    weight = np.full(len(grid), grid[1] - grid[0])
+    weight[[0, -1]] *= 0.5
+    spline = BSpline(knots, np.eye(len(knots) - 4)[:, 1:-1], 3)
+    value, first, second = spline(grid), spline(grid, 1), spline(grid, 2)
+    root = cholesky(value.T @ (weight[:, None] * value), lower=True)
+
+    def white(x: Array) -> Array:
+        return solve_triangular(root, (x * weight[:, None]).T, lower=True)
+
+    onto, along, twice = white(value), -white(first), white(second)
+    share = (grid - s.begin_s) / (s.end_s - s.begin_s)
+    position = make_interp_spline(at, np.r_[s.begin, t.position[k], s.end], k=3)(grid)
+    # less its chord the position vanishes at both ends, and with it what integration by parts leaves there
+    bent = position - position[0] - (position[-1] - position[0]) * share
+    noise = sigma * rng.normal(size=(len(at), 2))
+    noise[[0, -1]] *= 0.5  # means of a rest
+    shaken = make_interp_spline(at, noise, k=3)(grid)
+    curved = shaken - shaken[0] - (shaken[-1] - shaken[0]) * share[:, None]
+    seen = np.stack([twice @ curved, along @ shaken, onto @ shaken])
+    speed = np.abs((position[-1] - position[0]) / (s.end_s - s.begin_s) + first @ solve_triangular(root.T, onto @ bent, lower=False))
+    current, held = np.interp(grid, t.time_s, t.current), np.interp(grid, t.time_s[k], t.current[k])
+    return _Projected(s, onto, np.c_[twice @ bent, along @ position], position, current, held, speed, np.einsum("ikr,jkr->ij", seen, seen) / 2)
+
+
+def _rows(q: _Projected, give: float, stribeck: float | None) -> tuple[Array, Array]:
+    """Regressors (k, 5 or 6) and current (k,): from rest friction is exp(-travel / give) of what it held, and slides for the rest."""
+    left = np.exp(-np.abs(q.position - q.stroke.begin) / give)
+    if q.stroke.slides:
+        friction, held, hold = np.full(len(left), q.stroke.sign), np.zeros_like(left), 0.0
+    elif q.stroke.hold is None:
+        friction, held, hold = q.stroke.sign * (1 - 2 * left), np.zeros_like(left), 0.0
+    else:
+        friction, held, hold = q.stroke.sign * (1 - left), left, q.stroke.hold
+    columns = [friction, q.position - held * q.stroke.begin, 1 - held]
+    if stribeck is not None:
+        columns.append(friction * np.exp(-q.speed / stribeck))
+    x = q.project @ np.column_stack([*columns, q.current - held * hold])
+    return np.c_[q.fixed, x[:, :-1]], x[:, -1]
+
+
+def _system(parts: Sequence[_Projected], give: float, stribeck: float | None) -> tuple[list[Array], list[Array], list[float]]:
+    """Normal matrices less the encoder's noise, right sides and squares of the current, stroke by stroke."""
+    gram, right, square = [], [], []
+    for q in parts:
+        x, y = _rows(q, give, stribeck)
+        g = x.T @ x
+        g[np.ix_([0, 1, 3], [0, 1, 3])] -= q.noise
+        gram.append(g)
+        right.append(x.T @ y)
+        square.append(float(y @ y))
+    return gram, right, square
+
+
+def _cost(parts: Sequence[_Projected], give: float) -> float:
+    gram, right, square = _system(parts, give, None)
+    b = sum(right)
+    return float(sum(square) - b @ np.linalg.solve(sum(gram), b))
+
+
+def _give(parts: Sequence[_Projected]) -> float:
+    """Distance over which friction turns round [%]; the least of GIVE where the strokes show none."""
+    from scipy.optimize import minimize_scalar
+
+    costs = [_cost(parts, g) for g in GIVE]
+    best = int(np.argmin(costs))
+    count = sum(len(q.fixed) for q in parts)
+    if best == 0 or costs[0] - costs[best] < EVIDENCE * costs[best] / count:
+        return GIVE[0]
+    bounds = (GIVE[best - 1] if best > 1 else 0.1, 1.8 if best == len(GIVE) - 1 else GIVE[best + 1])
+    return float(minimize_scalar(lambda g: _cost(parts, g), bounds=bounds, method="bounded", options={"xatol": 0.02}).x)
+
+
+def _solve(parts: Sequence[_Projected], stribeck: float | None) -> tuple[Array, Array, float]:
+    """Values, their covariance by leaving out one stroke after the other (jackknife), and the mean square left."""
+    gram, right, square = _system(parts, GIVE[0], stribeck)
+    total, b = sum(gram), sum(right)
+    values = np.linalg.solve(total, b)
+    left = float(max(sum(square) - b @ values, 0.0) / sum(len(q.fixed) for q in parts))
+    d = np.array([np.linalg.solve(total - g, g @ values - r) for g, r in zip(gram, right, strict=True)])
+    d -= d.mean(axis=0)
+    return values, (len(parts) - 1) / len(parts) * d.T @ d, left
+
+
+def _without_outliers(parts: list[_Projected]) -> list[_Projected]:
+    """The strokes without those that the others do not explain: something held the drive, or their ends were misjudged."""
+    for _ in range(3):
+        gram, right, _ = _system(parts, GIVE[0], None)
+        values = np.linalg.solve(sum(gram), sum(right))
+        misfit = np.array([np.mean((y - x @ values) ** 2) for x, y in (_rows(q, GIVE[0], None) for q in parts)])
+        kept = [q for q, m in zip(parts, misfit, strict=True) if m < 6 * np.median(misfit)]
+        if len(kept) == len(parts) or len(kept) < 6:
+            break
+        parts = kept
+    return parts
