@@ -8,10 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hand_model.effects import DriveState, effect
 from hand_model.errors import SessionError
 from hand_model.rig import fit_declared, load_rig, replay_rig
 from hand_model.rig.compete import pose, solution
 from hand_model.rig.evidence import multiplicities, weigh
+from hand_model.rig.horizon import open_loop
+from hand_model.rig.laws import Now, law
+from hand_model.rig.mjcf import read_effects, write_effects
 from hand_model.rig.overrides import apply_overrides, compile_model
 from hand_model.rig.proof import Bench
 from hand_model.rig.supply import supply_channel, supply_deviation
@@ -144,3 +148,50 @@ def test_evidence_takes_the_simplest_of_equals_and_nothing_from_noise() -> None:
     noise = 0.05 * np.array([np.tile([1, -1, -1, 1], 8), np.tile([-1, 1, 1, -1], 8)])
     said = weigh(none, np.array([0.5, 0.5])[:, None] + noise, [3, 1], group)
     assert said.chosen == 1 and said.probability == 1.0 and set(said.close) == {0, 1}
+
+
+SIZE = {"asymmetric_friction": 0.3, "asymmetric_viscous_friction": -0.2, "quadratic_damping": 0.1, "stribeck_friction": 0.4,
+        "elastoplastic_hysteresis": 0.7, "nonlinear_spring": 0.5, "end_stop_contact": 2.0, "torque_ripple": 0.3, "detent_load": 0.6}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SIZE)
+def test_law_in_open_loop_is_the_column_along_the_path(name: str) -> None:
+    """Step by step along a recorded path, an effect's effort (friction by the motion's direction) is that of its columns."""
+    t = np.arange(0, 6, 0.002)
+    q, v = np.sin(1.7 * t) + 0.4 * np.sin(4.1 * t), 1.7 * np.cos(1.7 * t) + 1.64 * np.cos(4.1 * t)
+    state = DriveState("", "", t, q, v, 0 * t, 0 * t, np.sign(v)[:, None], "rad", "N m", {}, ("coulomb",))
+    if name == "asymmetric_friction":
+        columns, names, shape = np.ones((len(t), 1)), ["offset"], {}
+    else:
+        shape = effect(name).grid((state,))[-1]
+        columns, names = effect(name).columns(state, shape), [a[0] for a in effect(name).amplitudes()]
+    act = law({"effect": name, "variant": "", "shape": shape, "amplitude": {n: SIZE[name] * (k + 1) for k, n in enumerate(names)}})
+    done = [act(Now(a, b, 0.0, 0.0)) for a, b in zip(q, v, strict=True)]
+    effort = np.array([e + f * np.sign(b) for (e, f), b in zip(done, v, strict=True)])
+    wanted = columns @ (SIZE[name] * (1 + np.arange(len(names))))
+    assert np.abs(effort - wanted).max() < 0.02 * np.abs(wanted).max()
+
+
+def test_law_by_load_and_what_has_none() -> None:
+    """Friction by load is a bound that never turns over; an effect that needs its past in another form is not simulated."""
+    now = Now(0.1, -2.0, -3.0, 4.0)
+    record = {"effect": "load_dependent_friction", "amplitude": {"per": 0.5}, "shape": {"stribeck_speed": 2.0}}
+    known = {"": (0.0, 1.5), "motor side": (0.0, 2.0), "low speed": (0.0, 1.5 / np.e), "with speed": (-3.0, 0.0)}
+    for variant, expected in known.items():
+        assert law({**record, "variant": variant})(now) == pytest.approx(expected)
+    assert law({"effect": "thermal_friction_drift"}) is None
+
+
+def test_motion_in_open_loop_falls_with_what_was_found(torque_bench: Path) -> None:
+    """The same recordings with an offset of the drive: the file that has it predicts whole trials, the declared one worse; a
+    trial whose torque is refused takes no part."""
+    rig = load_rig(read_session(torque_bench))
+    rig = replace(rig, trials=tuple(replace(t, effort={"hinge": t.effort["hinge"] + 0.05}) for t in rig.trials))
+    fit = fit_declared(rig)
+    theta = solution(pose(fit), ())
+    before = Bench(rig).file(fit, (), theta)
+    after = write_effects(before, [*read_effects(before), {"effect": "asymmetric_friction", "variant": "", "joint": "hinge",
+                                                           "shape": {}, "amplitude": {"offset": 0.05}}])  # fmt: skip
+    told = open_loop(rig, before, after)
+    assert told["held_out"] == ["log/3.csv"] and told["ratio"] < 0.6
+    assert "not_run" in open_loop(rig, before, after, {("log/3.csv", "hinge")})

@@ -46,7 +46,7 @@ def rig_findings_page(session: Session, findings: RigFindings) -> bytes:
     pairs = [] if swing or findings.lack_of_fit.get("before") is None else _pairs(rig, findings)
     sections = [Section("findings", "What is missing", _conclusion(findings), tuple(_findings(findings)))]
     if pairs:
-        sections += [_map(rig, pairs), _effects(rig, findings, pairs), _validation(rig, pairs)]
+        sections += [_map(rig, pairs), _effects(rig, findings, pairs), _validation(rig, findings, pairs)]
     if swing:
         sections += _motion(rig, findings)
     if findings.couplings:
@@ -187,7 +187,7 @@ def _binned(x: Array, y: Array) -> tuple[Array, Array, Array, Array]:
     return np.array([x[p].mean() for p in parts]), low, np.array([y[p].mean() for p in parts]), high
 
 
-def _validation(rig: RigModel, pairs: Sequence[Pair]) -> Section:
+def _validation(rig: RigModel, findings: RigFindings, pairs: Sequence[Pair]) -> Section:
     held = [p for p in pairs if p[0].validate] or list(pairs)
     rows = [[a.trial, a.joint, f"{_rms(a.error):.4g}", f"{_rms(b.error):.4g}", f"{_rms(b.error) / max(_rms(a.error), 1e-300):.2f}",
              rig.effort_unit(a.joint)] for a, b in held]  # fmt: skip
@@ -206,7 +206,22 @@ def _validation(rig: RigModel, pairs: Sequence[Pair]) -> Section:
     words = f"Effort by inverse dynamics of the two files on {count(len({a.trial for a, _ in held}), 'trial')} held out."
     return Section("validation", "Before and after", words, (
         table(head, rows, "Root mean square of the effort error, moving samples", text_columns=2),
-        key(("c2", "recorded"), ("c1", "declared model"), ("ink", "with what was found")), figures(*drawn)))  # fmt: skip
+        key(("c2", "recorded"), ("c1", "declared model"), ("ink", "with what was found")), figures(*drawn),
+        *_open_loop(findings)))  # fmt: skip
+
+
+def _open_loop(findings: RigFindings) -> list[Element]:
+    """The same files simulated: position error over whole trials or over the horizon that a simulation carries."""
+    told = findings.lack_of_fit.get("open_loop")
+    if told is None:
+        return []
+    if "not_run" in told:
+        return [note(f"Motion not simulated in open loop: {told['not_run']}.")]
+    how = "over whole trials" if told["horizon_s"] == "whole" else f"over {told['horizon_s']:g} s from recorded states"
+    rows = [[j, f"{p['before']:.4g}", f"{p['after']:.4g}", f"{p['after'] / max(p['before'], 1e-300):.2f}", p["unit"]]
+            for j, p in told["joints"].items()]  # fmt: skip
+    head = ("joint", "declared", "with what was found", "ratio", "unit")
+    return [table(head, rows, f"Root mean square position error, simulated by MuJoCo in open loop {how}", text_columns=1)]
 
 
 def _couplings(residuals: Sequence[CouplingResidual]) -> Section:

@@ -72,7 +72,9 @@ def _check_effort(rig: RigModel, joint: str, channel: str) -> list[ChannelIssue]
 
 
 def _looks(trial: RigTrial, joint: str, values: Array, measured: bool) -> list[tuple[str, float, str]]:
-    out = []
+    out: list[tuple[str, float, str]] = []
+    if not measured:  # a control that stands on its limits is what was put in
+        return out
     limits = [np.mean(values == e) for e in (values.min(), values.max())]
     if (
         min(limits) > CLIPPED
@@ -80,8 +82,6 @@ def _looks(trial: RigTrial, joint: str, values: Array, measured: bool) -> list[t
         and len(np.unique(values)) > 20
     ):
         out.append(("current_saturation", float(sum(limits)), "stands on its limits, the same both ways"))
-    if not measured:
-        return out
     share = sinusoids_left(trial.time_s, values)
     if share < SAME:
         out.append(("command_as_measurement", share, "is a sinusoid of time"))

@@ -17,6 +17,7 @@ from .compete import Score, Step, Term, compete, held_out, judge, normal, pose, 
 from .declared import DeclaredFit, fit_declared
 from .diagnose_swing import diagnose_swing
 from .findings import CouplingResidual, Finding, RigFindings
+from .horizon import open_loop
 from .model import RigModel, load_rig
 from .patch import write_couplings
 from .proof import Bench
@@ -51,6 +52,7 @@ def diagnose_rig(session: Session, output: str | Path | None = None,
         result = diagnose_swing(rig, session, fit, say)
     else:
         result = _diagnose_balance(rig, fit, say)
+        result[2]["open_loop"] = open_loop(rig, result[4], result[3], refused)
     parts, rejected, lack, xml, declared_xml = result
     found += parts
     angles = []
@@ -74,7 +76,7 @@ def diagnose_rig(session: Session, output: str | Path | None = None,
                   "held_out_repeats_the_training_trajectory": again,
                   "probability": PROBABILITY,
                   "not_isolable": [list(f.members) for f in found if len(f.members) > 1]},
-        findings=tuple(sorted(found, key=lambda f: (f.model is not None, -float(f.where.get("share_of_mismatch") or 0.0)))),
+        findings=tuple(sorted(found, key=_rank)),
         rejected=tuple(rejected),
         unexplained=unexplained,
         next_experiment=_next(found, issues, again),
@@ -86,6 +88,12 @@ def diagnose_rig(session: Session, output: str | Path | None = None,
     if output is not None:
         findings.write(output)
     return findings
+
+
+def _rank(finding: Finding) -> tuple[int, float]:
+    """What is refused first, for all else was found without it; then by share of the mismatch; clipped samples last."""
+    place = 1 if finding.model is not None else 0 if finding.effect == "command_as_measurement" else 2
+    return place, -float(finding.where.get("share_of_mismatch") or 0.0)
 
 
 def trusted_fit(rig: RigModel) -> tuple[DeclaredFit, tuple[ChannelIssue, ...]]:

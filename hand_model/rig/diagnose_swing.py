@@ -35,7 +35,7 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
     taken, rounds = compete_swing(stages, declared)
     say(f"{rig.name}: {', '.join(v.key for v in taken) or 'nothing'}")
     # Last, at the step of the replay; a free swing over whole recordings, for its phase is known well enough by now.
-    fine = build_swing(rig, fit, STEP_S, windows[-1] if stages[0].driven else np.inf)
+    fine = [build_swing(rig, fit, STEP_S, w) for w in (windows if stages[0].driven else (*windows[1:], np.inf))]
     held = bool(rig.select(True))  # without validation recordings the training ones measure, and the report says so
     known: dict[tuple[str, ...], Link] = {}
     kept, rejected = list(zip(taken, rounds, strict=True)), []
@@ -52,7 +52,7 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
         proof = {"metric": "position_rmse", "unit": rig.unit(rig.joints[0]), "before": figures[k], "after": figures[k + 1],
                  "noise_floor": _resolution(rig), "ci95_reduction": _fall(chain[k].replay, chain[k + 1].replay, held),
                  "held_out": [t.name for t in rig.select(held)], "engine": "mujoco"}  # fmt: skip
-        found.append(_swing_finding(rig, variant, round_, fine, chain[-1], proof))
+        found.append(_swing_finding(rig, variant, round_, fine[0], chain[-1], proof))
     means = [c.replay.figure("position_mae", held) for c in (chain[0], chain[-1])]
     lack = {"metric": "position_rmse", "unit": rig.unit(rig.joints[0]), "before": figures[0], "after": figures[-1],
             "one_effect": figures[min(1, len(figures) - 1)],
@@ -72,17 +72,18 @@ class Link:
     replay: RigResiduals
 
 
-def _chain(known: dict[tuple[str, ...], Link], rig: RigModel, session: Session, held: bool, swing: Swing, declared: np.ndarray,
+def _chain(known: dict[tuple[str, ...], Link], rig: RigModel, session: Session, held: bool, stages: Sequence[Swing], declared: np.ndarray,
            taken: Sequence[Variant], last: np.ndarray | None) -> None:  # fmt: skip
     """Add to `known` the declared model, with the first effect, with the first two, ...: fitted in one batch, written and
     replayed."""
+    swing = stages[0]
     free, start = free_declared(swing), vector(swing.initial)
     parts = [tuple(taken[:k]) for k in range(len(taken) + 1) if tuple(v.key for v in taken[:k]) not in known]
     if not parts:
         return
     sets = [tuple(dict.fromkeys((*free, *(n for v in part for n in v.start)))) for part in parts]
     starts = [np.where(np.isin(PARAMETERS, s), last, start) if part else declared for s, part in zip(sets, parts, strict=True)]
-    fits = fit_stages([swing], [Task(s, t, ()) for s, t in zip(sets, starts, strict=True)], 8)
+    fits = fit_stages(stages, [Task(s, t, ()) for s, t in zip(sets, starts, strict=True)], 8)
     files = [write_swing(rig, swing, f.theta) for f in fits]
     replays = Background(_replayed, [(session, x, held) for x in files]).results()
     for part, s, f, x, r in zip(parts, sets, fits, files, replays, strict=True):

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..session import Session
 from .inverse import apply_levels, effort_residuals
+from .laws import Now, law
 from .mjcf import read_effects
 from .model import RigModel, RigTrial, load_rig
 from .overrides import compile_model
@@ -69,10 +70,15 @@ class EffectStepper:
         self.model = model
         self.coulomb = np.array(model.dof_frictionloss)
         self.entries = [(model.joint(e["joint"]).id, e["swing"]) for e in effects if "swing" in e]
+        records = [e for e in effects if "effect" in e]
+        self.unknown = tuple(r["effect"] for r in records if law(r) is None)
+        self.laws = [(model.joint(r["joint"]).id, act) for r in records if (act := law(r)) is not None]
+        self.late = {r["joint"]: r["shape"]["delay"] for r in records if "delay" in r.get("shape", {})}
 
-    def delay_s(self) -> float:
-        """By how much the drive acts late [s]."""
-        return max((e.get("delay", 0.0) for _, e in self.entries), default=0.0)
+    def delay_s(self, joint: str) -> float:
+        """By how much the drive of a joint acts later than its channel says [s]."""
+        named = [e.get("delay", 0.0) for j, e in self.entries if j == self.model.joint(joint).id]
+        return max(named, default=0.0) - self.late.get(joint, 0.0)  # a balance's delay is that of the motion
 
     def control(self, drive: Array, supply: Array) -> Array:
         """The recorded control (n,) less sag and scaled with the supply; drive in the unit of effort per gain."""
@@ -106,6 +112,15 @@ class EffectStepper:
                     + _low_speed(e, v, external, shaft))  # fmt: skip
             # the bound takes effect in the next step: the constraint of this one stands already
             model.dof_frictionloss[joint] = max(self.coulomb[joint] + more, 1e-9)
+        bound: dict[int, float] = {}
+        for joint, act in self.laws:
+            drive = float(data.qfrc_actuator[joint])
+            load = drive + float(data.qfrc_passive[joint] + data.qfrc_constraint[joint])
+            effort, friction = act(Now(float(data.qpos[joint]), float(data.qvel[joint]), load, drive))
+            data.qfrc_passive[joint] -= effort
+            bound[joint] = bound.get(joint, self.coulomb[joint]) + friction
+        for joint, value in bound.items():
+            model.dof_frictionloss[joint] = max(value, 1e-9)
 
 
 def _low_speed(e: dict[str, float], v: float, external: float, shaft: float) -> float:
@@ -119,10 +134,11 @@ def _low_speed(e: dict[str, float], v: float, external: float, shaft: float) -> 
     return level * np.exp(-(abs(v / get("stribeck_speed", 1.0)) ** get("stribeck_exponent", 2.0)))
 
 
-def simulate_trial(rig: RigModel, trial: RigTrial) -> tuple[Array, Array]:
+def simulate_trial(rig: RigModel, trial: RigTrial, horizon_s: float = np.inf) -> tuple[Array, Array]:
     """Positions (n, joints) simulated in open loop at the trial's time stamps (n,), and those stamps.
 
-    Start: recorded position and smoothed velocity. Recorded effort or control goes in; nothing is fed back.
+    Start: recorded position and smoothed velocity, taken again after every horizon_s [s]. Recorded effort or control goes
+    in; nothing is fed back.
     """
     import mujoco
 
@@ -133,13 +149,17 @@ def simulate_trial(rig: RigModel, trial: RigTrial) -> tuple[Array, Array]:
     step = float(model.opt.timestep)
     grid = np.arange(0.0, trial.time_s[-1] + step, step)
     control = _controls(rig, trial, model, effects, grid)
-    data.qpos[:], data.qvel[:] = recorded_start(rig, trial)
+    stride = len(grid) if np.isinf(horizon_s) else max(1, round(horizon_s / step))
+    starts = recorded_states(rig, trial, grid[::stride])
+    data.qpos[:], data.qvel[:] = (s[0] for s in starts)
     if not model.nu:  # semi-implicit Euler is leapfrog when the velocity starts half a step early
         mujoco.mj_forward(model, data)
         data.qvel[:] -= 0.5 * step * data.qacc_smooth
     out = np.empty((len(grid), model.nq))
-    plain = not effects.entries
+    plain = not (effects.entries or effects.laws)
     for k in range(len(grid)):
+        if k and k % stride == 0:
+            data.qpos[:], data.qvel[:] = (s[k // stride] for s in starts)
         out[k] = data.qpos
         data.ctrl[:] = control[k]
         if plain:
@@ -156,26 +176,25 @@ def simulate_trial(rig: RigModel, trial: RigTrial) -> tuple[Array, Array]:
     return trial.time_s, at
 
 
-def recorded_start(rig: RigModel, trial: RigTrial) -> tuple[Array, Array]:
-    """Recorded position and smoothed velocity (joints,) at the first sample."""
+def recorded_states(rig: RigModel, trial: RigTrial, at_s: Array) -> tuple[Array, Array]:
+    """Recorded position and velocity, both smoothed, (m, joints) each at times at_s (m,) [s]."""
     grid = uniform_time(trial.time_s)
     rate = 1.0 / (grid[1] - grid[0])
     q0, v0 = [], []
     for joint in rig.joints:
         raw = np.interp(grid, trial.time_s, fill_gaps(trial.time_s, trial.position[joint]))
         smooth = low_pass(raw, rate, choose_cutoff(raw, rate))
-        q0.append(smooth[0])
-        v0.append(differentiate(smooth, rate)[0])
-    return np.array(q0), np.array(v0)
+        q0.append(np.interp(at_s, grid, smooth))
+        v0.append(np.interp(at_s, grid, differentiate(smooth, rate)))
+    return np.stack(q0, 1), np.stack(v0, 1)
 
 
 def _controls(rig: RigModel, trial: RigTrial, model: Any, effects: EffectStepper, grid: Array) -> Array:
     """Control of every actuator (n, nu) on the simulation's grid, late and sagging where the file says so."""
     out = np.zeros((len(grid), model.nu))
-    at = grid - effects.delay_s()
     supply = np.interp(grid, trial.time_s, supply_deviation(rig, trial))
     for drive in rig.drives:
-        a = model.actuator(drive.name).id
+        a, at = model.actuator(drive.name).id, grid - effects.delay_s(drive.joint)
         if drive.joint in trial.voltage:
             out[:, a] = effects.control(
                 np.interp(at, trial.time_s, fill_gaps(trial.time_s, trial.voltage[drive.joint])), supply

@@ -1,0 +1,93 @@
+"""What an effect of a balance does while MuJoCo steps: effort and dry friction at the present state of its joint."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..effects import DriveState, effect
+
+# Effects that depend on the present state alone; of those, the frictions.
+FRICTION = frozenset({"stribeck_friction", "position_dependent_friction"})
+OF_STATE = FRICTION | {"nonlinear_spring", "end_stop_contact", "detent_load", "torque_ripple"}
+
+
+@dataclass(frozen=True)
+class Now:
+    """One instant of a joint. position [rad or m], velocity [per s]; load: what the joint carries [N m or N]; drive: what
+    its own drive puts in."""
+
+    position: float
+    velocity: float
+    load: float
+    drive: float
+
+
+# (effort against the motion that the drive must give besides, bound of further dry friction), both [N m or N].
+Law = Callable[[Now], tuple[float, float]]
+
+
+def law(record: Mapping[str, Any]) -> Law | None:
+    """The law of a record {"effect", "variant", "shape", "amplitude"} of a file; None where it has none in open loop."""
+    name, variant = record["effect"], record.get("variant", "")
+    shape, size = record.get("shape", {}), tuple(record.get("amplitude", {}).values())
+    if name == "load_dependent_friction":
+        return _by_load(variant, shape, size[0])
+    if name == "elastoplastic_hysteresis":
+        return _Stop(shape, size[0])
+    simple: dict[str, Law] = {
+        "asymmetric_friction": lambda n: (size[0], 0.0),
+        "asymmetric_viscous_friction": lambda n: (size[0] * abs(n.velocity), 0.0),
+        "quadratic_damping": lambda n: (size[0] * n.velocity * abs(n.velocity), 0.0),
+        "current_channel_delay": lambda n: (0.0, 0.0),  # the channel was read at another instant: the control is shifted
+        "command_delay": lambda n: (0.0, 0.0),
+    }
+    return _of_state(record) if name in OF_STATE else simple.get(name)
+
+
+def _of_state(record: Mapping[str, Any]) -> Law:
+    """The catalogue's own columns at one sample; friction as the bound that it is while the joint moves forwards."""
+    named, shape = effect(record["effect"]), record.get("shape", {})
+    size = np.array([record["amplitude"][a[0]] for a in named.amplitudes()])
+    one, friction = np.ones(1), record["effect"] in FRICTION
+
+    def act(now: Now) -> tuple[float, float]:
+        state = DriveState("", "", 0 * one, now.position * one, now.velocity * one, 0 * one, np.nan * one, one[:, None],
+                           declared_names=("coulomb",))  # fmt: skip
+        value = float((named.columns(state, shape) @ size)[0])
+        return (0.0, value) if friction else (value, 0.0)
+
+    return act
+
+
+def _by_load(variant: str, shape: Mapping[str, float], size: float) -> Law:
+    if variant == "with speed":
+        return lambda n: (size * n.velocity * abs(n.load), 0.0)
+    if variant == "low speed":
+        return lambda n: (0.0, size * abs(n.load) * math.exp(-((n.velocity / shape["stribeck_speed"]) ** 2)))
+    if variant == "motor side":
+        return lambda n: (0.0, size * abs(n.drive))
+    return lambda n: (0.0, size * abs(n.load))
+
+
+class _Stop:
+    """Stop operator (form 0) or exponential build-up (form 1) along the path, step by step."""
+
+    def __init__(self, shape: Mapping[str, float], size: float) -> None:
+        self.reach, self.abrupt, self.size = max(shape["reach"], 1e-12), shape["form"] < 0.5, size
+        self.state, self.last = 0.0, math.nan
+
+    def __call__(self, now: Now) -> tuple[float, float]:
+        """Effort of the present state, no further friction."""
+        moved = 0.0 if math.isnan(self.last) else now.position - self.last
+        self.last = now.position
+        if self.abrupt:
+            self.state = min(max(self.state + moved / self.reach, -1.0), 1.0)
+        elif moved:
+            way = math.copysign(1.0, moved)
+            self.state = way + (self.state - way) * math.exp(-abs(moved) / self.reach)
+        return self.size * self.state, 0.0
