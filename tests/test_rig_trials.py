@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,9 +19,10 @@ from hand_model.rig.laws import Now, law
 from hand_model.rig.mjcf import read_effects, write_effects
 from hand_model.rig.overrides import apply_overrides, compile_model
 from hand_model.rig.proof import Bench
+from hand_model.rig.replay import can_simulate
 from hand_model.rig.supply import supply_channel, supply_deviation
 from hand_model.rig.swing import INDEX, Task, fit_together, simulate, vector
-from hand_model.rig.swing_build import build_swing
+from hand_model.rig.swing_build import build_swing, can_swing
 from hand_model.rig.swing_interval import intervals
 from hand_model.rig.swing_patch import write_swing
 from hand_model.session import read_session
@@ -195,3 +197,21 @@ def test_motion_in_open_loop_falls_with_what_was_found(torque_bench: Path) -> No
     told = open_loop(rig, before, after)
     assert told["held_out"] == ["log/3.csv"] and told["ratio"] < 0.6
     assert "not_run" in open_loop(rig, before, after, {("log/3.csv", "hinge")})
+
+
+def test_effort_recorded_of_a_voltage_drive_is_the_effort(tmp_path: Path, torque_bench: Path) -> None:
+    """A current, scaled to torque, beside a motor that the file drives by voltage: balance and replay use it as it is, and
+    no back-EMF is fitted; a trial without any drive channel is not simulated."""
+    folder = tmp_path / "s"
+    shutil.copytree(torque_bench, folder)
+    (folder / "rig.xml").write_text(BENCH.format(drive=VOLTAGE))
+    log = folder / "log/0.csv"
+    log.write_text(log.read_text().replace("torque", "unnamed", 1))
+    rig = load_rig(read_session(folder))
+    fit, plain = fit_declared(rig), fit_declared(load_rig(read_session(torque_bench)))
+    assert not can_swing(rig) and "back_emf:motor" not in [c.label for c in fit.columns]
+    assert [can_simulate(rig, t) for t in rig.trials] == [False, True, True, True]
+    xml = [Bench(load_rig(read_session(f))).file(x, (), solution(pose(x), ())) for f, x in ((folder, fit), (torque_bench, plain))]
+    told = [replay_rig(read_session(f), x, validate=True).joints[0] for f, x in zip((folder, torque_bench), xml, strict=True)]
+    assert told[0].effort_rmse == pytest.approx(told[1].effort_rmse, rel=0.5) and told[0].position_rmse < 0.1
+    assert np.isnan(replay_rig(read_session(folder), efforts=False, validate=False).joints[0].position_rmse)

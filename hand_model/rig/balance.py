@@ -118,7 +118,8 @@ def declared_columns(rig: RigModel, off_axis: bool = False) -> tuple[Column, ...
     for drive in rig.drives:
         if drive.offset:
             columns.append(Column("offset", drive.name, "", 0.0))
-        if drive.kind == "voltage":  # back-EMF: damping while the leads are connected
+        # Back-EMF: damping while the leads are connected, unless what the drive gives after it is recorded.
+        if drive.kind == "voltage" and not any(drive.joint in t.effort for t in rig.trials):
             columns.append(Column("back_emf", drive.name, "", _back_emf(model, drive.name)))
     columns += [Column("spring", model.tendon(t).name, "", float(model.tendon_stiffness[t])) for t in range(model.ntendon)
                 if model.tendon_stiffness[t] != 0]  # fmt: skip

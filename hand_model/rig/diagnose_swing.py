@@ -14,7 +14,7 @@ from .declared import DeclaredFit
 from .findings import Finding
 from .model import RigModel, load_rig
 from .replay import RigResiduals, replay_rig
-from .states import noise_std
+from .states import fill_gaps, noise_std
 from .swing import INDEX, PARAMETERS, STEP_S, Fitted, Swing, Task, parameter_units, vector
 from .swing_build import build_swing, windows_s
 from .swing_compete import Round, Variant, compete_swing, fit_stages, free_declared
@@ -95,7 +95,14 @@ def _replayed(session: Session, xml: bytes, held: bool) -> RigResiduals:
 
 
 def _resolution(rig: RigModel) -> float:
-    return float(np.median([noise_std(t.position[rig.joints[0]]) for t in rig.trials]))
+    """What a recording cannot tell from no error: encoder noise, and the way that the joint goes within one sample, for
+    position and drive are read at some instant of it (uniform: step / sqrt(12))."""
+    joint, floors = rig.joints[0], []
+    for t in rig.trials:
+        q = fill_gaps(t.time_s, t.position[joint])
+        step = float(np.median(np.diff(t.time_s)))
+        floors.append(np.hypot(noise_std(q), float(np.std(np.gradient(q, t.time_s))) * step / np.sqrt(12.0)))
+    return float(np.median(floors))
 
 
 def _fall(before: Any, after: Any, held: bool) -> list[float]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from .mjcf import read_effects
 from .model import RigModel, RigTrial
 from .overrides import compile_model
-from .replay import EffectStepper, simulate_trial
+from .replay import EffectStepper, can_simulate, simulate_trial
 from .states import fill_gaps
 
 Array = NDArray[np.float64]
@@ -31,7 +31,7 @@ def open_loop(rig: RigModel, before: bytes, after: bytes, refused: Collection[tu
     the files cannot be simulated so, else the horizon ("whole" or [s]), the ratio and each joint's figures.
     """
     wrong = {t for t, _ in refused}
-    trials = [t for t in (rig.select(True) or rig.trials) if t.name not in wrong and _driven(rig, t)]
+    trials = [t for t in (rig.select(True) or rig.trials) if t.name not in wrong and can_simulate(rig, t)]
     if rig.couplings:
         return {"not_run": "coupled joints: what drives the transmission from behind is not recorded as an effort"}
     if not trials:
@@ -50,12 +50,6 @@ def open_loop(rig: RigModel, before: bytes, after: bytes, refused: Collection[tu
                     "ratio": float(np.sqrt(np.mean((new / np.maximum(old, 1e-300)) ** 2))), "joints": joints,
                     "held_out": [t.name for t in trials]}  # fmt: skip
     return {"not_run": f"the declared model leaves the recordings within {HORIZONS_S[-1]:g} s"}
-
-
-def _driven(rig: RigModel, trial: RigTrial) -> bool:
-    """Whether everything that moves the rig in a trial is recorded."""
-    known = {*trial.effort, *trial.voltage, *trial.setpoint}
-    return all(j in trial.position for j in rig.joints) and all(d.joint in known or d.joint not in trial.live for d in rig.drives)
 
 
 def _error(rig: RigModel, trials: Sequence[RigTrial], horizon_s: float) -> Array:

@@ -148,7 +148,7 @@ def simulate_trial(rig: RigModel, trial: RigTrial, horizon_s: float = np.inf) ->
     effects = EffectStepper(model, read_effects(rig.xml))
     step = float(model.opt.timestep)
     grid = np.arange(0.0, trial.time_s[-1] + step, step)
-    control = _controls(rig, trial, model, effects, grid)
+    control, applied = _controls(rig, trial, model, effects, grid)
     stride = len(grid) if np.isinf(horizon_s) else max(1, round(horizon_s / step))
     starts = recorded_states(rig, trial, grid[::stride])
     data.qpos[:], data.qvel[:] = (s[0] for s in starts)
@@ -162,6 +162,7 @@ def simulate_trial(rig: RigModel, trial: RigTrial, horizon_s: float = np.inf) ->
             data.qpos[:], data.qvel[:] = (s[k // stride] for s in starts)
         out[k] = data.qpos
         data.ctrl[:] = control[k]
+        data.qfrc_applied[:] = applied[k]
         if plain:
             mujoco.mj_step(model, data)
             continue
@@ -174,6 +175,14 @@ def simulate_trial(rig: RigModel, trial: RigTrial, horizon_s: float = np.inf) ->
             break
     at = np.stack([np.interp(trial.time_s, grid, column) for column in out.T], 1)
     return trial.time_s, at
+
+
+def can_simulate(rig: RigModel, trial: RigTrial) -> bool:
+    """Whether the trial holds every joint's position and all that its drives put in, or are told."""
+    told = {"voltage": trial.voltage, "position": trial.setpoint, "force": trial.effort}
+    return all(j in trial.position for j in rig.joints) and all(
+        d.joint in told[d.kind] or d.joint in trial.effort for d in rig.drives if d.joint in trial.live
+    )
 
 
 def recorded_states(rig: RigModel, trial: RigTrial, at_s: Array) -> tuple[Array, Array]:
@@ -189,9 +198,10 @@ def recorded_states(rig: RigModel, trial: RigTrial, at_s: Array) -> tuple[Array,
     return np.stack(q0, 1), np.stack(v0, 1)
 
 
-def _controls(rig: RigModel, trial: RigTrial, model: Any, effects: EffectStepper, grid: Array) -> Array:
-    """Control of every actuator (n, nu) on the simulation's grid, late and sagging where the file says so."""
-    out = np.zeros((len(grid), model.nu))
+def _controls(rig: RigModel, trial: RigTrial, model: Any, effects: EffectStepper, grid: Array) -> tuple[Array, Array]:
+    """Control of every actuator (n, nu) on the simulation's grid, late and sagging where the file says so; and efforts
+    (n, nv) recorded of drives that the file drives by voltage: their motor is disconnected."""
+    out, applied = np.zeros((len(grid), model.nu)), np.zeros((len(grid), model.nv))
     supply = np.interp(grid, trial.time_s, supply_deviation(rig, trial))
     for drive in rig.drives:
         a, at = model.actuator(drive.name).id, grid - effects.delay_s(drive.joint)
@@ -203,8 +213,12 @@ def _controls(rig: RigModel, trial: RigTrial, model: Any, effects: EffectStepper
             out[:, a] = np.interp(at, trial.time_s, fill_gaps(trial.time_s, trial.setpoint[drive.joint]))
         elif drive.joint in trial.effort and drive.gain:
             effort = np.interp(at, trial.time_s, fill_gaps(trial.time_s, trial.effort[drive.joint]))
-            out[:, a] = effort / drive.gain
-    return out
+            if drive.kind == "force":
+                out[:, a] = effort / drive.gain
+            else:
+                model.actuator_gear[a] = 0.0
+                applied[:, rig.joints.index(drive.joint)] = effort
+    return out, applied
 
 
 def replay_rig(session: Session, model: bytes | RigModel | None = None, simulate: bool = True,
@@ -219,7 +233,8 @@ def replay_rig(session: Session, model: bytes | RigModel | None = None, simulate
     for trial in rig.trials:
         if validate not in (None, trial.validate) or not all(j in trial.position for j in rig.joints):
             continue
-        time_s, simulated = simulate_trial(rig, trial) if simulate else (trial.time_s, None)
+        run = simulate and can_simulate(rig, trial)
+        time_s, simulated = simulate_trial(rig, trial) if run else (trial.time_s, None)
         for i, joint in enumerate(rig.joints):
             motion = None if simulated is None else simulated[:, i]
             out.append(_residual(trial, joint, time_s, motion, known.get((trial.name, joint))))

@@ -30,9 +30,20 @@ def windows_s(rig: RigModel, fit: DeclaredFit) -> tuple[float, ...]:
 
 
 def can_swing(rig: RigModel) -> bool:
-    """Whether the rig is one joint whose drive is a voltage or absent: then simulation in open loop is the natural test."""
+    """Whether the rig is one joint whose drive is absent or a voltage, and that recorded: then simulation in open loop is the
+    natural test."""
     drive = rig.drive(rig.joints[0])
-    return len(rig.joints) == 1 and (drive is None or drive.kind == "voltage")
+    if len(rig.joints) != 1 or not (drive is None or drive.kind == "voltage"):
+        return False
+    usable = [t for t in rig.select(False) if _lane_known(rig, t)]
+    return bool(usable) and not any(t.effort for t in rig.trials)
+
+
+def _lane_known(rig: RigModel, trial: RigTrial) -> bool:
+    """Whether position and, where the drive is connected, voltage are recorded."""
+    joint = rig.joints[0]
+    connected = rig.drive(joint) is not None and joint in trial.live
+    return joint in trial.position and (not connected or joint in trial.voltage)
 
 
 def build_swing(rig: RigModel, fit: DeclaredFit, step_s: float = STEP_S, longest_s: float = np.inf) -> Swing:
@@ -67,7 +78,7 @@ def _rigid(model: Any) -> tuple[float, float, float]:
 
 def _stretches(rig: RigModel, trial: RigTrial, step_s: float, longest_s: float) -> list[Lane]:
     joint = rig.joints[0]
-    if joint not in trial.position:
+    if not _lane_known(rig, trial):
         return []
     grid = uniform_time(trial.time_s)
     rate = 1.0 / (grid[1] - grid[0])
