@@ -5,7 +5,7 @@ The chain of each finger comes from `identify`; validation recordings are posed 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,17 +15,19 @@ from ..effects.base import DriveState
 from ..errors import IdentificationError
 from ..identify.chain import Chain, ChainData, Pose
 from ..identify.finger import REST_S, observations, sound_frames
-from ..identify.likelihood import fit_chain, fit_poses
+from ..identify.likelihood import OUTLIER_LIMIT, fit_chain, fit_poses
 from ..identify.repair import Swap
 from ..identify.start import start_chain
 from ..session import Finger, Mocap, Session, Trial
 from .drive import count_range
 from .excursions import with_excursions
 from .motion import Motion, estimate_motion, local_quadratic
+from .name import Naming
 
 Array = NDArray[np.float64]
 
 LEARN_FRAMES = 1500  # of each recording, evenly spaced: enough for a chain, all frames are posed with it
+FARTHEST_M = 6e-3  # a residual beyond is a ghost or a wrong label, no slip
 LOAD_S = 0.05  # bandwidth of a smoothed current
 DEPARTURES_S = (0.1, 0.25, 0.6, 1.5)  # bandwidths of what a joint departs from its encoder's map
 
@@ -62,32 +64,70 @@ def finger_angles(session: Session, finger: Finger, shape: Array) -> FingerAngle
     trials = [t for t in session.select("flexion", finger.name) if t.mocap_path is not None]
     if not trials:
         raise IdentificationError(f'{session.path}: finger "{finger.name}" has no flexion trial with markers')
-    seen = [(t, t.mocap()) for t in trials]
-    observed = [observations(session, finger, mocap) for _, mocap in seen]
-    learn = [i for i, (t, _) in enumerate(seen) if not t.validate] or list(range(len(seen)))
+    mocaps = [t.mocap() for t in trials]
+    observed = [observations(session, finger, mocap) for mocap in mocaps]
+    recordings = [_Recording(*r) for r in zip(trials, mocaps, *zip(*observed, strict=True), strict=True)]
+    data, still = _learned_from(recordings)
+    return _posed(finger, recordings, start_chain(data, still, shape))
+
+
+def refitted(angles: FingerAngles, markers: Sequence[ChainData]) -> FingerAngles:
+    """The same recordings with their markers (one ChainData each) put right: chain and poses anew."""
+    recordings = [_Recording(r.trial, r.mocap, m, r.swaps) for r, m in zip(angles.records, markers, strict=True)]
+    return _posed(angles.finger, recordings, angles.chain)
+
+
+@dataclass(frozen=True)
+class _Recording:
+    trial: Trial
+    mocap: Mocap
+    markers: ChainData
+    swaps: tuple[Swap, ...]
+
+
+def _learned_from(recordings: Sequence[_Recording]) -> tuple[ChainData, NDArray[np.int64]]:
+    """Thinned frames of the training recordings (of all, where none is for training), and which of them are at rest."""
     parts, rest, count = [], [], 0
-    for i in learn:
-        step = max(1, len(seen[i][1].time_s) // LEARN_FRAMES)
-        parts.append(observed[i][0].position_world[::step])
-        rest.append(count + np.flatnonzero(seen[i][1].time_s[::step] < REST_S))
+    for recording in [r for r in recordings if not r.trial.validate] or recordings:
+        step = max(1, len(recording.mocap.time_s) // LEARN_FRAMES)
+        parts.append(recording.markers.position_world[::step])
+        rest.append(count + np.flatnonzero(recording.mocap.time_s[::step] < REST_S))
         count += len(parts[-1])
-    data = ChainData(np.concatenate(parts), observed[0][0].body, observed[0][0].labels)
-    still = np.concatenate(rest)
-    fit = fit_chain(data, start_chain(data, still, shape))
-    zero = np.median(fit.pose.angle_rad[still], axis=0)
-    chain = fit.chain.at(zero, data.body)
+    first = recordings[0].markers
+    return ChainData(np.concatenate(parts), first.body, first.labels), np.concatenate(rest)
+
+
+def _posed(finger: Finger, recordings: Sequence[_Recording], start: Chain) -> FingerAngles:
+    data, still = _learned_from(recordings)
+    fit = fit_chain(data, start)
+    chain = fit.chain.at(np.median(fit.pose.angle_rad[still], axis=0), data.body)
     records = []
-    for (trial, mocap), (markers, swaps) in zip(seen, observed, strict=True):
-        pose, weight = fit_poses(markers, chain, fit.noise_m)
-        angle = np.where(sound_frames(markers, weight)[:, None], pose.angle_rad, np.nan)
-        records.append(FlexionAngles(trial, mocap, angle, swaps, markers, pose))
+    for r in recordings:
+        pose, sound = _poses(r.markers, chain, fit.noise_m)
+        angle = np.where(sound[:, None], pose.angle_rad, np.nan)
+        records.append(FlexionAngles(r.trial, r.mocap, angle, r.swaps, r.markers, pose))
     return FingerAngles(finger, chain, fit.noise_m, tuple(records))
 
 
-def linkage_states(angles: FingerAngles, joint: int = 1, steps: Sequence[tuple[int, float]] = ()) -> tuple[DriveState, ...]:
+def _poses(markers: ChainData, chain: Chain, noise_m: float) -> tuple[Pose, NDArray[np.bool_]]:
+    """Poses of all frames, and which are sound. Frames that are not are posed by all their markers, within FARTHEST_M: a
+    support that turned leaves the chain by more than noise, and is to be seen, not thrown away."""
+    pose, weight = fit_poses(markers, chain, noise_m)
+    sound = sound_frames(markers, weight)
+    odd = np.flatnonzero(~sound)
+    if len(odd):
+        wide, _ = fit_poses(markers.take(odd), chain, max(noise_m, FARTHEST_M / OUTLIER_LIMIT))
+        for name in ("rotation", "translation", "angle_rad"):
+            getattr(pose, name)[odd] = getattr(wide, name)
+    return pose, sound
+
+
+def linkage_states(angles: FingerAngles, joint: int = 1, steps: Sequence[tuple[int, float]] = (),
+                   expected: Mapping[str, tuple[Array, Array]] | None = None) -> tuple[DriveState, ...]:
     """Balance of a follower: its angle [deg] against a quartic of its driver's angle [deg], one state per recording.
 
     The driver's angle is smoothed (see `_smoothed`): noise in a regressor would bend the map and hide small departures.
+    expected: trial -> times [s] and angles [deg] of the driver as its own station has it (`expected_angles`).
     """
     states = []
     name = angles.finger.segments[joint].name
@@ -98,7 +138,7 @@ def linkage_states(angles: FingerAngles, joint: int = 1, steps: Sequence[tuple[i
             continue
         t, q = record.mocap.time_s[good], np.rad2deg(record.angle_rad[good])
         log = _at_frames(record, t)
-        driver, velocity, acceleration, sure = _smoothed(t, q[:, joint - 1], log)
+        driver, velocity, acceleration, sure = _smoothed(t, q[:, joint - 1], log, (expected or {}).get(record.trial.name))
         stepped, more = _stepped(index, t, steps)
         declared = np.concatenate([np.stack([(driver / scale) ** k for k in range(5)], axis=-1), stepped], axis=1)
         follower = np.where(sure, q[:, joint], np.nan)
@@ -181,11 +221,22 @@ def _transmitted(time_s: Array, current: Array, motion: Motion) -> Array:
     return local_quadratic(time_s, current - inertia * motion.acceleration, LOAD_S)[0]
 
 
-def _smoothed(time_s: Array, angle: Array, log: _Log | None) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+def expected_angles(naming: Naming) -> dict[str, tuple[Array, Array]]:
+    """Trial -> times [s] and angles [deg] that an encoder station's final model predicts, named effects included."""
+    out, start = {}, 0
+    for state, mask in zip(naming.balance.states, naming.balance.masks, strict=True):
+        out[state.trial] = state.time_s[mask], naming.fit.prediction[start : start + mask.sum()]
+        start += int(mask.sum())
+    return out
+
+
+def _smoothed(time_s: Array, angle: Array, log: _Log | None,
+              expected: tuple[Array, Array] | None) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
     """Angle, velocity, acceleration (n,) of a joint with little noise, and where they are sure.
 
-    With a log: a cubic of the encoder, which is far quieter than one frame's markers, plus what the angle departs from it,
-    smoothed. Without: the angle by local quadratics, sure only while it moves (at rest its noise would be all there is).
+    With a log: what is expected of the encoder, which is far quieter than one frame's markers (else a cubic of it), plus what
+    the angle departs from that, smoothed. Without: the angle by local quadratics, sure only while it moves (at rest its noise
+    would be all there is).
     """
     if log is None:
         motion = estimate_motion(time_s, angle)
@@ -195,8 +246,9 @@ def _smoothed(time_s: Array, angle: Array, log: _Log | None) -> tuple[Array, Arr
     u = (log.counts - middle) / half
     fitted = np.polynomial.Polynomial.fit(u[use], angle[use], 3)
     slope = fitted.deriv()(u) / half
-    departure, rate = _least_error(time_s, angle - fitted(u))
-    return fitted(u) + departure, slope * log.speed + rate, slope * log.acceleration, use
+    base = fitted(u) if expected is None else np.interp(time_s, *expected)
+    departure, rate = _least_error(time_s, angle - base)
+    return base + departure, slope * log.speed + rate, slope * log.acceleration, use
 
 
 def _least_error(time_s: Array, values: Array) -> tuple[Array, Array]:

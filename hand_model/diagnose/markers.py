@@ -7,22 +7,27 @@ candidate's gain is what neither a pose nor another chain can explain; a step's 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..identify.chain import Chain, jacobians, propagate
-from .angles import FingerAngles
+from .angles import FARTHEST_M, FingerAngles, refitted
 
 Array = NDArray[np.float64]
 
 BLOCK = 8  # frames averaged into one row block
-FARTHEST_M = 6e-3  # a residual beyond is a ghost or a wrong label, no slip
 EVIDENCE_LEAST = 15.0  # log evidence of a marker effect, beyond its parameters and the search over moments
 MOST = 4
 SKIP_P = 0.3  # lack of fit above which no candidate is tried
 BOTH = (True, False)
+ALPHA = 0.003  # false alarms per finger
+EXPLAINED_LEAST = 0.7  # of the misfit: below, the names are not believed
+SPELL = 12  # blocks, about a second, whose mean shows what stays correlated
+HINGE = ("joint_wobble", "moving_centre")
+MOSTLY = 0.7  # share of what any motion in step with the angle explains
+NO_HINGE = "no plain hinge"  # a joint whose markers leave the hinge in step with its angle, by none of the known ways
 
 
 @dataclass(frozen=True)
@@ -51,21 +56,40 @@ class Blocks:
 
 @dataclass(frozen=True)
 class MarkerEffect:
-    """A candidate that was chosen. columns: (b, 3m, c) unprojected. begin: first block of a step, None where it acts always."""
+    """A candidate that was chosen. everywhere: (b, 3m, c) unprojected, as if it acted always. begin, end: first block of a
+    step and the one after its last, None where it acts always."""
 
     effect: str
     body: int
     label: str | None
     begin: int | None
-    columns: Array
+    end: int | None
+    everywhere: Array
     evidence: float
     gain: float
     coefficients: Array = field(default_factory=lambda: np.zeros(0))
 
+    @property
+    def columns(self) -> Array:
+        """(b, 3m, c) where it acts, zero elsewhere."""
+        if self.begin is None:
+            return self.everywhere
+        index = np.arange(len(self.everywhere))
+        return self.everywhere * ((index >= self.begin) & (index < self.end))[:, None, None]
+
+    def acts(self, blocks: Blocks, record: int, time_s: Array) -> Array:
+        """(n,) one where it acts at times [s] of a record, else zero."""
+        if self.begin is None:
+            return np.ones(len(time_s))
+        first, last = int(blocks.record[self.begin]), int(blocks.record[self.end - 1])
+        here = np.full(len(time_s), first < record <= last, float)
+        return (time_s >= blocks.time_s[self.begin]).astype(float) if record == first else here
+
 
 @dataclass(frozen=True)
 class MarkerNaming:
-    """Outcome of the marker station. sigma_m: noise of one coordinate of a block mean. p_before, p_after: lack of fit."""
+    """Outcome of the marker station. sigma_m: noise of one coordinate of a block mean. p_before, p_after: lack of fit.
+    refused: the likeliest further effect, that did not bring enough."""
 
     blocks: Blocks
     found: tuple[MarkerEffect, ...]
@@ -74,6 +98,12 @@ class MarkerNaming:
     p_after: float
     excess_before: float
     excess_after: float
+    refused: MarkerEffect | None = None
+
+    @property
+    def believed(self) -> bool:
+        """Whether the names stand: what they leave is noise, or they take most of the misfit away."""
+        return bool(self.found) and (self.p_after >= ALPHA or self.excess_after < (1 - EXPLAINED_LEAST) * self.excess_before)
 
 
 def blocks_of(angles: FingerAngles) -> Blocks:
@@ -83,16 +113,16 @@ def blocks_of(angles: FingerAngles) -> Blocks:
     parts: list[tuple[Array, ...]] = []
     for index, record in enumerate(angles.records):
         observed = record.data.position_world
-        good = np.flatnonzero(np.isfinite(record.angle_rad).all(1))
+        residual = record.pose.to_palm(observed) - propagate(chain, body, record.pose.angle_rad)[0]
+        far = ~(np.linalg.norm(residual, axis=-1) < FARTHEST_M)
+        good = np.flatnonzero(np.isfinite(record.angle_rad).all(1) | ~far.any(1))
         count = len(good) // BLOCK
         if count < 20:
             continue
         frames = good[: count * BLOCK].reshape(count, BLOCK)
         frames = frames[(frames[:, -1] - frames[:, 0]) < 3 * BLOCK]
-        flat = frames.ravel()
-        residual = record.pose.take(flat).to_palm(observed[flat]) - propagate(chain, body, record.pose.angle_rad[flat])[0]
-        far = ~(np.linalg.norm(residual, axis=-1) < FARTHEST_M)
         residual[far] = np.nan
+        residual = residual[frames.ravel()]
         residual = residual.reshape(len(frames), BLOCK, len(labels), 3)
         weight = np.isfinite(residual[..., 0]).sum(1).astype(float)
         mean = np.nansum(residual, axis=1) / np.maximum(weight, 1)[..., None]
@@ -132,7 +162,7 @@ def name_markers(angles: FingerAngles) -> MarkerNaming:
     sigma = _noise(y, blocks)
     candidates: list[_Candidate] | None = None
     found: list[MarkerEffect] = []
-    p_before = excess_before = None
+    p_before = excess_before = refused = None
     for _ in range(MOST + 1):
         coefficients, residual = _solve(shared, y)
         p, excess = _lack(residual, blocks)
@@ -143,22 +173,48 @@ def name_markers(angles: FingerAngles) -> MarkerNaming:
         if candidates is None:
             candidates = _candidates(blocks)
             moments = {id(c.columns): _moments(project(blocks, c.columns), shared, y) for c in candidates}
-        best = max((_try(c, blocks, moments[id(c.columns)], _chain_part(shared, y), sigma) for c in candidates),
-                   key=lambda e: e.evidence)
+        known = {e.body for e in found if e.effect in HINGE}
+        best = _choose([_try(c, blocks, moments[id(c.columns)], _chain_part(shared, y), sigma) for c in candidates
+                        if c.effect != NO_HINGE or c.body not in known])
+        more = project(blocks, best.columns)
+        wider = np.concatenate([shared, more], axis=-1)
+        # What stays correlated beside the best candidate weighs all of them down.
+        best = replace(best, evidence=best.evidence - 0.5 * best.gain * (1 - 1 / _inflation(_solve(wider, y)[1], blocks)))
         if best.evidence < EVIDENCE_LEAST:
+            refused = best
             break
         found.append(best)
-        more = project(blocks, best.columns)
-        shared = np.concatenate([shared, more], axis=-1)
+        shared = wider
         moments = {key: value.with_shared(more) for key, value in moments.items()}
     start = blocks.chain_columns.shape[-1]
     done = []
     for effect in found:
-        width = effect.columns.shape[-1]
-        done.append(MarkerEffect(effect.effect, effect.body, effect.label, effect.begin, effect.columns, effect.evidence,
-                                 effect.gain, coefficients[start : start + width]))
+        width = effect.everywhere.shape[-1]
+        done.append(replace(effect, coefficients=coefficients[start : start + width]))
         start += width
-    return MarkerNaming(blocks, tuple(done), sigma, p_before or 0.0, p, excess_before or 0.0, excess)
+    return MarkerNaming(blocks, tuple(done), sigma, 1.0 if p_before is None else p_before, p, excess_before or 0.0, excess, refused)
+
+
+def _choose(tried: list[MarkerEffect]) -> MarkerEffect:
+    """The likeliest. Any motion in step with the angle is what no known form explains: where one takes most of it, it is that
+    one, seen to first order."""
+    best = max(tried, key=lambda e: e.evidence)
+    if best.effect != NO_HINGE:
+        return best
+    named = max((e for e in tried if e.effect in HINGE and e.body == best.body), key=lambda e: e.evidence)
+    return named if named.gain > MOSTLY * best.gain else best
+
+
+def _inflation(residual: Array, blocks: Blocks) -> float:
+    """Variance of means over SPELL blocks of the residual (b, 3m, 1) over what independent blocks would have, at least one."""
+    z = residual[..., 0]
+    same = blocks.record[1:] == blocks.record[:-1]
+    white = 0.5 * float(np.sum(np.mean(np.diff(z, axis=0)[same] ** 2, axis=0)))
+    spells = [z[i : i + SPELL].mean(0) for r in np.unique(blocks.record) for rows in [np.flatnonzero(blocks.record == r)]
+              for i in range(rows[0], rows[-1] + 2 - SPELL, SPELL)]
+    if len(spells) < 4:
+        return 1.0
+    return max(SPELL * float(np.sum(np.mean(np.square(spells), axis=0))) / max(white, 1e-300), 1.0)
 
 
 def _solve(shared: Array, y: Array) -> tuple[Array, Array]:
@@ -206,7 +262,7 @@ def _candidates(blocks: Blocks) -> list[_Candidate]:
             columns[:, mine, :, 3:] = turned
             flat = columns.reshape(b, 3 * m, 6)
             out += [_Candidate("support_slip", k, None, flat, True, lasting) for lasting in BOTH]
-        out += _no_hinge(blocks, k)
+        out += [*_no_hinge(blocks, k), *_any_motion(blocks, k)]
     return out
 
 
@@ -223,7 +279,7 @@ def _no_hinge(blocks: Blocks, k: int) -> list[_Candidate]:
     low, high = np.quantile(blocks.angle[:, k - 1], [0.005, 0.995])
     u = ((blocks.angle[:, k - 1] - low) / max(high - low, 1e-9))[:, None]
     wave = [np.sin(2 * np.pi * u), np.cos(2 * np.pi * u)]
-    forms: list[list[Array]] = [[u**2], [u**2, u**3], wave]
+    forms: list[list[Array]] = [[u**2], [u**2, u**3], wave, [u**2, u**3, *wave]]
     moved = np.flatnonzero(blocks.body >= k)
     axis, centre = blocks.axes[:, k - 1], blocks.centres[:, k - 1]
     helper = np.eye(3)[np.argmin(np.abs(axis.mean(0)))]
@@ -246,6 +302,29 @@ def _no_hinge(blocks: Blocks, k: int) -> list[_Candidate]:
                     one[..., 2 * i + d] = shift
             columns[:, moved] = one
             out.append(_Candidate(name, k, None, columns.reshape(b, 3 * m, -1), False))
+    return out
+
+
+def _any_motion(blocks: Blocks, k: int) -> list[_Candidate]:
+    """Whatever a smooth function of joint k - 1's angle could be: any motion of what it carries as a rigid body, or of each
+    marker of its segment (skin, a loose support)."""
+    b, m = blocks.weight.shape
+    low, high = np.quantile(blocks.angle[:, k - 1], [0.005, 0.995])
+    u = (blocks.angle[:, k - 1] - low) / max(high - low, 1e-9)
+    forms = [u, u**2, u**3, np.sin(2 * np.pi * u), np.cos(2 * np.pi * u)]
+    moved, mine = np.flatnonzero(blocks.body >= k), np.flatnonzero(blocks.body == k)
+    rigid = np.zeros((b, m, 3, 6))
+    rigid[:, moved, :, :3] = np.eye(3)
+    arm = blocks.position[:, moved] - blocks.centres[:, k - 1][:, None]
+    rigid[:, moved, :, 3:] = np.stack([np.cross(np.eye(3)[i], arm) for i in range(3)], axis=-1)
+    own = np.zeros((b, m, 3, 3 * len(mine)))
+    for i, j in enumerate(mine):
+        own[:, j, :, 3 * i : 3 * i + 3] = blocks.rotation[:, j]
+    out = []
+    for basis in (rigid, own):
+        flat = basis.reshape(b, 3 * m, -1)
+        columns = np.concatenate([flat * f[:, None, None] for f in forms], axis=-1)
+        out.append(_Candidate(NO_HINGE, k, None, columns, False))
     return out
 
 
@@ -297,13 +376,9 @@ def _try(candidate: _Candidate, blocks: Blocks, moments: _Moments, chain: tuple[
     at = int(np.argmax(gain))
     parameters = width + (1 if candidate.step else 0)
     evidence = 0.5 * float(gain[at]) - 0.5 * parameters * np.log(max((blocks.weight > 0).sum() * 2, 2))
-    columns = candidate.columns
-    if candidate.step:
-        stop = len(columns) if candidate.lasting else last[at]
-        index = np.arange(len(columns))
-        columns = columns * ((index >= at) & (index < stop))[:, None, None]
-    return MarkerEffect(candidate.effect, candidate.body, candidate.label, at if candidate.step else None, columns,
-                        float(evidence), float(gain[at]))
+    begin = at if candidate.step else None
+    end = None if begin is None else len(blocks.residual) if candidate.lasting else int(last[at])
+    return MarkerEffect(candidate.effect, candidate.body, candidate.label, begin, end, candidate.columns, float(evidence), float(gain[at]))
 
 
 def _until(values: Array, last: NDArray[np.int64]) -> Array:
@@ -339,37 +414,29 @@ def _bins(values: Array, count: int) -> NDArray[np.int64]:
 
 
 def corrected_angles(angles: FingerAngles, naming: MarkerNaming) -> FingerAngles:
-    """The angles with the named effects' displacement taken out of the markers, by one linear step per frame."""
-    if not naming.found:
+    """The angles with the named effects' displacement taken out of the markers, chain and poses fitted anew."""
+    if not naming.believed:
         return angles
-    from dataclasses import replace
-
-    body = angles.records[0].data.body
-    chain = angles.chain
-    records = []
+    right = []
     for index, record in enumerate(angles.records):
-        observed = record.data.position_world
-        _, by_frame, _, _ = jacobians(chain, body, record.pose.angle_rad)
-        residual = record.pose.to_palm(observed) - propagate(chain, body, record.pose.angle_rad)[0]
-        shift = _at_frames(naming, index, record.mocap.time_s, body)
-        r = residual - shift
-        w = (np.isfinite(r[..., 0]) & (np.linalg.norm(np.nan_to_num(r), axis=-1) < FARTHEST_M)).astype(float)
-        a = by_frame.reshape(len(r), -1, by_frame.shape[-1]) * np.repeat(w, 3, axis=1)[..., None]
-        gram = np.swapaxes(a, 1, 2) @ a + 1e-12 * np.eye(a.shape[-1])
-        right = np.swapaxes(a, 1, 2) @ np.nan_to_num(r).reshape(len(r), -1, 1)
-        step = np.linalg.solve(gram, right)[..., 0]
-        records.append(replace(record, angle_rad=np.where(np.isfinite(record.angle_rad), record.pose.angle_rad + step[:, 6:], np.nan)))
-    return replace(angles, records=tuple(records))
+        shift = _at_frames(naming, index, record.mocap.time_s)
+        world = np.einsum("nij,nmj->nmi", record.pose.rotation, shift)
+        right.append(replace(record.data, position_world=record.data.position_world - world))
+    return refitted(angles, right)
 
 
-def _at_frames(naming: MarkerNaming, record: int, time_s: Array, body: NDArray[np.int64]) -> Array:
-    """Displacement (n, m, 3) [m] of all named effects at the frames of one record, interpolated between blocks."""
+def _at_frames(naming: MarkerNaming, record: int, time_s: Array) -> Array:
+    """Displacement (n, m, 3) [m], palm frame, of all named effects at the frames of one record."""
     blocks = naming.blocks
     mine = np.flatnonzero(blocks.record == record)
-    out = np.zeros((len(time_s), len(body), 3))
+    out = np.zeros((len(time_s), *blocks.weight.shape[1:], 3))
     if not len(mine):
         return out
-    nearest = mine[np.clip(np.searchsorted(blocks.time_s[mine], time_s), 0, len(mine) - 1)]
+    at = np.interp(time_s, blocks.time_s[mine], np.arange(len(mine)))
+    low = np.minimum(at.astype(int), max(len(mine) - 2, 0))
+    share = (at - low)[:, None]
     for effect in naming.found:
-        out += (effect.columns[nearest] @ effect.coefficients).reshape(len(time_s), -1, 3)
+        course = (effect.everywhere[mine] @ effect.coefficients)
+        now = (1 - share) * course[low] + share * course[np.minimum(low + 1, len(mine) - 1)]
+        out += (now * effect.acts(blocks, record, time_s)[:, None]).reshape(out.shape)
     return out

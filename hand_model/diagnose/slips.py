@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .angles import FingerAngles
 from .findings import Finding
-from .markers import MarkerEffect, MarkerNaming
+from .markers import ALPHA, HINGE, NO_HINGE, MarkerEffect, MarkerNaming
 
 Array = NDArray[np.float64]
 
@@ -20,6 +20,7 @@ CORRECTION = {
     "marker_swap": "the labels are put right while they were exchanged",
 }
 SMALL = 0.03  # share of what the marker station explains
+IN_STEP = "the markers leave the hinge's motion in step with the angle"
 SWAP_FRAMES = 5  # shorter exchanges are ghosts
 
 
@@ -27,15 +28,37 @@ def marker_findings(angles: FingerAngles, naming: MarkerNaming) -> list[tuple[fl
     """Findings of one finger's markers with their weight (log likelihood gained): swaps first, then the named effects,
     one per marker, support or joint."""
     out = _swaps(angles)
+    if not naming.believed:
+        return out
     groups: dict[tuple[str, int, str | None], list[MarkerEffect]] = {}
     for effect in naming.found:
         groups.setdefault((effect.effect, effect.body, effect.label), []).append(effect)
     total = sum(e.gain for e in naming.found)
     for (name, body, label), members in groups.items():
+        if name == NO_HINGE:
+            continue
         if sum(e.gain for e in members) < SMALL * total:
             continue  # no more than the form of the large one being another
         out.append((0.5 * sum(e.gain for e in members), _finding(angles, naming, name, body, label, members)))
     return out
+
+
+def unexplained(angles: FingerAngles, naming: MarkerNaming) -> list[dict[str, Any]]:
+    """What the markers show that no finding explains: a joint that is no plain hinge, or a misfit of no known form."""
+    def entry(joint: str | None, share: float, shape: str) -> dict[str, Any]:
+        return {"where": {"finger": angles.finger.name, "joint": joint, "actuator": None, "signal": "markers"},
+                "share_of_mismatch": share, "shape": shape}
+
+    if naming.believed:
+        total = sum(e.gain for e in naming.found)
+        return [entry(angles.finger.segments[e.body - 1].name, e.gain / total, f"{NO_HINGE}: {IN_STEP}")
+                for e in naming.found if e.effect == NO_HINGE]
+    if naming.p_before >= ALPHA:
+        return []
+    joints = [e.body - 1 for e in (*naming.found, naming.refused) if e is not None and e.effect in (NO_HINGE, *HINGE)]
+    if joints:
+        return [entry(angles.finger.segments[joints[0]].name, 1.0, f"{NO_HINGE}: {IN_STEP}")]
+    return [entry(None, 1.0, "markers leave their rigid segments, by no effect known here")]
 
 
 def _finding(angles: FingerAngles, naming: MarkerNaming, name: str, body: int, label: str | None,
@@ -127,4 +150,4 @@ def steps(angles: FingerAngles, naming: MarkerNaming) -> list[tuple[int, float]]
     """(record, time [s]) of every slip: a support that turns about its joint's own axis steps the angle, which markers alone
     cannot tell from motion; encoder and linkage balances let the angle step there."""
     return [(int(naming.blocks.record[e.begin]), float(naming.blocks.time_s[e.begin]))
-            for e in naming.found if e.begin is not None and e.effect in ("support_slip", "palm_marker_slip")]
+            for e in naming.found if naming.believed and e.begin is not None and e.effect in ("support_slip", "palm_marker_slip")]
