@@ -26,8 +26,8 @@ MOTOR = f"""<mujoco><compiler angle="radian"/><option gravity="3 -9 0" integrato
 # shape, amplitude, share of the effect's size by which file and column may differ in 99 % of the samples
 DRIVE = [
     ("asymmetric_viscous_friction", {}, {"half_difference": 0.08}, 0.01),
-    ("current_channel_delay", {"delay": 0.04}, {}, 0.03),
-    ("current_channel_delay", {"delay": -0.05}, {}, 0.03),
+    ("current_channel_delay", {"form": 0.0, "delay": 0.04}, {}, 0.03),
+    ("current_channel_delay", {"form": 0.0, "delay": -0.05}, {}, 0.03),
     ("current_saturation", {"limit": 45.0}, {}, 0.02),
     ("detent_load", {"form": 0.0, "centre": 40.0, "width": 6.0}, {"load": -12.0}, 0.01),
     ("detent_load", {"form": 1.0, "centre": 60.0, "width": 4.0}, {"load": 12.0}, 0.01),
@@ -53,9 +53,9 @@ NOT_OF_A_MAP = {"encoder_periodic_error", "clock_drift", "spring_decoupling"}
 MOTOR_NAMES = {"inertia": "inertia", "viscous": "viscous", "coulomb": "coulomb", "spring": "stiffness", "preload": "preload"}
 
 
-def state(elapsed_s: float = 5.0) -> DriveState:
+def state(until_s: float = 24.0, elapsed_s: float = 5.0) -> DriveState:
     """A drive that moves over its range at several speeds and rests between."""
-    t = np.arange(0.0, 24.0, 0.018)
+    t = np.arange(0.0, until_s, 0.018)
     knots = np.array([0.0, 1, 3, 4, 5.5, 6, 7.2, 8, 12, 13, 17, 18, 19.2, 20, 22, 24])
     level = np.array([0.0, 0, 97, 97, 20, 20, 80, 80, 5, 5, 95, 95, 30, 30, 0, 0])
     fine = np.arange(-1.0, 25.0, 0.001)
@@ -135,7 +135,7 @@ KINEMATIC = [
 
 def kinematic_state(station: str) -> DriveState:
     """The same motion, as the percent of an encoder or the degrees of a proximal joint, under a load."""
-    now = state()
+    now = state(8.5)
     x = now.position if station == "encoder" else 0.72 * now.position
     scale = 100.0 if station == "encoder" else 70.0
     declared = np.stack([(x / scale) ** k for k in range(4 if station == "encoder" else 5)], axis=-1)
@@ -175,7 +175,7 @@ def test_written_finger_moves_as_the_effect_predicts(name, shape, amplitude, tmp
     wanted = effect(name).declared(now, shape) @ powers + columns @ np.array(list(amplitude.values()) if columns.shape[1] else [])
     size = np.abs(wanted - now.effort).max()
     assert size > 0.5
-    assert np.quantile(np.abs(moved - wanted), 0.95) < 0.05 * size + 0.03  # fast reversals: the finger follows on its nominal spring
+    assert np.quantile(np.abs(moved - wanted), 0.98) < 0.05 * size + 0.03
 
 
 def test_every_effect_of_a_force_or_a_map_is_replayed() -> None:

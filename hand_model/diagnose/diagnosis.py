@@ -16,6 +16,7 @@ from ..hand import Hand
 from ..session import Finger, Session, read_session
 from .balance import Balance
 from .command import command_facts, command_findings, refused
+from .correct import write_corrected
 from .drive import drive_states, drive_trials, is_measured
 from .findings import Finding, Findings
 from .improve import read_model, write_improved
@@ -38,7 +39,7 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
     session: a session or its folder. model: a Hand, a .hand file or a compiled folder into which the effects are written
     (what is missing is judged by the declared model fitted to the session itself); None identifies the session's own, False
     writes none. output: folder that gets `findings.json`, `report.html` and, where physics was named, `model_before` and `model`,
-    compiled. say: called with one line per result as it comes.
+    compiled; where the recording was put right, `corrected`, a session. say: called with one line per result as it comes.
     Raises SessionError for a session that breaks its format, HandFileError for a model that is none.
     """
     session = session if isinstance(session, Session) else read_session(session)
@@ -62,9 +63,21 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
     if output is not None:
         if model is not False:
             findings = _modelled(findings, session, hand, stations, Path(output), tell)
+            write_corrected(session, findings.findings, _counts_corrected(session, stations), Path(output))
         write_page(findings, stations, session.path.name, Path(output))
         findings.save(output)
     return findings
+
+
+def _counts_corrected(session: Session, stations: list[Station]) -> dict[str, Callable[[Any], Any]]:
+    """Actuator -> correction of its encoder's counts."""
+    from .angles import ranges_of_counts
+
+    def of(correct: Callable[[Any], Any], low: float, high: float) -> Callable[[Any], Any]:
+        return lambda counts: low + (high - low) * correct(100 * (counts - low) / (high - low)) / 100
+
+    counts = ranges_of_counts(session)
+    return {a: of(correct, *counts[a]) for a, correct in _encoder_corrections(stations).items()}
 
 
 def _modelled(findings: Findings, session: Session, hand: Hand | None, stations: list[Station], output: Path,

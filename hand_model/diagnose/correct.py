@@ -1,0 +1,140 @@
+"""Corrected copies of recordings: what a diagnosis put right, in a session of its own; the original is never touched."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..session import Finger, Mocap, Session, Trial
+from .angles import FingerAngles, finger_angles
+from .findings import Finding
+from .markers import MarkerNaming, name_markers
+
+Array = NDArray[np.float64]
+
+SLIPS = ("marker_slip", "palm_marker_slip", "support_slip")
+FOLDER = "corrected"
+
+
+def write_corrected(session: Session, findings: Sequence[Finding], encoders: Mapping[str, Callable[[Array], Array]],
+                    output: Path) -> Path | None:
+    """Write the session with every correction of `findings` applied into `output`/corrected; None where there is none to apply.
+
+    encoders: actuator -> correction of its encoder counts. Marker files become QTM TSV, logs CSV, where they are changed; the
+    manifest names them, everything else is copied as it is. Replaces an earlier copy.
+    """
+    markers = {str(f.where["finger"]) for f in findings if f.effect in (*SLIPS, "marker_swap")}
+    drifts = {name: f.parameters["rate_minus_one"]["value"] for f in findings if f.effect == "clock_drift" for name in _logs_of(session, f)}
+    turned = {str(f.where["actuator"]) for f in findings if f.effect == "encoder_periodic_error"} & set(encoders)
+    if not markers and not drifts and not turned:
+        return None
+    target = output / FOLDER
+    if target.exists():
+        shutil.rmtree(target)
+    shutil.copytree(session.path, target)
+    renamed: dict[str, str] = {}
+    applied = {f.effect for f in findings}
+    for finger in session.fingers:
+        if finger.name in markers:
+            renamed |= _write_markers(session, finger, applied, target)
+    for trial in session.trials:
+        actuator = session.finger(trial.finger).actuator if trial.finger is not None else None
+        if trial.log_path is not None and (trial.name in drifts or actuator in turned):
+            correct = encoders[actuator] if actuator in turned else None
+            renamed |= _write_log(session, trial, drifts.get(trial.name, 0.0), correct, target)
+    _rename(target / "session.toml", renamed)
+    return target
+
+
+def _logs_of(session: Session, finding: Finding) -> set[str]:
+    """Names of the trials whose log a drift concerns: all of its fingers, whose logs ran on one clock."""
+    fingers = {t.finger for t in session.trials if t.name in finding.where["trials"]}
+    return {t.name for t in session.trials if t.finger in fingers}
+
+
+def _write_markers(session: Session, finger: Finger, applied: set[str], target: Path) -> dict[str, str]:
+    """Write the corrected flexion recordings of one finger; old -> new path in the manifest."""
+    from ..identify.identification import palm_shape
+
+    angles = finger_angles(session, finger, palm_shape(session))
+    naming = name_markers(angles)
+    out = {}
+    for index, record in enumerate(angles.records):
+        mocap = corrected_markers(angles, naming, index, applied)
+        out |= _replace(session, record.trial.mocap_path, target, ".tsv", lambda path, m=mocap: write_tsv(path, m))
+    return out
+
+
+def corrected_markers(angles: FingerAngles, naming: MarkerNaming, index: int, applied: set[str]) -> Mocap:
+    """One recording with exchanged labels put right and the named slips' displacement taken out. applied: effects that were found."""
+    from dataclasses import replace
+
+    record = angles.records[index]
+    position = np.array(record.mocap.position_world)
+    seen = record.data.position_world if "marker_swap" in applied else record.mocap.markers(record.data.labels)
+    blocks = naming.blocks
+    mine = np.flatnonzero(blocks.record == index)
+    edges = 0.5 * (blocks.time_s[mine][1:] + blocks.time_s[mine][:-1])
+    nearest = mine[np.searchsorted(edges, record.mocap.time_s)] if len(mine) else mine
+    right = np.array(seen)
+    for found in naming.found if len(mine) else ():
+        if found.effect in applied and found.effect in SLIPS:
+            shift_palm = (found.columns[nearest] @ found.coefficients).reshape(right.shape)
+            right -= np.einsum("nij,nmj->nmi", record.pose.rotation, shift_palm)
+    for j, label in enumerate(record.data.labels):
+        position[:, record.mocap.labels.index(label)] = right[:, j]
+    return replace(record.mocap, position_world=position)
+
+
+def _write_log(session: Session, trial: Trial, drift: float, correct: Callable[[Array], Array] | None, target: Path) -> dict[str, str]:
+    log = trial.log()
+    columns = dict(log.columns)
+    if correct is not None:
+        columns["position"] = correct(columns["position"])
+    time_s = log.time_s[0] + (log.time_s - log.time_s[0]) * (1 + drift)
+    return _replace(session, trial.log_path, target, ".csv", lambda path: write_csv(path, time_s, columns))
+
+
+def _replace(session: Session, old: Path | None, target: Path, ending: str, write: Callable[[Path], None]) -> dict[str, str]:
+    """Write a file beside the copy of `old`, which is removed; the old path in the manifest and the new one."""
+    name = Path(str(old)).relative_to(session.path)
+    new = name.with_name(f"{name.stem}_corrected{ending}")
+    write(target / new)
+    copy = target / name
+    shutil.rmtree(copy) if copy.is_dir() else copy.unlink(missing_ok=True)
+    return {name.as_posix(): new.as_posix()}
+
+
+def write_tsv(path: Path, mocap: Mocap) -> None:
+    """Marker trajectories as a QTM TSV export in millimetres with frame and time; a gap is an empty cell."""
+    names = [f"{label} {axis}" for label in mocap.labels for axis in "XYZ"]
+    head = [("NO_OF_FRAMES", len(mocap.time_s)), ("NO_OF_MARKERS", len(mocap.labels)), ("FREQUENCY", repr(mocap.rate_hz)),
+            ("DATA_INCLUDED", "3D"), ("MARKER_NAMES", *mocap.labels), ("Frame", "Time", *names)]
+    rows = ["\t".join(map(str, line)) for line in head]
+    flat = 1e3 * mocap.position_world.reshape(len(mocap.time_s), -1)
+    for i, (t, row) in enumerate(zip(mocap.time_s.tolist(), flat.tolist(), strict=True), start=1):
+        rows.append("\t".join([str(i), repr(t), *("" if np.isnan(x) else f"{x:.6f}" for x in row)]))
+    path.write_text("\n".join(rows) + "\n")
+
+
+def write_csv(path: Path, time_s: Array, columns: Mapping[str, Array]) -> None:
+    """A log as CSV with all its digits; an empty cell is a lost sample."""
+    rows = [",".join(("time", *columns))]
+    for row in np.column_stack([time_s, *columns.values()]).tolist():
+        rows.append(",".join("" if np.isnan(x) else repr(x) for x in row))
+    path.write_text("\n".join(rows) + "\n")
+
+
+def _rename(manifest: Path, renamed: Mapping[str, str]) -> None:
+    """Put new paths in the place of old ones, in quotes, and leave the rest of the manifest as it is."""
+    text = manifest.read_text()
+    for old, new in renamed.items():
+        for quote in ('"', "'"):
+            text = text.replace(f"{quote}{old}{quote}", f"{quote}{new}{quote}")
+    manifest.write_text(text)
+
+

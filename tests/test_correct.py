@@ -1,0 +1,78 @@
+"""Corrected copies of sessions: what was wrong is put right, everything else and the original stay as they were."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hand_model.diagnose.correct import write_corrected, write_csv, write_tsv
+from hand_model.diagnose.findings import Finding
+from hand_model.session import Mocap, read_session
+from hand_model.session.csv_log import read_csv_log
+from hand_model.session.qtm_tsv import read_qtm_tsv
+
+
+def finding(effect: str, trials: list[str], **more) -> Finding:
+    where = {"finger": None, "actuator": "index", "trials": trials, **more.pop("where", {})}
+    return Finding(effect, (effect,), 1.0, (), where, "", more, {}, None, "put right")
+
+
+def digests(folder: Path) -> dict[str, bytes]:
+    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+def test_markers_and_logs_are_read_back_as_written(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    position = rng.normal(0, 0.2, (40, 3, 3))
+    position[5, 1] = np.nan
+    mocap = Mocap(("A", "B 2", "C"), np.arange(40) / 119.7, position, 119.7, tmp_path / "x.c3d")
+    write_tsv(tmp_path / "x.tsv", mocap)
+    again = read_qtm_tsv(tmp_path / "x.tsv")
+    assert again.labels == mocap.labels
+    np.testing.assert_allclose(again.position_world, position, atol=1e-9)
+    np.testing.assert_allclose(again.time_s, mocap.time_s, atol=1e-12)
+    current = rng.normal(0, 9, 40)
+    current[3] = np.nan
+    write_csv(tmp_path / "x.csv", mocap.time_s, {"position": position[:, 0, 0], "current": current})
+    log = read_csv_log(tmp_path / "x.csv")
+    np.testing.assert_array_equal(log.column("current"), current)
+    np.testing.assert_array_equal(log.time_s, mocap.time_s)
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    from hand_model.twin.case import draw_case
+
+    folder = tmp_path_factory.mktemp("twin") / "s"
+    draw_case(7, "none").record(folder)
+    return folder
+
+
+def test_clock_and_counts_are_put_right_in_a_copy(session: Path, tmp_path: Path) -> None:
+    read = read_session(session)
+    before = digests(session)
+    trial = next(t for t in read.trials if t.kind == "flexion")
+    drift = finding("clock_drift", [trial.name], rate_minus_one={"value": 0.002, "unit": "1"})
+    actuator = read.finger(trial.finger).actuator
+    periodic = finding("encoder_periodic_error", [trial.name], where={"actuator": actuator})
+    copy = write_corrected(read, [drift, periodic], {actuator: lambda counts: counts + 5.0}, tmp_path)
+    assert digests(session) == before
+    again = read_session(copy)
+    for old, new in zip(read.trials, again.trials, strict=True):
+        if old.log_path is None:
+            continue
+        a, b = old.log(), new.log()
+        mine = old.finger == trial.finger
+        np.testing.assert_allclose(np.diff(b.time_s), np.diff(a.time_s) * (1.002 if mine else 1.0), rtol=1e-9)
+        shift = 5.0 if read.finger(old.finger).actuator == actuator else 0.0
+        np.testing.assert_allclose(b.column("position"), a.column("position") + shift, rtol=1e-12)
+        np.testing.assert_array_equal(b.column("current"), a.column("current"))
+
+
+def test_nothing_is_written_where_nothing_is_to_be_put_right(session: Path, tmp_path: Path) -> None:
+    physics = replace(finding("stribeck_friction", []), correction=None)
+    assert write_corrected(read_session(session), [physics], {}, tmp_path) is None
+    assert not list(tmp_path.iterdir())
