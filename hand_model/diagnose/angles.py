@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 
 LEARN_FRAMES = 1500  # of each recording, evenly spaced: enough for a chain, all frames are posed with it
 FARTHEST_M = 6e-3  # a residual beyond is a ghost or a wrong label, no slip
+MOMENT_S = 0.2  # within which a step's moment is known
 LOAD_S = 0.05  # bandwidth of a smoothed current
 DEPARTURES_S = (0.1, 0.25, 0.6, 1.5)  # bandwidths of what a joint departs from its encoder's map
 
@@ -141,7 +142,7 @@ def linkage_states(angles: FingerAngles, joint: int = 1, steps: Sequence[tuple[i
         driver, velocity, acceleration, sure = _smoothed(t, q[:, joint - 1], log, (expected or {}).get(record.trial.name))
         stepped, more = _stepped(index, t, steps)
         declared = np.concatenate([np.stack([(driver / scale) ** k for k in range(5)], axis=-1), stepped], axis=1)
-        follower = np.where(sure, q[:, joint], np.nan)
+        follower = np.where(sure & ~_near(index, t, steps), q[:, joint], np.nan)
         extra = {"trial_index": np.full(len(t), float(index)), "load": None if log is None else log.load,
                  "scale": np.full(len(t), scale), "slope": _slope(driver, driver, q[:, joint], sure, 4)}
         states.append(DriveState(record.trial.name, f"{angles.finger.name}/{name}", t, driver, velocity, acceleration, follower,
@@ -173,7 +174,7 @@ def encoder_states(
         declared = np.concatenate([np.stack([(x / 100) ** k for k in range(4)], axis=-1), offsets, stepped], axis=1)
         extra = {"trial_index": np.full(len(t), float(index)), "load": log.load, "scale": np.full(len(t), 100.0), "slope": slope}
         states.append(DriveState(record.trial.name, angles.finger.name, t, x, velocity, 100 * log.acceleration / (high - low),
-                                 np.where(log.inside, q, np.nan), declared, "%", "deg", _known(extra),
+                                 np.where(log.inside & ~_near(index, t, steps), q, np.nan), declared, "%", "deg", _known(extra),
                                  (*_names(3), *(f"offset_{i}" for i in range(len(records))), *more), record.trial.validate))
     return with_excursions(states)
 
@@ -274,6 +275,12 @@ def _stepped(record: int, time_s: Array, steps: Sequence[tuple[int, float]]) -> 
     columns = [np.full(len(time_s), float(record > r)) if record != r else (time_s >= at).astype(float) for r, at in steps]
     names = tuple(f"step_{i}" for i in range(len(steps)))
     return np.stack(columns, axis=-1) if columns else np.zeros((len(time_s), 0)), names
+
+
+def _near(record: int, time_s: Array, steps: Sequence[tuple[int, float]]) -> NDArray[np.bool_]:
+    """Samples (n,) too close to a step for its moment to be known."""
+    close = [np.abs(time_s - at) < MOMENT_S for r, at in steps if r == record]
+    return np.any(close, axis=0) if close else np.zeros(len(time_s), bool)
 
 
 def _slope(at: Array, driver: Array, follower: Array, use: NDArray[np.bool_], order: int) -> Array:

@@ -11,8 +11,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from ..identify.chain import Chain, jacobians, propagate
+from ..identify.likelihood import OUTLIER_LIMIT
 from .angles import FARTHEST_M, FingerAngles, refitted
 
 Array = NDArray[np.float64]
@@ -20,6 +22,7 @@ Array = NDArray[np.float64]
 BLOCK = 8  # frames averaged into one row block
 EVIDENCE_LEAST = 15.0  # log evidence of a marker effect, beyond its parameters and the search over moments
 MOST = 4
+LASTING_S = 2.0  # half of it is how long something must last that is no ghost
 SKIP_P = 0.3  # lack of fit above which no candidate is tried
 BOTH = (True, False)
 ALPHA = 0.003  # false alarms per finger
@@ -114,8 +117,10 @@ def blocks_of(angles: FingerAngles) -> Blocks:
     for index, record in enumerate(angles.records):
         observed = record.data.position_world
         residual = record.pose.to_palm(observed) - propagate(chain, body, record.pose.angle_rad)[0]
-        far = ~(np.linalg.norm(residual, axis=-1) < FARTHEST_M)
-        good = np.flatnonzero(np.isfinite(record.angle_rad).all(1) | ~far.any(1))
+        size = np.linalg.norm(residual, axis=-1)
+        sound = np.isfinite(record.angle_rad).all(1)
+        far = ~(size < FARTHEST_M) | _passing(size > OUTLIER_LIMIT * angles.noise_m, record.mocap.time_s)
+        good = np.flatnonzero(sound | (~far.any(1) & ~_passing(~sound, record.mocap.time_s)))
         count = len(good) // BLOCK
         if count < 20:
             continue
@@ -130,6 +135,13 @@ def blocks_of(angles: FingerAngles) -> Blocks:
         parts.append((mean, weight, angle, np.full(len(frames), index), record.mocap.time_s[frames].mean(1)))
     residual, weight, angle, record_index, time_s = (np.concatenate(p) for p in zip(*parts, strict=True))
     return _assembled(chain, body, labels, residual, weight, angle, record_index, time_s)
+
+
+def _passing(flag: NDArray[np.bool_], time_s: Array) -> NDArray[np.bool_]:
+    """Where a flag (n,) or (n, m) is up for a moment only: a ghost passes, a slip lasts."""
+    width = max(int(LASTING_S / float(np.median(np.diff(time_s)))), 1)
+    up = uniform_filter1d(flag.astype(float), width, axis=0, mode="nearest")
+    return flag & (up < 0.45)
 
 
 def _assembled(chain: Chain, body: NDArray[np.int64], labels: tuple[str, ...], residual: Array, weight: Array, angle: Array,
