@@ -74,8 +74,8 @@ def _from_commands(fit: MotorFit, trial: MotorTrial) -> list[tuple[MoveData, Arr
         return []
     early = [shortened(m, ALIGN_S) for m in data]
     own = output_error.fit(early, fit.simulated, (), noise, {}, fit.output_error.controller, iterations=4).own
-    simulated = output_error.simulate_moves(data, fit.simulated, own, fit.output_error.controller)
-    return [(m, (m.current - y[:, 1]) / fit.sigma_current) for m, y in zip(data, simulated, strict=True)]
+    found = output_error.whitened(data, fit.simulated, own, noise, fit.output_error.controller)
+    return [(m, z[:, 1]) for m, z in zip(data, found, strict=True)]
 
 
 def _from_motion(fit: MotorFit, trial: MotorTrial) -> list[tuple[MoveData, Array]]:

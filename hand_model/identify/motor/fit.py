@@ -65,6 +65,8 @@ BOUNDS = {
 }
 MOVE_S = 2.5  # of a move that is simulated: the rest of a slow one says little more
 LACK_OF_FIT = 1.5  # residual variance over the noise's, above which output error does not describe the recording
+NEAR, FAR = 5.0, 10.0  # a start is not tried when another came near the noise and it began so many times farther off
+CLAIM = 6.0  # standard errors, by a jackknife over some forty strokes, above which the regression claims a Stribeck rise
 REGRESSION_MISFIT = 4.0  # the same for the regression; noise with a memory of a sample or two reaches 3
 EVIDENCE = 16.0  # fall of the misfit (in variances, two parameters and two shapes tried): once in about a thousand by chance
 
@@ -277,6 +279,8 @@ def _fit_controller(moves: Sequence[MoveData], start: Mapping[str, float], sigma
     best = None
     for i in np.argsort(first):
         kind, values = starts[i]
+        if best is not None and max(best.chi2) < NEAR and first[i] > FAR * min(first):
+            break
         fit = output_error.fit(moves, values, CONTROLLERS[kind], sigma, BOUNDS, kind)
         if best is None or fit.cost < best.cost:
             best = fit
@@ -301,7 +305,7 @@ def _is_at_bound(f: OutputErrorFit) -> bool:
 
 
 def _from_regression(plain: Regression, curved: Regression) -> tuple[dict[str, float], tuple[str, ...], Array, bool]:
-    stribeck = curved.excess_z > 4.0
+    stribeck = curved.excess_z > CLAIM
     used = curved if stribeck else plain
     values = dict(zip(NAMES, map(float, used.values), strict=True))
     if stribeck:

@@ -18,6 +18,8 @@ from .moves import MoveData
 Array = NDArray[np.float64]
 
 COARSE_S = 5e-3
+# steps [s], rounds, fall of the misfit that is worth another round, width [%] over which a deadband sets in: what sets in softly has no kinks
+STAGES = ((COARSE_S, 8, 5.0, 0.5), (STEP_S, 3, 5.0, 0.25), (STEP_S, 10, 0.5, 0.1))
 ABSOLUTE_REACH = {"preload": 20.0, "viscous": 0.1, "stiffness": 0.2, "coulomb": 10.0, "bristle": 0.01, "damping": 2.0, "rise": 0.02, "fall": 0.02, "deadband": 0.2, "delay": 0.002, "lead": 0.002}
 TICK_S = 1e-3  # what instants of the controller's steps are known to: a current that jumps within it says little
 # differences wide enough that the instants at which a drive sticks or a deadband sets in, held to one step, average out
@@ -59,13 +61,27 @@ def _arrays(data: Sequence[MoveData], own: Array, repeat: int) -> Moves:
 
 def simulate_moves(data: Sequence[MoveData], q: Mapping[str, float], own: Array, controller: str, step_s: float = STEP_S) -> list[Array]:
     """Simulated position [%] and current [raw], (n, 2) per move."""
+    return [y for y, _ in _simulated(data, q, own, (1.0, 1.0), controller, step_s)]
+
+
+def whitened(
+    data: Sequence[MoveData], q: Mapping[str, float], own: Array, sigma: tuple[float, float], controller: str, step_s: float = STEP_S
+) -> list[Array]:
+    """Recorded less simulated position and current in units of what they are known to, (n, 2) per move."""
+    simulated = _simulated(data, q, own, sigma, controller, step_s)
+    return [(np.stack([m.position, m.current], axis=1) - y) * weight for m, (y, weight) in zip(data, simulated, strict=True)]
+
+
+def _simulated(
+    data: Sequence[MoveData], q: Mapping[str, float], own: Array, sigma: tuple[float, float], controller: str, step_s: float
+) -> list[tuple[Array, Array]]:
     order = np.argsort([-m.time_s[-1] for m in data], kind="stable")
-    sorted_data = [data[i] for i in order]
     full = {k: np.full(len(data), v) for k, v in q.items()}
-    t, p, u = simulate(_arrays(sorted_data, own[order], 1), full, step_s, controller)
-    out: list[Array] = [np.empty(0)] * len(data)
+    t, p, u = simulate(_arrays([data[i] for i in order], own[order], 1), full, step_s, controller)
+    out: list = [None] * len(data)
     for column, i in enumerate(order):
-        out[i] = _sample(t, p[:, column : column + 1], u[:, column : column + 1], data[i].time_s, q.get("lead", 0.0))[:, :, 0]
+        c, at = slice(column, column + 1), data[i].time_s
+        out[i] = _sample(t, p[:, c], u[:, c], at, q.get("lead", 0.0))[:, :, 0], _weights(t, u[:, column], at, sigma)
     return out
 
 
@@ -90,7 +106,11 @@ def _linearise(
     data: Sequence[MoveData], q: Mapping[str, float], names: Sequence[str], own: Array, sigma: tuple[float, float], controller: str, step_s: float,
     width_share: float = 1.0,
 ) -> tuple[list[Array], list[Array], list[Array], list[Array]]:
-    """Whitened residuals (2n,), shared (2n, k) and own (2n, 4) Jacobian of every move, one batch of simulations; weights (n, 2)."""
+    """Whitened residuals (2n,) at steps of step_s [s], shared (2n, k) and own (2n, 4) Jacobian of every move; weights (n, 2).
+
+    The Jacobian of a profile generator is that of the coarse simulation: a derivative that is off by a few percent changes the way to
+    the optimum, not where the residuals have no part of it left. A deadband needs the fine one.
+    """
     k = len(names)
     width = k + 1 + len(OWN_STEP)
     steps, own_step = width_share * _steps(q, names), width_share * np.array(OWN_STEP)
@@ -104,16 +124,22 @@ def _linearise(
     owns = np.repeat(own[order], width, axis=0)
     for i, small in enumerate(own_step):
         owns[k + 1 + i :: width, i] += small
-    t, p, u = simulate(_arrays(ordered, owns, width), values, step_s, controller)
+    coarse_s = COARSE_S if controller == "profile" else step_s
+    t, p, u = simulate(_arrays(ordered, owns, width), values, coarse_s, controller)
+    if step_s < coarse_s:
+        fine_t, fine_p, fine_u = simulate(_arrays(ordered, own[order], 1), {n: np.full(len(data), v) for n, v in q.items()}, step_s, controller)
+    else:
+        fine_t, fine_p, fine_u = t, p[:, ::width], u[:, ::width]
     out_r: list = [None] * len(data)
     out_g: list = [None] * len(data)
     out_l: list = [None] * len(data)
     out_w: list = [None] * len(data)
     for column, i in enumerate(order):
-        m, c = data[i], slice(column * width, (column + 1) * width)
-        weight = _weights(t, u[:, column * width], m.time_s, sigma)
+        m, c, one = data[i], slice(column * width, (column + 1) * width), slice(column, column + 1)
+        weight = _weights(fine_t, fine_u[:, column], m.time_s, sigma)
+        base = _sample(fine_t, fine_p[:, one], fine_u[:, one], m.time_s, q.get("lead", 0.0))[:, :, 0]
+        out_r[i] = ((np.stack([m.position, m.current], axis=1) - base) * weight).T.ravel()
         y = _sample(t, p[:, c], u[:, c], m.time_s, values["lead"][c] if "lead" in q else 0.0) * weight[:, :, None]  # (n, 2, width)
-        out_r[i] = (np.stack([m.position, m.current], axis=1) * weight - y[:, :, 0]).T.ravel()
         derivative = (y[:, :, 1:] - y[:, :, :1]) / np.append(steps, own_step)
         derivative = derivative.transpose(1, 0, 2).reshape(-1, width - 1)
         out_g[i], out_l[i], out_w[i] = derivative[:, :k], derivative[:, k:], weight
@@ -170,8 +196,9 @@ def fit(
     """
     q, own = dict(start_values), np.array([m.own for m in data]) if own is None else own.copy()
     samples = 2 * sum(len(m.time_s) for m in data)
-    for step_s, rounds, enough, edge in ((COARSE_S, 8, 5.0, 0.5), (STEP_S, iterations, 0.3, 0.1)):
-        damping, q = 1e-3, {**q, "edge": edge}  # a deadband that sets in softly has no kinks to be caught in
+    for step_s, rounds, enough, edge in STAGES if controller == "cascade" else (STAGES[0], STAGES[-1]):
+        rounds = min(rounds, iterations) if step_s < COARSE_S else rounds
+        damping, q = 1e-3, {**q, "edge": edge}
         share = 1.0
         for i in range(rounds):
             linear = _linearise(data, q, names, own, sigma, controller, step_s, share)
@@ -185,7 +212,10 @@ def fit(
                     break
                 share, damping = 0.3, 1e-1
                 continue
+            fell = cost - moved[2]
             q, own, cost, damping = moved
+            if fell < 0.2 * enough:
+                break
     return _finish(data, linear, q, names, sigma, own, cost, controller, bounds)
 
 
@@ -233,26 +263,29 @@ def _step(
     controller: str,
     step_s: float,
 ) -> tuple[dict[str, float], Array, float, float] | None:
-    """One Levenberg-Marquardt step, the best of seven dampings: new values, own unknowns, cost and damping; None where nothing improves."""
+    """One Levenberg-Marquardt step, the best of three dampings, or of four more: new values, own unknowns, cost and damping; None where nothing improves."""
     normal, gradient, blocks = system
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-30))
-    tried, candidates = damping * 10.0 ** np.arange(-2, 5), []
     free = _free(gradient, np.array([q[n] for n in names]), _limits(names, bounds))
     system = (normal / np.outer(scale, scale))[np.ix_(free, free)]
-    for strength in tried:
-        move = np.zeros(len(names))
-        move[free] = np.linalg.lstsq(system + strength * np.eye(free.sum()), (gradient / scale)[free], rcond=1e-12)[0] / scale[free]
-        new_q = dict(q)
-        for n, d in zip(names, move, strict=True):
-            low, high = bounds.get(n, (-np.inf, np.inf))
-            reach = 0.5 * abs(q[n]) + ABSOLUTE_REACH.get(n, 0.0)
-            new_q[n] = float(np.clip(q[n] + np.clip(d, -reach, reach), low, high))
-        actual = np.array([new_q[n] - q[n] for n in names])
-        local = np.array([inverse @ (b - c @ actual) for inverse, b, c in blocks])
-        candidates.append((new_q, own + np.clip(local, -OWN_REACH, OWN_REACH)))
-    costs = _costs(data, [c[0] for c in candidates], [c[1] for c in candidates], weights, controller, step_s)
-    best = int(np.argmin(costs))
-    return (*candidates[best], float(costs[best]), float(np.clip(tried[best], 1e-8, 1e3))) if costs[best] < cost else None
+    for powers in ((-1, 0, 1), (-2, 2, 3, 4)):
+        candidates = []
+        for strength in (tried := damping * 10.0 ** np.array(powers, float)):
+            move = np.zeros(len(names))
+            move[free] = np.linalg.lstsq(system + strength * np.eye(free.sum()), (gradient / scale)[free], rcond=1e-12)[0] / scale[free]
+            new_q = dict(q)
+            for n, d in zip(names, move, strict=True):
+                low, high = bounds.get(n, (-np.inf, np.inf))
+                reach = 0.5 * abs(q[n]) + ABSOLUTE_REACH.get(n, 0.0)
+                new_q[n] = float(np.clip(q[n] + np.clip(d, -reach, reach), low, high))
+            actual = np.array([new_q[n] - q[n] for n in names])
+            local = np.array([inverse @ (b - c @ actual) for inverse, b, c in blocks])
+            candidates.append((new_q, own + np.clip(local, -OWN_REACH, OWN_REACH)))
+        costs = _costs(data, [c[0] for c in candidates], [c[1] for c in candidates], weights, controller, step_s)
+        best = int(np.argmin(costs))
+        if costs[best] < cost:
+            return (*candidates[best], float(costs[best]), float(np.clip(tried[best], 1e-8, 1e3)))
+    return None
 
 
 def _normal(
