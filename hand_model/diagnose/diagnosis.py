@@ -23,6 +23,7 @@ from .improve import read_model, write_improved
 from .interval import held_out, parameter_intervals, proven, variance_ratio
 from .name import ALPHA, Named, Naming, name_effects, polish, scan
 from .page import write_page
+from .prove import Replay
 
 # How before and after were computed, said in the findings: no compiled file is involved until one is replayed.
 ENGINE = {"current": "inverse dynamics of the motor's balance, motion as recorded", "encoder": "encoder map, motion as recorded",
@@ -61,10 +62,11 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
         tell(stations[-1].line())
     findings = assemble(stations, _once(found), notes)
     if output is not None:
+        replays: tuple[Replay, ...] = ()
         if model is not False:
-            findings = _modelled(findings, session, hand, stations, Path(output), tell)
+            findings, replays = _modelled(findings, session, hand, stations, Path(output), tell)
             write_corrected(session, findings.findings, _counts_corrected(session, stations), Path(output))
-        write_page(findings, stations, session.path.name, Path(output))
+        write_page(findings, stations, replays, session.path.name, Path(output))
         findings.save(output)
     return findings
 
@@ -81,20 +83,20 @@ def _counts_corrected(session: Session, stations: list[Station]) -> dict[str, Ca
 
 
 def _modelled(findings: Findings, session: Session, hand: Hand | None, stations: list[Station], output: Path,
-              tell: Callable[[str], None]) -> Findings:
-    """The findings with the model that holds them written; without a `hand` the session's own is identified."""
+              tell: Callable[[str], None]) -> tuple[Findings, tuple[Replay, ...]]:
+    """The findings with the model that holds them written, and its replays; without a `hand` the session's own is identified."""
     from ..identify import identify
     from .angles import ranges_of_counts
 
     if not any(f.correction is None for f in findings.findings):
-        return findings
+        return findings, ()
     try:
         hand = identify(session) if hand is None else hand
         tell(f"writing {output / 'model'}")
-        named = write_improved(hand, findings.findings, stations, ranges_of_counts(session), output)
+        named, replays = write_improved(hand, findings.findings, stations, ranges_of_counts(session), output)
     except HandModelError as error:
-        return replace(findings, notes=(*findings.notes, f"no model was written: {error}"))
-    return replace(findings, findings=named)
+        return replace(findings, notes=(*findings.notes, f"no model was written: {error}")), ()
+    return replace(findings, findings=named), replays
 
 
 def _encoder_corrections(stations: list[Station]) -> dict[str, Callable[[Any], Any]]:

@@ -13,7 +13,7 @@ from numpy.polynomial import Polynomial
 from ..effects import effect
 from ..hand import Coupling, Effect, EncoderMap, Estimate, Finger, Hand, Motor, load_hand
 from .findings import Finding
-from .prove import proved
+from .prove import Replay, proved
 
 MOTOR = {"inertia": ("inertia", "raw s^2/%"), "viscous": ("viscous", "raw s/%"), "coulomb": ("coulomb", "raw"),
          "spring": ("stiffness", "raw/%"), "preload": ("preload", "raw")}
@@ -109,9 +109,9 @@ def written(before: Path, finding: Finding) -> dict[str, Any]:
 
 
 def write_improved(hand: Hand, findings: Sequence[Finding], stations: Sequence[Any], counts: Mapping[str, tuple[float, float]],
-                   output: Path) -> tuple[Finding, ...]:
+                   output: Path) -> tuple[tuple[Finding, ...], tuple[Replay, ...]]:
     """Compile the hand as declared into `output`/model_before and with its effects into `output`/model; the findings, saying
-    where each is written and what replaying the two says.
+    where each is written and what replaying the two says, and the replays.
 
     Raises HandModelError where the hand cannot be compiled. Nothing is written where no finding is physics of the hand.
     """
@@ -121,17 +121,19 @@ def write_improved(hand: Hand, findings: Sequence[Finding], stations: Sequence[A
     before = as_fitted(hand, touched, counts, lambda naming: naming.declared)
     after = with_effects(as_fitted(hand, touched, counts, lambda naming: naming.fit), findings)
     if not any(f.correction is None for f in findings):
-        return tuple(findings)
+        return tuple(findings), ()
     compile(before, output / "model_before")
     compile(after, output / "model")
-    out = []
+    out, replays = [], []
     for finding in findings:
         if finding.correction is None:
             finding = replace(finding, model=written(output / "model_before", finding))
             station = next((s for s in stations if _of(finding, s)), None)
-            finding = replace(finding, fit=proved(finding, station, output / "model_before", output / "model"))
+            fit, replay = proved(finding, station, output / "model_before", output / "model")
+            finding = replace(finding, fit=fit)
+            replays += [] if replay is None else [replace(replay, finding=finding)]
         out.append(finding)
-    return tuple(out)
+    return tuple(out), tuple(replays)
 
 
 def _of(finding: Finding, station: Any) -> bool:

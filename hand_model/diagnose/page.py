@@ -1,4 +1,4 @@
-"""`report.html` of a diagnosis: verdict, ranked findings, residual maps before and after, the effects' curves."""
+"""`report.html` of a diagnosis: verdict, ranked findings, the replay before and after, residual maps, the effects' curves."""
 
 from __future__ import annotations
 
@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from ..report.page import Cell, Section, figures, key, listing, note, page, table
 from ..report.style import INK, MUTED, SERIES, drawing
 from .findings import Finding, Findings
+from .prove import Replay
 
 Array = NDArray[np.float64]
 
 POINTS = 700
+CELLS = 40
 VERDICTS = {
     "consistent": "Nothing is missing: the declared model explains the recordings within their noise.",
     "mismatch": "Something is missing, and it is named below.",
@@ -23,24 +25,30 @@ VERDICTS = {
 }
 
 
-def write_page(findings: Findings, stations: Sequence[Any], title: str, folder: Path) -> Path:
-    """Write `report.html` into `folder`, whole or not at all; stations: those of the diagnosis, with their balances."""
+def write_page(findings: Findings, stations: Sequence[Any], replays: Sequence[Replay], title: str, folder: Path) -> Path:
+    """Write `report.html` into `folder`, whole or not at all; stations: those of the diagnosis, with their balances. replays: of
+    the compiled files, before and after."""
     folder.mkdir(parents=True, exist_ok=True)
     target, sibling = folder / "report.html", folder / ".report.html.part"
-    sibling.write_bytes(render(findings, stations, title))
+    sibling.write_bytes(render(findings, stations, replays, title))
     sibling.replace(target)
     return target
 
 
-def render(findings: Findings, stations: Sequence[Any], title: str) -> bytes:
+def render(findings: Findings, stations: Sequence[Any], replays: Sequence[Replay], title: str) -> bytes:
     """The page as UTF-8."""
-    tiles = [(findings.verdict, "verdict"), (str(len(findings.findings)), "findings")]
+    count = len(findings.findings)
+    tiles = [(findings.verdict, "verdict"), (str(count), "finding" if count == 1 else "findings")]
     if "before" in findings.lack_of_fit:
         tiles += [(f"{findings.lack_of_fit[k]:.2f}", f"residual over noise variance, {k}") for k in ("before", "after")]
     sections = [Section("findings", "Findings", _lead(findings), tuple(_ranked(findings)))]
-    drawn = [s for s in stations if s.missing or s.believed] or list(stations)
-    for station in drawn:
-        sections.append(_station(station, f"station-{len(sections)}"))
+    sections += [_replayed(replay, f"replay-{i}") for i, replay in enumerate(replays)]
+    apart = [s for s in stations if s.missing or s.believed]
+    sections += [_station(station, f"station-{i}") for i, station in enumerate(apart)]
+    calm = [s for s in stations if not (s.missing or s.believed)]
+    if calm:
+        sections.append(Section("consistent", "Consistent channels", "Nothing is missing here; residual of the declared model, mean over strokes.",
+                                (figures(*(_first_map(s) for s in calm)), KEY)))
     sections.append(Section("channels", "Every channel", "p: probability of residuals as structured as these if nothing is missing.",
                             (_channels(findings),)))
     return page(f"Diagnosis of {title}", VERDICTS[findings.verdict], tiles, sections)
@@ -56,60 +64,135 @@ def _lead(findings: Findings) -> str:
 
 def _ranked(findings: Findings) -> list[Any]:
     if not findings.findings:
-        return []
-    rows = [[f.effect.replace("_", " "), str(f.where.get("finger") or "all"), f"{f.where.get('share_of_mismatch', 0):.0%}",
-             f"{f.probability:.3f}", _number(f.fit.get("before")), _number(f.fit.get("after")),
-             _number(f.fit.get("noise_floor")), str(f.fit.get("unit", "")), Cell(f.statement, "wrap")] for f in findings.findings]
-    columns = ("effect", "finger", "share", "probability", "error before", "after", "noise", "unit", "statement")
-    out = [table(columns, rows, text_columns=2), note("; ".join(sorted({_proof(f) for f in findings.findings})))]
-    if findings.next_experiment:
-        out.append(listing([f"Next experiment: {findings.next_experiment}."]))
-    return out
+        return [listing(list(findings.notes))] if findings.notes else []
+    rows = [[_words(f.effect), str(f.where.get("finger") or "all"), str(f.fit.get("unit", "")),
+             f"{f.where.get('share_of_mismatch', 0):.0%}", f"{f.probability:.3f}", _number(f.fit.get("before")),
+             _number(f.fit.get("after")), _number(f.fit.get("noise_floor")), _interval(f.fit.get("ci95_reduction"))]
+            for f in findings.findings]
+    columns = ("effect", "finger", "unit", "share", "probability", "error before", "after", "noise", "95 % of the reduction")
+    out = [table(columns, rows, text_columns=3), note("; ".join(sorted({_proof(f) for f in findings.findings})) + ".")]
+    held = [[_words(f.effect), str(name), str(value.get("unit", "")), _number(value["value"]), _interval(value.get("ci95"))]
+            for f in findings.findings for name, value in f.parameters.items()]
+    if held:
+        out.append(table(("of", "parameter", "unit", "value", "95 % interval"), held, text_columns=3))
+    out.append(table(("effect", "where it is put right"), [[_words(f.effect), Cell(_kept(f), "wrap")] for f in findings.findings],
+                     text_columns=2))
+    more = [f"Not told apart from {', '.join(_words(m) for m in f.members if m != f.effect)}: {_words(f.effect)}."
+            for f in findings.findings if len(f.members) > 1]
+    more += [f"Next experiment: {findings.next_experiment}."] if findings.next_experiment else []
+    more += [f"Unexplained: {u['where']['finger']} {u['where']['signal']}, {u['shape']}." for u in findings.unexplained]
+    return [*out, listing([*more, *findings.notes])] if more or findings.notes else out
+
+
+def _kept(finding: Finding) -> str:
+    """Where a finding is written, in words."""
+    if finding.correction is not None:
+        return f"in the corrected copy of the session: {finding.correction}"
+    model = finding.model or {}
+    if model.get("mjcf"):
+        return f"in the MJCF, {model['mjcf']}; URDF: {model['urdf']}"
+    if model.get("callback"):
+        return f"by the passive-force callback, {model['callback']}; URDF: {model['urdf']}"
+    return str(model.get("note") or "in no file")
 
 
 def _proof(finding: Finding) -> str:
     kept = finding.fit.get("held_out") or []
-    return f"{finding.effect.replace('_', ' ')}: {finding.fit.get('engine')}, {f'{len(kept)} recordings kept out' if kept else 'in-sample'}"
+    told = finding.fit.get("note") or f"{len(kept)} recordings kept out" if kept or finding.fit.get("note") else "in-sample"
+    return f"{_words(finding.effect)}: {finding.fit.get('engine') or 'no replay'}, {told}"
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
 
 
 def _number(value: Any) -> str:
     return "" if value is None or not np.isfinite(value) else f"{value:.4g}"
 
 
+def _interval(value: Any) -> str:
+    return "" if value is None else f"{value[0]:.4g} to {value[1]:.4g}"
+
+
 def _channels(findings: Findings) -> Any:
-    rows = [[str(c["finger"]), str(c["joint"] or ""), str(c["signal"]), f"{c['p_before']:.2g}", f"{c['p_after']:.2g}",
-             ", ".join(c["effects"]).replace("_", " ")] for c in findings.channels]
-    return table(("finger", "joint", "signal", "p before", "p after", "named"), rows, text_columns=3)
+    rows = [[str(c["finger"]), str(c["joint"] or ""), str(c["signal"]), ", ".join(c["effects"]).replace("_", " "),
+             f"{c['p_before']:.2g}", f"{c['p_after']:.2g}"] for c in findings.channels]
+    return table(("finger", "joint", "signal", "named", "p before", "p after"), rows, text_columns=4)
+
+
+KEY = key(("c1", "position rises"), ("c2", "position falls"), ("muted", "noise of one sample"))
+
+
+def _replayed(replay: Replay, name: str) -> Section:
+    """The compiled files' residual map before and after, on recordings that took no part."""
+    fit = replay.finding.fit
+    place = " ".join(str(replay.finding.where[k]) for k in ("finger", "joint") if replay.finding.where.get(k))
+    largest = _largest(replay.position, replay.velocity, replay.before)
+    drawn = [(f"{label} [{replay.unit}]", _map(replay.position, replay.velocity, residual, replay.noise, replay.position_unit,
+                                               replay.unit, largest))
+             for label, residual in (("model as it was: recorded minus replayed", replay.before), ("model with its effects", replay.after))]
+    said = (f"{_words(replay.finding.effect)}, {place}: {fit['before']:.4g} to {fit['after']:.4g} {replay.unit}, noise {fit['noise_floor']:.4g}, "
+            f"replayed by MuJoCo on {', '.join(replay.trials)}.")
+    return Section(name, f"Replay: {place} {_words(replay.finding.effect)}", said, (figures(*drawn), KEY))
+
+
+def _maps(station: Any) -> tuple[Array, Array, list[Array], float, str, str]:
+    """Steady samples of a station: position, velocity, residuals of the declared and of the final model, noise, units."""
+    balance = station.naming.balance
+    use = balance.steady
+    residuals = [(balance.effort - f.prediction)[use] for f in (station.naming.declared, station.naming.fit)]
+    return (balance.gather(lambda s: s.position)[use], balance.gather(lambda s: s.velocity)[use], residuals, balance.sigma,
+            balance.states[0].position_unit, balance.states[0].effort_unit)
+
+
+def _place(station: Any) -> str:
+    return " ".join(x for x in (station.finger, station.joint, station.signal) if x)
+
+
+def _first_map(station: Any) -> tuple[str, bytes]:
+    position, velocity, residuals, sigma, unit, effort = _maps(station)
+    return f"{_place(station)} [{effort}]", _map(position, velocity, residuals[0], sigma, unit, effort)
 
 
 def _station(station: Any, name: str) -> Section:
-    naming = station.naming
-    place = " ".join(x for x in (station.finger, station.joint, station.signal) if x)
-    balance = naming.balance
-    position, velocity = balance.gather(lambda s: s.position), balance.gather(lambda s: s.velocity)
-    unit, effort = balance.states[0].position_unit, balance.states[0].effort_unit
-    use = balance.steady
-    drawn = [(f"{label}: residual, mean over strokes [{effort}]", _map(position[use], velocity[use], (balance.effort - f.prediction)[use],
-              balance.sigma, unit, effort)) for label, f in (("declared model", naming.declared), ("with what was named", naming.fit))]
+    position, velocity, residuals, sigma, unit, effort = _maps(station)
+    largest = _largest(position, velocity, residuals[0])
+    drawn = [(f"{label} [{effort}]", _map(position, velocity, residual, sigma, unit, effort, largest))
+             for label, residual in zip(("declared model, fitted: residual", "with what was named"), residuals, strict=True)]
     if station.believed:
-        drawn += [(f"{f.term.effect.name.replace('_', ' ')}: its part and what is left of the data", _curve(naming, f, unit, effort))
+        drawn += [(f"{_words(f.term.effect.name)}: its part through the data less the rest [{effort}]", _curve(station.naming, f, unit, effort))
                   for f in station.kept[:3]]
-    return Section(name, place, station.line() + ".",
-                   (figures(*drawn), key(("c1", "position rises"), ("c2", "position falls"), ("muted", "noise of one sample"))))
+    return Section(name, _place(station), station.line().replace("_", " ") + ".", (figures(*drawn), KEY))
 
 
-def _map(position: Array, velocity: Array, residual: Array, sigma: float, unit: str, effort: str) -> bytes:
+def _largest(position: Array, velocity: Array, residual: Array) -> float:
+    """Largest mean residual of the map's cells: both maps of a pair are drawn to it."""
+    return max((float(np.nanmax(np.abs(m))) for _, m in _means(position, velocity, residual)), default=0.0)
+
+
+def _means(position: Array, velocity: Array, residual: Array) -> list[tuple[Array, Array]]:
+    """Mean position and mean residual (k,) of cells of equal occupation, for rising and for falling positions."""
+    edges = np.quantile(position, np.linspace(0, 1, CELLS + 1))
+    out = []
+    for way in (velocity > 0, velocity <= 0):
+        cell = np.clip(np.searchsorted(edges, position[way], side="right") - 1, 0, CELLS - 1)
+        count = np.bincount(cell, minlength=CELLS)
+        mean = np.bincount(cell, residual[way], minlength=CELLS) / np.maximum(count, 1)
+        seen = count > 2
+        out.append(((0.5 * (edges[1:] + edges[:-1]))[seen], mean[seen]))
+    return [o for o in out if len(o[0])]
+
+
+def _map(position: Array, velocity: Array, residual: Array, sigma: float, unit: str, effort: str, largest: float = 0.0) -> bytes:
     """Mean residual over position, per direction, with the noise of one sample as a band."""
     with drawing() as d:
-        edges = np.quantile(position, np.linspace(0, 1, 41))
         d.axes.axhspan(-sigma, sigma, color=MUTED, alpha=0.15, linewidth=0)
         d.axes.axhline(0, color=INK, linewidth=0.6)
-        for colour, way in ((SERIES[0], velocity > 0), (SERIES[1], velocity <= 0)):
-            cell = np.clip(np.searchsorted(edges, position[way], side="right") - 1, 0, 39)
-            count = np.bincount(cell, minlength=40)
-            mean = np.bincount(cell, residual[way], minlength=40) / np.maximum(count, 1)
-            seen = count > 2
-            d.axes.plot((0.5 * (edges[1:] + edges[:-1]))[seen], mean[seen], color=colour)
+        for colour, (at, mean) in zip(SERIES, _means(position, velocity, residual), strict=False):
+            d.axes.plot(at, mean, color=colour)
+        if largest:
+            span = 1.08 * max(largest, sigma)
+            d.axes.set_ylim(-span, span)
         d.axes.set_xlabel(f"position [{unit}]")
         d.axes.set_ylabel(f"residual [{effort}]")
     return d.svg

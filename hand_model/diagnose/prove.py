@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,26 +22,46 @@ FORWARD = "mujoco: the compiled finger simulated, its driver on the recorded pat
 RESAMPLES = 1000
 
 
-def proved(finding: Finding, station: Any, before: Path, after: Path) -> dict[str, Any]:
-    """`fit` of a finding from the folders `before` and `after`; as it was, saying why, where they cannot be replayed.
+@dataclass(frozen=True)
+class Replay:
+    """Residuals of two compiled files along the recordings kept out: position, velocity, before, after (n,), units, noise of a
+    sample, names of the recordings."""
+
+    finding: Finding
+    position: Array
+    velocity: Array
+    before: Array
+    after: Array
+    position_unit: str
+    unit: str
+    noise: float
+    trials: tuple[str, ...]
+
+
+def proved(finding: Finding, station: Any, before: Path, after: Path) -> tuple[dict[str, Any], Replay | None]:
+    """`fit` of a finding from the folders `before` and `after`, and their replay; as it was, saying why, where they cannot be
+    replayed.
 
     station: where it was named, None for what was read from events.
     """
     kind = effect(finding.effect)
     if station is None or not kind.of_the_hand or kind.unwritten:
-        return {**finding.fit, "note": kind.unwritten or "read from events, not from a balance"}
+        return {**finding.fit, "note": kind.unwritten or "read from events, not from a balance"}, None
     states = kept_out(station.naming.balance.states)
     replay = _currents if station.signal == "current" else _angles
     errors = [replay(station, finding, folder, fit, states)
               for folder, fit in ((before, station.naming.declared), (after, station.naming.fit))]
     if errors[0] is None or errors[1] is None:
-        return {**finding.fit, "note": "no compiled file has its motor or its joint"}
+        return {**finding.fit, "note": "no compiled file has its motor or its joint"}, None
     every = bool(kind.warps or kind.replaces)
     used = [_used(s, every) for s in states]
     r0, r1 = ([e[u] for e, u in zip(error, used, strict=True)] for error in errors)
     blocks = [_blocks(s)[u] for s, u in zip(states, used, strict=True)]
-    return {**finding.fit, **reduction(r0, r1, blocks), "engine": INVERSE if station.signal == "current" else FORWARD,
-            "held_out": [s.trial for s in states if s.validate]}
+    fit = {**finding.fit, **reduction(r0, r1, blocks), "engine": INVERSE if station.signal == "current" else FORWARD,
+           "held_out": [s.trial for s in states if s.validate]}
+    x, v = (np.concatenate([getattr(s, k)[u] for s, u in zip(states, used, strict=True)]) for k in ("position", "velocity"))
+    return fit, Replay(finding, x, v, np.concatenate(r0), np.concatenate(r1), states[0].position_unit, states[0].effort_unit,
+                       station.naming.balance.sigma, tuple(s.trial for s in states))
 
 
 def _currents(station: Any, finding: Finding, folder: Path, fit: Any, states: Sequence[DriveState]) -> list[Array] | None:
