@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..identify.likelihood import OUTLIER_LIMIT
 from .angles import FingerAngles
 from .findings import Finding
 from .markers import ALPHA, HINGE, NO_HINGE, MarkerEffect, MarkerNaming
@@ -143,7 +144,9 @@ def _swaps(angles: FingerAngles) -> list[tuple[float, Finding]]:
     fit = {"metric": "marker_rmse", "unit": "m", "before": None, "after": None, "noise_floor": angles.noise_m,
            "ci95_reduction": None, "held_out": [], "engine": "chain fitted to the markers, in-sample"}
     text = f"{' and '.join(names)} are exchanged from {begin:.1f} to {end:.1f} s of {trial}."
-    return [(1e6, Finding("marker_swap", ("marker_swap",), 1.0, (), where, text, parameters, fit, None, CORRECTION["marker_swap"]))]
+    frames = sum(b - a for _, a, b in spans) / float(np.median(np.diff(angles.records[0].mocap.time_s)))
+    weight = 2 * frames * OUTLIER_LIMIT**2  # what the robust likelihood of the chain loses on two wrong labels
+    return [(weight, Finding("marker_swap", ("marker_swap",), 1.0, (), where, text, parameters, fit, None, CORRECTION["marker_swap"]))]
 
 
 def steps(angles: FingerAngles, naming: MarkerNaming) -> list[tuple[int, float]]:

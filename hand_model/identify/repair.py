@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 SMALLEST_SLIP_M = 2e-5
 # Slips of one support's markers are found some blocks apart [frames].
 SAME_MOMENT = 150
+# Frames over which a marker's last place says where it will be.
+LONGEST_GAP = 10
 
 
 @dataclass(frozen=True)
@@ -42,28 +44,50 @@ def repair_labels(data: ChainData) -> tuple[ChainData, tuple[Swap, ...]]:
     """Undo exchanged labels: where a cluster loses its shape, markers are followed from the last sound frame.
 
     A permutation is applied only where it brings every marker nearer to its track than the labels do, by more than half of
-    the smallest distance between two markers.
+    the smallest distance between two markers. Two labels that jump to each other's places from one frame to the next are
+    exchanged until they jump back, whether or not the cluster's shape shows it (a nearly symmetrical one does not).
     """
-    y = data.position_world
+    spacing = _spacing(data)
+    order = _jumped(data, spacing)
+    y = np.take_along_axis(data.position_world, order[..., None], axis=1)
+    data = replace(data, position_world=y)
     broken = _broken(data)
     if not broken.any() or broken.all():
-        return data, ()
-    spacing = _spacing(data)
+        return data, _swaps(order, data.labels)
     fixed = y.copy()
-    order = np.tile(np.arange(y.shape[1]), (len(y), 1))
     for run in _runs(broken):
         forward = run[0] > 0
         frames = range(run[0], run[1] + 1) if forward else range(run[1], run[0] - 1, -1)
         last = _last_seen(fixed, run[0] - 1 if forward else run[1] + 1, forward)
         for f in frames:
             permutation = _follow(y[f], last, spacing)
-            order[f] = permutation
+            order[f] = order[f, permutation]
             fixed[f] = y[f, permutation]
             seen = np.isfinite(fixed[f, :, 0])
             near = seen & (np.linalg.norm(np.nan_to_num(fixed[f]) - last, axis=1) < spacing / 2)
             last[near] = fixed[f, near]
     repaired = replace(data, position_world=fixed)
     return repaired, _swaps(order, data.labels)
+
+
+def _jumped(data: ChainData, spacing: float) -> NDArray[np.int64]:
+    """(n, m) column that each label has in truth, by pairs of labels that jump to each other's last places and back."""
+    y = data.position_world
+    n, m = y.shape[:2]
+    order = np.tile(np.arange(m), (n, 1))
+    seen = np.isfinite(y[..., 0])
+    index = np.maximum.accumulate(np.where(seen, np.arange(n)[:, None], 0), axis=0)
+    last = np.take_along_axis(y, index[..., None], axis=0)  # held over gaps
+    recent = (np.arange(n)[:, None] - index)[:-1] < LONGEST_GAP
+    for a in range(m):
+        for b in range(a + 1, m):
+            stay = np.minimum(*(np.linalg.norm(y[1:, i] - last[:-1, i], axis=-1) for i in (a, b)))
+            cross = np.maximum(*(np.linalg.norm(y[1:, i] - last[:-1, j], axis=-1) for i, j in ((a, b), (b, a))))
+            with np.errstate(invalid="ignore"):
+                jumps = (cross < 0.4 * stay) & (stay > 0.7 * spacing) & recent[:, a] & recent[:, b]
+            exchanged = np.concatenate([[False], np.cumsum(jumps) % 2 == 1])
+            order[np.ix_(exchanged, [a, b])] = order[np.ix_(exchanged, [b, a])]
+    return order
 
 
 def _broken(data: ChainData) -> NDArray[np.bool_]:
