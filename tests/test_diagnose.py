@@ -68,9 +68,9 @@ PLANTED = [
     ("quadratic_damping", {}, [0.0015]),
     ("elastoplastic_hysteresis", {"form": 0.0, "reach": 15.0}, [10.0]),
     ("torque_ripple", {"period": 9.0}, [4.0, 3.0]),
-    ("end_stop_contact", {"side": 1.0, "begin": 82.0}, [1.5]),
-    ("thermal_friction_drift", {"warm_up_time": 60.0}, [12.0]),
-    ("nonlinear_spring", {}, [1.5e-5]),
+    ("end_stop_contact", {"side": 1.0, "inward": 18.0, "end": 100.0}, [1.5]),
+    ("thermal_friction_drift", {"form": 0.0, "warm_up_time": 60.0}, [12.0]),
+    ("nonlinear_spring", {}, [2e-4, 1.5e-5]),
     ("viscoelastic_spring", {"relaxation_time": 1.0}, [0.2]),
 ]
 

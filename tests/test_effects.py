@@ -121,9 +121,9 @@ MOTOR = """<mujoco><compiler angle="radian"/><option gravity="0 0 0"/><worldbody
  <actuator><general name="index" joint="index_motor" gainprm="0" biastype="none"/></actuator></mujoco>"""
 NATIVE = [
     ("quadratic_damping", {}, {"drag": 0.002}, [0.002]),
-    ("nonlinear_spring", {}, {"cubic_stiffness": 3e-5}, [3e-5]),
-    ("end_stop_contact", {"side": 1.0, "begin": 82.0}, {"side": 1.0, "begin": 82.0, "stiffness": 1.5}, [1.5]),
-    ("end_stop_contact", {"side": -1.0, "begin": 12.0}, {"side": -1.0, "begin": 12.0, "stiffness": 1.5}, [1.5]),
+    ("nonlinear_spring", {}, {"quadratic_stiffness": 1e-3, "cubic_stiffness": 3e-5}, [1e-3, 3e-5]),
+    ("end_stop_contact", {"side": 1.0, "inward": 18.0, "end": 100.0}, {"side": 1.0, "begin": 82.0, "stiffness": 1.5}, [1.5]),
+    ("end_stop_contact", {"side": -1.0, "inward": 12.0, "end": 0.0}, {"side": -1.0, "begin": 12.0, "stiffness": 1.5}, [1.5]),
     ("torque_ripple", {"period": 9.0}, {"amplitude": 5.0, "period": 9.0, "phase": float(np.arctan2(3.0, 4.0))}, [4.0, 3.0]),
 ]
 

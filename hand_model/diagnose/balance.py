@@ -6,7 +6,7 @@ Everything here is generic in what the effort is (current, torque, an angle) and
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 # What physics allows of a declared coefficient, by its column's name.
 DECLARED_LOW = {"inertia": 0.0, "viscous": 0.0, "coulomb": 0.0, "spring": 0.0}
-DISCRETE = ("side", "trial", "form")  # shapes that choose among few cases: no continuous parameter is spent on them
+DISCRETE = ("side", "trial", "form", "end")  # shapes that choose among few cases: no continuous parameter is spent on them
 
 
 @dataclass(frozen=True)
@@ -48,11 +48,13 @@ class Balance:
     """The compared samples of several DriveStates, stacked.
 
     effort, weight (1 / standard deviation), train (bool): (n,). sigma: noise of the effort; inflation: integrated
-    autocorrelation of that noise (1 where it is white): a sum of squares counts divided by it.
+    autocorrelation of that noise (1 where it is white): a sum of squares counts divided by it. typical: declared
+    coefficients of other balances of the same kind, by name.
     """
 
-    def __init__(self, states: tuple[DriveState, ...], everything: bool = False) -> None:
-        self.states = states
+    def __init__(self, states: tuple[DriveState, ...], everything: bool = False,
+                 typical: Mapping[str, float] | None = None) -> None:
+        self.states, self.typical = states, typical or {}
         self.masks = [np.isfinite(s.effort) & np.isfinite(s.declared).all(1) for s in states]
         self.effort = np.concatenate([s.effort[m] for s, m in zip(states, self.masks, strict=True)])
         self.train = np.concatenate([np.full(m.sum(), everything or not s.validate)
@@ -63,18 +65,8 @@ class Balance:
         self.weight = np.ones(len(self.effort))
         self.sigma, self.inflation = noise(self)
         extra = self.gather(lambda s: s.extra.get("sigma", np.zeros(len(s.time_s))))
-        timing = self.gather(lambda s: s.extra.get("timing", np.zeros(len(s.time_s))))
         self.weight = 1 / np.sqrt(self.sigma**2 + extra**2)
-        self.sharp = 1 / np.sqrt(self.sigma**2 + timing**2)
         self.steady = extra <= 0.25 * self.sigma
-
-    def sharpened(self) -> Balance:
-        """The same balance with starts and stops weighted by their timing alone, to see delays and give in them."""
-        from copy import copy
-
-        other = copy(self)
-        other.weight = self.sharp
-        return other
 
     def gather(self, value: Any) -> Array:
         """Stack `value(state)` (n, ...) over the compared samples."""
@@ -108,7 +100,7 @@ class Balance:
             columns = state.declared
             for term in terms:
                 if term.effect.replaces is not None:
-                    columns = term.effect.declared(state, term.shape)
+                    columns = term.effect.declared(replace(state, declared=columns), term.shape)
             for term in warps:
                 columns = term.effect.warp(state, columns, term.shape)
             return columns
@@ -131,7 +123,7 @@ class Balance:
         inside = np.ones(len(self.effort), bool)
         for _ in range(4 if clips else 1):
             coefficients = bounded_least_squares(matrix * (w * inside)[:, None], self.effort * w * inside, low, high)
-            coefficients = self._own_nuisances(matrix, coefficients, w)
+            coefficients = self._own_nuisances(matrix, coefficients, w, low)
             prediction = raw = matrix @ coefficients
             for term in clips:
                 prediction = term.effect.clip(prediction, term.shape)
@@ -148,11 +140,10 @@ class Balance:
         return Fit(terms, declared, tuple(amplitudes), prediction, rss, size)
 
 
-    def _own_nuisances(self, matrix: Array, coefficients: Array, w: Array) -> Array:
-        """Coefficients of columns that act in validation recordings only (their own clock offset, a step in them) from
-        those recordings: they belong to the recording, not to the model, which stays as trained."""
-        k = len(self.names)
-        idle = (np.abs(matrix[:, :k] * w[:, None]).sum(0) == 0) & (np.abs(matrix[:, :k]).sum(0) > 0)
+    def _own_nuisances(self, matrix: Array, coefficients: Array, w: Array, low: Array) -> Array:
+        """Coefficients of columns that act in validation recordings only (their own clock offset, a step in them, an obstacle
+        that is still there) from those recordings: they belong to the recording, not to the model, which stays as trained."""
+        idle = (np.abs(matrix * w[:, None]).sum(0) == 0) & (np.abs(matrix).sum(0) > 0)
         if not idle.any():
             return coefficients
         columns = np.flatnonzero(idle)
@@ -160,7 +151,7 @@ class Balance:
         left = (self.effort - matrix @ coefficients) * held
         out = coefficients.copy()
         out[columns] += np.linalg.lstsq(matrix[:, columns] * held[:, None], left, rcond=None)[0]
-        return out
+        return np.maximum(out, low)
 
 
 def bounded_least_squares(matrix: Array, target: Array, low: Array, high: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,11 +14,14 @@ from ..effects.base import DriveState
 from ..errors import HandModelError, IdentificationError
 from ..hand import Hand
 from ..session import Finger, Session, read_session
+from .angles import FingerAngles
 from .balance import Balance
 from .command import command_facts, command_findings, refused
 from .correct import write_corrected
 from .drive import drive_states, drive_trials, is_measured
+from .evidence import typical_coefficients
 from .findings import Finding, Findings
+from .gravity import with_gravity
 from .improve import read_model, write_improved
 from .interval import held_out, parameter_intervals, proven, variance_ratio
 from .name import ALPHA, Named, Naming, name_effects, polish, scan
@@ -48,19 +51,24 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
     tell = say or (lambda line: None)
     notes: list[str] = []
     found: list[tuple[float, Finding]] = []
-    stations = _kinematic_stations(session, tell, notes, found)
-    drives = drive_states(session, _encoder_corrections(stations))
+    fingers: dict[str, FingerAngles] = {}
+    unexplained: list[dict[str, Any]] = []
+    stations = _kinematic_stations(session, tell, notes, found, fingers, unexplained)
+    drives = {a: with_gravity(session, fingers, states)
+              for a, states in drive_states(session, _encoder_corrections(stations)).items()}
     for actuator in [a for a, states in drives.items() if not is_measured(states)]:
         found.append(refused(actuator, _finger_of(session, actuator), tuple(s.trial for s in drives.pop(actuator))))
     found += _command(session, drives)
     for _, finding in found:
         tell(finding.statement)
-    allowed = _delays_apart(drives)
+    allowed, alone = _delays_apart(drives), {a: Balance(states).fit() for a, states in drives.items()}
     for actuator, states in drives.items():
         effects = [e for e in catalogue("drive") if not e.warps or allowed[actuator]]
-        stations.append(Station("current", _finger_of(session, actuator), actuator, None, name_effects(states, effects)))
+        typical = typical_coefficients([fit for a, fit in alone.items() if a != actuator])
+        stations.append(Station("current", _finger_of(session, actuator), actuator, None,
+                                name_effects(states, effects, typical=typical)))
         tell(stations[-1].line())
-    findings = assemble(stations, _once(found), notes)
+    findings = assemble(stations, _once(found), notes, unexplained)
     if output is not None:
         replays: tuple[Replay, ...] = ()
         if model is not False:
@@ -125,7 +133,7 @@ def _delays_apart(drives: dict[str, tuple[DriveState, ...]]) -> dict[str, bool]:
     """Whether each drive's current may be delayed: a delay that all drives of a session share is how the log is read."""
     best: dict[str, float] = {}
     for actuator, states in drives.items():
-        balance = Balance(states).sharpened()
+        balance = Balance(states)
         delay = next(e for e in catalogue("drive") if e.warps)
         fit = scan(balance, delay, ())
         best[actuator] = polish(balance, fit, 0).terms[0].shape["delay"] if fit is not None else 0.0
@@ -164,8 +172,9 @@ class Station:
 
     @property
     def missing(self) -> bool:
-        """Whether the lack-of-fit test says that something is missing."""
-        return self.naming.before.p < ALPHA
+        """Whether the lack-of-fit test says that something is missing, or an effect that it overlooked holds out: along the
+        known effects mismatch shows earlier than in any grouping of cells."""
+        return self.naming.before.p < ALPHA or bool(self.proven)
 
     @property
     def explained(self) -> float:
@@ -200,7 +209,8 @@ def _finger_of(session: Session, actuator: str) -> str | None:
 
 
 def _kinematic_stations(session: Session, tell: Callable[[str], None], notes: list[str],
-                        marker_findings: list[tuple[float, Finding]]) -> list[Station]:
+                        marker_findings: list[tuple[float, Finding]], fingers: dict[str, FingerAngles],
+                        unexplained: list[dict[str, Any]]) -> list[Station]:
     if session.palm is None:
         return []
     from ..identify.identification import palm_shape
@@ -217,34 +227,38 @@ def _kinematic_stations(session: Session, tell: Callable[[str], None], notes: li
     out: list[Station] = []
     for finger in session.fingers:
         try:
-            out += _finger_stations(session, finger, shape, counts, tell, marker_findings)
+            out += _finger_stations(session, finger, shape, counts, tell, marker_findings, fingers, unexplained)
         except IdentificationError as error:
             notes.append(str(error))
     return out
 
 
 def _finger_stations(session: Session, finger: Finger, shape: Any, counts: dict[str, tuple[float, float]],
-                     tell: Callable[[str], None], marker_findings: list[tuple[float, Finding]]) -> list[Station]:
-    from .angles import encoder_states, finger_angles, linkage_states
+                     tell: Callable[[str], None], marker_findings: list[tuple[float, Finding]],
+                     fingers: dict[str, FingerAngles], unexplained: list[dict[str, Any]]) -> list[Station]:
+    from .angles import encoder_states, expected_angles, finger_angles, linkage_states
     from .markers import corrected_angles, name_markers
     from .slips import marker_findings as findings_of
     from .slips import steps
+    from .slips import unexplained as unexplained_of
 
-    angles = finger_angles(session, finger, shape)
+    angles = fingers[finger.name] = finger_angles(session, finger, shape)
     markers = name_markers(angles)
     found = findings_of(angles, markers)
     marker_findings += found
+    unexplained += unexplained_of(angles, markers)
     tell(f"{finger.name} markers: {', '.join(f.effect for _, f in found) or 'consistent'} "
          f"(p {markers.p_before:.2g} -> {markers.p_after:.2g})")
     angles, moments = corrected_angles(angles, markers), steps(angles, markers)
-    out = []
+    out: list[Station] = []
     states = encoder_states(angles, *counts[finger.actuator], moments) if finger.actuator in counts else ()
     if states:
         out.append(Station("encoder", finger.name, finger.actuator, finger.segments[0].name,
                            name_effects(states, catalogue("encoder"))))
         tell(out[-1].line())
     for joint in range(1, len(finger.segments)):
-        states = linkage_states(angles, joint, moments)
+        expected = expected_angles(out[0].naming) if out and joint == 1 else {}
+        states = linkage_states(angles, joint, moments, expected)
         if states:
             out.append(Station("markers", finger.name, finger.actuator, finger.segments[joint].name,
                                name_effects(states, catalogue("linkage"))))
@@ -252,11 +266,12 @@ def _finger_stations(session: Session, finger: Finger, shape: Any, counts: dict[
     return out
 
 
-def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding]], notes: list[str]) -> Findings:
-    """One ranked list from all stations; weight: log likelihood that an effect's model takes off."""
+def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding]], notes: list[str],
+             unexplained: Sequence[dict[str, Any]] = ()) -> Findings:
+    """One ranked list from all stations; weight: log likelihood that an effect's model takes off. unexplained: of the markers."""
     ranked: list[tuple[float, Finding]] = list(marker_findings)
     rejected: list[dict[str, str]] = []
-    unexplained: list[dict[str, Any]] = []
+    unexplained = list(unexplained)
     for station in stations:
         if station.believed:
             ranked += [_finding(station, named, share) for named, share in _merged(station.kept)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,9 +16,9 @@ from .motion import Motion, estimate_motion
 Array = NDArray[np.float64]
 
 KINDS = ("flexion", "excitation")
-COULOMB_GIVE = 0.7  # [%] starting bristle length of the declared Coulomb friction: a hard sign function cannot be simulated
-START_DOUBT = 0.5  # of the Coulomb friction: 15 % per start, one error common to its dozen samples
-COULOMB_GIVE_MOST = 1.2  # [%] above this, give is presliding
+START_DOUBT = 0.1  # of the Coulomb friction: what the give of other bristles than the session's would change
+GIVE_LEAST, GIVE_MOST = 0.02, 1.2  # [%] of the declared Coulomb friction's bristles; beyond, give is presliding
+GIVE_UNSEEN = 0.12  # [%] differences of bristles below this are within what starts tell
 SETTLE_SAMPLES = (14, 13)  # after a start and before a stop: where acceleration is smeared by the kernel
 
 SETTLE_TRAVEL = 4.0  # [%] some six bristle lengths of a healthy drive
@@ -46,20 +46,23 @@ def count_range(logs: list[Log]) -> tuple[float, float]:
 def drive_states(
     session: Session, corrections: Mapping[str, Callable[[Array], Array]] | None = None
 ) -> dict[str, tuple[DriveState, ...]]:
-    """DriveStates of every actuator, [%] of its range and raw current; one bristle length for the whole session.
+    """DriveStates of every actuator, [%] of its range and raw current; with the bristle length of its friction.
 
     corrections: actuator -> function that takes its position [%] to what it should have read.
     """
     raw = {a: [(t, t.log()) for t in trials] for a, trials in drive_trials(session).items()}
     prepared = {a: _prepare(a, entries, (corrections or {}).get(a)) for a, entries in raw.items()}
-    give = session_give({a: states for a, states in prepared.items() if states})
-    return {a: tuple(with_coulomb(s, give) for s in states) for a, states in prepared.items() if states}
+    prepared = {a: states for a, states in prepared.items() if states}
+    give, granted = gives(prepared)
+    return {a: tuple(with_coulomb(s, give[a], granted) for s in states) for a, states in prepared.items()}
 
 
 def _prepare(
     actuator: str, entries: list[tuple[Trial, Log]], correct: Callable[[Array], Array] | None = None
 ) -> list[DriveState]:
     low, high = count_range([log for _, log in entries])
+    history: list[tuple[float, float]] = []  # of each earlier trial: time in motion, rest until the next one [s]
+    end = None
     first = min(float(log.time_s[0]) for _, log in entries)
     states = []
     for index, (trial, log) in enumerate(entries):
@@ -72,6 +75,12 @@ def _prepare(
         extra = {name: log.columns[name][seen] for name in ("setpoint", "speed", "current_limit", "temperature")
                  if name in log.columns and np.isfinite(log.columns[name][seen]).all()}
         extra["elapsed"] = time_s - first
+        if end is not None:
+            history[-1] = (history[-1][0], max(float(time_s[0]) - end, 0.0))
+        extra["history"] = np.array(history).reshape(-1, 2)
+        extra["moved"] = np.cumsum(np.diff(time_s, prepend=time_s[0]) * motion.moving)
+        history.append((float(extra["moved"][-1]), 0.0))
+        end = float(time_s[-1])
         extra["trial_index"] = np.full(len(time_s), float(index))
         effort = np.where(motion.moving, current[seen], np.nan)
         extra["bandwidth_s"] = np.full(len(time_s), motion.bandwidth_s)
@@ -110,18 +119,18 @@ def steady(time_s: Array, motion: Motion) -> NDArray[np.bool_]:
     return settled & (np.abs(motion.position - motion.position[begin]) > SETTLE_TRAVEL)
 
 
-def with_coulomb(state: DriveState, give: float) -> DriveState:
+def with_coulomb(state: DriveState, give: float, granted: float) -> DriveState:
     """The state with a Dahl column of that bristle length [%] as its Coulomb friction, and with the uncertainty of
-    starts and stops."""
+    starts and stops. granted: the longest that is no presliding."""
     declared = np.array(state.declared)
     declared[:, state.declared_names.index("coulomb")] = dahl(state.position, give)
-    extra = {**state.extra, "give": np.full(len(state.time_s), give)}
+    extra = {**state.extra, "give": np.full(len(state.time_s), give), "granted": np.full(len(state.time_s), granted)}
     return with_timing(replace(state, declared=declared, extra=extra))
 
 
 def with_timing(state: DriveState) -> DriveState:
-    """Adds "sigma" around starts and stops, zero in steady motion: what one sample interval of timing means for the
-    declared prediction, and that friction is unknown within its bounds while it turns over."""
+    """Adds "sigma" around starts and stops, zero in steady motion: what half a sample interval of timing means for the
+    declared prediction, and what is not known of friction while it turns over."""
     seen = np.isfinite(state.effort)
     if seen.sum() < 20:
         return state
@@ -131,24 +140,23 @@ def with_timing(state: DriveState) -> DriveState:
     slope = np.abs(np.gradient(state.declared @ beta, state.time_s))
     slope = np.maximum.reduce([np.roll(slope, k) for k in (-2, -1, 0, 1, 2)])
     turning = state.extra["steady"] <= 0
-    sigma = np.where(turning, step * slope + START_DOUBT * abs(beta[2]), 0.0)
-    return replace(state, extra={**state.extra, "sigma": sigma, "timing": np.where(turning, 0.5 * step * slope, 0.0)})
+    sigma = np.where(turning, np.hypot(0.5 * step * slope, START_DOUBT * beta[2]), 0.0)
+    return replace(state, extra={**state.extra, "sigma": sigma})
 
 
-def session_give(prepared: dict[str, list[DriveState]]) -> float:
-    """Bristle length [%] of the declared Coulomb friction: the least that any drive of the session needs.
+def gives(prepared: Mapping[str, Sequence[DriveState]]) -> tuple[dict[str, float], float]:
+    """Bristle length [%] of each drive's declared Coulomb friction, and the most that any drive of the session is granted.
 
-    Coulomb friction turns over within a small distance in any drive that can be simulated; the drive that gives least
-    shows how small. What a drive gives beyond that is presliding, an effect.
+    Coulomb friction turns over within a small distance in any drive; the drive that gives least shows how small. What a
+    drive gives clearly beyond that is presliding, an effect.
     """
-    best = []
-    for states in prepared.values():
-        lengths = np.geomspace(0.3, COULOMB_GIVE_MOST, 8)
-        best.append(lengths[int(np.argmin([_misfit(states, length) for length in lengths]))])
-    return float(min(best)) if best else COULOMB_GIVE
+    lengths = np.geomspace(GIVE_LEAST, GIVE_MOST, 12)
+    best = {a: float(lengths[int(np.argmin([_misfit(states, length) for length in lengths]))]) for a, states in prepared.items()}
+    granted = max(1.6 * min(best.values(), default=GIVE_LEAST), GIVE_UNSEEN)
+    return {a: min(length, granted) for a, length in best.items()}, granted
 
 
-def _misfit(states: list[DriveState], give: float) -> float:
+def _misfit(states: Sequence[DriveState], give: float) -> float:
     columns, efforts = [], []
     for state in states:
         declared = np.array(state.declared)

@@ -139,14 +139,16 @@ def held_out(naming: Naming, which: int, seed: int = 0) -> dict[str, Any]:
 
 
 def proven(naming: Naming, which: int) -> bool:
-    """Whether the term `which` lowers the error of recordings that took no part by more than their strokes scatter.
+    """Whether recordings that took no part are predicted better with the term `which` than by the best fit without it.
 
     True where nothing can be asked: no untouched recording, or an event that belongs to one recording only.
     """
-    if "trial" in naming.fit.terms[which].shape:
+    balance, fit = naming.balance, naming.fit
+    if "trial" in fit.terms[which].shape or balance.train.all():
         return True
-    proof = held_out(naming, which)
-    return not proof["held_out"] or proof["ci95_reduction"][0] > 0
+    without = balance.fit(tuple(t for i, t in enumerate(fit.terms) if i != which))
+    r0, r1 = (np.sum(((balance.effort - f.prediction) * balance.weight)[~balance.train] ** 2) for f in (without, fit))
+    return bool(r1 < r0)
 
 
 def variance_ratio(naming: Naming, fit: Fit) -> float:

@@ -1,13 +1,13 @@
 """Which effects are missing: candidates compete on a balance, by forward and backward selection with joint refits.
 
 Generic: the balance may be a motor's current, a rig's torque or one angle against another; the candidates are whatever
-`effects.catalogue(station)` holds. Decided by penalised likelihood on the training recordings (BIC, Schwarz 1978, with
-samples counted by their correlation time); nothing here sees a validation recording.
+`effects.catalogue(station)` holds. Decided by their evidence on the training recordings; nothing here sees a validation
+recording.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from .balance import DISCRETE, Balance, Fit, Term
+from .evidence import evidence, rough_evidence, scale_of
 from .lack_of_fit import LackOfFit, lack_of_fit
 
 Array = NDArray[np.float64]
 
 ALPHA = 0.003  # false alarms per channel: 5 % over some fifteen channels of a session
 EVIDENCE_LEAST = 6.0  # log evidence an effect must bring: e^6 against "none", and against the search over shapes
-STARTS_EVIDENCE = 40.0  # of a delay or give from starts and stops, whose errors repeat from start to start
 CLASS_WIDTH = 3.0  # log evidence within which two effects are one class: 20 to 1
 MOST_TERMS = 5
 
@@ -73,26 +73,18 @@ class Naming:
         return self.before.p >= ALPHA and not self.found
 
 
-def evidence(balance: Balance, fit: Fit, reference: Fit, scale: float = 1.0) -> float:
-    """Log evidence of a fit over a reference: half the fall of the weighted RSS minus BIC's penalty.
-
-    scale: residual variance over pure error of the best model known, at least 1: a misfit weighs all candidates down.
-    """
-    count = max(balance.train.sum() / balance.inflation, 2.0)
-    gain = 0.5 * (reference.rss - fit.rss) / (scale * balance.inflation)
-    return float(gain - 0.5 * (fit.size - reference.size) * np.log(count))
-
-
-def name_effects(states: tuple[Any, ...], effects: Iterable[Any], progress: Callable[[str], None] | None = None) -> Naming:
+def name_effects(states: tuple[Any, ...], effects: Iterable[Any], progress: Callable[[str], None] | None = None,
+                 typical: Mapping[str, float] | None = None) -> Naming:
     """Name what is missing from the balance of `states` among `effects`; raises nothing for healthy recordings.
 
     states: DriveStates of one balance, validation recordings marked by `validate`. The lack-of-fit test alone decides
-    whether anything is missing; without it no effect is named, however well it fits.
+    whether anything is missing; without it no effect is named, however well it fits. typical: declared coefficients of the
+    hand's other motors, by name.
     """
-    naming = _name(Balance(tuple(states)), tuple(effects), progress)
+    naming = _name(Balance(tuple(states), typical=typical), tuple(effects), progress)
     if naming.before.p < ALPHA and not naming.found and any(s.validate for s in states):
         # What happened in a validation recording only cannot be learned from the others.
-        return _name(Balance(tuple(states), everything=True), tuple(effects), progress)
+        return _name(Balance(tuple(states), True, typical), tuple(effects), progress)
     return naming
 
 
@@ -103,17 +95,8 @@ def _name(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str], 
     fit = declared
     after = before
     brought: dict[str, float] = {}
-    everything = effects
-    effects = tuple(e for e in everything if not e.warps)  # a delay shows at starts and stops only, or it is none
-    terms, fit = _starts(balance, everything, terms, fit)
-    if terms:
-        after = lack_of_fit(balance, fit.prediction, len(balance.names) + fit.size, ALPHA)
-        before = replace(before, p=0.0)
     while len(terms) < MOST_TERMS and (after.p < ALPHA or not terms):
         ranked = rank(balance, effects, terms, fit)
-        if not terms and ranked:
-            # Directed test: along the known effects lack of fit shows earlier than in any grouping of cells.
-            before = after = replace(before, p=min(before.p, float(np.exp(-max(ranked[0].evidence, 0.0)))))
         for rival in ranked:
             brought[rival.name] = max(brought.get(rival.name, -np.inf), rival.evidence)
         if not ranked or ranked[0].evidence < EVIDENCE_LEAST:
@@ -122,30 +105,10 @@ def _name(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str], 
         after = lack_of_fit(balance, fit.prediction, len(balance.names) + fit.size, ALPHA)
         if progress is not None:
             progress(f"{balance.states[0].drive}: {', '.join(t.effect.name for t in terms)}")
-    if all(not t.effect.warps for t in terms):
-        terms, fit = _starts(balance, everything, terms, fit)
-    after = lack_of_fit(balance, fit.prediction, len(balance.names) + fit.size, ALPHA)
-    found = _findings(balance, everything, terms, fit, declared)
+    found = _findings(balance, effects, terms, fit, declared)
     kept = {t.effect.name for t in terms}
     rejected = tuple(sorted(((n, e) for n, e in brought.items() if n not in kept), key=lambda item: -item[1]))
     return Naming(balance, declared, fit, before, after, found, rejected)
-
-
-def _starts(balance: Balance, effects: tuple[Any, ...], terms: tuple[Term, ...], fit: Fit) -> tuple[tuple[Term, ...], Fit]:
-    """Delays and give show at starts and stops, which weigh little elsewhere: added here where they explain most of the
-    misfit there, by more than the timing of half a sample could."""
-    sharp = balance.sharpened()
-    now = sharp.fit(terms)
-    lively = [e for e in effects if (e.warps or e.replaces) and all(t.effect.name != e.name for t in terms)]
-    ranked = rank(sharp, lively, terms, now)
-    if not ranked or ranked[0].evidence < STARTS_EVIDENCE or not _resolved(balance, ranked[0].fit.terms[-1]):
-        return terms, fit
-    # A drive that sticks draws current before it moves, which looks like current read early: only a current read late, or
-    # a shift that takes most of the misfit away, is a delay.
-    late = ranked[0].fit.terms[-1].shape.get("delay", 0.0) > 0
-    if now.rss - ranked[0].fit.rss < (0.2 if late else 0.8) * (now.rss - balance.train.sum()):
-        return terms, fit
-    return settle(balance, effects, ranked[0].fit.terms, keep=ranked[0].name)
 
 
 def _resolved(balance: Balance, term: Term) -> bool:
@@ -164,21 +127,17 @@ def rank(balance: Balance, effects: Iterable[Any], terms: tuple[Term, ...], fit:
             continue
         best = scan(balance, effect, terms)
         if best is not None:
-            rough.append((evidence(balance, best, fit, _scale(balance, best)), best))
+            rough.append((rough_evidence(balance, best, fit, scale_of(balance, best)), best))
     rough.sort(key=lambda item: -item[0])
     out = []
     for position, (_, start) in enumerate(rough):
         best = polish(balance, start, len(terms)) if position < refine else start
         needs = best.terms[-1].effect.needs
         if _resolved(balance, best.terms[-1]) and best.declared.get(needs, 1.0) > 0:
-            out.append((start.terms[-1].effect.name, best))
-    scale = min((_scale(balance, f) for _, f in out), default=1.0)
-    rivals = [Rival(name, evidence(balance, f, fit, scale), f) for name, f in out]
+            out.append((best, evidence if position < refine else rough_evidence))
+    scale = min((scale_of(balance, f) for f, _ in out), default=1.0)
+    rivals = [Rival(f.terms[-1].effect.name, weigh(balance, f, fit, scale=scale), f) for f, weigh in out]
     return sorted(rivals, key=lambda r: -r.evidence)
-
-
-def _scale(balance: Balance, fit: Fit) -> float:
-    return max(fit.rss / max(balance.train.sum(), 1), 1.0)
 
 
 def scan(balance: Balance, effect: Any, terms: tuple[Term, ...]) -> Fit | None:
@@ -206,8 +165,9 @@ def _project(balance: Balance, effect: Any, terms: tuple[Term, ...], grid: list[
     for shape in grid:
         c = balance.columns(effect, shape, warps) * w
         size = np.linalg.norm(c, axis=0)
+        c, size = c[:, size > 0], size[size > 0]  # what acts in validation recordings only tells nothing here
         c = c - q @ (q.T @ c)
-        if not c.shape[1] or np.any(np.linalg.norm(c, axis=0) < 1e-6 * np.maximum(size, 1e-300)):
+        if not c.shape[1] or np.any(np.linalg.norm(c, axis=0) < 1e-6 * size):
             gains.append(0.0)
             continue
         if c.shape[1] == 1:
@@ -249,19 +209,15 @@ def polish(balance: Balance, fit: Fit, which: int) -> Fit:
     return best if best.rss < fit.rss else fit
 
 
-def settle(
-    balance: Balance, effects: tuple[Any, ...], terms: tuple[Term, ...], keep: str | None = None
-) -> tuple[tuple[Term, ...], Fit]:
-    """Joint refit; terms that no longer pay leave; a term that another effect replaces better is exchanged.
-
-    keep: name of a term that stays whatever it brings here (it was decided on the starts and stops)."""
+def settle(balance: Balance, effects: tuple[Any, ...], terms: tuple[Term, ...]) -> tuple[tuple[Term, ...], Fit]:
+    """Joint refit; terms that no longer pay leave; a term that another effect replaces better is exchanged."""
     fit = refit(balance, balance.fit(terms))
     for _ in range(3):
-        dropped = _drop(balance, fit, keep)
+        dropped = _drop(balance, fit)
         if dropped is not None:
             fit = dropped
             continue
-        swapped = _swap(balance, effects, fit, keep) if len(fit.terms) > 1 else None
+        swapped = _swap(balance, effects, fit) if len(fit.terms) > 1 else None
         if swapped is None:
             break
         fit = swapped
@@ -279,30 +235,26 @@ def refit(balance: Balance, fit: Fit, rounds: int = 2) -> Fit:
     return fit
 
 
-def _drop(balance: Balance, fit: Fit, keep: str | None = None) -> Fit | None:
+def _drop(balance: Balance, fit: Fit) -> Fit | None:
     """The fit without the term that costs more than it brings; None where every term pays."""
     for which in range(len(fit.terms)):
-        if fit.terms[which].effect.name == keep:
-            continue
         rest = balance.fit(tuple(t for i, t in enumerate(fit.terms) if i != which))
-        if not fit.terms[which].effect.warps and evidence(balance, fit, rest, _scale(balance, fit)) < EVIDENCE_LEAST:
+        if evidence(balance, fit, rest, which, scale_of(balance, fit)) < EVIDENCE_LEAST:
             return refit(balance, rest)
     return None
 
 
-def _swap(balance: Balance, effects: tuple[Any, ...], fit: Fit, keep: str | None = None) -> Fit | None:
+def _swap(balance: Balance, effects: tuple[Any, ...], fit: Fit) -> Fit | None:
     """The best exchange of one term for another effect, where it raises the evidence; else None."""
     for which in range(len(fit.terms)):
-        if fit.terms[which].effect.name == keep:
-            continue
         rest = tuple(t for i, t in enumerate(fit.terms) if i != which)
         without = balance.fit(rest)
-        own = evidence(balance, fit, without, _scale(balance, fit))
+        own = evidence(balance, fit, without, which, scale_of(balance, fit))
         ranked = [r for r in rank(balance, effects, rest, without, refine=3) if r.name != fit.terms[which].effect.name]
         if ranked and ranked[0].evidence > own - 10:
             other = refit(balance, ranked[0].fit)
-            scale = min(_scale(balance, other), _scale(balance, fit))
-            if evidence(balance, other, without, scale) > evidence(balance, fit, without, scale) + 1:
+            scale = min(scale_of(balance, other), scale_of(balance, fit))
+            if evidence(balance, other, without, scale=scale) > evidence(balance, fit, without, which, scale) + 1:
                 return other
     return None
 
@@ -317,7 +269,7 @@ def _findings(balance: Balance, effects: tuple[Any, ...], terms: tuple[Term, ...
         rest = tuple(t for i, t in enumerate(terms) if i != which)
         without = balance.fit(rest)
         ranked = rank(balance, effects, rest, without)
-        own = evidence(balance, fit, without, _scale(balance, fit))
+        own = evidence(balance, fit, without, which, scale_of(balance, fit))
         rivals = [r for r in ranked if r.name != term.effect.name]
         rivals.append(Rival(term.effect.name, max([own, *[r.evidence for r in ranked if r.name == term.effect.name]]), fit))
         rivals.sort(key=lambda r: -r.evidence)

@@ -166,6 +166,10 @@ class Effect:
         """Parameters by their textbook names, from shapes, amplitudes and declared coefficients."""
         return {**shape, **amplitude}
 
+    def log_prior(self, parameters: Mapping[str, float]) -> float:
+        """Log density of the parameters over that of ordinary ones: negative where machines rarely are like that."""
+        return 0.0
+
     def region(self, states: tuple[DriveState, ...], shape: Mapping[str, float]) -> dict[str, Any] | None:
         """The part of state in which the effect acts, as `where.region` of a finding; None where it acts everywhere."""
         return None

@@ -12,16 +12,24 @@ from .mjcf import free_name, motor_joint, section
 
 
 class EndStopContact(Effect):
-    """F = k max(0, x - x0) at the upper end, or -k max(0, x0 - x) at the lower."""
+    """F = k max(0, x - x0) at the upper end, or -k max(0, x0 - x) at the lower.
+
+    A stop lies in the outer third of the range; what bends further in is a spring.
+    """
 
     name = "end_stop_contact"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """Side (1 upper, -1 lower) and where the stop begins."""
+        """Side (1 upper, -1 lower) and how far before the end of the range the stop begins."""
         low, high = position_range(states)
-        span, unit = high - low, states[0].position_unit
+        span = high - low
         return (Shape("side", "1", -1.0, 1.0, (-1.0, 1.0)),
-                Shape("begin", unit, low + 0.015 * span, high - 0.015 * span, tuple(low + span * np.linspace(0.04, 0.96, 24))))
+                Shape("inward", states[0].position_unit, 0.015 * span, span / 3, tuple(span * np.linspace(0.03, 0.31, 10))))
+
+    def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
+        """Each shape with the end of the range on its side."""
+        low, high = position_range(states)
+        return [{**point, "end": high if point["side"] > 0 else low} for point in super().grid(states)]
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Stiffness of the stop, never negative."""
@@ -29,13 +37,17 @@ class EndStopContact(Effect):
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """Depth into the stop, signed as its load, (n, 1)."""
-        side = 1.0 if shape["side"] >= 0 else -1.0
-        return (side * np.maximum(side * (state.position - shape["begin"]), 0.0))[:, None]
+        side, begin = _side(shape), _begin(shape)
+        return (side * np.maximum(side * (state.position - begin), 0.0))[:, None]
+
+    def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
+                   declared: Mapping[str, float]) -> dict[str, float]:
+        """Side, where the stop begins, and its stiffness."""
+        return {"side": shape["side"], "begin": _begin(shape), **amplitude}
 
     def region(self, states: tuple[DriveState, ...], shape: Mapping[str, float]) -> dict[str, Any] | None:
         """From where the stop begins to the end of the range."""
-        low, high = position_range(states)
-        ends = [shape["begin"], high] if shape["side"] >= 0 else [low, shape["begin"]]
+        ends = sorted((_begin(shape), shape["end"]))
         return {"position": ends, "unit": states[0].position_unit}
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
@@ -52,6 +64,14 @@ class EndStopContact(Effect):
                                   stiffness=repr(unit * parameters["stiffness"]))
         etree.SubElement(tendon, "joint", joint=joint.get("name"), coef="1")
         return f"tendon/fixed[@name='{name}']"
+
+
+def _side(shape: Mapping[str, float]) -> float:
+    return 1.0 if shape["side"] >= 0 else -1.0
+
+
+def _begin(shape: Mapping[str, float]) -> float:
+    return shape["end"] - _side(shape) * shape["inward"]
 
 
 EFFECT = EndStopContact()

@@ -12,13 +12,13 @@ from .law import Law, Moment
 
 
 class GravityLoad(Effect):
-    """F = a g_x + b g_z, turned by the joint angle: gravity in the frame that moves with the finger, times a constant lever."""
+    """Torque of a weight at a constant lever in the plane of the finger, turned by the joint angle."""
 
     name = "gravity_load"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """Angle swept over the range of positions, [rad]; with a recorded pose only."""
-        if not any("gravity_x" in s.extra for s in states):
+        if not any("gravity_along" in s.extra for s in states):
             return ()
         return (Shape("sweep", "rad", 0.5, 2.5, (0.8, 1.4, 2.0)),)
 
@@ -27,12 +27,12 @@ class GravityLoad(Effect):
         return (("along", "effort", -np.inf, np.inf), ("across", "effort", -np.inf, np.inf))
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """Gravity's two components in the plane of the finger, turned with it, (n, 2); none without a recorded pose."""
-        if "gravity_x" not in state.extra or not shape:
+        """Torque of a unit weight on the finger's line and across it, (n, 2) in parts of 9.81 m/s^2; none without a pose."""
+        if "gravity_along" not in state.extra or not shape:
             return np.zeros((len(state.time_s), 2))
         angle = shape["sweep"] * state.position / 100.0
-        gx, gz = state.extra["gravity_x"] / 9.81, state.extra["gravity_z"] / 9.81
-        return np.stack([gz * np.cos(angle) - gx * np.sin(angle), gx * np.cos(angle) + gz * np.sin(angle)], axis=-1)
+        along, across = state.extra["gravity_along"] / 9.81, state.extra["gravity_across"] / 9.81
+        return np.stack([across * np.cos(angle) - along * np.sin(angle), along * np.cos(angle) + across * np.sin(angle)], axis=-1)
 
     def law(self, parameters: Mapping[str, float]) -> Law:
         """Gravity in the finger's plane, turned with the finger."""

@@ -1,4 +1,4 @@
-"""Nonlinear spring: the return spring stiffens or softens (cubic term over the range)."""
+"""Nonlinear spring: the return spring stiffens or softens over the range."""
 
 from __future__ import annotations
 
@@ -12,30 +12,32 @@ from .mjcf import motor_joint
 
 
 class NonlinearSpring(Effect):
-    """F = k x + A (x / span)^3 beyond the declared line."""
+    """F = b x^2 + c x^3 beyond the declared line."""
 
     name = "nonlinear_spring"
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
-        """Cubic stiffness, either sign."""
-        return (("cubic_stiffness", "effort/position^3", -np.inf, np.inf),)
+        """Quadratic and cubic stiffness, either sign."""
+        return (("quadratic_stiffness", "effort/position^2", -np.inf, np.inf),
+                ("cubic_stiffness", "effort/position^3", -np.inf, np.inf))
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """x^3, (n, 1), x in the drive's unit."""
-        return (state.position**3)[:, None]
+        """x^2 and x^3, (n, 2), x in the drive's unit."""
+        return np.stack([state.position**2, state.position**3], axis=-1)
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
-        """`stiffness` and `springref`: k x + p + c x^3 around its root r, MuJoCo's force is -(a y + b y^2 + c y^3), y = x - r."""
+        """`stiffness` and `springref`: k x + p + b x^2 + c x^3 around its root r; MuJoCo's force is -(A y + B y^2 + C y^3), y = x - r."""
         found = motor_joint(root, where)
         if found is None:
             return None
         joint, unit = found
-        cubic, linear = unit * parameters["cubic_stiffness"], float((joint.get("stiffness") or "0").split()[0])
+        square, cubic = unit * parameters.get("quadratic_stiffness", 0.0), unit * parameters["cubic_stiffness"]
+        linear = float((joint.get("stiffness") or "0").split()[0])
         preload = -linear * float(joint.get("springref") or 0.0)
-        roots = np.roots([cubic, 0.0, linear, preload])
+        roots = np.roots([cubic, square, linear, preload])
         real = roots[np.abs(roots.imag) < 1e-9 * (1 + np.abs(roots))].real
         r = float(real[np.argmin(np.abs(real))])
-        joint.set("stiffness", f"{linear + 3 * cubic * r * r!r} {3 * cubic * r!r} {cubic!r}")
+        joint.set("stiffness", f"{linear + 2 * square * r + 3 * cubic * r * r!r} {square + 3 * cubic * r!r} {cubic!r}")
         joint.set("springref", repr(r))
         return f"joint[@name='{joint.get('name')}']/@stiffness"
 

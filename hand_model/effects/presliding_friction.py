@@ -19,11 +19,11 @@ class PreslidingFriction(Effect):
     replaces = "coulomb"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """Bristle length: from 1.6 times what the session's stiffest drive gives (or 1.2 % of the range) to a third of it."""
+        """Bristle length: from what is granted to any drive of the session (or 1.2 % of the range) to a third of it."""
         low, high = position_range(states)
         span = high - low
-        give = states[0].extra.get("give")
-        least = 0.012 * span if give is None else 1.6 * float(np.max(give))
+        granted = states[0].extra.get("granted")
+        least = 0.012 * span if granted is None else float(np.max(granted))
         return (Shape("bristle_length", states[0].position_unit, least, 0.35 * span,
                       tuple(np.geomspace(1.1 * least, 0.25 * span, 11))),)
 

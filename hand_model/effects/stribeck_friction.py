@@ -42,6 +42,10 @@ class StribeckFriction(Effect):
         return {"static_ratio": 1 + amplitude["static_excess"] / coulomb, "stribeck_speed": shape["stribeck_speed"],
                 "static_excess": amplitude["static_excess"]}
 
+    def log_prior(self, parameters: Mapping[str, float]) -> float:
+        """Static friction is seldom more than three times the Coulomb friction."""
+        return -0.5 * max(0.0, min(parameters["static_ratio"], 8.0) - 3.0) ** 2
+
     def region(self, states: tuple[DriveState, ...], shape: Mapping[str, float]) -> dict[str, Any] | None:
         """Speeds below two Stribeck speeds hold 86 % of it."""
         return {"speed": [0.0, 2.0 * shape["stribeck_speed"]], "unit": f"{states[0].position_unit}/s"}

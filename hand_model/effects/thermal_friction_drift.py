@@ -14,29 +14,44 @@ MOVING = 1.0  # %/s: below, a drive is at rest
 
 
 class ThermalFrictionDrift(Effect):
-    """F = sign(v) A exp(-t / tau): the change still to come at time t since the session began."""
+    """F = sign(v) A (1 - h): the change still to come. h rises to 1 with the time since the session began (form 0), or with the
+    time in motion, and falls back at rest between recordings (form 1).
+    """
 
     name = "thermal_friction_drift"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """Warm-up time between 5 s and four times the session."""
+        """Warm-up time between 5 s and four times the session, cooling time at rest, form."""
         total = max(max(float(s.elapsed_s[-1]) for s in states), 10.0)
-        return (Shape("warm_up_time", "s", 5.0, 4 * total, tuple(np.geomspace(max(5.0, 0.04 * total), 2 * total, 7))),)
+        forms = (0.0, 1.0) if all("moved" in s.extra for s in states) else (0.0,)
+        return (Shape("form", "1", 0.0, 1.0, forms),
+                Shape("warm_up_time", "s", 5.0, 4 * total, tuple(np.geomspace(max(5.0, 0.04 * total), 2 * total, 7))),
+                Shape("cooling_time", "s", 20.0, 40 * total, (60.0, 120.0, 400.0)))
+
+    def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
+        """Nothing cools in form 0."""
+        points = super().grid(states)
+        return [p for p in points if p["form"] > 0.5 or p["cooling_time"] == points[0]["cooling_time"]]
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Friction above the final value when cold; lubricants thin out, yet either sign is allowed."""
         return (("cold_excess", "effort", -np.inf, np.inf),)
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """sign(v) exp(-t / tau), or sign(v) times temperature where that is logged, (n, 1)."""
+        """sign(v) (1 - h), or sign(v) times temperature where that is logged, (n, 1)."""
         if "temperature" in state.extra:
             return (state.direction * state.extra["temperature"])[:, None]
-        return (state.direction * np.exp(-state.elapsed_s / shape["warm_up_time"]))[:, None]
+        if shape["form"] < 0.5:
+            return (state.direction * np.exp(-state.elapsed_s / shape["warm_up_time"]))[:, None]
+        cold = 1.0
+        for moved, rest in state.extra["history"]:
+            cold = 1 - (1 - cold * np.exp(-moved / shape["warm_up_time"])) * np.exp(-rest / shape["cooling_time"])
+        return (state.direction * cold * np.exp(-state.extra["moved"] / shape["warm_up_time"]))[:, None]
 
     def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
                    declared: Mapping[str, float]) -> dict[str, float]:
-        """Cold excess as a ratio to the warm Coulomb friction, and the warm-up time."""
-        return {**amplitude, **shape, "ratio": amplitude["cold_excess"] / declared.get("coulomb", np.nan)}
+        """Cold excess, also as a ratio to the warm Coulomb friction, and the times."""
+        return {**amplitude, **shape, "ratio": amplitude["cold_excess"] / (declared.get("coulomb") or np.nan)}
 
     def started(self, state: DriveState, parameters: Mapping[str, float]) -> dict[str, float]:
         """Share of the excess that is left when a recording begins."""

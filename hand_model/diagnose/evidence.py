@@ -1,0 +1,95 @@
+"""Log evidence of one more term in a balance: what it gains, less what its freedom could gain by chance.
+
+Amplitudes carry a prior as wide as the data find likely (empirical Bayes; George & Foster 2000, eq. 9), shapes are uniform
+within the bounds that the effect declares (Laplace's method; Kass & Raftery 1995, eq. 4). Sums of squares count divided by
+the correlation time of the noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..effects.base import Shape
+from .balance import DISCRETE, Balance, Fit, Term
+
+SPREAD = 0.3  # mean absolute deviation of the logarithm of a motor's coefficients within one hand
+
+
+def scale_of(balance: Balance, fit: Fit) -> float:
+    """Residual variance over pure error, at least 1: a misfit weighs all candidates down."""
+    return max(fit.rss / max(balance.train.sum(), 1), 1.0)
+
+
+def gain(balance: Balance, fit: Fit, reference: Fit, scale: float = 1.0) -> float:
+    """Log likelihood that `fit` has over `reference`."""
+    return 0.5 * (reference.rss - fit.rss) / (scale * balance.inflation)
+
+
+def rough_evidence(balance: Balance, fit: Fit, reference: Fit, scale: float = 1.0) -> float:
+    """Gain less the penalty of Schwarz (1978): cheap, to choose whom to look at closely."""
+    count = max(balance.train.sum() / balance.inflation, 2.0)
+    return gain(balance, fit, reference, scale) - 0.5 * (fit.size - reference.size) * float(np.log(count))
+
+
+def evidence(balance: Balance, fit: Fit, reference: Fit, which: int = -1, scale: float = 1.0) -> float:
+    """Log evidence of the term `which` of a polished fit over `reference`, the fit without it.
+
+    scale: residual variance over pure error of the best model known, at least 1. With `balance.typical` (what the hand's
+    other motors are like) a model pays for coefficients unlike theirs.
+    """
+    brought = gain(balance, fit, reference, scale)
+    count = len(fit.amplitudes[which])
+    if count and brought > 0:
+        brought -= 0.5 * count * (1 + np.log(max(2 * brought / count, 1.0)))
+    term = fit.terms[which]
+    volume = sum(_occam(balance, fit, which, shape, scale) for shape in term.effect.shapes(balance.states) if shape.name in term.shape)
+    return float(brought - volume + oddity(balance, reference) - oddity(balance, fit))
+
+
+def oddity(balance: Balance, fit: Fit) -> float:
+    """Log density lost by declared coefficients unlike those of the hand's other motors (Laplace on their logarithms), and by
+    effects' parameters that machines rarely have."""
+    lost = -sum(t.effect.log_prior(t.effect.parameters(t.shape, a, fit.declared))
+                for t, a in zip(fit.terms, fit.amplitudes, strict=True))
+    for name, typical in balance.typical.items():
+        value = max(fit.declared.get(name, typical), 1e-2 * typical)
+        lost += abs(float(np.log(value / typical))) / SPREAD
+    return lost
+
+
+def typical_coefficients(others: list[Fit]) -> Mapping[str, float]:
+    """Median of each positive motor coefficient over the fits of other motors of the same hand."""
+    out = {}
+    for name in ("inertia", "viscous", "coulomb"):
+        values = [f.declared[name] for f in others if f.declared.get(name, 0.0) > 0]
+        if values:
+            out[name] = float(np.median(values))
+    return out
+
+
+def _occam(balance: Balance, fit: Fit, which: int, shape: Shape, scale: float) -> float:
+    """Log of the prior range of a shape over the width of its likelihood, never below zero."""
+    name = shape.name
+    if name in DISCRETE:
+        return float(np.log(max(len(shape.starts), 1)))
+    span = shape.high - shape.low
+    value = fit.terms[which].shape[name]
+    toward = 1.0 if shape.high - value > value - shape.low else -1.0
+    step = 0.02 * span
+    width = span
+    for _ in range(5):
+        rise = gain(balance, fit, _moved(balance, fit, which, name, value + toward * step), scale)
+        rise = -rise if rise < 0 else rise
+        width = step / np.sqrt(max(2 * rise, 1e-6))
+        if 0.1 < rise < 8:
+            break
+        step = float(np.clip(width, 1e-4 * span, 0.45 * span))
+    return max(float(np.log(span / (np.sqrt(2 * np.pi) * width))), 0.0)
+
+
+def _moved(balance: Balance, fit: Fit, which: int, name: str, value: float) -> Fit:
+    terms = list(fit.terms)
+    terms[which] = Term(terms[which].effect, {**terms[which].shape, name: value})
+    return balance.fit(tuple(terms))

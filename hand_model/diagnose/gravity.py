@@ -1,0 +1,75 @@
+"""Gravity as a finger sees it: in the plane of its first joint, while the palm turns in the world."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..effects.base import DriveState
+from ..errors import IdentificationError
+from ..identify.chain import Chain, palm_pose
+from ..identify.clock import align
+from ..identify.finger import observations
+from ..session import Session, Trial
+from .angles import FingerAngles
+from .motion import local_quadratic
+
+Array = NDArray[np.float64]
+
+SMOOTH_S = 0.1  # the palm turns slowly
+TURNED = 0.05  # spread of gravity's direction below which nothing can be learned from it: three degrees
+
+
+def with_gravity(session: Session, fingers: Mapping[str, FingerAngles], states: tuple[DriveState, ...]) -> tuple[DriveState, ...]:
+    """The states with `gravity_along` and `gravity_across` [m/s^2] in `extra`: gravity along the open finger and across it.
+
+    fingers: by name. Recordings without markers get the mean of the others, as a hand left where it was. Unchanged where the session names no
+    gravity, where no recording shows the palm, or where it never turned.
+    """
+    if session.gravity_world is None:
+        return states
+    trials = {t.name: t for t in session.trials}
+    seen = {s.trial: found for s in states if (found := _in_finger(session, fingers, trials[s.trial], s)) is not None}
+    if not seen:
+        return states
+    everything = np.concatenate(list(seen.values()))
+    if float(np.linalg.norm(everything.std(0))) < TURNED * float(np.linalg.norm(session.gravity_world)):
+        return states
+    out = []
+    for state in states:
+        g = seen.get(state.trial, np.broadcast_to(everything.mean(0), (len(state.time_s), 2)))
+        extra: Mapping[str, Array] = {**state.extra, "gravity_along": g[:, 0], "gravity_across": g[:, 1]}
+        out.append(replace(state, extra=extra))
+    return tuple(out)
+
+
+def _in_finger(session: Session, fingers: Mapping[str, FingerAngles], trial: Trial, state: DriveState) -> Array | None:
+    """Gravity (n, 2) in the finger's plane at the state's samples; None without markers or with clocks that do not align."""
+    if trial.mocap_path is None or trial.finger not in fingers:
+        return None
+    angles = fingers[trial.finger]
+    mocap, chain = trial.mocap(), angles.chain
+    data, _ = observations(session, angles.finger, mocap)
+    tip, base = (np.nanmean(data.position_world[:, data.body == k], axis=1) for k in (data.body.max(), 0))
+    reach = np.linalg.norm(tip - base, axis=1)  # shrinks as the finger flexes
+    good = np.isfinite(reach)
+    try:
+        clock = align(mocap.time_s[good], -reach[good], state.time_s, state.position, trial.name)
+    except IdentificationError:
+        return None
+    gravity_palm = np.einsum("nij,i->nj", palm_pose(chain, data).rotation, session.gravity_world)
+    smooth = np.stack([local_quadratic(mocap.time_s, g, SMOOTH_S)[0] for g in (gravity_palm @ plane(chain).T).T], axis=-1)
+    at = clock.log_time(mocap.time_s)
+    return np.stack([np.interp(state.time_s, at, g) for g in smooth.T], axis=-1)
+
+
+def plane(chain: Chain) -> Array:
+    """Unit vectors (2, 3) in the palm, in the plane of the first joint: along the open finger, and where flexion takes it."""
+    axis = chain.axis_palm[0]
+    arm = (chain.centre_palm[1] if len(chain.centre_palm) > 1 else chain.marker_palm[-1]) - chain.centre_palm[0]
+    along = arm - axis * (axis @ arm)
+    along = along / np.linalg.norm(along)
+    return np.stack([along, np.cross(axis, along)])
