@@ -196,7 +196,7 @@ def _prove(bench: Bench, fit: DeclaredFit, stories: Sequence[tuple[Step, Term]],
     for step, term in stories:
         many = settled(bench, fit, [*kept, term])
         proof = bench.proof(term.candidate.joint, (fit, *few), (fit, *many))
-        if not proof["after"] < proof["before"]:
+        if proof["ci95_reduction"][0] <= 0:  # not beyond what resampled validation blocks give by chance
             rejected.append({"effect": term.candidate.key, "reason": "error on validation trials does not fall"})
             continue
         kept.append(term)

@@ -17,7 +17,7 @@ from .replay import RigResiduals, replay_rig
 from .states import fill_gaps, noise_std
 from .swing import INDEX, PARAMETERS, STEP_S, Fitted, Swing, Task, parameter_units, vector
 from .swing_build import build_swing, windows_s
-from .swing_compete import Round, Variant, compete_swing, fit_stages, free_declared
+from .swing_compete import LEAST_GAIN, Round, Variant, all_free, compete_swing, fit_stages, free_declared
 from .swing_interval import intervals
 from .swing_patch import write_swing
 from .words import shares, statement
@@ -38,15 +38,19 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
     fine = [build_swing(rig, fit, STEP_S, w) for w in (windows if stages[0].driven else (*windows[1:], np.inf))]
     held = bool(rig.select(True))  # without validation recordings the training ones measure, and the report says so
     known: dict[tuple[str, ...], Link] = {}
-    kept, rejected = list(zip(taken, rounds, strict=True)), []
+    kept, rejected, banned = list(zip(taken, rounds, strict=True)), [], set()
     while True:
         _chain(known, rig, session, held, fine, declared.theta, [v for v, _ in kept], kept[-1][1].fit.theta if kept else None)
         chain = [known[tuple(v.key for v, _ in kept[:k])] for k in range(len(kept) + 1)]
         figures = [c.replay.figure("position_rmse", held) for c in chain]
-        worse = next((k for k in range(len(kept)) if not figures[k + 1] < figures[k]), None)
-        if worse is None:
+        worse = next((k for k in range(len(kept)) if not figures[k + 1] < (1.0 - LEAST_GAIN) * figures[k]), None)
+        if worse is not None:
+            rejected.append({"effect": kept.pop(worse)[0].key, "reason": "error on validation trials does not fall"})
+            continue
+        if banned == {r["effect"] for r in rejected}:
             break
-        rejected.append({"effect": kept.pop(worse)[0].key, "reason": "error on validation trials does not fall"})
+        banned = {r["effect"] for r in rejected}  # what stood in its shadow may come forward
+        kept += _resumed(stages, [v for v, _ in kept], chain[-1], banned)
     found = []
     for k, (variant, round_) in enumerate(kept):
         proof = {"metric": "position_rmse", "unit": rig.unit(rig.joints[0]), "before": figures[k], "after": figures[k + 1],
@@ -77,17 +81,24 @@ def _chain(known: dict[tuple[str, ...], Link], rig: RigModel, session: Session, 
     """Add to `known` the declared model, with the first effect, with the first two, ...: fitted in one batch, written and
     replayed."""
     swing = stages[0]
-    free, start = free_declared(swing), vector(swing.initial)
+    start = vector(swing.initial)
     parts = [tuple(taken[:k]) for k in range(len(taken) + 1) if tuple(v.key for v in taken[:k]) not in known]
     if not parts:
         return
-    sets = [tuple(dict.fromkeys((*free, *(n for v in part for n in v.start)))) for part in parts]
+    sets = [all_free(swing, part) for part in parts]
     starts = [np.where(np.isin(PARAMETERS, s), last, start) if part else declared for s, part in zip(sets, parts, strict=True)]
     fits = fit_stages(stages, [Task(s, t, ()) for s, t in zip(sets, starts, strict=True)], 8)
     files = [write_swing(rig, swing, f.theta) for f in fits]
     replays = Background(_replayed, [(session, x, held) for x in files]).results()
     for part, s, f, x, r in zip(parts, sets, fits, files, replays, strict=True):
         known[tuple(v.key for v in part)] = Link(s, f, x, r)
+
+
+def _resumed(stages: Sequence[Swing], taken: list[Variant], last: Link, banned: set[str]) -> list[tuple[Variant, Round]]:
+    """What the competition adds to the variants taken once others are banned."""
+    current = fit_stages(stages, [Task(last.free, last.fit.theta, ())], 6)[0]
+    variants, rounds = compete_swing(stages, current, taken, banned)
+    return list(zip(variants[len(taken) :], rounds, strict=True))
 
 
 def _replayed(session: Session, xml: bytes, held: bool) -> RigResiduals:

@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 RESAMPLES = 600
 BEYOND_DOUBT = 0.95
+ONE_STANDARD_ERROR = 0.84  # of a normal distribution: so often is a gain of one standard error a gain
 ENOUGH = 6  # recordings from which on they are drawn whole
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """best, chosen: indices among those that beat nothing beyond doubt (chosen is the simplest as good as the best);
+    """best, chosen: indices among those that surely beat nothing (chosen is the simplest as good as the best);
     probability: of the chosen one against nothing; wins (rivals,): share of resamples in which each is best of all; close:
     not told from the best, in order of error; gain: share of the error of "nothing" that the chosen one takes away."""
 
@@ -44,13 +45,14 @@ def multiplicities(group: Array, count: int = RESAMPLES, seed: int = 0) -> Array
     return np.stack([np.bincount(row, minlength=total) for row in drawn]).astype(float)[:, unit]
 
 
-def weigh(none: Array, errors: Array, sizes: Sequence[int], group: Array) -> Verdict | None:
+def weigh(none: Array, errors: Array, sizes: Sequence[int], group: Array,
+          least: float = BEYOND_DOUBT) -> Verdict | None:  # fmt: skip
     """Compare rivals (errors (rivals, blocks), sizes: parameters) with each other and with "nothing" (none (blocks,)); None
-    where nothing is beaten by none of them beyond doubt."""
+    where none of them beats nothing with probability `least`."""
     draws = multiplicities(group)
     resampled, base, total = errors @ draws.T, draws @ none, errors.sum(1)
     against = np.mean(resampled < base, 1)
-    sure = [k for k in range(len(errors)) if against[k] >= BEYOND_DOUBT]
+    sure = [k for k in range(len(errors)) if against[k] >= least]
     if not sure:
         return None
     best = min(sure, key=lambda k: total[k])

@@ -6,20 +6,21 @@ only the error on those decides. All fits of a round run in one batch of lanes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..background import Background
-from .evidence import weigh
+from .evidence import ONE_STANDARD_ERROR, weigh
 from .swing import DECLARED, INDEX, LOW_SPEED, Fitted, Swing, Task, errors, fit_together, vector
 
 Array = NDArray[np.float64]
-FOLDS, SHORTLIST = 4, 5
-LEAST_GAIN, MOST_TERMS = 0.025, 4
+FOLDS, SHORTLIST, ALIKE = 4, 6, 3
+LEAST_GAIN, MOST_TERMS = 0.025, 5
 BETTER = 1.01  # an exchange of variants has to pay
+BY_LOAD = frozenset({"load_gear", "load_motor", "load_external"})
 PARTS = 4  # a recording's error is resampled in so many parts
 
 
@@ -30,6 +31,7 @@ class Variant:
     effect: str
     name: str
     start: Mapping[str, float]
+    beside: frozenset[str] = frozenset()  # refines an effect that frees one of these: no square without its line (Nelder 1977)
 
     @property
     def key(self) -> str:
@@ -81,6 +83,10 @@ def variants(swing: Swing) -> tuple[Variant, ...]:
             Variant(
                 "load_dependent_friction", "gear, low speed", {"load_gear_low": 0.0, "stribeck_speed": 0.2 * speed}
             ),
+            Variant("load_dependent_friction", "driven load squared, low speed",
+                    {"external_squared": 0.0, "stribeck_speed": 0.2 * speed}, BY_LOAD),
+            Variant("load_dependent_friction", "load squared, low speed",
+                    {"motor_squared": 0.0, "external_squared": 0.0, "stribeck_speed": 0.2 * speed}, BY_LOAD),
             Variant("drive_sag", "", {"sag": 0.0}),
             Variant("command_delay", "", {"delay": 0.005}),
         ]
@@ -130,19 +136,22 @@ def fit_stages(stages: Sequence[Swing], tasks: Sequence[Task], iterations: int =
     return fits
 
 
-def compete_swing(stages: Sequence[Swing], declared: Fitted) -> tuple[tuple[Variant, ...], tuple[Round, ...]]:
-    """Forward selection; returns the variants taken and the rounds, each with the fit of all taken so far."""
+def compete_swing(stages: Sequence[Swing], current: Fitted, begin: Sequence[Variant] = (),
+                  banned: Collection[str] = ()) -> tuple[tuple[Variant, ...], tuple[Round, ...]]:  # fmt: skip
+    """Forward selection from the variants that stand already (begin, fitted as current), without those that are banned
+    (keys); returns all variants and the new rounds, each with the fit of all taken so far."""
     swing = stages[-1]
     train = tuple(int(i) for i in swing.train())
     folds = _folds(swing, train)
-    taken: tuple[Variant, ...] = ()
-    current, rounds = declared, []
+    taken: tuple[Variant, ...] = tuple(begin)
+    rounds: list[Round] = []
     while len(taken) < MOST_TERMS:
-        free = _free(swing, taken)
-        rivals = [v for v in variants(swing) if not set(v.start) <= set(free)]
-        tasks = [Task(_free(swing, (*taken, v)), _started(current.theta, v), ()) for v in rivals]
+        free = all_free(swing, taken)
+        rivals = [v for v in variants(swing) if not set(v.start) <= set(free) and (not v.beside or v.beside & set(free))
+                  and v.key not in banned]  # fmt: skip
+        tasks = [Task(all_free(swing, (*taken, v)), _started(current.theta, v), ()) for v in rivals]
         fits = fit_stages(stages, tasks, 8)
-        order = sorted(range(len(rivals)), key=lambda k: fits[k].cost)[:SHORTLIST]
+        order = _shortlist(rivals, fits)
         best = _several(swing, [Task(tasks[k].free, fits[k].theta, train) for k in order])
         none, scores = _left_out(swing, folds, (Task(free, current.theta, train), current),
                                  [(tasks[k], f) for k, f in zip(order, best, strict=True)])  # fmt: skip
@@ -152,9 +161,19 @@ def compete_swing(stages: Sequence[Swing], declared: Fitted) -> tuple[tuple[Vari
             break
         taken, current = (*taken, rivals[order[found[0]]]), best[found[0]]
         rounds.append(replace(found[1], fit=current))
-        taken, current = _exchanged(stages, taken, current)
+        if not banned:  # what has been proven stands as it is
+            taken, current = _exchanged(stages, taken, current)
         rounds[-1] = replace(rounds[-1], fit=current)
     return taken, tuple(rounds)
+
+
+def _shortlist(rivals: Sequence[Variant], fits: Sequence[Fitted]) -> list[int]:
+    """The best by training error, of one effect not more than a few variants."""
+    out: list[int] = []
+    for k in sorted(range(len(rivals)), key=lambda k: fits[k].cost):
+        if sum(rivals[i].effect == rivals[k].effect for i in out) < ALIKE and len(out) < SHORTLIST:
+            out.append(k)
+    return out
 
 
 def _exchanged(
@@ -175,7 +194,7 @@ def _exchanged(
             theta[INDEX[name]] = vector({})[INDEX[name]]
         for v in group:
             theta = _started(theta, v) if v not in taken else theta
-        tasks.append(Task(_free(swing, group), theta, ()))
+        tasks.append(Task(all_free(swing, group), theta, ()))
     fits = fit_stages(stages, tasks, 12)
     best = min(range(len(sets)), key=lambda k: fits[k].cost)
     return (sets[best], fits[best]) if BETTER * fits[best].cost < current.cost else (taken, current)
@@ -206,7 +225,8 @@ def _folds(swing: Swing, train: Sequence[int]) -> list[tuple[tuple[int, ...], tu
              tuple(i for i, g in zip(train, fold, strict=True) if g == f)) for f in range(count)]  # fmt: skip
 
 
-def _free(swing: Swing, taken: Sequence[Variant]) -> tuple[str, ...]:
+def all_free(swing: Swing, taken: Sequence[Variant]) -> tuple[str, ...]:
+    """Names of the declared parameters and of those that the variants taken free."""
     names = list(free_declared(swing)) + [name for v in taken for name in v.start]
     return tuple(dict.fromkeys(names))
 
@@ -236,8 +256,8 @@ def _left_out(
 def _judge(
     none: Array, scores: list[Array], rivals: Sequence[Variant], sizes: Sequence[int], group: Array
 ) -> tuple[int, Round] | None:
-    """Index of the winner and what the round says, or None where nothing beats "none" beyond doubt."""
-    said = weigh(none, np.array(scores), sizes, group)
+    """Index of the winner and what the round says, or None where nothing beats "none" by a standard error."""
+    said = weigh(none, np.array(scores), sizes, group, ONE_STANDARD_ERROR)
     if said is None or none.sum() - scores[said.best].sum() < LEAST_GAIN * none.sum():
         return None
     same = tuple(dict.fromkeys(rivals[k].effect for k in said.close))
