@@ -170,6 +170,10 @@ class Effect:
         """Log density of the parameters over that of ordinary ones: negative where machines rarely are like that."""
         return 0.0
 
+    def further(self, states: tuple[DriveState, ...], parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+        """Further parameters (value, unit, ci95) that follow from the fitted ones and the recorded range; none."""
+        return {}
+
     def region(self, states: tuple[DriveState, ...], shape: Mapping[str, float]) -> dict[str, Any] | None:
         """The part of state in which the effect acts, as `where.region` of a finding; None where it acts everywhere."""
         return None

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -51,3 +52,19 @@ def soft_play(path: Array, gap: float, softness: float) -> Array:
     """Play with give at its ends: the mean of plays of (1 - softness), one and (1 + softness) times the gap."""
     gaps = (gap,) if softness <= 0 else ((1 - softness) * gap, gap, (1 + softness) * gap)
     return np.mean([play(path, g) for g in gaps], axis=0)
+
+
+def mean_slope(states: tuple[DriveState, ...]) -> float:
+    """Slope of the map from one end of the range to the other, in the unit of what follows per driver's unit."""
+    position = np.concatenate([s.position for s in states])
+    slope = np.concatenate([s.slope for s in states])
+    order = np.argsort(position)
+    x, y = position[order], slope[order]
+    return float(np.sum(0.5 * (y[1:] + y[:-1]) * np.diff(x)) / max(x[-1] - x[0], 1e-12))
+
+
+def segment_gap(states: tuple[DriveState, ...], gap: Mapping[str, Any]) -> dict[str, Any]:
+    """A gap (value, ci95) of the driver as what follows shows it [deg]: full width, at the map's mean slope."""
+    slope = mean_slope(states)
+    interval = {"ci95": [slope * x for x in gap["ci95"]]} if "ci95" in gap else {}
+    return {"value": slope * gap["value"], "unit": "deg", **interval}

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
-from .driven import driven, soft_play
+from .driven import driven, segment_gap, soft_play
 from .input import map_of, write_play
 
 
@@ -34,6 +34,15 @@ class LinkageBacklash(Effect):
     def declared(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """The map's columns of the position behind the gap."""
         return driven(state, lambda x: soft_play(x, shape["gap"], 0.5 * shape["form"]))
+
+    def further(self, states: tuple[DriveState, ...], parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+        """The gap as what follows shows it."""
+        return {"segment_gap": segment_gap(states, parameters["gap"])}
+
+    def statement(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """How much motion is lost, on both sides."""
+        seen = f", {parameters['segment_gap']:.2f} deg of the segment" if "segment_gap" in parameters else ""
+        return f"{where.get('finger')}: the distal segment loses {parameters['gap']:.2f} deg of the proximal joint when the motion turns{seen}."
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """An input joint behind the driver, within the gap."""
