@@ -55,7 +55,7 @@ class EffectsOn:
     """
 
     def __init__(self, model: Any, places: tuple[Place, ...]) -> None:
-        self.places, self.signature = places, int(model.signature)
+        self.places, self.model = places, model  # held, so that its address is no other model's
         self.names = tuple(p.effect.effect for p in places)
         self.memories: dict[int, Memory] = {}
 
@@ -67,7 +67,7 @@ class EffectsOn:
 
     def off(self) -> None:
         """Switch them off; other models keep theirs."""
-        _ON.pop(self.signature, None)
+        _ON.pop(self.model._address, None)
         _install()
 
     def apply(self, model: Any, data: Any) -> None:
@@ -91,20 +91,20 @@ def effects_on(model: Any, folder: str | Path | Hand) -> EffectsOn:
 
     folder: the compiled folder that the model was loaded from (its `hand.json` is read), a .hand file, or a Hand. Returns an
     object that switches them off. Raises HandFileError where there is no hand, DescriptionError where the model is not a
-    mujoco.MjModel. Compiled copies of one file share the effects.
+    mujoco.MjModel.
     """
-    if not hasattr(model, "signature"):
+    if not hasattr(model, "actuator_trnid"):
         raise DescriptionError(f"effects_on needs a mujoco.MjModel, not a {type(model).__name__}")
     hand = folder if isinstance(folder, Hand) else load_hand(Path(folder) / "hand.json" if Path(folder).is_dir() else folder)
     places = tuple(p for e in hand.effects if _law(e) is not None for p in [_place(model, hand, e)] if p is not None)
     on = EffectsOn(model, places)
     if places:
-        _ON[on.signature] = on
+        _ON[model._address] = on
         _install()
     return on
 
 
-_ON: dict[int, EffectsOn] = {}  # by the signature of the model
+_ON: dict[int, EffectsOn] = {}  # by the address of the model
 
 
 def _install() -> None:
@@ -115,7 +115,7 @@ def _install() -> None:
 
 
 def _passive(model: Any, data: Any) -> None:
-    on = _ON.get(int(model.signature))
+    on = _ON.get(model._address)
     if on is not None:
         on.apply(model, data)
 

@@ -12,7 +12,7 @@ from hand_model.effects.base import DriveState
 from hand_model.effects.path import dahl, jenkins, lowpass, strokes, travelled
 from hand_model.errors import DescriptionError
 
-STATIONS = {"drive", "encoder", "linkage", "command"}
+STATIONS = {"drive", "encoder", "linkage", "command", "markers"}
 
 
 def state(n: int = 1200, seed: int = 0) -> DriveState:

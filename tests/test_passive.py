@@ -181,3 +181,64 @@ def test_written_finger_moves_as_the_effect_predicts(name, shape, amplitude, tmp
 def test_every_effect_of_a_force_or_a_map_is_replayed() -> None:
     assert {d[0] for d in DRIVE} | NOT_OF_THE_DRIVE == {e.name for e in catalogue("drive")}
     assert {d[0] for d in KINEMATIC} | NOT_OF_A_MAP == {e.name for e in (*catalogue("encoder"), *catalogue("linkage"))}
+
+
+def test_keyframes_satisfy_maps_behind_inputs() -> None:
+    """A dead band: at zero the input stands where the motion begins, and the follower on its map there."""
+    from hand_model.effects.input import settle
+
+    root = etree.fromstring(FINGER)
+    where = {"finger": "index", "joint": "distal", "actuator": "index"}
+    assert effect("coupling_deadband").write_mjcf(root, where, {"until": 20.0}) is not None
+    pose = {"index_proximal": 0.0, "index_distal": 0.0, "index_linkage_input": 0.0}
+    settle(root, pose)
+    assert pose["index_linkage_input"] == pytest.approx(np.deg2rad(20.0))
+    assert pose["index_distal"] == pytest.approx(np.polynomial.polynomial.polyval(np.deg2rad(20.0), LINKAGE))
+
+
+def test_effects_are_of_one_model_and_go_off() -> None:
+    """Another model is left alone; after the block nothing acts."""
+    from hand_model.passive import effects_on
+
+    hand = motor_with("detent_load", {"form": 0.0, "centre": 40.0, "width": 6.0}, {"load": 12.0}).hand
+    mine, other = (mujoco.MjModel.from_xml_string(x) for x in (MOTOR, MOTOR.replace("index_motor", "index_other")))
+
+    def force(model) -> float:
+        data = mujoco.MjData(model)
+        data.qpos[0] = 40.0
+        mujoco.mj_forward(model, data)
+        return float(data.qfrc_passive[0])
+
+    plain = force(mine)
+    with effects_on(mine, hand) as on:
+        assert on.names == ("detent_load",)
+        assert force(mine) == pytest.approx(plain - UNIT * 12.0)
+        assert force(other) == pytest.approx(plain)
+    assert force(mine) == plain
+
+
+def test_compliance_moves_the_target_within_the_step() -> None:
+    """The callback shifts the violation of the map's equality, not the model."""
+    from hand_model.compile.motor import write_motors
+    from hand_model.passive import effects_on
+
+    root = etree.fromstring(FINGER)
+    motor = Motor("index", 0.0, 100.0, {MOTOR_NAMES[k]: Estimate(v, None, "", "") for k, v in DECLARED.items()}, 1.0, ())
+    hinge = Joint("proximal", np.array([0, 1.0, 0]), np.zeros(3), np.zeros((6, 6)), (0.0, 1.4), {})
+    finger = Finger("index", "index", (hinge, replace(hinge, name="distal")), (EncoderMap(0.0, 100.0, ENCODER, {}, {}),))
+    give = Effect("series_elasticity", {"finger": "index", "joint": "proximal", "actuator": "index"},
+                  {"compliance": Estimate(0.05, None, "deg/raw", ""), "form": Estimate(1.0, None, "1", "")})
+    hand = Hand("h", "left", {}, {}, (finger,), 1e-4, {}, (motor,), (give,))
+    write_motors(root, hand)
+    model = mujoco.MjModel.from_xml_string(etree.tostring(root).decode())
+    before = model.eq_data.copy()
+    data = mujoco.MjData(model)
+    with effects_on(model, hand):
+        for _ in range(3000):  # the drive pushes against the end of its range
+            data.ctrl[model.actuator("index").id] = 101.0
+            mujoco.mj_step(model, data)
+    load = float(data.actuator("index").force[0])
+    lever = np.polynomial.polynomial.polyval(data.joint("index_motor").qpos[0] / 100, ENCODER)
+    assert load > 3
+    assert data.joint("index_drive").qpos[0] == pytest.approx(lever - np.deg2rad(0.05 * load), abs=2e-4)
+    np.testing.assert_array_equal(model.eq_data, before)

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from ..compile.coupling import linkages, source_of
 from ..description import Description, Model
+from ..effects import effect
+from ..effects.input import source
 from ..engines import mujoco as engine
 from ..engines.ours import load
 from ..kinematics import finger_angles
@@ -46,12 +48,22 @@ def direction(description: Description, model: Model) -> Finding:
         for i, joint in enumerate(finger.joints):
             name = ours.names.joint[finger.name, joint.name]
             (drive if joint.name in paths else wanted)[name] = angles[:, i]
+    loose = _loose(ours)
+    wanted = {name: a for name, a in wanted.items() if name not in loose}
+    if not wanted:
+        return Finding(item, True, None, f"loose by their named effects: {', '.join(sorted(loose))}")
     run = engine.simulate(model.mjcf, time, drive)
     gap = {n: float(np.abs(run.angles_rad[n] - a).max()) for n, a in wanted.items() if n in run.angles_rad}
     name = max(gap, key=lambda n: gap[n])
     passed = bool(gap[name] <= TRACKING and not run.warnings)
     said = f"drivers moved through their ranges, followers within {np.degrees(gap[name]):.2g} deg of the polynomial"
     return Finding(item, passed, float(np.degrees(gap[name])), said + ("" if passed else f' ("{name}")'))
+
+
+def _loose(ours: Any) -> set[str]:
+    """Followers that a named effect takes off their polynomial: lost motion, give, a stop, a dead band."""
+    return {ours.names.joint[str(e.where.get("finger")), str(e.where.get("joint"))] for e in ours.hand.effects
+            if effect(e.effect).station == "linkage" and (e.where.get("finger"), e.where.get("joint")) in ours.names.joint}
 
 
 def _roles(ours: Any, root: Any) -> list[str]:
@@ -64,7 +76,8 @@ def _roles(ours: Any, root: Any) -> list[str]:
             if name not in found:
                 problems.append(f'no equality "{name}"')
                 continue
-            roles = found[name].get("joint1"), found[name].get("joint2")
+            # lost motion, a dead band or a stop stands between them as an input joint
+            roles = found[name].get("joint1"), source(root, found[name].get("joint2"))
             if roles == (driver, follower):
                 problems.append(
                     f'"{name}" has joint1 and joint2 reversed: the dependent joint "{follower}" must be joint1'
@@ -86,9 +99,9 @@ def stiffness(description: Description, model: Model) -> Finding:
     mj = engine.load(model.mjcf).mj
     if not engine.followers(mj):
         return Finding(item, not any(f.couplings for f in ours.hand.fingers), None, "the model has no linkage")
-    worst, where, moving = 0.0, "", 0.0
+    worst, where, moving, loose = 0.0, "none", 0.0, _loose(ours)
     for finger in ours.hand.fingers:
-        if not finger.couplings:
+        if not finger.couplings or any(ours.names.joint[finger.name, c.follower] in loose for c in finger.couplings):
             continue
         joints = [ours.names.joint[finger.name, j.name] for j in finger.joints]
         for held in (True, False):

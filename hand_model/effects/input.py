@@ -26,14 +26,14 @@ def map_of(root: Any, where: Mapping[str, Any], station: str) -> Any:
     where the file has none."""
     if station == "encoder":
         found = motor_joint(root, where)
-        wanted = None if found is None else (lambda e: _source(root, e.get("joint2")) == found[0].get("name"))
+        wanted = None if found is None else (lambda e: source(root, e.get("joint2")) == found[0].get("name"))
     else:
         follower = f"{where.get('finger')}_{where.get('joint')}"
         wanted = lambda e: e.get("joint1") == follower
     return None if wanted is None else next((e for e in root.iterfind("equality/joint") if wanted(e)), None)
 
 
-def _source(root: Any, joint: str) -> str:
+def source(root: Any, joint: str) -> str:
     """The joint behind a chain of inputs."""
     while joint.endswith(SUFFIX) or SUFFIX + "_" in joint:
         tendon = next(t for t in root.iterfind("tendon/fixed") if t.findall("joint")[-1].get("joint") == joint)
@@ -106,13 +106,13 @@ def settle(root: Any, pose: dict[str, float]) -> None:
         if driver not in pose:
             continue
         if SUFFIX in driver:
-            source = _source(root, driver)
+            behind = source(root, driver)
             low, high = -np.inf, np.inf
             for a, b, joints in tendons:
                 if driver in joints:
                     rest = sum(c * pose[j] for j, c in joints.items() if j != driver)
                     ends = sorted(((a - rest) / joints[driver], (b - rest) / joints[driver]))
                     low, high = max(low, ends[0]), min(high, ends[1])
-            pose[driver] = float(np.clip(pose[source], low, high))
+            pose[driver] = float(np.clip(pose[behind], low, high))
             coefficients = [float(x) for x in equality.get("polycoef").split()]
             pose[equality.get("joint1")] = float(np.polynomial.polynomial.polyval(pose[driver], coefficients))

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..effects.input import SUFFIX
 from ..errors import DescriptionError, did_you_mean
 from .common import columns, homogeneous, relative
 
@@ -151,7 +152,8 @@ def simulate(
     mj, time = model.mj, np.asarray(time_s, float)
     sample = time if sample_s is None else np.asarray(sample_s, float)
     coupled = followers(mj)
-    free = [name for name in model.joints if mj.joint(name).id not in coupled]
+    # what stands between a driver and its map (lost motion, a stop) is moved by its tendons
+    free = [name for name in model.joints if mj.joint(name).id not in coupled and SUFFIX not in name]
     for name in driver_angles:
         if name not in free:
             raise DescriptionError(f'joint "{name}" cannot be driven; {did_you_mean(name, free)}')
@@ -179,7 +181,9 @@ def _roll(mj: Any, prescribed: list[int], grid: Array, spline: Any) -> tuple[Arr
     import mujoco
 
     off = mujoco.mjtDisableBit
-    mj.opt.disableflags |= int(off.mjDSBL_CONTACT) | int(off.mjDSBL_LIMIT) | int(off.mjDSBL_ACTUATION)
+    mj.opt.disableflags |= int(off.mjDSBL_CONTACT) | int(off.mjDSBL_ACTUATION)
+    if not any(SUFFIX in mj.joint(i).name for i in range(mj.njnt)):
+        mj.opt.disableflags |= int(off.mjDSBL_LIMIT)
     mj.opt.timestep = STEP_S
     address, dof = mj.jnt_qposadr[prescribed], mj.jnt_dofadr[prescribed]
     mj.dof_armature[dof] = HOLD
