@@ -175,6 +175,7 @@ def test_good_log_passes() -> None:
         ({"position": np.linspace(12000, 18000, 600)}, "no extension"),
         ({"current": np.clip(60 * np.sin(np.arange(600) * 0.018), -40, 40)}, "saturated"),
         ({"current": 20 + 29 * (1 - np.cos(np.arange(600) * 0.018))}, "command"),
+        ({"current": 20 + 29 * (1 - np.cos(np.arange(600) * 0.018 + 0.05))}, "command"),  # a reference that the position follows
         ({"setpoint": np.repeat([12000.0, 18000.0, 12000.0], 200), "current": np.repeat([5.0, 80.0, 5.0], 200)}, "command"),
     ],
 )

@@ -157,3 +157,18 @@ def _cascade(q: Mapping[str, Array], k: int, error: Array, speed: Array, top_spe
     share = np.minimum(np.maximum((np.abs(error) - q["deadband"][:k]) / q["edge"][:k] + 0.5, 0.0), 1.0)
     wanted = share * np.minimum(np.maximum(q["position_gain"][:k] * error, -top_speed[:k]), top_speed[:k])
     return share, np.minimum(np.maximum(wanted - speed, -slew[:k]), slew[:k])
+
+
+def cascade_step(
+    q: Mapping[str, float], error: float, speed: float, reference: float, wanted: float, velocity: float, step_s: float
+) -> tuple[float, float]:
+    """Reference [%] and wanted speed [%/s] of the cascade after one step of step_s [s], for a controller in another simulator's loop.
+
+    error [%]: setpoint less position; speed: share of full; velocity [%/s] of the drive.
+    """
+    one = {k: np.atleast_1d(np.asarray(q[k], float)) for k in ("deadband", "edge", "position_gain", "speed_full", "rise")}
+    slew = step_s * one["speed_full"] / np.maximum(one["rise"], 1e-4)
+    share, change = _cascade(one, 1, np.atleast_1d(error), np.atleast_1d(wanted), one["speed_full"] * speed, slew)
+    s, w = float(share[0]), wanted + float(change[0])
+    # within the deadband the integral holds: the reference goes with the drive
+    return s * (reference + 0.5 * step_s * (wanted + w)) + (1 - s) * (reference + step_s * velocity), w

@@ -112,6 +112,12 @@ def _phases(m: MoveData, own: Array, position: Array) -> NDArray[np.int64]:
     return out
 
 
+def aligned_moves(fit: MotorFit, trial: MotorTrial) -> tuple[tuple[MoveData, ...], Array]:
+    """The moves of a trial that start from rest, and for each when its command took effect, where the drive rested, its speed and hold."""
+    data = moves_from_rest(trial, (fit.sigma_position, fit.sigma_current), fit.scale.speed_full)
+    return data, (_align(fit, data) if data else np.empty((0, 4)))
+
+
 def reference(fit: MotorFit, trial: MotorTrial, time_s: Array) -> Array:
     """Control of the compiled actuator, (n,) [%], at times (n,) [s] of the trial: r + (damping / gain) r' of the profile generator.
 
@@ -119,8 +125,7 @@ def reference(fit: MotorFit, trial: MotorTrial, time_s: Array) -> Array:
     """
     if not fit.predictive or fit.output_error.controller != "profile":
         raise IdentificationError(f'motor "{fit.motor.actuator}": its controller has no reference that is known before the motion')
-    data = moves_from_rest(trial, (fit.sigma_position, fit.sigma_current), fit.scale.speed_full)
-    own = _align(fit, data) if data else np.empty((0, 4))
+    data, own = aligned_moves(fit, trial)
     out = np.full(len(time_s), data[0].origin if data else 0.0)
     lead = fit.values["damping"] / fit.values["gain"]
     for m, x in zip(data, own, strict=True):

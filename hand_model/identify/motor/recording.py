@@ -167,7 +167,8 @@ def _follows_command(t: MotorTrial) -> str | None:
             mean = np.bincount(level, t.current) / np.bincount(level)
             fitted = mean[level]
         else:
-            x = np.c_[column, np.ones(len(column))]
+            # a reference runs ahead of the position that follows it, by its velocity times a delay
+            x = np.c_[column, _coarse_velocity(t), np.ones(len(column))]
             fitted = x @ np.linalg.lstsq(x, t.current, rcond=None)[0]
         if np.var(t.current - fitted) < 0.005 * np.var(t.current):
             return f'equals a function of column "{name}" to {100 * np.std(t.current - fitted) / np.std(t.current):.1f} %'
