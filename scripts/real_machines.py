@@ -71,7 +71,11 @@ def _figure(lack: dict) -> str:
     one, two, ratio = (lack[k] / lack["before"] for k in ("one_effect", "two_effects", "after"))
     steps = f"x {ratio:.2f} (one effect a joint x {one:.2f}, two x {two:.2f})"
     if lack["metric"] == "effort_rmse":
-        return f"effort: {steps}"
+        told = lack.get("open_loop", {})
+        if "ratio" not in told:
+            return f"effort: {steps}"
+        how = "whole trials" if told["horizon_s"] == "whole" else f"{told['horizon_s']:g} s"
+        return f"effort: {steps}; position in open loop over {how}: x {told['ratio']:.2f}"
     return f"position in open loop: {lack['before']:.4f} to {lack['after']:.4f} {lack['unit']}, {steps}"
 
 

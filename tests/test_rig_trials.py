@@ -23,6 +23,7 @@ from hand_model.rig.replay import can_simulate
 from hand_model.rig.supply import supply_channel, supply_deviation
 from hand_model.rig.swing import INDEX, Task, fit_together, simulate, vector
 from hand_model.rig.swing_build import build_swing, can_swing
+from hand_model.rig.swing_compete import all_free, fit_stages, refine_swing, variants
 from hand_model.rig.swing_interval import intervals
 from hand_model.rig.swing_patch import write_swing
 from hand_model.session import read_session
@@ -90,7 +91,7 @@ def test_simulated_fit_uses_each_trials_weight_and_covers_the_truth(tmp_path: Pa
     """Voltage-driven, two weights: inertia, gain and friction return, the truth lies within their intervals, and MuJoCo
     on the written file moves as recorded."""
     truth = vector({"inertia": 0.0085, "gain": 0.13, "back_emf": 0.05, "damping": 0.012, "coulomb": 0.03, "load_gear": 0.1})
-    t, random = np.arange(0, 5, 0.002), np.random.default_rng(0)
+    t, random = np.arange(0, 4, 0.002), np.random.default_rng(0)
     volts = [2.5 * np.sin(2.2 * t + k) + 1.5 * np.sin(5.1 * t + 2 * k) for k in range(4)]
     table = [np.stack([t, 0 * t, u], 1) for u in volts]
     blank = session(tmp_path / "blank", VOLTAGE, "voltage", table, "time,position,voltage")
@@ -103,7 +104,7 @@ def test_simulated_fit_uses_each_trials_weight_and_covers_the_truth(tmp_path: Pa
     rig = load_rig(read_session(folder))
     swing = build_swing(rig, fit_declared(rig), 2e-3, 1.0)
     free = ("inertia", "gain", "back_emf", "damping", "coulomb", "load_gear")
-    fit = fit_together(swing, [Task(free, vector(swing.initial), tuple(swing.train()))], 30)[0]
+    fit = fit_together(swing, [Task(free, vector(swing.initial), tuple(swing.train()))], 14)[0]
     assert [fit.theta[INDEX[n]] for n in free] == pytest.approx([truth[INDEX[n]] for n in free], rel=0.1)
     ends = intervals(swing, free, fit.theta)
     assert sum(low <= truth[INDEX[n]] <= high for n, (low, high) in ends.items()) >= len(free) - 1
@@ -215,3 +216,23 @@ def test_effort_recorded_of_a_voltage_drive_is_the_effort(tmp_path: Path, torque
     told = [replay_rig(read_session(f), x, validate=True).joints[0] for f, x in zip((folder, torque_bench), xml, strict=True)]
     assert told[0].effort_rmse == pytest.approx(told[1].effort_rmse, rel=0.5) and told[0].position_rmse < 0.1
     assert np.isnan(replay_rig(read_session(folder), efforts=False, validate=False).joints[0].position_rmse)
+
+
+def test_a_closer_law_is_taken_where_the_recordings_ask_for_it(tmp_path: Path) -> None:
+    """Beside friction by the gear's load, a planted square of the driven load at low speed is found by likelihood; where the
+    line alone was planted, or no load friction stands, nothing is added."""
+    t = np.arange(0, 5, 0.002)
+    volts = [2.5 * np.sin(2.2 * t + k) + 1.5 * np.sin(5.1 * t + 2 * k) for k in range(4)]
+    folder = session(tmp_path / "s", VOLTAGE, "voltage", [np.stack([t, 0 * t, u], 1) for u in volts], "time,position,voltage")
+    blank = build_swing(rig := load_rig(read_session(folder)), fit_declared(rig), 4e-3, 1.0)
+    line = {"inertia": 0.0085, "gain": 0.13, "back_emf": 0.05, "damping": 0.012, "coulomb": 0.02, "load_gear": 0.1}
+    gear = next(v for v in variants(blank) if v.name == "gear")
+    noise = 1e-3 * np.random.default_rng(0).standard_normal((2, len(blank.lanes), len(t)))
+    for planted, e in zip((line, {**line, "external_squared": 0.6, "stribeck_speed": 1.5}), noise, strict=True):
+        q = simulate(blank, np.repeat(vector(planted)[None], len(blank.lanes), 0), np.arange(len(blank.lanes)))
+        lanes = tuple(replace(lane, position=q[: len(lane.position), k] + e[k, : len(lane.position)]) for k, lane in enumerate(blank.lanes))
+        swing = replace(blank, lanes=lanes)
+        fit = fit_stages([swing], [Task(all_free(swing, [gear]), vector(line), ())], 12)[0]
+        found = refine_swing([swing], fit, [gear], ())
+        assert [v.effect for v, _ in found] == (["load_dependent_friction"] if planted is not line else [])
+    assert refine_swing([swing], fit, [], ()) == ()

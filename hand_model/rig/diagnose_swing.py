@@ -17,7 +17,7 @@ from .replay import RigResiduals, replay_rig
 from .states import fill_gaps, noise_std
 from .swing import INDEX, PARAMETERS, STEP_S, Fitted, Swing, Task, parameter_units, vector
 from .swing_build import build_swing, windows_s
-from .swing_compete import LEAST_GAIN, Round, Variant, all_free, compete_swing, fit_stages, free_declared
+from .swing_compete import LEAST_GAIN, Round, Variant, all_free, compete_swing, fit_stages, free_declared, refine_swing
 from .swing_interval import intervals
 from .swing_patch import write_swing
 from .words import shares, statement
@@ -47,10 +47,12 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
         if worse is not None:
             rejected.append({"effect": kept.pop(worse)[0].key, "reason": "error on validation trials does not fall"})
             continue
-        if banned == {r["effect"] for r in rejected}:
+        resume = banned != {r["effect"] for r in rejected}  # what stood in the shadow of those may come forward
+        banned = {r["effect"] for r in rejected}
+        more = _continued(stages, [v for v, _ in kept], chain[-1], banned, resume)
+        if not more:
             break
-        banned = {r["effect"] for r in rejected}  # what stood in its shadow may come forward
-        kept += _resumed(stages, [v for v, _ in kept], chain[-1], banned)
+        kept += more
     found = []
     for k, (variant, round_) in enumerate(kept):
         proof = {"metric": "position_rmse", "unit": rig.unit(rig.joints[0]), "before": figures[k], "after": figures[k + 1],
@@ -94,11 +96,15 @@ def _chain(known: dict[tuple[str, ...], Link], rig: RigModel, session: Session, 
         known[tuple(v.key for v in part)] = Link(s, f, x, r)
 
 
-def _resumed(stages: Sequence[Swing], taken: list[Variant], last: Link, banned: set[str]) -> list[tuple[Variant, Round]]:
-    """What the competition adds to the variants taken once others are banned."""
+def _continued(stages: Sequence[Swing], taken: list[Variant], last: Link, banned: set[str],
+               resume: bool) -> list[tuple[Variant, Round]]:  # fmt: skip
+    """What the competition adds to the variants taken once others are banned (resume), or else a closer law of theirs."""
     current = fit_stages(stages, [Task(last.free, last.fit.theta, ())], 6)[0]
-    variants, rounds = compete_swing(stages, current, taken, banned)
-    return list(zip(variants[len(taken) :], rounds, strict=True))
+    if resume:
+        variants, rounds = compete_swing(stages, current, taken, banned)
+        if rounds:
+            return list(zip(variants[len(taken) :], rounds, strict=True))
+    return list(refine_swing(stages, current, taken, banned))
 
 
 def _replayed(session: Session, xml: bytes, held: bool) -> RigResiduals:

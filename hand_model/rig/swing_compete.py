@@ -167,6 +167,26 @@ def compete_swing(stages: Sequence[Swing], current: Fitted, begin: Sequence[Vari
     return taken, tuple(rounds)
 
 
+def refine_swing(stages: Sequence[Swing], current: Fitted, taken: Sequence[Variant],
+                 banned: Collection[str]) -> tuple[tuple[Variant, Round], ...]:  # fmt: skip
+    """A closer law of an effect that stands (Variant.beside), by BIC with every stretch as one sample (Schwarz 1978); or
+    none. Its name stands already: what is left to choose is the form, and there the likelihood is enough."""
+    swing = stages[-1]
+    free, count = all_free(swing, taken), len(swing.train())
+    rivals = [v for v in variants(swing) if v.beside & set(free) and not set(v.start) <= set(free) and v.key not in banned]
+    if not rivals:
+        return ()
+    fits = fit_stages(stages, [Task(all_free(swing, (*taken, v)), _started(current.theta, v), ()) for v in rivals], 12)
+    more = [len(all_free(swing, (*taken, v))) - len(free) for v in rivals]
+    change = [count * np.log(f.cost / current.cost) + m * np.log(count) for f, m in zip(fits, more, strict=True)]
+    best = int(np.argmin(change))
+    if change[best] >= 0:
+        return ()
+    probability = float(1.0 / (1.0 + np.exp(0.5 * change[best])))
+    gain = 1.0 - np.sqrt(fits[best].cost / current.cost)
+    return ((rivals[best], Round(rivals[best], probability, float(gain), (), (rivals[best].effect,), fits[best])),)
+
+
 def _shortlist(rivals: Sequence[Variant], fits: Sequence[Fitted]) -> list[int]:
     """The best by training error, of one effect not more than a few variants."""
     out: list[int] = []

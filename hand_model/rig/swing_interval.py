@@ -10,14 +10,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .swing import INDEX, Swing, Task, jacobian, typical
+from .swing import INDEX, LOW, Swing, Task, jacobian, typical
 
 Array = NDArray[np.float64]
 QUANTILE = 1.96
 
 
 def intervals(swing: Swing, free: tuple[str, ...], theta: Array) -> dict[str, tuple[float, float]]:
-    """95 % interval of each free parameter at the solution theta (len(PARAMETERS),)."""
+    """95 % interval of each free parameter at the solution theta (len(PARAMETERS),), within its physical bounds."""
     stretches = tuple(int(i) for i in swing.train())
     residual, slopes = jacobian(swing, Task(free, theta, stretches), theta)
     per = slopes.reshape(len(stretches), -1, len(free))
@@ -29,7 +29,7 @@ def intervals(swing: Swing, free: tuple[str, ...], theta: Array) -> dict[str, tu
     out = {}
     for name, s in zip(free, spread, strict=True):
         value, half = theta[INDEX[name]], QUANTILE * s * unit[INDEX[name]]
-        out[name] = (float(value - half), float(value + half))
+        out[name] = (float(max(value - half, LOW.get(name, 0.0))), float(value + half))
     return out
 
 
