@@ -98,8 +98,9 @@ def _kept(finding: Finding) -> str:
 
 def _proof(finding: Finding) -> str:
     kept = finding.fit.get("held_out") or []
-    told = finding.fit.get("note") or f"{len(kept)} recordings kept out" if kept or finding.fit.get("note") else "in-sample"
-    return f"{_words(finding.effect)}: {finding.fit.get('engine') or 'no replay'}, {told}"
+    engine = str(finding.fit.get("engine") or "no replay")
+    told = [engine, f"{len(kept)} recording{'s' if len(kept) > 1 else ''} kept out" if kept else "in-sample", str(finding.fit.get("note") or "")]
+    return f"{_words(finding.effect)}: {', '.join(t for i, t in enumerate(told) if t and not (i and t in engine))}"
 
 
 def _words(name: str) -> str:

@@ -1,0 +1,63 @@
+"""Proof and report of a diagnosis: errors before and after with their interval, the page that shows them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hand_model.diagnose.findings import Finding, Findings
+from hand_model.diagnose.page import render
+from hand_model.diagnose.prove import Replay, reduction
+
+
+def test_reduction_holds_the_truth_and_knows_blocks() -> None:
+    rng = np.random.default_rng(1)
+    blocks = [np.repeat(np.arange(30), 40)] * 2
+    before = [3.0 * np.sign(rng.normal(size=30)).repeat(40) + rng.normal(0, 4, 1200) for _ in blocks]
+    after = [rng.normal(0, 4, 1200) for _ in blocks]
+    found = reduction(before, after, blocks)
+    assert found["before"] == pytest.approx(5.0, rel=0.05)
+    assert found["after"] == pytest.approx(4.0, rel=0.05)
+    assert found["ci95_reduction"][0] < 1.0 < found["ci95_reduction"][1]
+    assert found["ci95_reduction"][0] > 0.6
+
+
+def test_reduction_of_nothing_is_no_reduction() -> None:
+    rng = np.random.default_rng(2)
+    blocks = [np.repeat(np.arange(30), 40)]
+    found = reduction([rng.normal(0, 4, 1200)], [rng.normal(0, 4, 1200)], blocks)
+    assert found["ci95_reduction"][0] < 0 < found["ci95_reduction"][1]
+
+
+def _finding(**more) -> Finding:
+    fit = {"unit": "raw", "before": 9.0, "after": 5.1, "noise_floor": 5.0, "ci95_reduction": [3.7, 4.1], "held_out": ["log/b.csv"],
+           "engine": "mujoco: mj_inverse"}
+    where = {"finger": "index", "joint": None, "actuator": "index", "share_of_mismatch": 0.9}
+    model = {"native": False, "mjcf": None, "urdf": "not expressible", "callback": "hand_model.effects_on(model, folder)"}
+    values = {"finding": "detent_load", "model": model, "correction": None, **more}
+    return Finding(values["finding"], (values["finding"], "nonlinear_spring"), 0.98, (), where, "A detent.",
+                   {"centre": {"value": 40.0, "unit": "%", "ci95": [39.0, 41.0]}}, fit, values["model"], values["correction"])
+
+
+def test_page_says_what_where_how_sure_and_where_it_is_put_right() -> None:
+    rng = np.random.default_rng(3)
+    x = np.tile(np.linspace(0, 100, 400), 4)
+    v = np.repeat([1.0, -1.0, 1.0, -1.0], 400)
+    noise = rng.normal(0, 5, 1600)
+    bell = 9 * np.exp(-0.5 * ((x - 40) / 6) ** 2)
+    slip = _finding(finding="marker_slip", model=None, correction="the displacement is taken out")
+    detent = _finding()
+    replay = Replay(detent, x, v, noise + bell, noise, "%", "raw", 5.0, ("log/b.csv",))
+    findings = Findings("mismatch", {"before": 3.0, "after": 1.0, "limit": 1.2}, {}, (detent, slip), next_experiment="slower moves")
+    page = render(findings, (), (replay,), "a session").decode()
+    for said in ("A detent.", "39 to 41", "3.7 to 4.1", "passive-force callback, hand_model.effects_on(model, folder)", "9 to 5.1 raw",
+                 "corrected copy of the session: the displacement is taken out", "Next experiment: slower moves", "nonlinear spring"):
+        assert said in page, said
+    assert page.count("<svg") == 2
+
+
+def test_page_of_a_consistent_session_has_no_findings() -> None:
+    page = render(Findings("consistent", {}, {}, notes=("no palm markers",)), (), (), "a session").decode()
+    assert "Nothing is missing" in page
+    assert "no palm markers" in page
+    assert "error before" not in page
