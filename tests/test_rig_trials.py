@@ -91,7 +91,7 @@ def test_simulated_fit_uses_each_trials_weight_and_covers_the_truth(tmp_path: Pa
     """Voltage-driven, two weights: inertia, gain and friction return, the truth lies within their intervals, and MuJoCo
     on the written file moves as recorded."""
     truth = vector({"inertia": 0.0085, "gain": 0.13, "back_emf": 0.05, "damping": 0.012, "coulomb": 0.03, "load_gear": 0.1})
-    t, random = np.arange(0, 4, 0.002), np.random.default_rng(0)
+    t, random = np.arange(0, 5, 0.002), np.random.default_rng(0)
     volts = [2.5 * np.sin(2.2 * t + k) + 1.5 * np.sin(5.1 * t + 2 * k) for k in range(4)]
     table = [np.stack([t, 0 * t, u], 1) for u in volts]
     blank = session(tmp_path / "blank", VOLTAGE, "voltage", table, "time,position,voltage")
@@ -104,7 +104,7 @@ def test_simulated_fit_uses_each_trials_weight_and_covers_the_truth(tmp_path: Pa
     rig = load_rig(read_session(folder))
     swing = build_swing(rig, fit_declared(rig), 2e-3, 1.0)
     free = ("inertia", "gain", "back_emf", "damping", "coulomb", "load_gear")
-    fit = fit_together(swing, [Task(free, vector(swing.initial), tuple(swing.train()))], 14)[0]
+    fit = fit_together(swing, [Task(free, vector(swing.initial), tuple(swing.train()))], 20)[0]
     assert [fit.theta[INDEX[n]] for n in free] == pytest.approx([truth[INDEX[n]] for n in free], rel=0.1)
     ends = intervals(swing, free, fit.theta)
     assert sum(low <= truth[INDEX[n]] <= high for n, (low, high) in ends.items()) >= len(free) - 1
