@@ -242,3 +242,27 @@ def test_compliance_moves_the_target_within_the_step() -> None:
     assert load > 3
     assert data.joint("index_drive").qpos[0] == pytest.approx(lever - np.deg2rad(0.05 * load), abs=2e-4)
     np.testing.assert_array_equal(model.eq_data, before)
+
+
+def test_delays_and_clipping_are_what_mujoco_does() -> None:
+    """A command delay holds the drive's force back; the sensor of the current is late, or clips."""
+    def run(name: str, values: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
+        root = etree.fromstring(MOTOR.replace('gainprm="0"', f'gainprm="{UNIT}"'))
+        assert effect(name).write_mjcf(root, {"actuator": "index"}, values) is not None
+        model = mujoco.MjModel.from_xml_string(etree.tostring(root).decode())
+        data, force, seen = mujoco.MjData(model), [], []
+        for i in range(200):
+            data.ctrl[0] = 30.0 if i >= 50 else 0.0
+            mujoco.mj_step(model, data)
+            force.append(data.actuator_force[0] / UNIT)
+            seen.append(data.sensordata[0] / UNIT if model.nsensor else 0.0)
+        return np.array(force), np.array(seen)
+
+    force, _ = run("command_delay", {"delay": 0.06})
+    assert int(np.argmax(force > 15)) == pytest.approx(50 + 30, abs=2)
+    force, seen = run("current_channel_delay", {"form": 0.0, "delay": 0.04})
+    assert int(np.argmax(force > 15)) == pytest.approx(50, abs=1)
+    assert int(np.argmax(seen > 15)) == pytest.approx(50 + 20, abs=2)
+    force, seen = run("current_saturation", {"limit": 20.0})
+    assert force.max() == pytest.approx(30)
+    assert seen.max() == pytest.approx(20)
