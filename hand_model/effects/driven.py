@@ -44,7 +44,8 @@ def play(path: Array, gap: float, threshold: float | None = None) -> Array:
             out[a:b] = np.minimum(np.minimum.accumulate(x[a:b]) + 0.5 * gap, at)
         else:
             out[a:b] = at
-        at = out[b - 1]
+        end = x[min(b, len(x) - 1)]  # the turning point itself belongs to both strokes
+        at = max(out[b - 1], end - 0.5 * gap) if d > 0 else min(out[b - 1], end + 0.5 * gap) if d < 0 else out[b - 1]
     return out
 
 

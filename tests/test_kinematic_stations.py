@@ -1,0 +1,141 @@
+"""Encoder and linkage stations: planted effects are named with their size, healthy joints stay consistent."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hand_model.diagnose.excursions import with_excursions
+from hand_model.diagnose.name import name_effects
+from hand_model.effects import catalogue, effect
+from hand_model.effects.base import DriveState
+from hand_model.effects.driven import driven, play, soft_play
+from hand_model.identify.chain import ChainData
+from hand_model.identify.repair import repair_labels
+
+MAP = np.array([0.0, 62.0, 30.0, -12.0])  # deg over the share of the driver's range
+
+
+def strokes(speeds: tuple[float, ...], rest_s: float = 0.5, rate_hz: float = 100.0) -> tuple[np.ndarray, np.ndarray]:
+    """Position [0..100] of full strokes there and back at each speed, and its velocity, rests between."""
+    velocity = [np.zeros(int(rest_s * rate_hz))]
+    for speed in speeds:
+        for way in (1, -1):
+            velocity += [np.full(round(100 / speed * rate_hz), way * speed), np.zeros(int(rest_s * rate_hz))]
+    v = np.concatenate(velocity)
+    return np.clip(np.cumsum(v) / rate_hz, 0, 100), v
+
+
+def joint(seed: int, move=None, add=None, noise: float = 0.6, drift: float = 0.0) -> tuple[DriveState, ...]:
+    """Two recordings of an angle behind a map, the second for validation. move(x): what drives the map; add(t, x): on the angle."""
+    rng = np.random.default_rng(seed)
+    out = []
+    for k, speeds in enumerate([(100.0, 45.0, 27.0, 70.0, 15.0), (45.0, 27.0, 70.0)]):
+        x, v = strokes(speeds)
+        t = np.arange(len(x)) / 100.0
+        late = np.interp(t + drift * (t - t.mean()), t, x)
+        u = (late if move is None else move(late)) / 100
+        angle = np.polynomial.Polynomial(MAP)(u) + (0.0 if add is None else add(t, x, v))
+        load = 15.0 + 0.2 * x + 35.0 * np.tanh(v) + 0.15 * v + rng.normal(0, 1.5, len(x))
+        slope = np.polynomial.Polynomial(MAP).deriv()(x / 100) / 100
+        offset = np.zeros((len(x), 2))
+        offset[:, k] = slope * v
+        declared = np.concatenate([np.stack([(x / 100) ** i for i in range(4)], axis=-1), offset], axis=1)
+        extra = {"trial_index": np.full(len(x), float(k)), "scale": np.full(len(x), 100.0), "slope": slope, "load": load}
+        out.append(DriveState(f"log/{k}.csv", "index", t, x, v, 0 * v, angle + rng.normal(0, noise, len(x)), declared, "%", "deg", extra,
+                              ("power_0", "power_1", "power_2", "power_3", "offset_0", "offset_1"), validate=k == 1))
+    return with_excursions(out)
+
+
+def named(states: tuple[DriveState, ...], station: str) -> dict[str, dict[str, float]]:
+    naming = name_effects(states, catalogue(station))
+    return {f.term.effect.name: {**f.term.shape, **f.amplitudes} for f in naming.found}
+
+
+def test_play_follows_its_definition() -> None:
+    t = np.linspace(0, 20, 4000)
+    path = 30 * np.sin(t) + 12 * np.sin(2.7 * t + 1)
+    gap, at, want = 3.0, path[0] + 1.5, []
+    for x in path:
+        at = min(max(at, x - gap / 2), x + gap / 2)
+        want.append(at)
+    np.testing.assert_allclose(play(path, gap, threshold=0.0), want, atol=1e-9)
+    assert np.abs(soft_play(path, gap, 0.5) - path).max() <= 0.75 * gap + 1e-9
+
+
+def test_changes_of_the_driver_follow_one_another() -> None:
+    state = joint(0)[0]
+    first = driven(state, lambda x: np.minimum(x, 60.0))
+    both = driven(replace(state, declared=first), lambda x: np.maximum(x, 20.0))
+    np.testing.assert_allclose(both[:, 2], (np.clip(state.position, 20, 60) / 100) ** 2)
+    np.testing.assert_array_equal(both[:, 4:], state.declared[:, 4:])
+
+
+@pytest.mark.parametrize("station", ["encoder", "linkage"])
+def test_healthy_joints_are_consistent(station: str) -> None:
+    for seed in range(5):
+        assert name_effects(joint(seed), catalogue(station)).consistent
+
+
+@pytest.mark.parametrize(("station", "name"), [("encoder", "drive_backlash"), ("linkage", "linkage_backlash")])
+def test_lost_motion_is_named_with_its_full_width(station: str, name: str) -> None:
+    found = named(joint(1, move=lambda x: play(x, 1.5)), station)
+    assert list(found) == [name]
+    assert found[name]["gap"] == pytest.approx(1.5, rel=0.1)
+
+
+@pytest.mark.parametrize(("station", "name"), [("encoder", "series_elasticity"), ("linkage", "linkage_compliance")])
+def test_give_that_grows_with_load_is_no_lost_motion(station: str, name: str) -> None:
+    # While the drive rests the load falls, and what gives moves without it: lost motion does not.
+    states = joint(2, add=lambda t, x, v: -0.03 * (15.0 + 0.2 * x + 35.0 * np.tanh(v) + 0.15 * v))
+    found = named(states, station)
+    assert list(found) == [name]
+
+
+def test_deadband_and_stop_are_told_apart_and_placed() -> None:
+    deadband = named(joint(3, move=lambda x: np.maximum(x, 9.0)), "linkage")
+    assert list(deadband) == ["coupling_deadband"]
+    assert deadband["coupling_deadband"]["until"] == pytest.approx(9.0, abs=0.7)
+    stop = named(joint(3, move=lambda x: np.minimum(x, 88.0)), "linkage")
+    assert list(stop) == ["distal_stop"]
+    assert stop["distal_stop"]["from"] == pytest.approx(88.0, abs=0.7)
+
+
+def test_a_lifted_finger_is_decoupled_and_its_whiles_are_found() -> None:
+    begins = np.array([2.3, 8.1, 14.2])
+
+    def lift(t, x, v):
+        phase = (t[:, None] - begins) / 0.7
+        return (((phase > 0) & (phase < 1)) * 3.0 * np.sin(np.pi * phase) ** 2).sum(1)
+
+    states = joint(4, add=lift)
+    assert list(named(states, "encoder")) == ["spring_decoupling"]
+    spans = effect("spring_decoupling").region(states, {"form": 0.0, "below": 1.0})["time"]
+    for begin in begins:
+        assert any(a < begin + 0.35 < b for a, b in spans["log/0.csv"])
+
+
+def test_nothing_runs_ahead_in_noise() -> None:
+    assert all((s.extra["ahead"] == 0).all() for seed in range(6) for s in joint(seed))
+
+
+def test_clock_drift_is_named_with_its_rate() -> None:
+    found = named(joint(5, drift=2e-3), "encoder")
+    assert list(found) == ["clock_drift"]
+    assert abs(found["clock_drift"]["drift"]) == pytest.approx(2e-3, rel=0.15)
+
+
+def test_exchanged_labels_of_a_symmetrical_cluster_are_put_right() -> None:
+    t = np.linspace(0, 10, 1000)
+    base = np.array([[0, 0, 0], [60, 0, 0], [0, 40, 0], [80, 0, 20], [95, 7.5, 20], [95, -7.5, 20]]) * 1e-3
+    truth = base + 0.02 * np.stack([np.sin(t), np.cos(t), 0 * t], axis=-1)[:, None] + np.random.default_rng(0).normal(0, 1e-4, (1000, 6, 3))
+    wrong = truth.copy()
+    wrong[300:700, [4, 5]] = truth[300:700, [5, 4]]
+    fixed, swaps = repair_labels(ChainData(wrong, np.array([0, 0, 0, 1, 1, 1]), tuple("abcdef")))
+    np.testing.assert_array_equal(fixed.position_world, truth)
+    assert [(s.labels, s.start, s.stop) for s in swaps] == [(("e", "f"), 300, 699)]
+    untouched, none = repair_labels(ChainData(truth, np.array([0, 0, 0, 1, 1, 1]), tuple("abcdef")))
+    assert none == ()
+    np.testing.assert_array_equal(untouched.position_world, truth)
