@@ -14,14 +14,16 @@ from .findings import Finding
 Array = NDArray[np.float64]
 
 RUN_IN_S, RUN_OUT_S = 0.3, 0.25  # a stroke's part at steady speed begins and ends this far from rest
-SAG_LEAST = 0.015  # of the speed, over the recorded loads: less is within what a controller does
+SAG_LEAST = 0.025  # of the speed, over the recorded loads: less is within what a controller does
 SAG_T = 6.0
+CEILING_SHARE = 0.35  # of the load's rise that a drive at its limit takes from its speed: one, where the whole stroke is at it
+CEILING_T = 6.0
 
 
 @dataclass(frozen=True)
 class CommandFacts:
     """latency_s: (e,) from each setpoint change to the current's answer, motion_s: to the motion's. sag: loss of speed per unit of load, its standard
-    error, and the range of loads; nan where strokes do not tell."""
+    error, and the range of loads; nan where strokes do not tell. ceiling: current [raw] at which the drive is at its limit, or nan."""
 
     latency_s: Array
     motion_s: Array
@@ -29,6 +31,20 @@ class CommandFacts:
     sag: float
     sag_se: float
     load_range: float
+    ceiling: float = float("nan")
+    trials: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """A stroke at one commanded speed, away from its start and stop. way: 1 flexing, -1 extending. position [%], velocity
+    [%/s], current [raw]: (n,)."""
+
+    way: float
+    commanded: float
+    position: Array
+    velocity: Array
+    current: Array
 
 
 def command_facts(states: tuple[DriveState, ...], currents: tuple[Array, ...]) -> CommandFacts:
@@ -36,8 +52,9 @@ def command_facts(states: tuple[DriveState, ...], currents: tuple[Array, ...]) -
     latency = [x for s, c in zip(states, currents, strict=True) for x in _latencies(s, c)]
     motion = [x for s in states for x in _latencies(s, s.position)]
     step = float(np.median(np.concatenate([np.diff(s.time_s) for s in states])))
-    sag, error, span = _sag(states, currents)
-    return CommandFacts(np.array(latency), np.array(motion), step, sag, error, span)
+    strokes = _strokes(states, currents)
+    return CommandFacts(np.array(latency), np.array(motion), step, *_sag(strokes), _ceiling(strokes),
+                        tuple(s.trial for s in states))
 
 
 def _latencies(state: DriveState, channel: Array) -> list[float]:
@@ -58,12 +75,11 @@ def _latencies(state: DriveState, channel: Array) -> list[float]:
     return out
 
 
-def _sag(states: tuple[DriveState, ...], currents: tuple[Array, ...]) -> tuple[float, float, float]:
-    """Slope of log speed over load, common to all commanded speeds, by runs."""
-    rows = []
+def _strokes(states: tuple[DriveState, ...], currents: tuple[Array, ...]) -> list[Stroke]:
+    out = []
     for state, current in zip(states, currents, strict=True):
         if "speed" not in state.extra:
-            return np.nan, np.nan, np.nan
+            return []
         way = np.where(np.isfinite(state.effort), np.sign(state.velocity), 0)
         edges = np.r_[0, np.flatnonzero(np.diff(way)) + 1, len(way)]
         for a, b in pairwise(edges.tolist()):
@@ -71,19 +87,57 @@ def _sag(states: tuple[DriveState, ...], currents: tuple[Array, ...]) -> tuple[f
             keep = np.arange(a, b)[(t > t[0] + RUN_IN_S) & (t < t[-1] - RUN_OUT_S)]
             speeds = state.extra["speed"][keep]
             if way[a] and len(keep) >= 10 and np.ptp(speeds) == 0 and speeds[0] > 0:
-                ratio = way[a] * float(np.mean(state.velocity[keep]))
-                rows.append((float(speeds[0]), np.log(ratio), way[a] * float(np.mean(current[keep]))))
-    table = np.array(rows)
-    if len(table) < 12:
+                out.append(Stroke(float(way[a]), float(speeds[0]), state.position[keep], state.velocity[keep], current[keep]))
+    return out
+
+
+def _load_rise(strokes: list[Stroke]) -> tuple[dict[float, np.poly1d], float]:
+    """Rise of the load over position [raw/%] flexing and extending, as polynomials of position, and the viscous friction
+    [raw s/%]: current = cubic in position, one for each way, + viscous velocity."""
+    p, v, c = (np.concatenate([getattr(s, name) for s in strokes]) for name in ("position", "velocity", "current"))
+    flexing = np.concatenate([np.full(len(s.position), s.way > 0) for s in strokes])
+    powers = np.stack([(p / 100) ** k for k in range(4)], axis=-1)
+    design = np.concatenate([powers * flexing[:, None], powers * ~flexing[:, None], v[:, None]], axis=1)
+    beta = np.linalg.lstsq(design, c, rcond=None)[0]
+    scale = 100.0 ** -np.arange(4)
+    return {way: np.poly1d((b * scale)[::-1]).deriv() for way, b in ((1.0, beta[:4]), (-1.0, beta[4:8]))}, float(beta[8])
+
+
+def _sag(strokes: list[Stroke]) -> tuple[float, float, float]:
+    """Loss of log speed per load, its standard error and the range of loads. Strokes of one commanded speed are
+    compared; a reference that a proportional controller follows falls behind by the rise of the load, which is no sag."""
+    if len(strokes) < 12 or {s.way for s in strokes} != {1.0, -1.0}:
         return np.nan, np.nan, np.nan
-    speed, y, load = table.T
-    levels = (speed[:, None] == np.unique(speed)[None]).astype(float)
-    design = np.concatenate([levels, load[:, None]], axis=1)
+    rise, _ = _load_rise(strokes)
+    y = np.log([max(s.way * float(np.mean(s.velocity)), 1e-9) for s in strokes])
+    load = np.array([s.way * float(np.mean(s.current)) for s in strokes])
+    levels = np.array([[float(s.commanded == level) for level in sorted({s.commanded for s in strokes})] for s in strokes])
+    rises = np.array([float(np.mean(rise[s.way](s.position))) for s in strokes])
+    design = np.concatenate([levels, rises[:, None], load[:, None]], axis=1)
     beta = np.linalg.lstsq(design, y, rcond=None)[0]
-    residual = y - design @ beta
-    spread = np.median(np.abs(residual)) / 0.6745
+    spread = np.median(np.abs(y - design @ beta)) / 0.6745
     covariance = np.linalg.pinv(design.T @ design) * spread**2
     return -float(beta[-1]), float(np.sqrt(covariance[-1, -1])), float(np.ptp(load))
+
+
+def _ceiling(strokes: list[Stroke]) -> float:
+    """Current [raw] at which the drive is at its limit: where the load rises, speed falls by as much as keeps the current
+    the same. The share of the load's rise taken from speed is a regression within the fastest flexing strokes. nan: none."""
+    fast = max((s.commanded for s in strokes), default=0.0)
+    mine = [s for s in strokes if s.way > 0 and s.commanded == fast]
+    if len(mine) < 3 or {s.way for s in strokes} != {1.0, -1.0}:
+        return np.nan
+    rise, viscous = _load_rise([s for s in strokes if s.commanded < fast] or strokes)
+    if not {s.way for s in strokes if s.commanded < fast} >= {1.0, -1.0} or viscous <= 0:
+        return np.nan
+    load = rise[1.0].integ()
+    x = np.concatenate([load(s.position) - np.mean(load(s.position)) for s in mine])
+    y = np.concatenate([-viscous * (s.velocity - np.mean(s.velocity)) for s in mine])
+    share = float(x @ y / max(x @ x, 1e-12))
+    error = float(np.std(y - share * x) / np.sqrt(max(x @ x, 1e-12)))
+    if share < CEILING_SHARE or share < CEILING_T * error:
+        return np.nan
+    return float(np.median(np.concatenate([s.current for s in mine])))
 
 
 def command_findings(facts: dict[str, CommandFacts], fingers: dict[str, str | None]) -> list[tuple[float, Finding]]:
@@ -99,9 +153,22 @@ def command_findings(facts: dict[str, CommandFacts], fingers: dict[str, str | No
             also = len(moved) < 2 or moved.get(actuator, np.inf) - min(moved.values()) > fact.step_s
             if also and medians[actuator] - healthy > 1.5 * fact.step_s and np.mean(late > fact.step_s) > 0.7:
                 out.append(_delay(actuator, fingers.get(actuator), fact, healthy))
-        if np.isfinite(fact.sag) and fact.sag > SAG_T * fact.sag_se and fact.sag * fact.load_range > SAG_LEAST:
+        if np.isfinite(fact.ceiling):
+            out.append(_ceiling_finding(actuator, fingers.get(actuator), fact))
+        elif np.isfinite(fact.sag) and fact.sag > SAG_T * fact.sag_se and fact.sag * fact.load_range > SAG_LEAST:
             out.append(_sag_finding(actuator, fingers.get(actuator), fact))
     return out
+
+
+def _ceiling_finding(actuator: str, finger: str | None, fact: CommandFacts) -> tuple[float, Finding]:
+    fit = {"metric": "speed_loss", "unit": "1", "before": None, "after": None, "noise_floor": None, "ci95_reduction": None,
+           "held_out": [], "engine": "strokes"}
+    where = {**_where(actuator, finger), "signal": "current", "trials": list(fact.trials)}
+    text = (f"The {actuator} motor is at its limit of {fact.ceiling:.0f} raw in its fastest strokes: the current stays, and speed falls "
+            "as the load rises.")
+    model = {"native": True, "mjcf": f"actuator[@name='{actuator}']/@forcerange", "urdf": "limit effort"}
+    return 1e3, Finding("current_saturation", ("current_saturation",), 0.999, (), where, text,
+                        {"limit": {"value": fact.ceiling, "unit": "raw"}}, fit, model)
 
 
 def refused(actuator: str, finger: str | None, trials: tuple[str, ...]) -> tuple[float, Finding]:

@@ -326,6 +326,7 @@ def _finding(station: Station, named: Named, share: float) -> tuple[float, Findi
     which = naming.fit.terms.index(named.term)
     effect = named.term.effect
     parameters = parameter_intervals(naming, which)
+    parameters |= effect.further(naming.balance.states, parameters)
     values = {k: v["value"] for k, v in parameters.items()}
     where: dict[str, Any] = {
         "finger": station.finger,

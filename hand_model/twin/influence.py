@@ -192,7 +192,6 @@ def merge_terms(parts: Sequence[DriveTerms]) -> DriveTerms:
         load=sum((p.load for p in parts), ()),
         friction=sum((p.friction for p in parts), ()),
         advance=sum((p.advance for p in parts), ()),
-        deliver=sum((p.deliver for p in parts), ()),
         speed_factor=sum((p.speed_factor for p in parts), ()),
         sense=sum((p.sense for p in parts), ()),
         current_limit=min((p.current_limit for p in parts), default=float("inf")),

@@ -53,16 +53,15 @@ class DriveTerms:
     """What acts on one drive beyond the declared model.
 
     load: [raw] against flexion whatever the direction. friction: [raw] added to the Coulomb level, opposing motion.
-    advance: called once per step, after the motion. deliver: torque in current units delivered for a current (raw ->
-    raw). speed_factor: share of the commanded speed that the drive reaches. sense: position [%] that the encoder
-    tells the controller. current_limit: the drive's own clip [raw]. replace_coulomb: a bristle carries the Coulomb
+    advance: called once per step, after the motion. speed_factor: share of the commanded speed that the drive reaches.
+    sense: position [%] that the encoder tells the controller. current_limit: the drive's own clip [raw].
+    replace_coulomb: a bristle carries the Coulomb
     friction instead.
     """
 
     load: tuple[Term, ...] = ()
     friction: tuple[Term, ...] = ()
     advance: tuple[Callable[[DriveNow, float], None], ...] = ()
-    deliver: tuple[Callable[[DriveNow, float], float], ...] = ()
     speed_factor: tuple[Term, ...] = ()
     sense: tuple[Callable[[float], float], ...] = ()
     current_limit: float = float("inf")
@@ -192,8 +191,6 @@ def _step(
         load += term(now)
         now.transmitted = load
     drive = current
-    for deliver in terms.deliver:
-        drive = deliver(now, drive)
     drive -= load
     direction = (1.0 if v > 0 else -1.0) if v != 0.0 else (1.0 if drive > 0 else -1.0)
     now.direction = direction

@@ -39,10 +39,11 @@ def encoder_periodic(draw: Draw) -> Influence:
     )
 
 
-@effect("drive_sag", "channel", "current", ("speed", "supply", "torque"))
+@effect("drive_sag", "channel", "current", ("speed", "supply"))
 def drive_sag(draw: Draw) -> Influence:
-    """The drive delivers less per command as it is loaded: less speed (at once, or as its supply droops), or less
-    torque.
+    """The drive delivers less speed per command as it is loaded: at once, or as its supply droops.
+
+    (Less torque per current only rescales friction, damping and spring: a raw unit of current is left for anyone to see.)
     """
     share = draw.size("share_per_100_raw", 0.14, 0.24)
     droop = [0.0]
@@ -54,10 +55,6 @@ def drive_sag(draw: Draw) -> Influence:
         time_s = 0.25 if draw.form == "supply" else 0.03
         droop[0] += step_s / time_s * (abs(now.current) / 100.0 - droop[0])
 
-    if draw.form == "torque":
-        return Influence(
-            terms=DriveTerms(deliver=(lambda now, drive: drive * (1.0 - min(0.6, share * abs(drive) / 100.0)),))
-        )
     return Influence(
         start=start, terms=DriveTerms(speed_factor=(lambda now: max(0.3, 1.0 - share * droop[0]),), advance=(advance,))
     )
