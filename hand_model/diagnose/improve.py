@@ -117,7 +117,8 @@ def write_improved(hand: Hand, findings: Sequence[Finding], stations: Sequence[A
     """
     from ..compile import compile
 
-    touched = [s for s in stations if any(_of(f, s) for f in findings if f.correction is None)]
+    known = {f.name for f in hand.fingers}
+    touched = [s for s in stations if s.finger in known and any(_of(f, s) for f in findings if f.correction is None)]
     before = as_fitted(hand, touched, counts, lambda naming: naming.declared)
     after = with_effects(as_fitted(hand, touched, counts, lambda naming: naming.fit), findings)
     if not any(f.correction is None for f in findings):
