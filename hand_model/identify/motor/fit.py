@@ -239,7 +239,7 @@ def _start(moves: Sequence[MoveData], plain: Regression) -> dict[str, float]:
     speed = float(np.median(ratio)) * 1.02 if ratio else 100.0
     return {
         **plant, "presliding": 0.5, "bristle": 0.004, "static_ratio": 1.0, "stribeck_speed": 20.0, "stribeck_exponent": 1.0,
-        "speed_full": speed, "rise": 0.1, "fall": 0.1, "delay": 0.0, "lead": 5e-4, "edge": 0.1, "position_gain": 12.0, "deadband": float(np.median(np.abs(error))), "gain": gain,
+        "speed_full": speed, "rise": 0.1, "fall": 0.1, "delay": 5e-4, "lead": 5e-4, "edge": 0.1, "position_gain": 12.0, "deadband": float(np.median(np.abs(error))), "gain": gain,
         "damping": 2 * np.sqrt(gain * plant["inertia"]),
     }  # fmt: skip
 
@@ -287,7 +287,7 @@ def _fit_controller(moves: Sequence[MoveData], start: Mapping[str, float], sigma
         if max(best.chi2) < LACK_OF_FIT:
             break
     if max(best.chi2) > 1.2 and max(best.chi2) < 30:  # caught where a drive sticks or not: once more, from softer friction
-        again = {**best.values, "presliding": 0.2, "bristle": 0.004, "delay": 0.0, "lead": 5e-4}
+        again = {**best.values, "presliding": 0.2, "bristle": 0.004, "delay": 5e-4, "lead": 5e-4}
         fit = output_error.fit(moves, again, CONTROLLERS[best.controller], sigma, BOUNDS, best.controller)
         best = fit if fit.cost < best.cost else best
     return best

@@ -24,8 +24,9 @@ ABSOLUTE_REACH = {"preload": 20.0, "viscous": 0.1, "stiffness": 0.2, "coulomb": 
 TICK_S = 1e-3  # what instants of the controller's steps are known to: a current that jumps within it says little
 # differences wide enough that the instants at which a drive sticks or a deadband sets in, held to one step, average out
 STEP_SHARE, OWN_STEP = 2e-2, (1e-3, 1e-2, 1e-3, 0.5)
-# a loop that holds its value for a step of 0 to 2 ms acts half a step after the value that is logged
-PRIOR = {"lead": (0.5 * TICK_S, 0.5 * TICK_S)}
+# a loop that holds its value for a step of 0 to 2 ms acts half a step late, and half a step after the value that is logged; without this the
+# motion alone, which tells inertia less damping times delay, lets the two run off together
+PRIOR = {"lead": (0.5 * TICK_S, 0.5 * TICK_S), "delay": (0.5 * TICK_S, TICK_S)}
 SEARCH = 1.3  # scatter of the end of the search among kinks over that of the linear model, on simulated drives (scripts/motor_accuracy.py)
 OWN_REACH = np.array([0.01, 0.3, 0.01, 10.0])  # of one step
 
