@@ -77,7 +77,7 @@ class MotorFit:
 
     motor: what goes into the hand. scale: encoder range. values: every parameter of plant, friction and controller (see UNITS);
     covariance (k, k) of `names`. method: "output error" or "regression" (no setpoints, or none that explain the motion).
-    sigma_position [%], sigma_current [raw]: noise of one sample. regression: the corrected regression; published, alike: the
+    sigma_position [%], sigma_current [raw]: noise of one sample. regression: the regression in weak form; published, alike: the
     four models with the current as it is, and with both sides filtered alike; smear: share of the reciprocal term's gain that is
     smear. output_error: its fit, or None. stribeck: whether the recordings show a Stribeck rise; evidence: fall of the misfit by it.
     """
