@@ -26,7 +26,7 @@ from hand_model.session import read_session
 
 STEP_S = 1e-3
 NAMES = ("inertia", "viscous", "coulomb", "stiffness", "preload", "gain", "damping")
-MODEL = """<mujoco><option timestep="0.001" integrator="implicitfast" gravity="0 0 0"/><worldbody><body name="motor">
+MODEL = """<mujoco><compiler angle="radian"/><option timestep="0.001" integrator="implicitfast" gravity="0 0 0"/><worldbody><body name="motor">
 <inertial pos="0 0 0" mass="1e-9" diaginertia="1e-9 1e-9 1e-9"/><joint name="motor" type="hinge" axis="0 0 1" armature="0.02"
  damping="0.1" frictionloss="20" stiffness="0.1" springref="-50" solreffriction="0.004 1" solimpfriction="0.9999 0.9999 0.001 0.5 2"/>
 </body></worldbody><actuator><general name="motor" joint="motor" gainprm="20" biastype="affine" biasprm="0 -20 -1"/></actuator>
