@@ -95,7 +95,7 @@ def _name(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str], 
     fit = declared
     after = before
     brought: dict[str, float] = {}
-    while len(terms) < MOST_TERMS and (after.p < ALPHA or not terms):
+    while len(terms) < MOST_TERMS:
         ranked = rank(balance, effects, terms, fit)
         for rival in ranked:
             brought[rival.name] = max(brought.get(rival.name, -np.inf), rival.evidence)

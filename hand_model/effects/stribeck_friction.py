@@ -1,4 +1,4 @@
-"""Stribeck friction: friction rises as speed falls towards zero (Tustin 1947, exponent 1)."""
+"""Stribeck friction: friction rises as speed falls towards zero (Tustin 1947; Bo & Pavelescu 1982, exponents 1 and 2)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PLAIN = (0.049, 0.718, 1.142, 0.0, 0.0)
 
 
 class StribeckFriction(Effect):
-    """F(v) = sign(v) (Fc + (Fs - Fc) exp(-|v| / vs))."""
+    """F(v) = sign(v) (Fc + (Fs - Fc) exp(-(|v| / vs)^n)), n = 1 (form 0) or 2 (form 1)."""
 
     name = "stribeck_friction"
     needs = "coulomb"
@@ -24,7 +24,8 @@ class StribeckFriction(Effect):
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """Stribeck speed, from below the slowest to the fastest recorded motion."""
         low, high = speed_range(states)
-        return (Shape("stribeck_speed", f"{states[0].position_unit}/s", 0.15 * low, 0.6 * high,
+        return (Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),
+                Shape("stribeck_speed", f"{states[0].position_unit}/s", 0.15 * low, 0.6 * high,
                       tuple(np.geomspace(0.4 * low, 0.5 * high, 7))),)
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
@@ -32,8 +33,9 @@ class StribeckFriction(Effect):
         return (("static_excess", "effort", 0.0, np.inf),)
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """sign(v) exp(-|v| / vs), (n, 1)."""
-        return (state.direction * np.exp(-np.abs(state.velocity) / shape["stribeck_speed"]))[:, None]
+        """sign(v) exp(-(|v| / vs)^n), (n, 1)."""
+        power = 1.0 if shape["form"] < 0.5 else 2.0
+        return (state.direction * np.exp(-((np.abs(state.velocity) / shape["stribeck_speed"]) ** power)))[:, None]
 
     def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
                    declared: Mapping[str, float]) -> dict[str, float]:

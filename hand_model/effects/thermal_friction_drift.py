@@ -62,6 +62,11 @@ class ThermalFrictionDrift(Effect):
             cold = 1 - (1 - cold * math.exp(-moved / parameters["warm_up_time"])) * math.exp(-rest / parameters["cooling_time"])
         return {"cold": cold}
 
+    def log_prior(self, parameters: Mapping[str, float]) -> float:
+        """Warming seldom takes more than the warm friction off."""
+        ratio = abs(parameters["ratio"]) if np.isfinite(parameters["ratio"]) else 6.0
+        return -2.0 * max(0.0, min(ratio, 6.0) - 1.0) ** 2
+
     def law(self, parameters: Mapping[str, float]) -> Law:
         """Friction that fades while time passes (form 0) or while the drive moves (form 1); cold to begin with."""
         cold = [parameters.get("cold", 1.0)]
