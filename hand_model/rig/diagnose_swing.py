@@ -47,7 +47,7 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
         if worse is not None:
             rejected.append({"effect": kept.pop(worse)[0].key, "reason": "error on validation trials does not fall"})
             continue
-        resume = banned != {r["effect"] for r in rejected}  # what stood in the shadow of those may come forward
+        resume = bool(rejected) and not banned  # once: what stood in the shadow of those may come forward
         banned = {r["effect"] for r in rejected}
         more = _continued(stages, [v for v, _ in kept], chain[-1], banned, resume)
         if not more:
