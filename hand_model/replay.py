@@ -228,7 +228,7 @@ def replay_trial(
 def phases(time_s: Array, drive: Array) -> NDArray[np.str_]:
     """Phase (n,) of each frame from counts or angle: at rest in the open or the closed half, flexing, extending."""
     filled = np.interp(time_s, time_s[np.isfinite(drive)], drive[np.isfinite(drive)])
-    width = max(3, int(round(0.1 / np.median(np.diff(time_s)))))
+    width = max(3, round(0.1 / float(np.median(np.diff(time_s)))))
     smooth = np.convolve(np.pad(filled, width, mode="edge"), np.ones(width) / width, mode="same")[width:-width]
     speed = np.gradient(smooth, time_s)
     low, high = np.quantile(smooth, [0.01, 0.99])

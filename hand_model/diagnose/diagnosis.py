@@ -32,7 +32,7 @@ from .prove import Replay
 ENGINE = {"current": "inverse dynamics of the motor's balance, motion as recorded", "encoder": "encoder map, motion as recorded",
           "markers": "linkage polynomial, motion as recorded"}
 UNWRITTEN = {"native": False, "mjcf": None, "urdf": "not expressible"}
-SMALL = 0.1  # share of the explained mismatch
+SMALL = 0.07  # share of the explained mismatch
 EXPLAINED_LEAST = 0.7  # of the explainable mismatch: below, the names are not believed
 
 
@@ -68,6 +68,9 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
         stations.append(Station("current", _finger_of(session, actuator), actuator, None,
                                 name_effects(states, effects, typical=typical)))
         tell(stations[-1].line())
+    clipped = {s.actuator for s in stations if s.believed for f in s.kept if f.term.effect.clips}
+    # a reading that clips says little of the load, on which a sag is judged
+    found = [i for i in found if i[1].effect != "drive_sag" or i[1].where["actuator"] not in clipped]
     findings = assemble(stations, _once(found), notes, unexplained)
     if output is not None:
         replays: tuple[Replay, ...] = ()
@@ -189,10 +192,8 @@ class Station:
 
     @property
     def kept(self) -> tuple[Named, ...]:
-        """The effects that stand beside each other: where the whole still does not fit, the small ones may be no more than
-        the form of the large one being another, and are left to the unexplained part."""
-        if self.naming.after.p >= ALPHA:
-            return self.proven
+        """The effects that stand beside each other: one of a small share may be no more than the form of the large one being
+        another, and is left to the unexplained part."""
         return tuple(f for f in self.proven if f.share >= SMALL or f is self.proven[0])
 
     def line(self) -> str:

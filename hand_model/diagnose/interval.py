@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .balance import DISCRETE, Balance, Fit, Term
-from .name import Naming
+from .evidence import oddity
+from .name import Naming, refit
 
 Array = NDArray[np.float64]
 
@@ -20,7 +22,7 @@ def parameter_intervals(naming: Naming, which: int) -> dict[str, dict[str, Any]]
 
     Where the model does not fit (residual variance more than 1.5 times the pure error) the interval is left out.
     """
-    balance, fit = naming.balance, naming.fit
+    balance, fit = undisturbed(naming, which)
     term = fit.terms[which]
     theta, build = _vector(fit)
     shape, amplitude, declared = build(theta)
@@ -45,6 +47,29 @@ def parameter_intervals(naming: Naming, which: int) -> dict[str, dict[str, Any]]
                 entry["ci95"] = [float(value) - 1.96 * sd, float(value) + 1.96 * sd]
         out[name] = entry
     return out
+
+
+def undisturbed(naming: Naming, which: int) -> tuple[Balance, Fit]:
+    """Balance and fit from which the parameters of a term are read: steady samples alone, for starts and stops are smeared and
+    bend what happens at low speed; as named for effects that act at starts, and where too few samples are steady. Among the
+    forms of the effect, the one that steady motion likes best."""
+    balance, fit = naming.balance, naming.fit
+    count = (balance.train & balance.steady).sum()
+    lively = any(t.effect.warps or t.effect.replaces for t in fit.terms)
+    if lively or balance.steady.all() or count < 20 * (len(balance.names) + fit.size):
+        return balance, fit
+    calm = copy(balance)
+    calm.weight = np.where(balance.steady, balance.weight, 1e-3 * balance.weight)
+    term, best = fit.terms[which], None
+    forms = next((s.starts for s in term.effect.shapes(balance.states) if s.name == "form"), (None,))
+    for form in forms:
+        shape = term.shape if form is None else {**term.shape, "form": form}
+        terms = tuple(Term(t.effect, shape) if i == which else t for i, t in enumerate(fit.terms))
+        found = refit(calm, calm.fit(terms))
+        lost = 0.5 * found.rss / calm.inflation + oddity(calm, found)
+        if best is None or lost < best[0]:
+            best = (lost, found)
+    return calm, best[1] if best is not None else fit
 
 
 def _one(term: Term, which: int, name: str, values: Any) -> float:

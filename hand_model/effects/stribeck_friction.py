@@ -34,7 +34,7 @@ class StribeckFriction(Effect):
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """sign(v) exp(-(|v| / vs)^n), (n, 1)."""
-        power = 1.0 if shape["form"] < 0.5 else 2.0
+        power = 1.0 if shape.get("form", 0.0) < 0.5 else 2.0
         return (state.direction * np.exp(-((np.abs(state.velocity) / shape["stribeck_speed"]) ** power)))[:, None]
 
     def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
@@ -42,11 +42,13 @@ class StribeckFriction(Effect):
         """Static friction as a ratio to Coulomb friction, and the Stribeck speed."""
         coulomb = declared.get("coulomb") or np.nan  # without Coulomb friction there is no ratio
         return {"static_ratio": 1 + amplitude["static_excess"] / coulomb, "stribeck_speed": shape["stribeck_speed"],
+                "exponent": 1.0 if shape.get("form", 0.0) < 0.5 else 2.0,
                 "static_excess": amplitude["static_excess"]}
 
     def log_prior(self, parameters: Mapping[str, float]) -> float:
-        """Static friction is seldom more than three times the Coulomb friction."""
-        return -0.5 * max(0.0, min(parameters["static_ratio"], 8.0) - 3.0) ** 2
+        """Static friction is seldom more than three times the Coulomb friction; an exponent of 1 is more common than 2."""
+        rare = 0.5 * max(0.0, min(parameters["static_ratio"], 8.0) - 3.0) ** 2
+        return -rare - (4.0 if parameters["exponent"] > 1.5 else 0.0)
 
     def region(self, states: tuple[DriveState, ...], shape: Mapping[str, float]) -> dict[str, Any] | None:
         """Speeds below two Stribeck speeds hold 86 % of it."""
