@@ -122,12 +122,12 @@ def test_reading_again_is_free(tmp_path):
 
 def test_speed(tmp_path):
     file = write_log(tmp_path / "log.csv", n=3000)
-    best_s = np.inf
+    best_s = np.inf  # of processor time: the machine may be busy with something else
     for i in range(15):
         file = file.rename(tmp_path / f"log{i}.csv")
-        start = time.perf_counter()
+        start = time.process_time()
         assert len(read_log(file).time_s) == 3000
-        best_s = min(best_s, time.perf_counter() - start)
+        best_s = min(best_s, time.process_time() - start)
     assert best_s < 0.015
 
 

@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 RUN_IN_S, RUN_OUT_S = 0.3, 0.25  # a stroke's part at steady speed begins and ends this far from rest
 SAG_LEAST = 0.025  # of the speed, over the recorded loads: less is within what a controller does
-SAG_T = 6.0
+SAG_T = 10.0
 CEILING_SHARE = 0.35  # of the load's rise that a drive at its limit takes from its speed: one, where the whole stroke is at it
 CEILING_T = 6.0
 
@@ -135,7 +135,8 @@ def _ceiling(strokes: list[Stroke]) -> float:
     y = np.concatenate([-viscous * (s.velocity - np.mean(s.velocity)) for s in mine])
     share = float(x @ y / max(x @ x, 1e-12))
     error = float(np.std(y - share * x) / np.sqrt(max(x @ x, 1e-12)))
-    if share < CEILING_SHARE or share < CEILING_T * error:
+    followed = float(x @ np.concatenate([s.current - np.mean(s.current) for s in mine]) / max(x @ x, 1e-12))
+    if share < CEILING_SHARE or share < CEILING_T * error or followed > 1 - CEILING_SHARE:
         return np.nan
     return float(np.median(np.concatenate([s.current for s in mine])))
 
@@ -176,7 +177,7 @@ def refused(actuator: str, finger: str | None, trials: tuple[str, ...]) -> tuple
     fit = {"metric": "current_rmse", "unit": "raw", "before": None, "after": None, "noise_floor": None, "ci95_reduction": None,
            "held_out": [], "engine": None}
     where = {**_where(actuator, finger), "signal": "current", "trials": list(trials)}
-    text = f"The current of {actuator} is no measurement: it has no noise and does not follow the motion; nothing is fitted to it."
+    text = f"The current of {actuator} is no measurement: it does not follow the motion; nothing is fitted to it."
     return 1e9, Finding("command_as_measurement", ("command_as_measurement",), 0.999, (), where, text, {}, fit, None,
                         "the channel is refused")
 

@@ -23,7 +23,7 @@ from .evidence import typical_coefficients
 from .findings import Finding, Findings
 from .gravity import with_gravity
 from .improve import read_model, write_improved
-from .interval import held_out, parameter_intervals, proven, variance_ratio
+from .interval import held_out, parameter_intervals, proven, sized, variance_ratio
 from .name import ALPHA, Named, Naming, name_effects, polish, scan
 from .page import write_page
 from .prove import Replay
@@ -171,7 +171,7 @@ class Station:
 
     def __init__(self, signal: str, finger: str | None, actuator: str | None, joint: str | None, naming: Naming) -> None:
         self.signal, self.finger, self.actuator, self.joint, self.naming = signal, finger, actuator, joint, naming
-        self.proven = tuple(f for f in naming.found if proven(naming, naming.fit.terms.index(f.term)))
+        self.proven = tuple(f for f in naming.found if proven(naming, naming.fit.terms.index(f.term)) and sized(naming, f))
 
     @property
     def missing(self) -> bool:

@@ -21,6 +21,7 @@ GIVE_LEAST, GIVE_MOST = 0.02, 1.2  # [%] of the declared Coulomb friction's bris
 GIVE_UNSEEN = 0.12  # [%] differences of bristles below this are within what starts tell
 SETTLE_SAMPLES = (14, 13)  # after a start and before a stop: where acceleration is smeared by the kernel
 
+UNMOVED = 0.95  # of a current's standard deviation: more than this left by the motion, and it measures nothing
 SETTLE_TRAVEL = 4.0  # [%] some six bristle lengths of a healthy drive
 
 
@@ -94,8 +95,8 @@ def _prepare(
 
 
 def is_measured(states: tuple[DriveState, ...]) -> bool:
-    """False where the current channel is dead, or so free of noise beside a motion that it does not explain that it can
-    only be a command."""
+    """False where the current channel is dead, where the motion explains nothing of it (friction alone turns over with every
+    reversal), or where it is so free of noise beside a motion that it does not explain that it can only be a command."""
     current = np.concatenate([s.effort[np.isfinite(s.effort)] for s in states])
     if len(current) < 50:
         return True
@@ -106,7 +107,7 @@ def is_measured(states: tuple[DriveState, ...]) -> bool:
     scale = np.linalg.norm(declared, axis=0) + 1e-12
     left = float(np.std(current - declared @ (np.linalg.lstsq(declared / scale, current, rcond=None)[0] / scale)))
     jitter = float(np.median(np.abs(np.diff(current, 2)))) / 0.6745 / np.sqrt(6)
-    return not (jitter < 0.03 * spread and left > 10 * max(jitter, 0.02 * spread))
+    return left < UNMOVED * spread and not (jitter < 0.03 * spread and left > 10 * max(jitter, 0.02 * spread))
 
 
 def steady(time_s: Array, motion: Motion) -> NDArray[np.bool_]:

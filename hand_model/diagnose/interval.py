@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .balance import DISCRETE, Balance, Fit, Term
 from .evidence import oddity
-from .name import Naming, refit
+from .name import Named, Naming, refit
 
 Array = NDArray[np.float64]
 
@@ -174,6 +174,13 @@ def proven(naming: Naming, which: int) -> bool:
     without = balance.fit(tuple(t for i, t in enumerate(fit.terms) if i != which))
     r0, r1 = (np.sum(((balance.effort - f.prediction) * balance.weight)[~balance.train] ** 2) for f in (without, fit))
     return bool(r1 < r0)
+
+
+def sized(naming: Naming, named: Named) -> bool:
+    """Whether the size of an effect, read from steady motion, is told from zero; True where no interval is given."""
+    entries = parameter_intervals(naming, naming.fit.terms.index(named.term))
+    bounds = [entries[name]["ci95"] for name in named.amplitudes if "ci95" in entries.get(name, {})]
+    return not bounds or any(low > 0 or high < 0 for low, high in bounds)
 
 
 def variance_ratio(naming: Naming, fit: Fit) -> float:

@@ -11,7 +11,7 @@ from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
 
 class ExternalContact(Effect):
     """F = k max(0, x - x0) (form 0) or k max(0, x - x0)^2 (form 1) from a moment of one trial on to its end: an elastic
-    obstacle that was not always there. Whether it is still there in validation recordings is for those to say.
+    obstacle that was not always there, met after some free motion. Whether it is still there in validation recordings is for those to say.
     """
 
     name = "external_contact"
@@ -25,7 +25,7 @@ class ExternalContact(Effect):
         return (Shape("trial", "1", 0.0, len(states) - 1.0, tuple(float(i) for i, s in enumerate(states) if not s.validate)),
                 Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),
                 Shape("since", "1", 0.0, 0.9, (0.0, 0.2, 0.35, 0.5, 0.65, 0.8)),
-                Shape("begin", states[0].position_unit, low + 0.02 * span, high - 0.02 * span,
+                Shape("begin", states[0].position_unit, low + 0.08 * span, high - 0.02 * span,
                       tuple(low + span * np.linspace(0.1, 0.9, 9))))
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
