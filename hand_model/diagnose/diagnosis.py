@@ -171,7 +171,9 @@ class Station:
 
     def __init__(self, signal: str, finger: str | None, actuator: str | None, joint: str | None, naming: Naming) -> None:
         self.signal, self.finger, self.actuator, self.joint, self.naming = signal, finger, actuator, joint, naming
-        self.proven = tuple(f for f in naming.found if proven(naming, naming.fit.terms.index(f.term)) and sized(naming, f))
+        places = {id(f): naming.fit.terms.index(f.term) for f in naming.found}
+        self.parameters = {which: parameter_intervals(naming, which) for which in places.values() if proven(naming, which)}
+        self.proven = tuple(f for f in naming.found if places[id(f)] in self.parameters and sized(f, self.parameters[places[id(f)]]))
 
     @property
     def missing(self) -> bool:
@@ -326,7 +328,7 @@ def _finding(station: Station, named: Named, share: float) -> tuple[float, Findi
     naming = station.naming
     which = naming.fit.terms.index(named.term)
     effect = named.term.effect
-    parameters = parameter_intervals(naming, which)
+    parameters = dict(station.parameters[which])
     parameters |= effect.further(naming.balance.states, parameters)
     values = {k: v["value"] for k, v in parameters.items()}
     where: dict[str, Any] = {

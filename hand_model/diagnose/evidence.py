@@ -1,7 +1,7 @@
 """Log evidence of one more term in a balance: what it gains, less what its freedom could gain by chance.
 
-Amplitudes carry a prior as wide as the data find likely (empirical Bayes; George & Foster 2000, eq. 9), shapes are uniform
-within the bounds that the effect declares (Laplace's method; Kass & Raftery 1995, eq. 4). Sums of squares count divided by
+Amplitudes carry a prior as wide as the data find likely (empirical Bayes; George & Foster 2000), shapes are uniform
+within the bounds that the effect declares (Laplace's method; Kass & Raftery 1995). Sums of squares count divided by
 the correlation time of the noise.
 """
 
@@ -80,8 +80,7 @@ def _occam(balance: Balance, fit: Fit, which: int, shape: Shape, scale: float) -
     step = 0.02 * span
     width = span
     for _ in range(5):
-        rise = gain(balance, fit, _moved(balance, fit, which, name, value + toward * step), scale)
-        rise = -rise if rise < 0 else rise
+        rise = abs(gain(balance, fit, _moved(balance, fit, which, name, value + toward * step), scale))
         width = step / np.sqrt(max(2 * rise, 1e-6))
         if 0.1 < rise < 8:
             break

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from copy import copy
 from typing import Any
 
@@ -60,16 +61,13 @@ def undisturbed(naming: Naming, which: int) -> tuple[Balance, Fit]:
         return balance, fit
     calm = copy(balance)
     calm.weight = np.where(balance.steady, balance.weight, 1e-3 * balance.weight)
-    term, best = fit.terms[which], None
+    term, fits = fit.terms[which], []
     forms = next((s.starts for s in term.effect.shapes(balance.states) if s.name == "form"), (None,))
     for form in forms:
         shape = term.shape if form is None else {**term.shape, "form": form}
         terms = tuple(Term(t.effect, shape) if i == which else t for i, t in enumerate(fit.terms))
-        found = refit(calm, calm.fit(terms))
-        lost = 0.5 * found.rss / calm.inflation + oddity(calm, found)
-        if best is None or lost < best[0]:
-            best = (lost, found)
-    return calm, best[1] if best is not None else fit
+        fits.append(refit(calm, calm.fit(terms)))
+    return calm, min(fits, key=lambda found: 0.5 * found.rss / calm.inflation + oddity(calm, found))
 
 
 def _one(term: Term, which: int, name: str, values: Any) -> float:
@@ -176,9 +174,8 @@ def proven(naming: Naming, which: int) -> bool:
     return bool(r1 < r0)
 
 
-def sized(naming: Naming, named: Named) -> bool:
-    """Whether the size of an effect, read from steady motion, is told from zero; True where no interval is given."""
-    entries = parameter_intervals(naming, naming.fit.terms.index(named.term))
+def sized(named: Named, entries: Mapping[str, Mapping[str, Any]]) -> bool:
+    """Whether the size of an effect is told from zero by its `entries` (of `parameter_intervals`); True without an interval."""
     bounds = [entries[name]["ci95"] for name in named.amplitudes if "ci95" in entries.get(name, {})]
     return not bounds or any(low > 0 or high < 0 for low, high in bounds)
 
