@@ -38,6 +38,9 @@ def parameters(pseudo: Array) -> Array:
     return np.array([pseudo[3, 3], *pseudo[3, :3], *np.diag(about), about[0, 1], about[0, 2], about[1, 2]])
 
 
+LINEAR = np.array([parameters(e.reshape(4, 4)) for e in np.eye(16)])  # (16, 10): parameters are linear in it
+
+
 def is_physical(p: Array) -> bool:
     """Whether a body can have parameters (10,), to the precision of floating point."""
     level = np.linalg.eigvalsh(pseudo_inertia(p))
@@ -79,13 +82,26 @@ def consistent(columns: Sequence[Column], declared: Array, theta: Array, gram: A
         start.append(values[LOWER][masks[-1]])
     sizes = np.cumsum([0] + [len(s) for s in start])
 
-    def body(x: Array, k: int) -> Array:
+    def factor_of(x: Array, k: int) -> Array:
         values = np.zeros(10)
         values[masks[k]] = x
         factor = np.zeros((4, 4))
         factor[LOWER] = values
         np.fill_diagonal(factor, np.exp(np.clip(np.diag(factor), -40, 20)))
+        return factor
+
+    def body(x: Array, k: int) -> Array:
+        factor = factor_of(x, k)
         return parameters(factor @ factor.T)
+
+    def body_slope(x: Array, k: int) -> Array:
+        """d body / d x (10, len(x)): each entry of the factor changes one row of it."""
+        factor = factor_of(x, k)
+        unit = np.zeros((len(x), 4, 4))
+        row, column = LOWER[0][masks[k]], LOWER[1][masks[k]]
+        unit[np.arange(len(x)), row, column] = np.where(row == column, factor[row, column], 1.0)
+        half = unit @ factor.T
+        return (half + np.swapaxes(half, 1, 2)).reshape(-1, 16).dot(LINEAR).T
 
     def whole(x: Array) -> Array:
         out = np.zeros(len(theta))
@@ -97,11 +113,7 @@ def consistent(columns: Sequence[Column], declared: Array, theta: Array, gram: A
     def slope(x: Array) -> Array:
         out = np.zeros((len(theta), len(x)))
         for k, i in enumerate(own):
-            part = x[sizes[k] : sizes[k + 1]]
-            for n in range(len(part)):
-                step = np.zeros(len(part))
-                step[n] = 1e-6
-                out[i[i >= 0], sizes[k] + n] = ((body(part + step, k) - body(part - step, k)) / 2e-6)[i >= 0]
+            out[i[i >= 0], sizes[k] : sizes[k + 1]] = body_slope(x[sizes[k] : sizes[k + 1]], k)[i >= 0]
         out[rest, sizes[-1] + np.arange(len(rest))] = unit[rest]
         return matrix @ out
 

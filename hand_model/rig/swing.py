@@ -7,7 +7,7 @@ simulated position out, nothing filtered.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -149,22 +149,25 @@ def _run(swing: Swing, theta: Array, lanes: Array, steps: int, residual: bool) -
     sine, cosine = np.array([c.weight or (swing.sine, swing.cosine) for c in chosen]).T
     lateral = cosine + p["lateral"]
     bends = bool(np.any(lateral))
-    position, used = _stacked(swing)[2:4]
-    drive = _drive(swing, theta, lanes, has) if swing.driven else None
+    drive = _drive(swing, theta, lanes, has, steps) if swing.driven else None
     # Semi-implicit Euler is leapfrog when the velocity starts half a step early: second order instead of first.
     if not swing.driven:
         v = v + 0.5 * p["hi"] * (sine * np.sin(q) + lateral * np.cos(q))
     out = np.empty((steps, len(lanes)))
     with np.errstate(all="ignore"):
         for k in range(steps):
-            out[k] = (q - position[k, lanes]) * used[k, lanes] if residual else q
+            out[k] = q
             external = -sine * np.sin(q)
             if bends:
                 external -= lateral * np.cos(q)
             if has["stiffness"]:
                 external -= p["stiffness"] * q
-            v = _next_speed(p, has, v, external, None if drive is None else drive(k))
+            v = _next_speed(p, has, v, external, None if drive is None else drive[k])
             q = q + h * v
+        if residual:
+            position, used = _stacked(swing)[2:4]
+            out -= position[:steps, lanes]
+            out *= used[:steps, lanes]
     return out
 
 
@@ -221,26 +224,21 @@ def _low_speed(p: Mapping[str, Array], has: Mapping[str, bool], external: Array,
     return level
 
 
-def _drive(swing: Swing, theta: Array, lanes: Array, has: Mapping[str, bool]) -> Callable[[int], Array]:
-    """Drive effort (L,) at a step: gain x recorded drive, late by the delay, less by sag, scaled by the supply."""
-    recorded, supply = _stacked(swing)[:2]
+def _drive(swing: Swing, theta: Array, lanes: Array, has: Mapping[str, bool], steps: int) -> Array:
+    """Drive effort (steps, L): gain x recorded drive, late by the delay, less by sag, scaled by the supply."""
+    recorded, supply = (values[:steps] for values in _stacked(swing)[:2])
     gain, sag, share = (theta[:, INDEX[n]] for n in ("gain", "sag", "supply"))
-    late = theta[:, INDEX["delay"]] / swing.step_s
-    whole = np.ceil(late).astype(int)
-    part = whole - late
-
-    def effort(k: int) -> Array:
-        if has["delay"]:
-            low = np.maximum(k - whole, 0)
-            u = recorded[low, lanes] * (1 - part) + recorded[np.maximum(np.minimum(k - whole + 1, k), 0), lanes] * part
-        else:
-            u = recorded[k, lanes]
-        if has["supply"]:
-            u = u * (1.0 + share * supply[k, lanes])
-        u = u * gain
-        return u * (1.0 - sag * np.abs(u)) if has["sag"] else u
-
-    return effort
+    if has["delay"]:
+        late = theta[:, INDEX["delay"]] / swing.step_s
+        whole = np.ceil(late).astype(int)
+        k, part = np.arange(steps)[:, None] - whole, whole - late
+        u = recorded[np.maximum(k, 0), lanes] * (1 - part) + recorded[np.clip(k + 1, 0, steps - 1), lanes] * part
+    else:
+        u = recorded[:, lanes]
+    if has["supply"]:
+        u = u * (1.0 + share * supply[:, lanes])
+    u = u * gain
+    return u * (1.0 - sag * np.abs(u)) if has["sag"] else u
 
 
 @dataclass(frozen=True)
