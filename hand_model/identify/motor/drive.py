@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 STEP_S = 2e-3
 SHARED = ("inertia", "viscous", "coulomb", "stiffness", "preload", "presliding", "bristle", "speed_full", "rise", "gain", "damping", "delay", "lead")
-CONTROLLERS = {"profile": (*SHARED, "fall"), "cascade": (*SHARED, "position_gain", "deadband")}
+CONTROLLERS = {"profile": (*SHARED, "fall", "lag"), "cascade": (*SHARED, "position_gain", "deadband")}
 STRIBECK = ("static_ratio", "stribeck_speed")
 
 
@@ -46,110 +46,239 @@ class Moves:
 
 
 def profile(time_s: Array, moves: Moves, q: Mapping[str, Array]) -> tuple[Array, Array]:
-    """Reference [%] and its velocity [%/s], (n, B), of trapezoidal moves at times (n,) [s]."""
-    distance, sign = np.abs(moves.target - moves.origin), np.sign(moves.target - moves.origin)
+    """Reference [%] and its velocity [%/s], (n, B), of trapezoidal moves at times (n,) [s]; the velocity `lag` [s] behind."""
+    t = time_s[:, None] - moves.start_s
+    sign = np.sign(moves.target - moves.origin)
+    return moves.origin + sign * _trapezoid(t, moves, q)[0], sign * _trapezoid(t - q["lag"], moves, q)[1]
+
+
+def _trapezoid(t: Array, moves: Moves, q: Mapping[str, Array]) -> tuple[Array, Array]:
+    """Way [%] and speed [%/s], (n, B), at times (n, B) [s] after the command."""
+    distance = np.abs(moves.target - moves.origin)
     up, down = q["speed_full"] / np.maximum(q["rise"], 1e-4), q["speed_full"] / np.maximum(q["fall"], 1e-4)
     top = np.minimum(q["speed_full"] * moves.speed, np.sqrt(2 * distance * up * down / (up + down)))
     top = np.maximum(top, 1e-9)
     t_up, t_down = top / up, top / down
     t_flat = np.maximum(distance / top - 0.5 * (t_up + t_down), 0.0)
-    t = time_s[:, None] - moves.start_s
-    a = np.clip(t, 0.0, t_up)
-    b = np.clip(t - t_up, 0.0, t_flat)
-    c = np.clip(t - t_up - t_flat, 0.0, t_down)
-    reference = 0.5 * up * a * a + top * b + (top - 0.5 * down * c) * c
-    return moves.origin + sign * reference, sign * (up * a - down * c)
+    a = np.minimum(np.maximum(t, 0.0), t_up)
+    b = np.minimum(np.maximum(t - t_up, 0.0), t_flat)
+    c = np.minimum(np.maximum(t - t_up - t_flat, 0.0), t_down)
+    return 0.5 * up * a * a + top * b + (top - 0.5 * down * c) * c, up * a - down * c
 
 
 def simulate(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, controller: str = "profile") -> tuple[Array, Array, Array]:
     """Time (n,) [s], position (n, B) [%] and current (n, B) [raw] of B moves under B parameter sets (each (B,)).
 
     Every move starts at rest in balance, so its friction there is what the controller pushes less the spring; where it creeps,
-    friction is that of sliding.
+    friction is that of sliding. Friction without presliding in any set sticks hard.
     Rows after a move's duration are not filled.
     """
     n = int(np.ceil(moves.duration_s.max() / step_s)) + 2
     time_s = np.arange(n) * step_s
-    cascade = controller == "cascade"
-    r, w = (None, None) if cascade else profile(time_s, moves, q)
-    active = np.searchsorted(-moves.duration_s, -(time_s - 2 * step_s), side="right")
-    gain, damping, limit = q["gain"], q["damping"], moves.limit
-    spring, preload, viscous = q["stiffness"], q["preload"], q["viscous"]
-    exponent, bristle = q["stribeck_exponent"], q["bristle"]
-    ratio, per_speed = q["static_ratio"] - 1.0, 1.0 / q["stribeck_speed"]
-    coulomb, distance = q["coulomb"], q["presliding"]
-    has_stribeck = bool(np.any(ratio != 0.0))
+    steer = _Cascade(moves, q, step_s, time_s) if controller == "cascade" else _Profile(moves, q, time_s)
+    position, current = _run(moves, q, steer, step_s, n, np.inf)
+    if np.any(np.abs(current) > moves.limit):
+        steer = _Cascade(moves, q, step_s, time_s) if controller == "cascade" else steer
+        position, current = _run(moves, q, steer, step_s, n, moves.limit)
+    return time_s, position, current
+
+
+def _run(moves: Moves, q: Mapping[str, Array], steer: _Profile | _Cascade, step_s: float, n: int, limit: Array | float) -> tuple[Array, Array]:
+    """Position [%] and current [raw], (n, B), of drives that follow what `steer` says, their current within the limit [raw]."""
+    active = np.searchsorted(-moves.duration_s, -((np.arange(n) - 2) * step_s), side="right")
+    position, current = np.zeros((n, len(moves.target))), np.zeros((n, len(moves.target)))
     half = 0.5 * step_s
-    mass = q["inertia"] / half
-    position, current = np.empty((n, len(moves.target))), np.empty((n, len(moves.target)))
     p, v = moves.position.copy(), np.zeros(len(moves.target)) + moves.velocity
-    u = np.clip(moves.hold if cascade else gain * (r[0] - p), -limit, limit)
-    if cascade:
-        r_now, w_now = p + (u + damping * v) / gain, np.zeros(len(p))
-        slew, top_speed = step_s * q["speed_full"] / np.maximum(q["rise"], 1e-4), q["speed_full"] * moves.speed
-        started = moves.start_s
-    top = coulomb * (1.0 + ratio)
-    f = np.where(v == 0.0, np.clip(u - spring * p - preload, -top, top), np.sign(v) * top)
-    touch = "contact_stiffness" in q
-    linear = mass + viscous + half * spring
-    delay = np.minimum(q["delay"], 0.8 * q["inertia"] / np.maximum(damping, 1e-9))
-    closed = gain * (half - delay) + damping * (1.0 - delay / half)
     a = np.zeros(len(p))
+    friction = (_Stick if not np.any(q["presliding"]) else _Bristles)(q, step_s)
+    friction.begin(np.clip(steer.first(p, v), -limit, limit) - q["stiffness"] * p - q["preload"], v)
+    late = np.minimum(q["delay"], 0.8 * q["inertia"] / np.maximum(q["damping"], 1e-9))
+    mass, sprung = q["inertia"] / half, q["stiffness"] + q["gain"]
+    gain, keep, late_push = q["gain"], q["damping"] - q["gain"] * late, q["damping"] * late
+    moving, preload, limit = mass - late_push / half, q["preload"], limit + np.zeros(len(p))
+    plant = mass + q["viscous"] + half * q["stiffness"]
+    closed = gain * (half - late) + q["damping"] * (1.0 - late / half)
+    contact = _Contact(q, half) if "contact_stiffness" in q else None
+    bounded = bool(np.isfinite(limit).any())
     for i in range(n):
         k = active[i]
         if k == 0:
             break
         if k < len(p):
-            p, v, f, a = p[:k], v[:k], f[:k], a[:k]
-        if cascade:
-            r_now, w_now = r_now[:k], w_now[:k]
-            # the share of this step that lies behind the command, so that its instant counts within a step too
-            since = np.minimum(np.maximum((time_s[i] + step_s - started[:k]) / step_s, 0.0), 1.0)
-            share, change = _cascade(q, k, moves.target[:k] - p, w_now, top_speed, slew)
-            if since.min() < 1.0:
-                old_share, old_change = _cascade(q, k, moves.origin[:k] - p, w_now, top_speed, slew)
-                share, change = since * share + (1 - since) * old_share, since * change + (1 - since) * old_change
-            w_next = w_now + change
-            r_next = r_now + 0.5 * step_s * (w_now + w_next)
-        else:
-            r_now, w_now = r[i, :k], w[i, :k]
-            r_next, w_next = (r[i + 1, :k], w[i + 1, :k]) if i + 1 < n else (r_now, w_now)
-        late = delay[:k]
-        u = gain[:k] * (r_now - p + late * v) + damping[:k] * (w_now - v + late * a)
+            p, v, a, gain, keep, late_push, moving, sprung, preload, limit, plant, closed, mass = (
+                x[:k] for x in (p, v, a, gain, keep, late_push, moving, sprung, preload, limit, plant, closed, mass)
+            )
+            friction.narrow(k)
+        now, middle_push = steer.push(i, p)
         position[i, :k] = p
-        current[i, :k] = np.minimum(np.maximum(u, -limit[:k]), limit[:k])
-        if i + 1 == n:
-            break
-        level = coulomb[:k]
-        if has_stribeck:
-            level = level * (1.0 + ratio[:k] * np.exp(-(np.abs(v * per_speed[:k]) ** exponent[:k])))
-        ahead = gain[:k] * (0.5 * (r_now + r_next) - p) + damping[:k] * 0.5 * (w_now + w_next)
-        rest = mass[:k] * v - spring[:k] * p - preload[:k] - f
-        ahead = ahead - damping[:k] * late * v / half
-        push = rest + ahead
-        way = np.sign(push)
-        travel = np.maximum(step_s * np.abs(v), 1e-6 * distance[:k])
-        slope = (level - f * way) * -np.expm1(-travel / distance[:k]) / travel
-        inner = linear[:k] + (half + bristle[:k]) * slope
-        if touch:
-            pressed = np.where(p > q["contact_at"][:k], q["contact_stiffness"][:k], 0.0)
-            push = push - pressed * (p - q["contact_at"][:k])
-            rest = rest - pressed * (p - q["contact_at"][:k])
-            inner = inner + pressed * (half + q["contact_damping"][:k])
-        middle = push / (inner + closed[:k])
-        u_middle = ahead - closed[:k] * middle
-        over = np.abs(u_middle) > limit[:k]
-        if over.any():
-            middle = np.where(over, (rest + np.sign(u_middle) * limit[:k]) / inner, middle)
-        if cascade:  # within the deadband the integral holds: the reference goes with the drive
-            r_now = share * r_next + (1 - share) * (r_now + step_s * middle)
-            w_now = w_next
+        u = now - gain * p - keep * v + late_push * a
+        current[i, :k] = np.minimum(np.maximum(u, -limit), limit) if bounded else u
+        total = middle_push - preload + moving * v - sprung * p
+        inner = plant
+        if contact is not None:
+            pressed, stiffer = contact.load(p)
+            total, inner = total - pressed, plant + stiffer
+        middle = friction.velocity(total, inner + closed, v)
+        if bounded:
+            own = total - (middle_push - gain * p - (late_push / half) * v)  # what is left without the controller
+            u_middle = total - own - closed * middle
+            over = np.abs(u_middle) > limit
+            if over.any():
+                middle = np.where(over, friction.velocity(own + np.sign(u_middle) * limit, inner, v), middle)
+        steer.advance(middle)
         p = p + step_s * middle
-        a = (middle - v) / half
-        v = 2.0 * middle - v
-        limit_f = np.sign(middle) * level
-        f = limit_f + (f - limit_f) * np.exp(-step_s * np.abs(middle) / distance[:k])
-    return time_s, position, current
+        fresh = friction.advance(v, middle)
+        a = (fresh - v) / step_s
+        v = fresh
+    return position, current
+
+
+class _Profile:
+    """What a trapezoidal profile adds to the current: gain r + damping r', at the steps and between them."""
+
+    def __init__(self, moves: Moves, q: Mapping[str, Array], time_s: Array) -> None:
+        t, sign = time_s[:, None] - moves.start_s, np.sign(moves.target - moves.origin)
+        r = moves.origin + sign * _trapezoid(t, moves, q)[0]
+        way, speed = _trapezoid(t - q["lag"], moves, q)
+        self.at = q["gain"] * r + q["damping"] * sign * speed
+        # the mean over a step is exact where the velocity jumps within it
+        self.between = np.empty_like(r)
+        self.between[:-1] = q["gain"] * 0.5 * (r[1:] + r[:-1]) + q["damping"] * sign * np.diff(way, axis=0) / (time_s[1] - time_s[0])
+        self.between[-1] = self.at[-1]
+        self.hold = q["gain"] * r[0], q["gain"]
+
+    def first(self, p: Array, v: Array) -> Array:
+        """Current (B,) [raw] before the move, at rest at positions (B,) [%]."""
+        return self.hold[0] - self.hold[1] * p
+
+    def push(self, i: int, p: Array) -> tuple[Array, Array]:
+        """Its part of the current (k,) [raw] at step i and in the middle of the step."""
+        return self.at[i, : len(p)], self.between[i, : len(p)]
+
+    def advance(self, middle: Array) -> None:
+        """Nothing: the profile does not see the drive."""
+
+
+class _Cascade:
+    """What a position loop round a speed loop adds to the current; r goes with the drive within the deadband."""
+
+    def __init__(self, moves: Moves, q: Mapping[str, Array], step_s: float, time_s: Array) -> None:
+        self.q, self.moves, self.step_s, self.time_s = q, moves, step_s, time_s
+        self.slew, self.top_speed = step_s * q["speed_full"] / np.maximum(q["rise"], 1e-4), q["speed_full"] * moves.speed
+        self.last_start = float(moves.start_s.max())
+
+    def first(self, p: Array, v: Array) -> Array:
+        """Current (B,) [raw] before the move: what held the drive."""
+        self.r, self.w = p + (self.moves.hold + self.q["damping"] * v) / self.q["gain"], np.zeros(len(p))
+        return self.moves.hold
+
+    def push(self, i: int, p: Array) -> tuple[Array, Array]:
+        """Its part of the current (k,) [raw] at step i and in the middle of the step."""
+        k, q, step_s = len(p), self.q, self.step_s
+        r, w = self.r[:k], self.w[:k]
+        share, change = _cascade(q, k, self.moves.target[:k] - p, w, self.top_speed, self.slew)
+        if self.time_s[i] < self.last_start:
+            # the share of this step that lies behind the command, so that its instant counts within a step too
+            since = np.minimum(np.maximum((self.time_s[i] + step_s - self.moves.start_s[:k]) / step_s, 0.0), 1.0)
+            old_share, old_change = _cascade(q, k, self.moves.origin[:k] - p, w, self.top_speed, self.slew)
+            share, change = since * share + (1 - since) * old_share, since * change + (1 - since) * old_change
+        self.w = w + change
+        self.r, self.share, self.r_next = r, share, r + 0.5 * step_s * (w + self.w)
+        now = q["gain"][:k] * r + q["damping"][:k] * w
+        return now, 0.5 * (now + q["gain"][:k] * self.r_next + q["damping"][:k] * self.w)
+
+    def advance(self, middle: Array) -> None:
+        """One step with the drive at velocity `middle` (k,) [%/s]: within the deadband the integral holds."""
+        self.r = self.share * self.r_next + (1 - self.share) * (self.r + self.step_s * middle)
+
+
+class _Stick:
+    """Coulomb friction that truly sticks; set-valued at rest, solved implicitly (Moreau's sweeping process; Acary & Brogliato 2008)."""
+
+    def __init__(self, q: Mapping[str, Array], step_s: float) -> None:
+        self.rise = _Rise(q)
+
+    def begin(self, load: Array, v: Array) -> None:
+        """Nothing: what holds a drive at rest follows from its balance."""
+
+    def narrow(self, k: int) -> None:
+        """Keep the first k drives."""
+        self.rise.narrow(k)
+
+    def velocity(self, total: Array, inner: Array, v: Array) -> Array:
+        """Velocity (k,) [%/s] in the middle of a step, of all other efforts [raw] and what resists velocity [raw s/%]."""
+        level = self.rise.level(v)
+        return (total - np.minimum(np.maximum(total, -level), level)) / inner
+
+    def advance(self, v: Array, middle: Array) -> Array:
+        """Velocity (k,) [%/s] at the end of the step; a drive that would turn round has stopped."""
+        fresh = 2.0 * middle - v
+        return np.where(fresh * v < 0.0, 0.0, fresh)
+
+
+class _Bristles:
+    """LuGre's friction (see the module's docstring), linear within a step."""
+
+    def __init__(self, q: Mapping[str, Array], step_s: float) -> None:
+        self.rise, self.step_s = _Rise(q), step_s
+        self.distance, self.reach = np.maximum(q["presliding"], 1e-4), 0.5 * step_s + q["bristle"]
+        self.per = 1.0 / self.distance
+
+    def begin(self, load: Array, v: Array) -> None:
+        """Friction of drives in balance with a load (B,) [raw], or sliding at v (B,) [%/s]."""
+        top = self.rise.top
+        self.f = np.where(v == 0.0, np.clip(load, -top, top), np.sign(v) * top)
+
+    def narrow(self, k: int) -> None:
+        """Keep the first k drives."""
+        self.rise.narrow(k)
+        self.f, self.distance, self.reach, self.per = self.f[:k], self.distance[:k], self.reach[:k], self.per[:k]
+
+    def velocity(self, total: Array, inner: Array, v: Array) -> Array:
+        """Velocity (k,) [%/s] in the middle of a step, of all other efforts [raw] and what resists velocity [raw s/%]."""
+        push = total - self.f
+        self.level = self.rise.level(v)
+        travel = np.maximum(self.step_s * np.abs(v), 1e-6 * self.distance)
+        slope = (self.level - self.f * np.sign(push)) * -np.expm1(-travel * self.per) / travel
+        return push / (inner + self.reach * slope)
+
+    def advance(self, v: Array, middle: Array) -> Array:
+        """Velocity (k,) [%/s] at the end of the step; the bristles go with it."""
+        limit = np.sign(middle) * self.level
+        self.f = limit + (self.f - limit) * np.exp(-self.step_s * np.abs(middle) * self.per)
+        return 2.0 * middle - v
+
+
+class _Rise:
+    """The level of friction [raw] over speed: Coulomb, with a Stribeck rise where any drive has one."""
+
+    def __init__(self, q: Mapping[str, Array]) -> None:
+        self.coulomb, self.ratio, self.per_speed, self.exponent = q["coulomb"], q["static_ratio"] - 1.0, 1.0 / q["stribeck_speed"], q["stribeck_exponent"]
+        self.flat = not np.any(self.ratio != 0.0)
+        self.top = self.coulomb * (1.0 + self.ratio)
+
+    def narrow(self, k: int) -> None:
+        """Keep the first k drives."""
+        self.coulomb, self.ratio, self.per_speed, self.exponent = self.coulomb[:k], self.ratio[:k], self.per_speed[:k], self.exponent[:k]
+
+    def level(self, v: Array) -> Array:
+        """Friction (k,) [raw] of sliding at velocities (k,) [%/s]."""
+        if self.flat:
+            return self.coulomb
+        return self.coulomb * (1.0 + self.ratio * np.exp(-(np.abs(v * self.per_speed) ** self.exponent)))
+
+
+class _Contact:
+    """An object: a one-sided spring with damping."""
+
+    def __init__(self, q: Mapping[str, Array], half: float) -> None:
+        self.stiffness, self.at, self.reach = q["contact_stiffness"], q["contact_at"], half + q["contact_damping"]
+
+    def load(self, p: Array) -> tuple[Array, Array]:
+        """Load (k,) [raw] at positions (k,) [%], and what it resists velocity with [raw s/%]."""
+        k = len(p)
+        pressed = np.where(p > self.at[:k], self.stiffness[:k], 0.0)
+        return pressed * (p - self.at[:k]), pressed * self.reach[:k]
 
 
 def _cascade(q: Mapping[str, Array], k: int, error: Array, speed: Array, top_speed: Array, slew: Array) -> tuple[Array, Array]:

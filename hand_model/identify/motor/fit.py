@@ -14,9 +14,10 @@ from ...hand import Estimate, Motor
 from ...session import Session
 from . import output_error
 from .balance import NAMES
+from .controller import find_controller
 from .drive import CONTROLLERS, STRIBECK
-from .moves import BEFORE, MoveData, moves_from_rest, shortened
-from .output_error import OutputErrorFit
+from .moves import BEFORE, MoveData, moves_from_rest
+from .output_error import STAGES, OutputErrorFit
 from .published import PublishedFit, fit_published, smear_share
 from .recording import MotorTrial, Scale, actuator_trials, check_trials, motor_trial, trial_scale
 from .weak_form import Regression, fit_regressions
@@ -43,13 +44,14 @@ UNITS = {
     "damping": "raw s/%",
     "delay": "s",
     "lead": "s",
+    "lag": "s",
     "edge": "%",
 }
 BOUNDS = {
     "inertia": (1e-5, 1e3),
     "viscous": (-1e3, 1e4),
     "coulomb": (1e-3, 1e5),
-    "presliding": (0.005, 10.0),
+    "presliding": (0.02, 10.0),
     "bristle": (0.0, 0.2),
     "speed_full": (1.0, 1e4),
     "rise": (0.0, 3.0),
@@ -60,12 +62,11 @@ BOUNDS = {
     "damping": (0.0, 1e3),
     "delay": (-0.002, 0.02),
     "lead": (-0.01, 0.01),
+    "lag": (-0.005, 0.005),
     "static_ratio": (1.0, 8.0),
     "stribeck_speed": (1.5, 100.0),
 }
-MOVE_S = 2.5  # of a move that is simulated: the rest of a slow one says little more
-LACK_OF_FIT = 1.5  # residual variance over the noise's, above which output error does not describe the recording
-NEAR, FAR = 5.0, 10.0  # a start is not tried when another came near the noise and it began so many times farther off
+LACK_OF_FIT = 0.5  # systematic misfit [noise variances] above which output error does not describe the recording
 CLAIM = 6.0  # standard errors, by a jackknife over some forty strokes, above which the regression claims a Stribeck rise
 REGRESSION_MISFIT = 4.0  # the same for the regression; noise with a memory of a sample or two reaches 3
 EVIDENCE = 16.0  # fall of the misfit (in variances, two parameters and two shapes tried): once in about a thousand by chance
@@ -180,10 +181,10 @@ def fit_motor(trials: Sequence[MotorTrial], scale: Scale, actuator: str = "motor
     best, evidence = None, 0.0
     if len(moves) >= 4:
         best, evidence = _fit_output_error(moves, plain, curved, (sigma_p, sigma_u))
-    accepted = best is not None and max(best.chi2) < LACK_OF_FIT
+    accepted = best is not None and output_error.lack_of_fit(best) < LACK_OF_FIT
     notes = []
     if accepted:
-        sigma_p, sigma_u = sigma_p * np.sqrt(best.chi2[0]), sigma_u * np.sqrt(best.chi2[1])
+        sigma_p, sigma_u = (s * np.sqrt(c) for s, c in zip(best.sigma, best.chi2, strict=True))
         values, names, covariance = dict(best.values), best.names, best.covariance
         stribeck = "static_ratio" in names
     else:
@@ -202,8 +203,6 @@ def fit_motor(trials: Sequence[MotorTrial], scale: Scale, actuator: str = "motor
                 f"setpoints do not explain the motion (residual variance {best.chi2[0]:.1f} of position, {best.chi2[1]:.1f} of current, "
                 "in units of the noise): parameters are those of the regression, and something is missing from the model"
             )
-    if accepted and values["presliding"] <= 1.01 * BOUNDS["presliding"][0]:
-        notes.append("friction turns round within the encoder's noise: the inertia may be off by some percent beyond its interval")
     if stribeck:
         notes.append(f"friction rises as speed falls (Stribeck): misfit falls by {evidence:.0f} noise variances")
     motor = Motor(
@@ -216,40 +215,10 @@ def fit_motor(trials: Sequence[MotorTrial], scale: Scale, actuator: str = "motor
     )  # fmt: skip
 
 
-def _start(moves: Sequence[MoveData], plain: Regression) -> dict[str, float]:
-    """Starting values: plant from the regression, controller from how fast moves go and what holds the drive off its setpoint."""
-    plant = dict(zip(NAMES, map(float, plain.values), strict=True))
-    plant["inertia"] = max(plant["inertia"], 1e-3)
-    plant["coulomb"] = max(plant["coulomb"], 1.0)
-    ratio, error, hold = [], [], []
-    for m in moves:
-        n = len(m.time_s)
-        way = np.sign(m.target - m.origin)
-        middle = (way * (m.position - m.origin) > 0.25 * abs(m.target - m.origin)) & (
-            way * (m.position - m.origin) < 0.75 * abs(m.target - m.origin)
-        )
-        if middle.sum() >= 5 and m.own[2] > 0:
-            ratio.append(abs(np.polyfit(m.time_s[middle], m.position[middle], 1)[0]) / m.own[2])
-        tail = slice(max(0, n - 6), n)
-        error.append(np.mean(m.target - m.position[tail]))
-        hold.append(np.mean(m.current[tail]))
-    error, hold = np.array(error), np.array(hold)
-    gain = float(error @ hold / max(error @ error, 1e-9))
-    gain = gain if 0.5 < gain < 1e3 else 20.0
-    speed = float(np.median(ratio)) * 1.02 if ratio else 100.0
-    return {
-        **plant, "presliding": 0.5, "bristle": 0.004, "static_ratio": 1.0, "stribeck_speed": 20.0, "stribeck_exponent": 1.0,
-        "speed_full": speed, "rise": 0.1, "fall": 0.1, "delay": 5e-4, "lead": 5e-4, "edge": 0.1, "position_gain": 12.0, "deadband": float(np.median(np.abs(error))), "gain": gain,
-        "damping": 2 * np.sqrt(gain * plant["inertia"]),
-    }  # fmt: skip
-
-
 def _fit_output_error(
     moves: Sequence[MoveData], plain: Regression, curved: Regression, sigma: tuple[float, float]
 ) -> tuple[OutputErrorFit, float]:
-    start = _start(moves, plain)
-    moves = [shortened(m, MOVE_S) for m in moves]
-    base = _fit_controller(moves, start, sigma)
+    base = find_controller(moves, plain, sigma, BOUNDS, LACK_OF_FIT)
     fitted = CONTROLLERS[base.controller]
     # a Stribeck rise is tried where the regression, which knows no controller, leaves room for one
     if max(base.chi2) > 4.0 or curved.excess_z < 2.0:
@@ -258,7 +227,7 @@ def _fit_output_error(
     fits = []
     for exponent in (1.0, 2.0):
         curve = {**base.values, "static_ratio": ratio, "stribeck_speed": 20.0, "stribeck_exponent": exponent}
-        fits.append(output_error.fit(moves, curve, (*fitted, *STRIBECK), sigma, BOUNDS, base.controller, 6, base.own))
+        fits.append(output_error.fit(base.moves, curve, (*fitted, *STRIBECK), base.sigma, BOUNDS, base.controller, STAGES[-1:], base.own))
     best, other = sorted(fits, key=lambda f: f.cost)
     evidence = (base.cost - best.cost) / max(1.0, *best.chi2)
     if evidence < EVIDENCE or _is_at_bound(best):
@@ -266,31 +235,6 @@ def _fit_output_error(
     if other.cost - best.cost < EVIDENCE:
         best = _either_shape(*fits)
     return best, evidence
-
-
-def _fit_controller(moves: Sequence[MoveData], start: Mapping[str, float], sigma: tuple[float, float]) -> OutputErrorFit:
-    """The kind of controller that explains the motion, each kind from two starts; the first that reaches the noise ends the search."""
-    starts = (
-        ("profile", {**start, "rise": 0.1, "fall": 0.1}),
-        ("profile", {**start, "rise": 0.01, "fall": 0.01, "damping": 0.3 * start["damping"]}),
-        ("cascade", {**start, "rise": 0.08, "gain": 12.0, "damping": 2.5}),
-    )
-    first = [output_error.first_cost(moves, values, CONTROLLERS[kind], sigma, BOUNDS, kind) for kind, values in starts]
-    best = None
-    for i in np.argsort(first):
-        kind, values = starts[i]
-        if best is not None and max(best.chi2) < NEAR and first[i] > FAR * min(first):
-            break
-        fit = output_error.fit(moves, values, CONTROLLERS[kind], sigma, BOUNDS, kind)
-        if best is None or fit.cost < best.cost:
-            best = fit
-        if max(best.chi2) < LACK_OF_FIT:
-            break
-    if max(best.chi2) > 1.2 and max(best.chi2) < 30:  # caught where a drive sticks or not: once more, from softer friction
-        again = {**best.values, "presliding": 0.2, "bristle": 0.004, "delay": 5e-4, "lead": 5e-4}
-        fit = output_error.fit(moves, again, CONTROLLERS[best.controller], sigma, BOUNDS, best.controller)
-        best = fit if fit.cost < best.cost else best
-    return best
 
 
 def _either_shape(first: OutputErrorFit, second: OutputErrorFit) -> OutputErrorFit:

@@ -19,14 +19,15 @@ Array = NDArray[np.float64]
 
 COARSE_S = 5e-3
 # steps [s], rounds, fall of the misfit that is worth another round, width [%] over which a deadband sets in: what sets in softly has no kinks
-STAGES = ((COARSE_S, 8, 5.0, 0.5), (STEP_S, 3, 5.0, 0.25), (STEP_S, 10, 0.5, 0.1))
-ABSOLUTE_REACH = {"preload": 20.0, "viscous": 0.1, "stiffness": 0.2, "coulomb": 10.0, "bristle": 0.01, "damping": 2.0, "rise": 0.02, "fall": 0.02, "deadband": 0.2, "delay": 0.002, "lead": 0.002}
+STAGES = ((COARSE_S, 4, 5.0, 0.5), (STEP_S, 8, 0.5, 0.1))
+BIN_S = 0.08  # over which residuals are averaged before replicates are compared
+ABSOLUTE_REACH = {"preload": 20.0, "viscous": 0.1, "stiffness": 0.2, "coulomb": 10.0, "bristle": 0.01, "damping": 2.0, "rise": 0.02, "fall": 0.02, "deadband": 0.2, "delay": 0.002, "lead": 0.002, "lag": 0.002}
 TICK_S = 1e-3  # what instants of the controller's steps are known to: a current that jumps within it says little
 # differences wide enough that the instants at which a drive sticks or a deadband sets in, held to one step, average out
 STEP_SHARE, OWN_STEP = 2e-2, (1e-3, 1e-2, 1e-3, 0.5)
 # a loop that holds its value for a step of 0 to 2 ms acts half a step late, and half a step after the value that is logged; without this the
 # motion alone, which tells inertia less damping times delay, lets the two run off together
-PRIOR = {"lead": (0.5 * TICK_S, 0.5 * TICK_S), "delay": (0.5 * TICK_S, TICK_S)}
+PRIOR = {"lead": (0.5 * TICK_S, 0.5 * TICK_S), "delay": (0.5 * TICK_S, TICK_S), "lag": (0.0, TICK_S)}
 SEARCH = 1.3  # scatter of the end of the search among kinks over that of the linear model, on simulated drives (scripts/motor_accuracy.py)
 OWN_REACH = np.array([0.01, 0.3, 0.01, 10.0])  # of one step
 
@@ -99,7 +100,7 @@ def _sample(t: Array, p: Array, u: Array, at: Array, lead: Array | float = 0.0) 
 
 
 def _steps(values: Mapping[str, float], names: Sequence[str]) -> Array:
-    floor = {"preload": 1.0, "viscous": 0.02, "damping": 0.1, "bristle": 0.01, "rise": 0.01, "fall": 0.01, "deadband": 0.1, "delay": 0.01, "lead": 0.01, "stiffness": 0.02, "coulomb": 1.0}
+    floor = {"preload": 1.0, "viscous": 0.02, "damping": 0.1, "bristle": 0.01, "rise": 0.01, "fall": 0.01, "deadband": 0.1, "delay": 0.01, "lead": 0.01, "lag": 0.05, "stiffness": 0.02, "coulomb": 1.0}
     return np.array([STEP_SHARE * max(abs(values[n]), floor.get(n, 0.0)) for n in names])
 
 
@@ -187,25 +188,21 @@ def fit(
     sigma: tuple[float, float],
     bounds: Mapping[str, tuple[float, float]],
     controller: str = "profile",
-    iterations: int = 10,
+    stages: Sequence[tuple[float, int, float, float]] = STAGES,
     own: Array | None = None,
 ) -> OutputErrorFit:
     """Fit the named parameters to the moves by damped Gauss-Newton; the others stay at `start_values`.
 
-    sigma: noise of position [%] and current [raw]. bounds: parameter -> (low, high). own: (moves, 4) to start from.
-    A few iterations at a coarse step come first; a fit that stays far from the noise is given up early.
+    sigma: noise of position [%] and current [raw]. bounds: parameter -> (low, high). stages: see STAGES. own: (moves, 4) to start from.
     """
     q, own = dict(start_values), np.array([m.own for m in data]) if own is None else own.copy()
-    samples = 2 * sum(len(m.time_s) for m in data)
-    for step_s, rounds, enough, edge in STAGES if controller == "cascade" else (STAGES[0], STAGES[-1]):
-        rounds = min(rounds, iterations) if step_s < COARSE_S else rounds
-        damping, q = 1e-3, {**q, "edge": edge}
-        share = 1.0
-        for i in range(rounds):
+    for step_s, rounds, enough, edge in stages:
+        damping, share, q = 1e-3, 1.0, {**q, "edge": edge}
+        for _ in range(rounds):
             linear = _linearise(data, q, names, own, sigma, controller, step_s, share)
             cost = _misfit(linear[0], data, own, q)
             normal, gradient, blocks, _ = _normal(data, *linear[:3], own, q, names)
-            if (expected := _expected(normal, gradient, blocks)) < enough or (i > 3 and cost > 20 * samples and expected > 0.5 * cost):
+            if _expected(normal, gradient, blocks) < enough:
                 break
             moved = _step(data, q, names, own, linear[3], bounds, (normal, gradient, blocks), cost, damping, controller, step_s)
             if moved is None:  # caught at a kink: differences over another width see past it
@@ -220,28 +217,41 @@ def fit(
     return _finish(data, linear, q, names, sigma, own, cost, controller, bounds)
 
 
-def first_cost(
-    data: Sequence[MoveData],
-    values: Mapping[str, float],
-    names: Sequence[str],
-    sigma: tuple[float, float],
-    bounds: Mapping[str, tuple[float, float]],
-    controller: str,
-    share: int = 4,
-) -> float:
-    """Misfit that two coarse steps reach on every `share`-th move: to choose where a fit starts."""
-    some = tuple(sorted(data, key=lambda m: m.time_s[-1])[: max(6, len(data) // 2) : max(1, len(data) // (2 * share))])
-    q, own = dict(values), np.array([m.own for m in some])
-    damping, cost = 1e-3, np.inf
-    for _ in range(3):
-        linear = _linearise(some, q, names, own, sigma, controller, COARSE_S)
-        cost = _misfit(linear[0], some, own, q)
-        normal, gradient, blocks, _ = _normal(some, *linear[:3], own, q, names)
-        moved = _step(some, q, names, own, linear[3], bounds, (normal, gradient, blocks), cost, damping, controller, COARSE_S)
-        if moved is None:
-            break
-        q, own, cost, damping = moved
-    return cost
+def lack_of_fit(f: OutputErrorFit) -> float:
+    """Systematic misfit: the variance, in units of the noise's, that repeated moves leave unexplained alike; of the worse channel.
+
+    Moves of one kind (origin, target, speed) are replicates: what differs between them is pure error, of whatever colour; what they share is
+    the model's (analysis of variance on residuals averaged over BIN_S). The lower end of its 95 % interval, from the scatter between kinds;
+    never more than the mean square less one, which is all that counts where nothing was repeated.
+    """
+    kinds: dict[tuple, list[int]] = {}
+    for i, m in enumerate(f.moves):
+        kinds.setdefault((round(m.origin), round(m.target), round(float(m.own[2]), 2)), []).append(i)
+    found = [_shared(f, members) for members in kinds.values() if len(members) > 1]
+    least = max(f.chi2) - 1.0
+    if len(found) < 3:
+        return least
+    square, samples = np.array([x for x, _ in found]), np.array([n for _, n in found])
+    mean = square.sum(axis=0) / samples.sum()
+    sd = np.sqrt(np.sum((square - samples[:, None] * mean) ** 2, axis=0)) / samples.sum()
+    return float(min(least, np.max(mean - 1.64 * sd)))
+
+
+def _shared(f: OutputErrorFit, members: Sequence[int]) -> tuple[Array, float]:
+    """Sum of squares (2,) that replicates share, whitened, of position and current, and the samples that it stands for."""
+    last = min(f.moves[i].time_s[-1] - f.own[i, 0] for i in members)
+    bins = max(int(last / BIN_S), 1)
+    counts, means = np.empty((len(members), bins)), np.empty((len(members), 2, bins))
+    for row, i in enumerate(members):
+        at = np.floor((f.moves[i].time_s - f.own[i, 0]) / BIN_S).astype(int)
+        k = (at >= 0) & (at < bins)
+        counts[row] = np.bincount(at[k], minlength=bins)
+        for channel in (0, 1):
+            means[row, channel] = np.bincount(at[k], f.residual[i][k, channel] / f.sigma[channel], minlength=bins) / np.maximum(counts[row], 1)
+    full = (counts > 0).all(axis=0)
+    samples = 1 / (1 / counts[:, full]).mean(axis=0)
+    mean, scatter = means[:, :, full].mean(axis=0), means[:, :, full].var(axis=0, ddof=1)
+    return np.sum((mean**2 - scatter / len(members)) * samples, axis=1), float(samples.sum())
 
 
 def _expected(normal: Array, gradient: Array, blocks: list[tuple[Array, Array, Array]]) -> float:

@@ -1,0 +1,115 @@
+"""The kind of controller behind a drive, and a start for the fit of everything: searched with the plant held at the regression's values.
+
+A few moves of every speed and direction, simulated at a coarse step, are enough to tell one controller from another; the plant, which a regression
+that knows no controller has found already, is not let go before the controller is near, or the two run off together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from . import output_error
+from .balance import NAMES
+from .drive import CONTROLLERS
+from .moves import SETTLED, MoveData, shortened
+from .output_error import COARSE_S, OutputErrorFit
+from .weak_form import GIVE, Regression
+
+SOME = 12  # moves that the search simulates
+SOME_S = 1.6  # of each of them
+MOVE_S = 2.5  # of a move that is simulated: the rest of a slow one says little more
+GLANCE, SEARCH = ((COARSE_S, 3, 5.0, 0.5),), ((COARSE_S, 8, 5.0, 0.5),)  # see output_error.fit
+STICK, BRISTLES = {"presliding": 0.0, "bristle": 0.0}, {"presliding": 0.3, "bristle": 0.004}  # the kinds of friction
+EVIDENCE = 10.0  # fall of the misfit for which bristles, two parameters more, are believed
+UNREST = 1.3  # mean square of the residuals [noise variances] above which they are weighed anew
+NEAR, FAR = 5.0, 10.0  # a start is not tried when another came near the noise and it began so many times farther off
+
+
+def find_controller(
+    moves: Sequence[MoveData], plain: Regression, sigma: tuple[float, float], bounds: Mapping[str, tuple[float, float]], enough: float
+) -> OutputErrorFit:
+    """Fit of plant and controller, the kind of controller chosen by how well it explains the moves.
+
+    sigma: noise of position [%] and current [raw]. bounds: parameter -> (low, high). enough: systematic misfit [noise variances]
+    below which no other kind is tried.
+    """
+    start, some = start_values(moves, plain), _spread(moves)
+    moves = [shortened(m, MOVE_S) for m in moves]
+    starts = (
+        ("profile", {**start, "rise": 0.1, "fall": 0.1}),
+        ("profile", {**start, "rise": 0.01, "fall": 0.01, "damping": 0.3 * start["damping"]}),
+        ("cascade", {**start, "rise": 0.08, "gain": 12.0, "damping": 2.5}),
+    )
+    glances = [
+        output_error.fit(some, values, [n for n in _names(kind, values) if n not in NAMES], sigma, bounds, kind, GLANCE) for kind, values in starts
+    ]
+    nearest = min(g.cost for g in glances)
+    best = None
+    for i in np.argsort([g.cost for g in glances]):
+        g = glances[i]
+        if best is not None and max(best.chi2) < NEAR and g.cost > FAR * nearest:
+            break
+        near = min((_near(some, g, values, sigma, bounds) for values in (STICK, BRISTLES)), key=lambda f: f.cost + EVIDENCE * ("bristle" in f.names))
+        found = output_error.fit(moves, near.values, _names(near.controller, near.values), sigma, bounds, near.controller)
+        if best is None or found.cost < best.cost:
+            best = found
+        if output_error.lack_of_fit(best) < enough:
+            break
+    return _reweighted(best, bounds) if output_error.lack_of_fit(best) < enough and max(best.chi2) > UNREST else best
+
+
+def _reweighted(f: OutputErrorFit, bounds: Mapping[str, tuple[float, float]]) -> OutputErrorFit:
+    """The fit again with both channels weighed by what they were left with: a drive that is not quite alike twice moves by more than its encoder's noise."""
+    sigma = (f.sigma[0] * float(np.sqrt(max(f.chi2[0], 1.0))), f.sigma[1] * float(np.sqrt(max(f.chi2[1], 1.0))))
+    return output_error.fit(f.moves, f.values, f.names, sigma, bounds, f.controller, output_error.STAGES[-1:], f.own)
+
+
+def _names(kind: str, values: Mapping[str, float]) -> tuple[str, ...]:
+    """Parameters of a drive with this controller; one that sticks hard has no bristles."""
+    return tuple(n for n in CONTROLLERS[kind] if values["presliding"] > 0 or n not in STICK)
+
+
+def _near(
+    some: Sequence[MoveData], g: OutputErrorFit, friction: Mapping[str, float], sigma: tuple[float, float], bounds: Mapping[str, tuple[float, float]]
+) -> OutputErrorFit:
+    """The search from a glance, with friction of one kind."""
+    values = dict(g.values) if (g.values["presliding"] > 0) == (friction["presliding"] > 0) else {**g.values, **friction}
+    return output_error.fit(some, values, [n for n in _names(g.controller, values) if n not in NAMES], sigma, bounds, g.controller, SEARCH, g.own)
+
+
+def start_values(moves: Sequence[MoveData], plain: Regression) -> dict[str, float]:
+    """Starting values: plant from the regression, controller from how fast moves go and what holds the drive off its setpoint."""
+    plant = dict(zip(NAMES, map(float, plain.values), strict=True))
+    plant["inertia"] = max(plant["inertia"], 1e-3)
+    plant["coulomb"] = max(plant["coulomb"], 1.0)
+    ratio, error, hold = [], [], []
+    for m in moves:
+        n = len(m.time_s)
+        way = np.sign(m.target - m.origin)
+        middle = (way * (m.position - m.origin) > 0.25 * abs(m.target - m.origin)) & (
+            way * (m.position - m.origin) < 0.75 * abs(m.target - m.origin)
+        )
+        if middle.sum() >= 5 and m.own[2] > 0:
+            ratio.append(abs(np.polyfit(m.time_s[middle], m.position[middle], 1)[0]) / m.own[2])
+        tail = slice(max(0, n - 6), n)
+        if np.ptp(m.position[tail]) < SETTLED:
+            error.append(np.mean(m.target - m.position[tail]))
+            hold.append(np.mean(m.current[tail]))
+    error, hold = np.array(error), np.array(hold)
+    gain = float(error @ hold / max(error @ error, 1e-9))
+    gain = gain if 0.5 < gain < 1e3 else 20.0
+    speed = float(np.median(ratio)) * 1.02 if ratio else 100.0
+    return {
+        **plant, **(STICK if plain.give <= GIVE[0] else BRISTLES | {"presliding": plain.give}), "static_ratio": 1.0, "stribeck_speed": 20.0, "stribeck_exponent": 1.0,
+        "speed_full": speed, "rise": 0.1, "fall": 0.1, "delay": 5e-4, "lead": 5e-4, "lag": 0.0, "edge": 0.1,
+        "position_gain": 12.0, "deadband": float(np.median(np.abs(error))) if len(error) else 1.0, "gain": gain, "damping": 2 * np.sqrt(gain * plant["inertia"]),
+    }  # fmt: skip
+
+
+def _spread(moves: Sequence[MoveData]) -> tuple[MoveData, ...]:
+    """SOME of the moves, of every direction, speed and distance, their first SOME_S."""
+    order = sorted(moves, key=lambda m: (m.target > m.origin, m.own[2], abs(m.target - m.origin)))
+    pick = np.unique(np.linspace(0, len(order) - 1, min(SOME, len(order))).astype(int))
+    return tuple(shortened(order[i], SOME_S) for i in pick)
