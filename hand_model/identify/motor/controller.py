@@ -17,12 +17,15 @@ from .moves import SETTLED, MoveData, shortened
 from .output_error import COARSE_S, OutputErrorFit
 from .weak_form import GIVE, Regression
 
+CLOSE = 1.15  # mean square of the residuals [noise variances] below which no other kind of friction is tried
 SOME = 12  # moves that the search simulates
 SOME_S = 1.6  # of each of them
 MOVE_S = 2.5  # of a move that is simulated: the rest of a slow one says little more
 GLANCE, SEARCH = ((COARSE_S, 3, 5.0, 0.5),), ((COARSE_S, 8, 5.0, 0.5),)  # see output_error.fit
 STICK, BRISTLES = {"presliding": 0.0, "bristle": 0.0}, {"presliding": 0.3, "bristle": 0.004}  # the kinds of friction
-EVIDENCE = 10.0  # fall of the misfit for which bristles, two parameters more, are believed
+JUMP = {"rise": 0.0, "fall": 0.0}  # a reference whose speed jumps
+SUDDEN_S = 0.03  # time to full speed [s] below which a jump is tried
+EVIDENCE = 10.0  # fall of the misfit for which two parameters more are believed
 UNREST = 1.3  # mean square of the residuals [noise variances] above which they are weighed anew
 NEAR, FAR = 5.0, 10.0  # a start is not tried when another came near the noise and it began so many times farther off
 
@@ -38,20 +41,28 @@ def find_controller(
     start, some = start_values(moves, plain), _spread(moves)
     moves = [shortened(m, MOVE_S) for m in moves]
     starts = (
-        ("profile", {**start, "rise": 0.1, "fall": 0.1}),
         ("profile", {**start, "rise": 0.01, "fall": 0.01, "damping": 0.3 * start["damping"]}),
+        ("profile", {**start, "rise": 0.1, "fall": 0.1}),
         ("cascade", {**start, "rise": 0.08, "gain": 12.0, "damping": 2.5}),
     )
-    glances = [
-        output_error.fit(some, values, [n for n in _names(kind, values) if n not in NAMES], sigma, bounds, kind, GLANCE) for kind, values in starts
-    ]
+    glances: list[OutputErrorFit] = []
+    for kind, values in starts:
+        if not glances or min(max(g.chi2) for g in glances) > NEAR:
+            names = [n for n in _names(kind, values) if n not in NAMES]
+            glances.append(output_error.fit(some, values, names, sigma, bounds, kind, GLANCE))
     nearest = min(g.cost for g in glances)
     best = None
     for i in np.argsort([g.cost for g in glances]):
         g = glances[i]
         if best is not None and max(best.chi2) < NEAR and g.cost > FAR * nearest:
             break
-        near = min((_near(some, g, values, sigma, bounds) for values in (STICK, BRISTLES)), key=lambda f: f.cost + EVIDENCE * ("bristle" in f.names))
+        near = _near(some, g, {}, sigma, bounds)
+        if max(near.chi2) > CLOSE:
+            other = _near(some, near, BRISTLES if near.values["presliding"] == 0 else STICK, sigma, bounds)
+            near = min((near, other), key=lambda f: f.cost + EVIDENCE * ("bristle" in f.names))
+        if near.controller == "profile" and min(near.values["rise"], near.values["fall"]) < SUDDEN_S:
+            jump = _near(some, near, JUMP, sigma, bounds)
+            near = jump if jump.cost < near.cost + EVIDENCE else near
         found = output_error.fit(moves, near.values, _names(near.controller, near.values), sigma, bounds, near.controller)
         if best is None or found.cost < best.cost:
             best = found
@@ -67,15 +78,16 @@ def _reweighted(f: OutputErrorFit, bounds: Mapping[str, tuple[float, float]]) ->
 
 
 def _names(kind: str, values: Mapping[str, float]) -> tuple[str, ...]:
-    """Parameters of a drive with this controller; one that sticks hard has no bristles."""
-    return tuple(n for n in CONTROLLERS[kind] if values["presliding"] > 0 or n not in STICK)
+    """Parameters of a drive with this controller; one that sticks hard has no bristles, a reference whose speed jumps no ramps of speed."""
+    fixed = (*(STICK if values["presliding"] == 0 else ()), *(JUMP if values["rise"] == 0 else ()))
+    return tuple(n for n in CONTROLLERS[kind] if n not in fixed)
 
 
 def _near(
-    some: Sequence[MoveData], g: OutputErrorFit, friction: Mapping[str, float], sigma: tuple[float, float], bounds: Mapping[str, tuple[float, float]]
+    some: Sequence[MoveData], g: OutputErrorFit, changed: Mapping[str, float], sigma: tuple[float, float], bounds: Mapping[str, tuple[float, float]]
 ) -> OutputErrorFit:
-    """The search from a glance, with friction of one kind."""
-    values = dict(g.values) if (g.values["presliding"] > 0) == (friction["presliding"] > 0) else {**g.values, **friction}
+    """The search from a glance, with these values."""
+    values = {**g.values, **changed}
     return output_error.fit(some, values, [n for n in _names(g.controller, values) if n not in NAMES], sigma, bounds, g.controller, SEARCH, g.own)
 
 

@@ -46,7 +46,7 @@ class Regression:
 @dataclass(frozen=True)
 class Stroke:
     """A stretch of motion in one direction (sign), from begin_s to end_s [s], positions there [%], the current that held the drive
-    before it [raw] (None where it did not come from rest), and its samples' slice. slides: friction has turned round from the start."""
+    before it [raw] (None where it did not come from rest), its samples' slice, and where friction began to turn round, rest [%]."""
 
     sign: float
     begin_s: float
@@ -55,7 +55,7 @@ class Stroke:
     end: float
     hold: float | None
     samples: slice
-    slides: bool = False
+    rest: float
 
 
 @dataclass(frozen=True)
@@ -87,12 +87,12 @@ def fit_regressions(trials: Sequence[MotorTrial], sigma_position: float, sigma_c
     parts = _without_outliers(parts)
     if (give := _give(parts)) > GIVE[0]:  # how friction builds up is a model of its own, and takes the place of inertia: only what slides
         sliding = [[_settled(t, s, 2.5 * give + 2 * sigma_position) for s in found] for t, found in zip(trials, moved, strict=True)]
-        parts = _without_outliers(_projected(trials, sliding, sigma_position, sigma_current))
+        parts = _without_outliers(_projected(trials, sliding, sigma_position, sigma_current), give)
     noise = sigma_current**2 * float(np.median(np.concatenate([np.diff(t.time_s) for t in trials])))
-    fits = [(*_solve(parts, speed), speed) for speed in (None, *STRIBECK)]
+    fits = [(*_solve(parts, give, speed), speed) for speed in (None, *STRIBECK)]
     values, covariance, square, _ = fits[0]
     # what the current does between the last sample outside a stroke and the first inside is not recorded
-    shift = _solve([replace(q, current=q.held_current) for q in parts], None)[0] - values
+    shift = _solve([replace(q, current=q.held_current) for q in parts], give, None)[0] - values
     unrecorded = np.outer(shift, shift) / 4
     plain = Regression(values, covariance + unrecorded, square / noise, give)
     values, covariance, square, speed = min(fits[1:], key=lambda f: f[2])
@@ -115,7 +115,7 @@ def strokes(t: MotorTrial, sigma: float) -> list[Stroke]:
         after = runs[i + 1][0] if i + 1 < len(runs) else len(time)
         begin_s, begin, hold = _end(t, sigma, range(a, before, -1))
         end_s, end, _ = _end(t, sigma, range(b - 1, after - 1))
-        found.append(Stroke(float(sign[a]), begin_s, end_s, begin, end, hold, slice(a, b)))
+        found.append(Stroke(float(sign[a]), begin_s, end_s, begin, end, hold, slice(a, b), begin))
     return found
 
 
@@ -151,12 +151,12 @@ def _end(t: MotorTrial, sigma: float, outwards: range) -> tuple[float, float, fl
 
 
 def _settled(t: MotorTrial, s: Stroke, travel: float) -> Stroke:
-    """The stroke from where it has gone `travel` [%] on, which friction takes to turn round."""
+    """The stroke from where it has gone `travel` [%] on, in which friction turns round but for a small rest."""
     k = np.arange(s.samples.start, s.samples.stop)
     k = k[np.abs(t.position[k] - s.begin) > travel]
     if len(k) == 0:
         return replace(s, begin_s=s.end_s)
-    return replace(s, begin_s=float(t.time_s[k[0]]), begin=float(t.position[k[0]]), hold=None, slides=True)
+    return replace(s, begin_s=float(t.time_s[k[0]]), begin=float(t.position[k[0]]))
 
 
 def _projected(trials: Sequence[MotorTrial], moved: Sequence[Sequence[Stroke]], sigma: float, sigma_current: float) -> list[_Projected]:
@@ -165,13 +165,12 @@ def _projected(trials: Sequence[MotorTrial], moved: Sequence[Sequence[Stroke]], 
     for t, found in zip(trials, moved, strict=True):
         interval = float(np.median(np.diff(t.time_s)))
         spacing = max(2.5 * interval, np.pi * float(np.sqrt(INERTIA * sigma / sigma_current)))
-        parts += [_project(t, s, sigma, spacing, interval / 6, rng) for s in found if s.end_s - s.begin_s > 4 * spacing]
+        parts += [_project(t, s, sigma, spacing, interval / 4, rng) for s in found if s.end_s - s.begin_s > 4 * spacing]
     return parts
 
 
 def _project(t: MotorTrial, s: Stroke, sigma: float, spacing: float, step: float, rng: np.random.Generator) -> _Projected:
     from scipy.interpolate import BSpline, make_interp_spline
-    from scipy.linalg import cholesky, solve_triangular
 
     k = np.arange(max(s.samples.start - 3, 0), min(s.samples.stop + 3, len(t.time_s)))
     k = k[(t.time_s[k] > s.begin_s + 1e-4) & (t.time_s[k] < s.end_s - 1e-4)]
@@ -183,12 +182,8 @@ def _project(t: MotorTrial, s: Stroke, sigma: float, spacing: float, step: float
     weight[[0, -1]] *= 0.5
     spline = BSpline(knots, np.eye(len(knots) - 4)[:, 1:-1], 3)
     value, first, second = spline(grid), spline(grid, 1), spline(grid, 2)
-    root = cholesky(value.T @ (weight[:, None] * value), lower=True)
-
-    def white(x: Array) -> Array:
-        return solve_triangular(root, (x * weight[:, None]).T, lower=True)
-
-    onto, along, twice = white(value), -white(first), white(second)
+    white = np.linalg.inv(np.linalg.cholesky(value.T @ (weight[:, None] * value)))
+    onto, along, twice = ((white @ x.T) * weight for x in (value, -first, second))
     share = (grid - s.begin_s) / (s.end_s - s.begin_s)
     position = make_interp_spline(at, np.r_[s.begin, t.position[k], s.end], k=3)(grid)
     # less its chord the position vanishes at both ends, and with it what integration by parts leaves there
@@ -198,21 +193,21 @@ def _project(t: MotorTrial, s: Stroke, sigma: float, spacing: float, step: float
     shaken = make_interp_spline(at, noise, k=3)(grid)
     curved = shaken - shaken[0] - (shaken[-1] - shaken[0]) * share[:, None]
     seen = np.stack([twice @ curved, along @ shaken, onto @ shaken])
-    speed = np.abs((position[-1] - position[0]) / (s.end_s - s.begin_s) + first @ solve_triangular(root.T, onto @ bent, lower=False))
+    chord = (position[-1] - position[0]) / (s.end_s - s.begin_s)
+    velocity = along @ bent + chord * onto.sum(axis=1)
+    speed = np.abs(chord + first @ (white.T @ (onto @ bent)))
     current, held = np.interp(grid, t.time_s, t.current), np.interp(grid, t.time_s[k], t.current[k])
-    return _Projected(s, onto, np.c_[twice @ bent, along @ position], position, current, held, speed, np.einsum("ikr,jkr->ij", seen, seen) / 2)
+    return _Projected(s, onto, np.c_[twice @ bent, velocity], position, current, held, speed, np.einsum("ikr,jkr->ij", seen, seen) / 2)
 
 
 def _rows(q: _Projected, give: float, stribeck: float | None) -> tuple[Array, Array]:
     """Regressors (k, 5 or 6) and current (k,): from rest friction is exp(-travel / give) of what it held, and slides for the rest."""
-    left = np.exp(-np.abs(q.position - q.stroke.begin) / give)
-    if q.stroke.slides:
-        friction, held, hold = np.full(len(left), q.stroke.sign), np.zeros_like(left), 0.0
-    elif q.stroke.hold is None:
+    left = np.exp(-np.abs(q.position - q.stroke.rest) / give)
+    if q.stroke.hold is None:
         friction, held, hold = q.stroke.sign * (1 - 2 * left), np.zeros_like(left), 0.0
     else:
         friction, held, hold = q.stroke.sign * (1 - left), left, q.stroke.hold
-    columns = [friction, q.position - held * q.stroke.begin, 1 - held]
+    columns = [friction, q.position - held * q.stroke.rest, 1 - held]
     if stribeck is not None:
         columns.append(friction * np.exp(-q.speed / stribeck))
     x = q.project @ np.column_stack([*columns, q.current - held * hold])
@@ -251,9 +246,9 @@ def _give(parts: Sequence[_Projected]) -> float:
     return float(minimize_scalar(lambda g: _cost(parts, g), bounds=bounds, method="bounded", options={"xatol": 0.02}).x)
 
 
-def _solve(parts: Sequence[_Projected], stribeck: float | None) -> tuple[Array, Array, float]:
+def _solve(parts: Sequence[_Projected], give: float, stribeck: float | None) -> tuple[Array, Array, float]:
     """Values, their covariance by leaving out one stroke after the other (jackknife), and the mean square left."""
-    gram, right, square = _system(parts, GIVE[0], stribeck)
+    gram, right, square = _system(parts, give, stribeck)
     total, b = sum(gram), sum(right)
     values = np.linalg.solve(total, b)
     left = float(max(sum(square) - b @ values, 0.0) / sum(len(q.fixed) for q in parts))
@@ -262,12 +257,12 @@ def _solve(parts: Sequence[_Projected], stribeck: float | None) -> tuple[Array, 
     return values, (len(parts) - 1) / len(parts) * d.T @ d, left
 
 
-def _without_outliers(parts: list[_Projected]) -> list[_Projected]:
+def _without_outliers(parts: list[_Projected], give: float = GIVE[0]) -> list[_Projected]:
     """The strokes without those that the others do not explain: something held the drive, or their ends were misjudged."""
     for _ in range(3):
-        gram, right, _ = _system(parts, GIVE[0], None)
+        gram, right, _ = _system(parts, give, None)
         values = np.linalg.solve(sum(gram), sum(right))
-        misfit = np.array([np.mean((y - x @ values) ** 2) for x, y in (_rows(q, GIVE[0], None) for q in parts)])
+        misfit = np.array([np.mean((y - x @ values) ** 2) for x, y in (_rows(q, give, None) for q in parts)])
         kept = [q for q, m in zip(parts, misfit, strict=True) if m < 6 * np.median(misfit)]
         if len(kept) == len(parts) or len(kept) < 6:
             break
