@@ -6,6 +6,7 @@ Everything here is generic in what the effort is (current, torque, an angle) and
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..effects.base import DriveState
 from ..effects.path import strokes
+from .wander import Wander
 
 Array = NDArray[np.float64]
 
@@ -67,6 +69,17 @@ class Balance:
         extra = self.gather(lambda s: s.extra.get("sigma", np.zeros(len(s.time_s))))
         self.weight = 1 / np.sqrt(self.sigma**2 + extra**2)
         self.steady = extra <= 0.25 * self.sigma
+        self.wander: Wander | None = None
+
+    def wandering(self, wander: Wander | None) -> Balance:
+        """The same balance with a random level per while in its noise."""
+        other = copy(self)
+        other.wander = wander
+        return other
+
+    def whiten(self, values: Array, weight: Array) -> Array:
+        """Weighted values (n,) or (n, k) in which the noise is as good as white; as they are without `wander`."""
+        return values if self.wander is None else self.wander.whiten(values, weight, self.inflation)
 
     def gather(self, value: Any) -> Array:
         """Stack `value(state)` (n, ...) over the compared samples."""
@@ -122,13 +135,14 @@ class Balance:
         prediction = np.zeros(len(self.effort))
         inside = np.ones(len(self.effort), bool)
         for _ in range(4 if clips else 1):
-            coefficients = bounded_least_squares(matrix * (w * inside)[:, None], self.effort * w * inside, low, high)
+            v = w * inside
+            coefficients = bounded_least_squares(self.whiten(matrix * v[:, None], v), self.whiten(self.effort * v, v), low, high)
             coefficients = self._own_nuisances(matrix, coefficients, w, low)
             prediction = raw = matrix @ coefficients
             for term in clips:
                 prediction = term.effect.clip(prediction, term.shape)
             inside = prediction == raw
-        rss = float(np.sum(((self.effort - prediction) * w) ** 2))
+        rss = float(np.sum(self.whiten((self.effort - prediction) * w, w) ** 2))
         k = len(self.names)
         amplitudes, start = [], k
         for term in terms:
@@ -138,7 +152,6 @@ class Balance:
         size = sum(len([k for k in t.shape if k not in DISCRETE]) + len(t.effect.amplitudes()) for t in terms)
         declared = dict(zip(self.names, coefficients[:k].tolist(), strict=True))
         return Fit(terms, declared, tuple(amplitudes), prediction, rss, size)
-
 
     def _own_nuisances(self, matrix: Array, coefficients: Array, w: Array, low: Array) -> Array:
         """Coefficients of columns that act in validation recordings only (their own clock offset, a step in them, an obstacle
@@ -189,7 +202,7 @@ def noise(balance: Balance) -> tuple[float, float]:
     if same.sum() < 20:
         return float(np.std(r)) or 1.0, 1.0
     neighbours = float(np.sqrt(np.mean(np.diff(r)[same] ** 2) / 2))
-    deviation, share = _replicate_deviation(balance, r, steady)
+    deviation, share = replicate_deviation(balance, r, steady)
     if not len(deviation):
         return max(neighbours, 1e-9), 1.0
     lags = []
@@ -206,7 +219,7 @@ def noise(balance: Balance) -> tuple[float, float]:
     return float(np.sqrt(max(covariance[0], 1e-300) / share)), float(1 + 2 * rho[1:stop].sum())
 
 
-def _replicate_deviation(balance: Balance, residual: Array, use: NDArray[np.bool_]) -> tuple[Array, float]:
+def replicate_deviation(balance: Balance, residual: Array, use: NDArray[np.bool_]) -> tuple[Array, float]:
     """Residual minus its mean over the other strokes' replicates (n,), nan where there are none, and the share of the
     variance that is left by taking a mean out."""
     position, velocity = balance.gather(lambda s: s.position), balance.gather(lambda s: s.velocity)

@@ -83,6 +83,7 @@ def _prepare(
         history.append((float(extra["moved"][-1]), 0.0))
         end = float(time_s[-1])
         extra["trial_index"] = np.full(len(time_s), float(index))
+        extra["validation_index"] = np.full(len(time_s), float(sum(t.validate for t, _ in entries[:index])))
         effort = np.where(motion.moving, current[seen], np.nan)
         extra["bandwidth_s"] = np.full(len(time_s), motion.bandwidth_s)
         extra["steady"] = steady(time_s, motion).astype(float)

@@ -40,7 +40,7 @@ def evidence(balance: Balance, fit: Fit, reference: Fit, which: int = -1, scale:
     other motors are like) a model pays for coefficients unlike theirs.
     """
     brought = gain(balance, fit, reference, scale)
-    count = len(fit.amplitudes[which])
+    count = int(np.any(balance.columns(fit.terms[which].effect, fit.terms[which].shape)[balance.train] != 0, axis=0).sum())
     if count and brought > 0:
         brought -= 0.5 * count * (1 + np.log(max(2 * brought / count, 1.0)))
     term = fit.terms[which]

@@ -123,7 +123,8 @@ def _covariance(balance: Balance, fit: Fit, theta: Array, build: Any) -> Array:
         step = 1e-4 * (abs(theta[i]) + 1e-3)
         up, down = theta.copy(), theta.copy()
         up[i], down[i] = theta[i] + step, theta[i] - step
-        columns.append((predict(balance, fit, up, build) - predict(balance, fit, down, build)) / (2 * step) * w)
+        change = (predict(balance, fit, up, build) - predict(balance, fit, down, build)) / (2 * step)
+        columns.append(balance.whiten(change * w, w))
     jacobian = np.stack(columns, axis=1)
     size = np.linalg.norm(jacobian, axis=0)
     size = np.where(size > 0, size, 1.0)
@@ -170,7 +171,8 @@ def proven(naming: Naming, which: int) -> bool:
     if "trial" in fit.terms[which].shape or balance.train.all():
         return True
     without = balance.fit(tuple(t for i, t in enumerate(fit.terms) if i != which))
-    r0, r1 = (np.sum(((balance.effort - f.prediction) * balance.weight)[~balance.train] ** 2) for f in (without, fit))
+    w = balance.weight * ~balance.train
+    r0, r1 = (np.sum(balance.whiten((balance.effort - f.prediction) * w, w) ** 2) for f in (without, fit))
     return bool(r1 < r0)
 
 

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from .balance import DISCRETE, Balance, Fit, Term
-from .evidence import evidence, rough_evidence, scale_of
+from .evidence import evidence, gain, rough_evidence, scale_of
 from .lack_of_fit import LackOfFit, lack_of_fit
+from .wander import Wander, estimate_wander
 
 Array = NDArray[np.float64]
 
@@ -25,6 +26,8 @@ ALPHA = 0.003  # false alarms per channel: 5 % over some fifteen channels of a s
 EVIDENCE_LEAST = 6.0  # log evidence an effect must bring: e^6 against "none", and against the search over shapes
 CLASS_WIDTH = 3.0  # log evidence within which two effects are one class: 20 to 1
 MOST_TERMS = 5
+MOST_WANDERS = 2  # searches begun anew with noise that knows what does not repeat
+GROWN = 1.3  # of that noise, from which another search is worth its time
 
 
 @dataclass(frozen=True)
@@ -89,26 +92,60 @@ def name_effects(states: tuple[Any, ...], effects: Iterable[Any], progress: Call
 
 
 def _name(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str], None] | None) -> Naming:
+    fit, brought = _search(balance, effects, progress)
+    for _ in range(MOST_WANDERS):
+        wander = _unrepeated(balance, fit)
+        if wander is None or (balance.wander is not None and wander.deviation < GROWN * balance.wander.deviation):
+            break
+        balance = balance.wandering(wander)
+        fit, brought = _search(balance, effects, progress)
     declared = balance.fit()
     before = lack_of_fit(balance, declared.prediction, len(balance.names), ALPHA)
-    terms: tuple[Term, ...] = ()
-    fit = declared
-    after = before
-    brought: dict[str, float] = {}
-    while len(terms) < MOST_TERMS:
-        ranked = rank(balance, effects, terms, fit)
+    after = lack_of_fit(balance, fit.prediction, len(balance.names) + fit.size, ALPHA) if fit.terms else before
+    found = _findings(balance, effects, fit.terms, fit, declared)
+    kept = {t.effect.name for t in fit.terms}
+    rejected = tuple(sorted(((n, e) for n, e in brought.items() if n not in kept), key=lambda item: -item[1]))
+    return Naming(balance, declared, fit, before, after, found, rejected)
+
+
+def _search(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str], None] | None) -> tuple[Fit, dict[str, float]]:
+    """The fit to which no effect adds evidence, and what every candidate brought at its best moment."""
+    fit, brought = balance.fit(), {}
+    while len(fit.terms) < MOST_TERMS:
+        ranked = rank(balance, effects, fit.terms, fit)
         for rival in ranked:
             brought[rival.name] = max(brought.get(rival.name, -np.inf), rival.evidence)
         if not ranked or ranked[0].evidence < EVIDENCE_LEAST:
             break
-        terms, fit = settle(balance, effects, ranked[0].fit.terms)
-        after = lack_of_fit(balance, fit.prediction, len(balance.names) + fit.size, ALPHA)
+        _, fit = settle(balance, effects, ranked[0].fit.terms)
         if progress is not None:
-            progress(f"{balance.states[0].drive}: {', '.join(t.effect.name for t in terms)}")
-    found = _findings(balance, effects, terms, fit, declared)
-    kept = {t.effect.name for t in terms}
-    rejected = tuple(sorted(((n, e) for n, e in brought.items() if n not in kept), key=lambda item: -item[1]))
-    return Naming(balance, declared, fit, before, after, found, rejected)
+            progress(f"{balance.states[0].drive}: {', '.join(t.effect.name for t in fit.terms)}")
+    return fit, brought
+
+
+def _unrepeated(balance: Balance, fit: Fit) -> Wander | None:
+    """What does not repeat beside `fit`. An event of one recording is never repeated: it must be likelier than a model without
+    it in which the same residual is chance."""
+    wander = estimate_wander(balance, fit.prediction)
+    for which, term in enumerate(fit.terms):
+        if "trial" not in term.shape:
+            continue
+        rest = balance.fit(tuple(t for i, t in enumerate(fit.terms) if i != which))
+        chance = estimate_wander(balance, rest.prediction)
+        if chance is None:
+            continue
+        free = evidence(balance, fit, rest, which) - gain(balance, fit, rest)
+        if _likelihood(balance, fit, wander) - _likelihood(balance, rest, chance) + free < EVIDENCE_LEAST:
+            wander = chance if wander is None or chance.deviation > wander.deviation else wander
+    return wander
+
+
+def _likelihood(balance: Balance, fit: Fit, wander: Wander | None) -> float:
+    weight = balance.weight * balance.train
+    residual = (balance.effort - fit.prediction) * weight
+    if wander is None:
+        return -0.5 * float(np.sum(residual**2)) / balance.inflation
+    return wander.log_likelihood(residual, weight, balance.inflation)
 
 
 def _resolved(balance: Balance, term: Term) -> bool:
@@ -154,16 +191,17 @@ def scan(balance: Balance, effect: Any, terms: tuple[Term, ...]) -> Fit | None:
 def _project(balance: Balance, effect: Any, terms: tuple[Term, ...], grid: list[dict[str, float]]) -> list[dict[str, float]]:
     """The two best shapes of a grid by the fall of the RSS that its columns, orthogonal to the design, bring."""
     matrix, _, _ = balance.design(terms)
-    w = (balance.weight * balance.train)[:, None]
-    norm = np.linalg.norm(matrix * w, axis=0)
-    q, _ = np.linalg.qr(matrix * w / np.where(norm > 0, norm, 1.0))
-    residual = balance.effort * w[:, 0]
+    w = balance.weight * balance.train
+    matrix = balance.whiten(matrix * w[:, None], w)
+    norm = np.linalg.norm(matrix, axis=0)
+    q, _ = np.linalg.qr(matrix / np.where(norm > 0, norm, 1.0))
+    residual = balance.whiten(balance.effort * w, w)
     residual = residual - q @ (q.T @ residual)
     warps = tuple(t for t in terms if t.effect.warps)
     bounds = effect.amplitudes()
     gains = []
     for shape in grid:
-        c = balance.columns(effect, shape, warps) * w
+        c = balance.whiten(balance.columns(effect, shape, warps) * w[:, None], w)
         size = np.linalg.norm(c, axis=0)
         c, size = c[:, size > 0], size[size > 0]  # what acts in validation recordings only tells nothing here
         c = c - q @ (q.T @ c)

@@ -8,43 +8,60 @@ import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
 
+WHILES = ((0.0, 1.0), (0.2, 1.0), (0.35, 1.0), (0.5, 1.0), (0.65, 1.0), (0.8, 1.0), (0.0, 0.35), (0.0, 0.65), (0.2, 0.5), (0.35, 0.65),
+          (0.5, 0.8))
+MOST_VALIDATION = 6  # validation recordings in which an obstacle can still be told
+
 
 class ExternalContact(Effect):
-    """F = k max(0, x - x0) (form 0) or k max(0, x - x0)^2 (form 1) from a moment of one trial on to its end: an elastic
-    obstacle that was not always there, met after some free motion. Whether it is still there in validation recordings is for those to say.
+    """F = k max(0, x - x0) (form 0) or k max(0, x - x0)^2 (form 1) for a while of one trial: an elastic obstacle that was not
+    always there, met after some free motion. Whether it is still there in validation recordings is for each of those to say.
     """
 
     name = "external_contact"
+    repeats = True  # in another trial
     of_the_hand = False
     unwritten = "an obstacle of one recording is no part of the hand"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """Which trial (index into the states), from which share of it on, form, and where the contact begins."""
+        """Which trial (index into the states), from and until which share of it, form, and where the contact begins."""
         low, high = position_range(states)
         span = high - low
         return (Shape("trial", "1", 0.0, len(states) - 1.0, tuple(float(i) for i, s in enumerate(states) if not s.validate)),
                 Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),
-                Shape("since", "1", 0.0, 0.9, (0.0, 0.2, 0.35, 0.5, 0.65, 0.8)),
+                Shape("since", "1", 0.0, 0.9, tuple(sorted({a for a, _ in WHILES}))),
+                Shape("until", "1", 0.1, 1.0, tuple(sorted({b for _, b in WHILES}))),
                 Shape("begin", states[0].position_unit, low + 0.08 * span, high - 0.02 * span,
                       tuple(low + span * np.linspace(0.1, 0.9, 9))))
 
+    def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
+        """Every start of trial, form and place, in some whiles of the trial."""
+        return [point for point in super().grid(states) if (point["since"], point["until"]) in WHILES]
+
     def amplitudes(self) -> tuple[Amplitude, ...]:
-        """Stiffness of the contact in that trial, and in validation recordings; never negative."""
-        return (("stiffness", "effort/position", 0.0, np.inf), ("stiffness_validation", "effort/position", 0.0, np.inf))
+        """Stiffness of the contact in that trial, and in each validation recording; never negative."""
+        return (("stiffness", "effort/position", 0.0, np.inf),
+                *((f"stiffness_validation_{i}", "effort/position", 0.0, np.inf) for i in range(MOST_VALIDATION)))
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """Depth into the contact in that trial and in validation recordings, (n, 2)."""
+        """Depth into the contact in that trial and in each validation recording, (n, 1 + MOST_VALIDATION)."""
         depth = np.maximum(state.position - shape["begin"], 0.0)
         if shape["form"] > 0.5:
             depth = depth**2 / 10.0
-        index = state.extra.get("trial_index", np.zeros(len(state.time_s)))
-        late = state.time_s - state.time_s[0] >= shape["since"] * np.ptp(state.time_s)
-        return np.stack([depth * ((index == round(shape["trial"])) & late), depth * float(state.validate)], axis=-1)
+        out = np.zeros((len(depth), 1 + MOST_VALIDATION))
+        index = state.extra.get("trial_index", np.zeros(len(depth)))
+        share = (state.time_s - state.time_s[0]) / max(float(np.ptp(state.time_s)), 1e-9)
+        out[:, 0] = depth * ((index == round(shape["trial"])) & (share >= shape["since"]) & (share <= shape["until"]))
+        if state.validate:
+            rank = int(np.median(state.extra.get("validation_index", np.zeros(len(depth)))))
+            out[:, 1 + rank % MOST_VALIDATION] = depth
+        return out
 
     def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
                    declared: Mapping[str, float]) -> dict[str, float]:
         """Where it begins and how stiff it is."""
-        return {"trial": shape["trial"], "since": shape["since"], "begin": shape["begin"], "stiffness": amplitude["stiffness"]}
+        return {"trial": shape["trial"], "since": shape["since"], "until": shape["until"],
+                "begin": shape["begin"], "stiffness": amplitude["stiffness"]}
 
 
 EFFECT = ExternalContact()

@@ -1,0 +1,112 @@
+"""Findings of all stations as one ranked list, with the verdict and the next experiment."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from .findings import Finding, Findings
+from .interval import variance_ratio
+from .name import ALPHA, Named
+from .station import Station, channel_of, finding_of, unexplained_of, unrepeated_of
+
+UNLIKE_OTHERS = 2.0  # times the wander of the calmest finger
+UNREST = 0.3  # of the noise: wander that a lone finger is granted
+
+
+def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding]], notes: list[str],
+             unexplained: Sequence[dict[str, Any]] = ()) -> Findings:
+    """One ranked list from all stations; weight: log likelihood that an effect's model takes off. unexplained: of the markers."""
+    ranked: list[tuple[float, Finding]] = list(marker_findings)
+    rejected: list[dict[str, str]] = []
+    unexplained = list(unexplained)
+    for station in stations:
+        if station.believed:
+            ranked += [finding_of(station, named, share) for named, share in _merged(station.kept)]
+        elif station.missing:
+            unexplained.append(unexplained_of(station, 1.0))
+        if station.believed and station.naming.after.p < ALPHA and station.explained < 0.95:
+            unexplained.append(unexplained_of(station, 1 - station.explained))
+        rejected += [{"effect": name, "where": str(station.finger), "reason": _reason(value)}
+                     for name, value in station.naming.rejected[:4]]
+    unexplained += [unrepeated_of(s) for s in stations if _wanders(s, stations)]
+    ranked = _one_clock(ranked)
+    ranked.sort(key=lambda item: -item[0])
+    found = tuple(f for _, f in ranked)
+    verdict = "mismatch" if found else "unexplained" if unexplained else "consistent"
+    worst = max(stations, key=lambda s: variance_ratio(s.naming, s.naming.declared), default=None)
+    lack = {"before": 1.0, "after": 1.0, "limit": 1.0}
+    if worst is not None:
+        n = worst.naming.balance
+        count = max(int((~n.train & n.steady).sum()) or int(n.steady.sum()), 1)
+        lack = {"before": variance_ratio(worst.naming, worst.naming.declared),
+                "after": variance_ratio(worst.naming, worst.naming.fit), "limit": 1 + 2.6 * float(np.sqrt(2 / count))}
+    return Findings(verdict, lack, _protocol(stations), found, tuple(rejected), tuple(unexplained), _next(found),
+                    tuple(channel_of(s) for s in stations), tuple(notes))
+
+
+def _wanders(station: Station, stations: Sequence[Station]) -> bool:
+    """Whether one finger repeats itself clearly less well than the others do: how all of them are is how this hand is."""
+    if station.wander == 0:
+        return False
+    others = [s.wander for s in stations if s.signal == station.signal and s is not station and s.joint == station.joint]
+    return station.wander > (UNLIKE_OTHERS * min(others) if others else UNREST)
+
+
+def _one_clock(ranked: list[tuple[float, Finding]]) -> list[tuple[float, Finding]]:
+    """A drift that several fingers show is the log's one clock: one finding, of no finger in particular."""
+    drifts = sorted((i for i in ranked if i[1].effect == "clock_drift"), key=lambda i: -i[0])
+    if len(drifts) > 1:
+        weight, first = drifts[0]
+        trials = sorted({t for _, f in drifts for t in f.where["trials"]})
+        drifts = [(weight, replace(first, where={**first.where, "finger": None, "actuator": None, "trials": trials}))]
+    return [i for i in ranked if i[1].effect != "clock_drift"] + drifts
+
+
+def _merged(found: tuple[Named, ...]) -> list[tuple[Named, float]]:
+    """One entry per effect with its share: further harmonics of a periodic one belong to its first."""
+    out: dict[str, tuple[Named, float]] = {}
+    for named in found:
+        first, share = out.get(named.term.effect.name, (named, 0.0))
+        out[named.term.effect.name] = (first, share + named.share)
+    return list(out.values())
+
+
+def _reason(log_evidence: float) -> str:
+    if log_evidence <= 0:
+        return f"the fit does not gain what its parameters cost (log evidence {log_evidence:.1f})"
+    return f"another effect explains it better, or what it brings is within the noise (log evidence {log_evidence:.1f})"
+
+
+def _protocol(stations: list[Station]) -> dict[str, Any]:
+    drives = [s for s in stations if s.signal == "current"]
+    if not drives:
+        return {}
+    states = drives[0].naming.balance.states
+    speeds = {v for s in states if "speed" in s.extra for v in np.unique(s.extra["speed"]).tolist()}
+    step = float(np.median(np.concatenate([np.diff(s.time_s) for s in states])))
+    return {"repeats": len(states), "rate_hz": round(1 / step, 1), "speeds": len(speeds), "isolable": [],
+            "not_isolable": [["asymmetric_friction", "spring_preload"]]}
+
+
+EXPERIMENTS = {
+    frozenset(("stribeck_friction", "quadratic_damping")): "moves at a tenth of full speed and at three speeds between",
+    frozenset(("drive_backlash", "series_elasticity")): "the same flexion with a known weight at the tip",
+    frozenset(("linkage_backlash", "linkage_compliance")): "the same flexion with a known weight at the tip",
+    frozenset(("nonlinear_spring", "gravity_load")): "the same flexion with the palm turned over",
+    frozenset(("detent_load", "end_stop_contact")): "slow moves that end at three places short of the end of the range",
+}
+
+
+def _next(found: tuple[Finding, ...]) -> str | None:
+    for finding in found:
+        if len(finding.members) > 1:
+            for pair, text in EXPERIMENTS.items():
+                if pair <= set(finding.members):
+                    return f"{text}: it would separate {' from '.join(sorted(pair))}"
+            return (f"slow and fast full-range moves repeated five times on {finding.where['finger']}, and half-range moves "
+                    f"from both ends: they would separate {', '.join(finding.members)}")
+    return None

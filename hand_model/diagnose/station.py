@@ -1,0 +1,121 @@
+"""One balance of one finger, what was named there, and how far that is believed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .findings import Finding
+from .interval import held_out, parameter_intervals, proven, sized
+from .name import ALPHA, Named, Naming
+
+# How before and after were computed, said in the findings: no compiled file is involved until one is replayed.
+ENGINE = {"current": "inverse dynamics of the motor's balance, motion as recorded", "encoder": "encoder map, motion as recorded",
+          "markers": "linkage polynomial, motion as recorded"}
+UNWRITTEN = {"native": False, "mjcf": None, "urdf": "not expressible"}
+SMALL = 0.07  # share of the explained mismatch
+EXPLAINED_LEAST = 0.7  # of the explainable mismatch: below, the names are not believed
+
+
+class Station:
+    """One balance of one finger and what was named there."""
+
+    def __init__(self, signal: str, finger: str | None, actuator: str | None, joint: str | None, naming: Naming) -> None:
+        self.signal, self.finger, self.actuator, self.joint, self.naming = signal, finger, actuator, joint, naming
+        places = {id(f): naming.fit.terms.index(f.term) for f in naming.found}
+        self.parameters = {which: parameter_intervals(naming, which) for which in places.values() if proven(naming, which)}
+        self.proven = tuple(f for f in naming.found if places[id(f)] in self.parameters and sized(f, self.parameters[places[id(f)]]))
+
+    @property
+    def missing(self) -> bool:
+        """Whether the lack-of-fit test says that something is missing, or an effect that it overlooked holds out: along the
+        known effects mismatch shows earlier than in any grouping of cells."""
+        return self.naming.before.p < ALPHA or bool(self.proven)
+
+    @property
+    def wander(self) -> float:
+        """Standard deviation of what does not repeat over that of the noise; zero where nothing of the kind shows."""
+        wander = self.naming.balance.wander
+        return 0.0 if wander is None else wander.deviation / self.naming.balance.sigma
+
+    @property
+    def explained(self) -> float:
+        """Share of the explainable mismatch that the named effects take away."""
+        before = max(self.naming.before.excess, 1e-9)
+        return float(np.clip(1 - max(self.naming.after.excess, 0.0) / before, 0, 1))
+
+    @property
+    def believed(self) -> bool:
+        """Whether the names stand: the final model passes the test, or takes most of the mismatch away."""
+        return bool(self.proven) and (self.naming.after.p >= ALPHA or self.explained >= EXPLAINED_LEAST)
+
+    @property
+    def kept(self) -> tuple[Named, ...]:
+        """The effects that stand beside each other: one of a small share may be no more than the form of the large one being
+        another, and is left to the unexplained part."""
+        return tuple(f for f in self.proven if f.share >= SMALL or f is self.proven[0])
+
+    def line(self) -> str:
+        """One line for a progress display."""
+        place = " ".join(x for x in (self.finger, self.joint, self.signal) if x)
+        if not self.missing:
+            return f"{place}: consistent (p {self.naming.before.p:.2g})"
+        names = ", ".join(f.term.effect.name for f in self.kept) if self.believed else "unexplained"
+        return f"{place}: {names} (p {self.naming.before.p:.2g} -> {self.naming.after.p:.2g})"
+
+
+def finding_of(station: Station, named: Named, share: float) -> tuple[float, Finding]:
+    naming = station.naming
+    which = naming.fit.terms.index(named.term)
+    effect = named.term.effect
+    parameters = dict(station.parameters[which])
+    parameters |= effect.further(naming.balance.states, parameters)
+    values = {k: v["value"] for k, v in parameters.items()}
+    where: dict[str, Any] = {
+        "finger": station.finger,
+        "joint": getattr(effect, "joint", station.joint) if station.signal != "current" else None,
+        "actuator": station.actuator,
+        "signal": getattr(effect, "signal", station.signal),
+        "marker": None,
+        "trials": [s.trial for s in naming.balance.states],
+        "region": effect.region(naming.balance.states, named.term.shape),
+        "share_of_mismatch": share * station.explained,
+    }
+    top = named.rivals[0].evidence
+    weights = np.exp(np.array([r.evidence for r in named.rivals] + [0.0]) - max(top, 0.0))
+    weights = weights / weights.sum()
+    alternatives = tuple((r.name, float(p)) for r, p in zip(named.rivals, weights[:-1], strict=True)
+                         if r.name != effect.name and p > 1e-3)[:4]
+    unit = naming.balance.states[0].effort_unit
+    fit = {"metric": f"{station.signal}_rmse", "unit": unit, **held_out(naming, which), "engine": ENGINE[station.signal]}
+    members = named.members if effect.name in named.members else (effect.name, *named.members)
+    recording = getattr(effect, "correction", None)
+    model = None if recording else dict(UNWRITTEN)
+    weight = 0.5 * max(naming.declared.rss - naming.fit.rss, 0.0) * share
+    return weight, Finding(effect.name, members, named.probability, alternatives, where,
+                           effect.statement(where, values), parameters, fit, model, recording)
+
+
+def unexplained_of(station: Station, share: float) -> dict[str, Any]:
+    return {
+        "where": {"finger": station.finger, "joint": station.joint, "actuator": station.actuator, "signal": station.signal},
+        "share_of_mismatch": share,
+        "shape": f"varies with {station.naming.after.telling}",
+    }
+
+
+def unrepeated_of(station: Station) -> dict[str, Any]:
+    """The entry of what changes from one while to the next at the same place, speed and direction."""
+    wander = station.naming.balance.wander
+    length = 0.0 if wander is None else wander.length_s
+    span = f"whiles of {length:.1g} s" if np.isfinite(length) else "stroke to stroke"
+    entry = unexplained_of(station, station.wander**2 / (1 + station.wander**2))
+    return {**entry, "shape": f"does not repeat: changes over {span} by {station.wander:.1f} times the noise"}
+
+
+def channel_of(station: Station) -> dict[str, Any]:
+    n = station.naming
+    return {"finger": station.finger, "joint": station.joint, "signal": station.signal, "p_before": n.before.p,
+            "p_after": n.after.p, "varies_with": n.before.telling, "noise": n.balance.sigma,
+            "effects": [f.term.effect.name for f in n.found], "explained": station.explained}

@@ -1,0 +1,98 @@
+"""Wander: what differs from one while to the next although place, speed and direction are the same.
+
+Machines and channels do not repeat themselves exactly: a zero drifts, friction is another in every stroke, something shakes
+the bench. Such a load has no law to be named, but whoever counts it as white noise names whatever effect resembles the
+accident. It is a random level per while (a random intercept; Laird & Ware 1982), as large as the replicates say.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from .balance import Balance
+
+Array = NDArray[np.float64]
+
+WHILES_S = (0.3, 0.8, 2.0, np.inf)  # lengths of the whiles within a stroke that are tried; infinite: the whole stroke
+EVIDENCE_LEAST = 6.0  # log likelihood that a random level must bring: as much as any effect
+FEWEST = 8  # whiles below which nothing can be said
+
+
+@dataclass(frozen=True)
+class Wander:
+    """A random level per while. label: (n,) while of every compared sample. deviation: standard deviation of the levels
+    [effort]. evidence: log likelihood that it brings. length_s: of a while, infinite for whole strokes."""
+
+    label: NDArray[np.int64]
+    deviation: float
+    evidence: float
+    length_s: float
+
+    def whiten(self, values: Array, weight: Array, inflation: float) -> Array:
+        """Weighted values (n,) or (n, k) with the level of each while shrunk to the size that noise has: uncorrelated again.
+
+        weight: (n,) that `values` carry, zero for samples that take no part. Exact inverse root of
+        I + d^2/inflation * w w' within each while (Woodbury).
+        """
+        many = int(self.label.max()) + 1
+        size = np.bincount(self.label, weight**2, many)
+        shrink = 1 - 1 / np.sqrt(1 + self.deviation**2 * size / inflation)
+        rate = np.where(size > 0, shrink / np.where(size > 0, size, 1.0), 0.0)
+        columns = values.reshape(len(values), -1)
+        sums = np.stack([np.bincount(self.label, c * weight, many) for c in columns.T], axis=1)
+        return (columns - (weight[:, None] * (rate[:, None] * sums)[self.label])).reshape(values.shape)
+
+    def log_likelihood(self, residual: Array, weight: Array, inflation: float) -> float:
+        """Log likelihood of a weighted residual (n,), normalised to that of white noise of the same weights."""
+        size = np.bincount(self.label, weight**2) / inflation
+        left = float(np.sum(self.whiten(residual, weight, inflation) ** 2)) / inflation
+        return -0.5 * (left + float(np.sum(np.log1p(self.deviation**2 * size))))
+
+
+def estimate_wander(balance: Balance, prediction: Array) -> Wander | None:
+    """The random level that the residual of a prediction (n,) shows in training recordings, beside what repeats; None where
+    it brings less than EVIDENCE_LEAST (likelihood of Laird & Ware 1982, maximised over its size and the length of a while)."""
+    from .balance import replicate_deviation
+
+    use = balance.train & balance.steady
+    apart, _ = replicate_deviation(balance, balance.effort - prediction, use)
+    if not len(apart):
+        return None
+    seen = use & np.isfinite(apart)
+    weight = np.where(seen, balance.weight, 0.0)
+    z = np.where(seen, apart, 0.0) * weight
+    best = None
+    for length_s in WHILES_S:
+        label = whiles(balance, length_s)
+        size = np.bincount(label, weight**2) / balance.inflation
+        square = np.bincount(label, z * weight) ** 2 / balance.inflation
+        square, size = square[size > 0], size[size > 0]
+        if len(size) < FEWEST:
+            continue
+        deviations = np.geomspace(0.02, 5.0, 40) * balance.sigma
+        gains = [_gain(d**2, size, square) for d in deviations]
+        k = int(np.argmax(gains))
+        if best is None or gains[k] > best.evidence:
+            best = Wander(label, float(deviations[k]), float(gains[k]), float(length_s))
+    return best if best is not None and best.evidence >= EVIDENCE_LEAST else None
+
+
+def _gain(variance: float, size: Array, square: Array) -> float:
+    grown = 1 + variance * size
+    return 0.5 * float(np.sum(square * variance / grown - np.log(grown)))
+
+
+def whiles(balance: Balance, length_s: float) -> NDArray[np.int64]:
+    """Label (n,) of the while to which each compared sample belongs: strokes, cut into pieces of `length_s` [s]."""
+    if not np.isfinite(length_s):
+        return balance.stroke
+    time_s = balance.gather(lambda s: s.time_s)
+    first = np.full(int(balance.stroke.max()) + 1, np.inf)
+    np.minimum.at(first, balance.stroke, time_s)
+    piece = ((time_s - first[balance.stroke]) / length_s).astype(np.int64)
+    return np.unique(balance.stroke * (int(piece.max()) + 1) + piece, return_inverse=True)[1]
