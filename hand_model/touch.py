@@ -1,8 +1,9 @@
 """Touch read from the current: what the free-motion model does not explain, tested sample by sample.
 
 Residual: measured less predicted current of the open-loop simulation, in units of the noise, along the motion. Test: Page's (1954)
-cumulative sum. Its threshold is set for a false-alarm rate on free motion: the maxima of the sum's excursions have an exponential tail,
-which is fitted to the excursions of free-motion logs, so that correlation and model error in them count (Siegmund 1985, ch. 2).
+cumulative sum. Its threshold is set for a false-alarm rate on free motion: the largest value of the sum in each free move has an exponential
+tail (Siegmund 1985, ch. 2), whatever the residuals' correlation and model error. A tail known from few moves reaches further than the best
+guess of it: the threshold is that of the predictive distribution, a Pareto one (exponential excesses of unknown mean; Geisser 1993, ch. 2).
 """
 
 from __future__ import annotations
@@ -30,12 +31,13 @@ AFTER_S = 1.2  # of pressing that the stiffness is read from
 
 @dataclass(frozen=True)
 class TouchDetector:
-    """Threshold of the cumulative sum [noise deviations]; its false-alarm rate [1/min] on free motion; decay of the excursions'
-    tail, the free motion that it was calibrated on [min], and the white-noise threshold below which it is never set."""
+    """Threshold of the cumulative sum [noise deviations]; its false-alarm rate [1/min] on free motion; mean excess of the tail of the
+    moves' maxima, the free moves and the motion [min] that it was calibrated on, and the white-noise threshold below which it is never set."""
 
     threshold: float
     false_alarms_per_minute: float
-    decay: float
+    mean_excess: float
+    free_moves: int
     free_minutes: float
     white_threshold: float
 
@@ -115,37 +117,35 @@ def cumulative_sum(z: Array, slack: float = SLACK) -> Array:
     return out
 
 
-def excursions(z: Array, slack: float = SLACK) -> Array:
-    """Maxima of the cumulative sum between its returns to zero."""
-    g = cumulative_sum(z, slack)
-    starts = np.flatnonzero((g > 0) & (np.r_[0.0, g[:-1]] == 0))
-    return np.maximum.reduceat(g, starts) if len(starts) else np.empty(0)
-
-
 def calibrate(fit: MotorFit, free: Sequence[tuple[str, Log]], false_alarms_per_minute: float = 0.1) -> TouchDetector:
     """Threshold for a false-alarm rate [1/min] from logs of free motion (name, log).
 
-    Raises IdentificationError with fewer than 30 excursions of the sum: too little free motion to calibrate on.
+    Raises IdentificationError with fewer than 12 free moves into flexion: too little to calibrate on.
     """
-    peaks, samples, minutes = [], 0, 0.0
+    maxima, samples, minutes = [], 0, 0.0
     for name, log in free:
         for m, _, z in residuals(fit, log, name):
             tested = z[m.time_s > ALIGN_S]
-            peaks.append(excursions(tested))
+            maxima.append(float(cumulative_sum(tested).max()))
             samples += len(tested)
             minutes += float(m.time_s[-1] - ALIGN_S) / 60
-    heights = np.concatenate(peaks) if peaks else np.empty(0)
-    if len(heights) < 30:
-        raise IdentificationError(f"{len(heights)} excursions of the free-motion residual; at least 30 are needed to calibrate touch")
-    # the tail above the median: exponential, so its mean excess is one over its decay; two standard errors on the safe side
-    middle = float(np.median(heights))
-    tail = heights[heights > middle] - middle
-    decay = 1 / (float(tail.mean()) * (1 + 2 / np.sqrt(len(tail))))
-    rate = len(tail) / max(minutes, 1e-9)
-    threshold = middle + np.log(max(rate / false_alarms_per_minute, 1.0)) / decay
-    per_minute = samples / max(minutes, 1e-9)
-    white = np.log(2 * SLACK**2 * per_minute / false_alarms_per_minute + 1) / (2 * SLACK) - 1.166
-    return TouchDetector(float(max(threshold, white)), false_alarms_per_minute, decay, minutes, float(white))
+    if len(maxima) < 12:
+        raise IdentificationError(f"{len(maxima)} free moves into flexion; at least 12 are needed to calibrate touch")
+    wanted = false_alarms_per_minute * minutes / len(maxima)  # alarms per move
+    threshold, mean_excess = tail_threshold(np.array(maxima), wanted)
+    white = np.log(2 * SLACK**2 * samples / minutes / false_alarms_per_minute + 1) / (2 * SLACK) - 1.166
+    return TouchDetector(float(max(threshold, white)), false_alarms_per_minute, mean_excess, len(maxima), minutes, float(white))
+
+
+def tail_threshold(maxima: Array, probability: float) -> tuple[float, float]:
+    """Value that one more of maxima (n,) passes with this probability, by the predictive distribution of an exponential tail; its mean excess."""
+    middle = float(np.median(maxima))
+    excess = maxima[maxima > middle] - middle
+    if len(excess) == 0:
+        return middle, 0.0
+    share = len(excess) / len(maxima)
+    reach = excess.sum() * (max(share / probability, 1.0) ** (1 / len(excess)) - 1)
+    return float(middle + reach), float(excess.mean())
 
 
 def detect(fit: MotorFit, detector: TouchDetector, log: Log, name: str = "log", measure: bool = True) -> tuple[Contact, ...]:

@@ -8,16 +8,21 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
-import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from hand_model import touch
-from hand_model.identify.motor import identify_motor
-from hand_model.identify.motor.recording import actuator_trials
-from hand_model.session import read_session
-from hand_model.twin import LogNoise, Plan, bebionic, record
+from hand_model.identify.motor import fit_motor
+from hand_model.identify.motor.recording import motor_trial, trial_scale
+from hand_model.session import Log
+from hand_model.twin import LogNoise, Plan, bebionic
+from hand_model.twin.dirt import log_columns, unrest_terms
+from hand_model.twin.influence import merge_terms
+from hand_model.twin.motor import simulate
+from hand_model.twin.record import contact_percent, grasp_terms
+from hand_model.twin.schedule import TrialPlan, schedule
 from hand_model.twin.truth import Controller
 
 AIR, STIFF, COMPLIANT = "air", "stiff", "compliant"
@@ -27,40 +32,52 @@ def hand(seed: int):
     """A twin hand with one finger: its motor, controller gains and log noise drawn from the seed."""
     rng = np.random.default_rng(seed)
     truth = bebionic("left" if seed % 2 else "right", seed, ["index"])
-    ramp = seed % 4 != 3
-    control = Controller("ramp", rng.uniform(16, 30), rng.uniform(0.45, 0.8), 12.0, rng.uniform(85, 140), 255.0)
-    if not ramp:
+    control, give = Controller("ramp", rng.uniform(16, 30), rng.uniform(0.45, 0.8), 12.0, rng.uniform(85, 140), 255.0), 0.0
+    if seed % 4 == 3:
         control = dataclasses.replace(control, kind="cascade", gain=rng.uniform(1.6, 3.0), integral=rng.uniform(9, 16))
-    motors = {"index": dataclasses.replace(truth.motors["index"], controller=control)}
+    elif seed % 4 == 2:
+        control, give = dataclasses.replace(control, kind="profile", damping=rng.uniform(1.5, 3.5), acceleration=rng.uniform(700, 1200)), rng.uniform(0.4, 0.8)
+    motors = {"index": dataclasses.replace(truth.motors["index"], controller=control, give=give)}
     noise = LogNoise(encoder_counts=rng.uniform(1, 6), current_raw=rng.uniform(3, 8), current_memory_s=float(rng.choice([0.0, 0.02])))
     return dataclasses.replace(truth, motors=motors, log=noise), rng
 
 
-def one_hand(seed: int, repeats: int, free: int, measure: bool) -> list[dict]:
+def recorded(truth, plan: Plan, seed: int) -> Iterator[tuple[TrialPlan, Log, float | None]]:
+    """Motion trials of a plan as the twin logs them, and when the object of a grasp was met on the log's clock [s]."""
+    motor = truth.motors["index"]
+    for trial in schedule(truth, plan):
+        if trial.program is None:
+            continue
+        met = contact_percent(trial, seed)
+        parts = [unrest_terms(motor, trial, seed)] if motor.unrest > 0 else []
+        motion = simulate(motor, trial.program, merge_terms(parts + ([] if met is None else [grasp_terms(trial, met)])), trial.start_s)
+        columns = log_columns(truth, motor, trial, motion, motion.position, motion.current, seed, 1.0)
+        touched = np.flatnonzero(motion.position > met) if met is not None and trial.stiffness else []
+        clock = truth.log.clock_offset_s + truth.log.clock_rate * trial.start_s
+        log = Log(np.round(columns.pop("time"), 5), columns, Path(f"{trial.name}.csv"))
+        yield trial, log, clock + truth.log.clock_rate * float(motion.time_s[touched[0]]) if len(touched) else None
+
+
+def one_hand(seed: int, repeats: int, free: int, measure: bool, asked: float) -> list[dict]:
     """Scores and delays of all closing moves of one hand's grasps."""
     truth, rng = hand(seed)
     objects = (*((f"{AIR}{i}", 0.0) for i in range(free)), (STIFF, rng.uniform(20, 60)), (COMPLIANT, rng.uniform(0.7, 4.0)))
+    training = [(t.name, log) for t, log, _ in recorded(truth, Plan(), seed)]
+    own = [x for x, t in zip(training, (t for t in schedule(truth, Plan()) if t.program is not None), strict=True) if not t.validate]
+    scale = trial_scale(own, truth.motors["index"].controller.speed_raw_full)
+    fit = fit_motor([motor_trial(n, log, scale) for n, log in own], scale)
+    detector = touch.calibrate(fit, training, asked)
     rows = []
-    with tempfile.TemporaryDirectory() as scratch:
-        answer = record(truth, Path(scratch) / "session", seed, plan=Plan(grasps=objects, grasp_repeats=repeats))
-        session = read_session(Path(scratch) / "session")
-        fit = identify_motor(session, "index")
-        free = [(t.name, t.log()) for t in actuator_trials(session, "index")]
-        detector = touch.calibrate(fit, free)
-        for trial in actuator_trials(session, "index", ("grasp",), None):
-            stem, log = Path(trial.name).stem, trial.log()
-            truth_time = answer.trials[stem].log_time_s
-            contact_s = answer.table["grasps"][stem]["contact_s"]
-            found = touch.detect(fit, detector, log, trial.name, measure=measure)
-            closing = touch.residuals(fit, log, trial.name)
-            scores = np.array([touch.cumulative_sum(z).max() for _, _, z in closing])
-            alarm = min((float(np.interp(c.detected_s, log.time_s, truth_time)) for c in found), default=None)
-            rows.append({
-                "seed": seed, "object": AIR if trial.object.startswith(AIR) else trial.object, "stiffness": trial.stiffness, "scores": scores.tolist(),
-                "delay_s": None if alarm is None or contact_s is None else alarm - contact_s,
-                "alarms": len(found), "minutes": sum(float(m.time_s[-1] - touch.ALIGN_S) for m, _, _ in closing) / 60, "method": fit.method, "current_noise": fit.sigma_current,
-                "fitted": [[c.stiffness.value, *c.stiffness.ci95, c.kind] for c in found if c.stiffness],
-            })  # fmt: skip
+    for trial, log, contact_s in recorded(truth, Plan(flexion=(), validation=(), excitations=0, grasps=objects, grasp_repeats=repeats), seed):
+        found = touch.detect(fit, detector, log, trial.name, measure=measure)
+        closing = touch.residuals(fit, log, trial.name)
+        rows.append({
+            "seed": seed, "object": AIR if trial.object.startswith(AIR) else trial.object, "stiffness": trial.stiffness,
+            "scores": [float(touch.cumulative_sum(z).max()) for _, _, z in closing], "threshold": detector.threshold,
+            "delay_s": found[0].detected_s - contact_s if found and contact_s is not None else None,
+            "alarms": len(found), "minutes": sum(float(m.time_s[-1] - touch.ALIGN_S) for m, _, _ in closing) / 60, "method": fit.method, "current_noise": fit.sigma_current,
+            "fitted": [[c.stiffness.value, *c.stiffness.ci95, c.kind] for c in found if c.stiffness],
+        })  # fmt: skip
     return rows
 
 
@@ -79,9 +96,15 @@ def main() -> None:
     parser.add_argument("--free", type=int, default=5, help="objects of air: free motion to count false alarms on, each REPEATS times")
     parser.add_argument("--first-seed", type=int, default=100)
     parser.add_argument("--stiffness", action="store_true", help="estimate the stiffness of every contact too")
+    parser.add_argument("--rate", type=float, default=0.1, help="false alarms asked for [1/min]")
     parser.add_argument("--output", default="roc_touch.json")
     args = parser.parse_args()
-    rows = [row for seed in range(args.first_seed, args.first_seed + args.hands) for row in one_hand(seed, args.repeats, args.free, args.stiffness)]
+    rows: list[dict] = []
+    for seed in range(args.first_seed, args.first_seed + args.hands):
+        rows += one_hand(seed, args.repeats, args.free, args.stiffness, args.rate)
+        air = [r for r in rows if r["object"] == AIR and r["seed"] == seed]
+        print(f"hand {seed}: {sum(r['alarms'] for r in air)} alarms in {sum(r['minutes'] for r in air):.1f} min, threshold {rows[-1]['threshold']:.1f}, "
+              f"largest {max(s for r in air for s in r['scores']):.1f}", flush=True)  # fmt: skip
     pool = {k: np.array([s for r in rows if r["object"] == k for s in r["scores"]]) for k in (AIR, STIFF, COMPLIANT)}
     summary = {"hands": args.hands, "without_controller": len({r["seed"] for r in rows if r["method"] != "output error"})}
     for kind in (STIFF, COMPLIANT):
@@ -97,6 +120,7 @@ def main() -> None:
     air = [r for r in rows if r["object"] == AIR]
     summary["false_alarms_per_minute"] = sum(r["alarms"] for r in air) / max(sum(r["minutes"] for r in air), 1e-9)
     summary["free_minutes"] = sum(r["minutes"] for r in air)
+    summary["false_alarms"] = sum(r["alarms"] for r in air)
     Path(args.output).write_text(json.dumps({"summary": summary, "grasps": rows}, indent=1) + "\n")
     print(json.dumps({k: {q: w for q, w in v.items() if q != "roc"} if isinstance(v, dict) else v for k, v in summary.items()}, indent=1))
 

@@ -45,25 +45,22 @@ def test_free_motion_is_silent(grasps) -> None:
         assert touch.detect(fit, detector, trial.log(), trial.name) == ()
 
 
-def test_sum_and_excursions() -> None:
+def test_cumulative_sum() -> None:
     z = np.array([0.0, 3.0, 0.5, -4.0, 0.0, 2.0, 2.0])
     assert np.allclose(touch.cumulative_sum(z, 1.0), [0, 2, 1.5, 0, 0, 1, 2])
-    assert np.allclose(touch.excursions(z, 1.0), [2, 2])
 
 
-def test_threshold_rises_with_correlation() -> None:
-    """Correlated residuals have higher excursions than white ones of the same variance: their tail decides."""
+def test_threshold_keeps_its_probability() -> None:
+    """However few the moves it is read from, a threshold is passed by one more move with the probability asked for."""
     rng = np.random.default_rng(0)
-    white = rng.normal(size=20000)
-    coloured = np.empty(20000)
-    coloured[0] = white[0]
-    for i in range(1, 20000):
-        coloured[i] = 0.8 * coloured[i - 1] + 0.6 * white[i]
-    assert touch.excursions(coloured).max() > 2 * touch.excursions(white).max()
+    maxima = rng.exponential(2.0, (4000, 21))
+    passed = [row[-1] > touch.tail_threshold(row[:-1], 0.01)[0] for row in maxima]
+    assert np.mean(passed) == pytest.approx(0.01, abs=0.005)
+    assert touch.tail_threshold(maxima[0], 0.001)[0] > touch.tail_threshold(maxima[0], 0.01)[0]
 
 
 def test_too_little_free_motion_is_refused(grasps) -> None:
-    with pytest.raises(IdentificationError, match="at least 30"):
+    with pytest.raises(IdentificationError, match="at least 12"):
         touch.calibrate(grasps[2], [])
 
 
