@@ -15,7 +15,7 @@ from ...session import Session
 from . import output_error
 from .balance import NAMES
 from .controller import find_controller
-from .drive import CONTROLLERS, STRIBECK
+from .drive import STRIBECK
 from .moves import BEFORE, MoveData, moves_from_rest
 from .output_error import STAGES, OutputErrorFit
 from .published import PublishedFit, fit_published, smear_share
@@ -219,7 +219,6 @@ def _fit_output_error(
     moves: Sequence[MoveData], plain: Regression, curved: Regression, sigma: tuple[float, float]
 ) -> tuple[OutputErrorFit, float]:
     base = find_controller(moves, plain, sigma, BOUNDS, LACK_OF_FIT)
-    fitted = CONTROLLERS[base.controller]
     # a Stribeck rise is tried where the regression, which knows no controller, leaves room for one
     if max(base.chi2) > 4.0 or curved.excess_z < 2.0:
         return base, 0.0
@@ -227,7 +226,7 @@ def _fit_output_error(
     fits = []
     for exponent in (1.0, 2.0):
         curve = {**base.values, "static_ratio": ratio, "stribeck_speed": 20.0, "stribeck_exponent": exponent}
-        fits.append(output_error.fit(base.moves, curve, (*fitted, *STRIBECK), base.sigma, BOUNDS, base.controller, STAGES[-1:], base.own))
+        fits.append(output_error.fit(base.moves, curve, (*base.names, *STRIBECK), base.sigma, BOUNDS, base.controller, STAGES[-1:], base.own))
     best, other = sorted(fits, key=lambda f: f.cost)
     evidence = (base.cost - best.cost) / max(1.0, *best.chi2)
     if evidence < EVIDENCE or _is_at_bound(best):
