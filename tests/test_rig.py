@@ -18,6 +18,7 @@ from hand_model.rig.dynamics import INERTIAL, inertial_columns, inertial_paramet
 from hand_model.rig.mjcf import read_effects, write_effects
 from hand_model.rig.physical import physical
 from hand_model.rig.solve import solve_bounded
+from hand_model.rig.states import local_states
 from hand_model.rig.swing import Lane, Swing, Task, errors, fit_together, simulate, vector
 from hand_model.session import read_session
 
@@ -349,3 +350,13 @@ def test_report_of_a_rig_shows_what_was_found(planted_load: Path, tmp_path: Path
     for anchor in ('id="findings"', 'id="map"', 'id="effects"', 'id="validation"', "load dependent friction"):
         assert anchor in page
     assert "http://" not in page.replace("http://www.w3.org", "")
+
+
+def test_the_start_of_a_recording_is_read_without_bias() -> None:
+    """Position and velocity at the ends of a swing let go from rest: zero there, within what the encoder can tell."""
+    t = np.arange(0, 10, 0.002)
+    values = np.round(np.cos(8 * t) / 1.6e-4) * 1.6e-4
+    position, velocity = local_states(values, 500.0)
+    assert abs(velocity[0]) < 0.02
+    assert abs(position[0] - 1.0) < 1e-4
+    assert np.abs(velocity + 8 * np.sin(8 * t))[5:-5].max() < 0.1

@@ -15,7 +15,7 @@ from .findings import Finding
 from .model import RigModel, load_rig
 from .replay import RigResiduals, replay_rig
 from .states import fill_gaps, noise_std
-from .swing import INDEX, PARAMETERS, STEP_S, Fitted, Swing, Task, parameter_units, vector
+from .swing import INDEX, PARAMETERS, STEP_S, Fitted, Swing, Task, errors, parameter_units, vector
 from .swing_build import build_swing, windows_s
 from .swing_compete import LEAST_GAIN, Round, Variant, all_free, compete_swing, fit_stages, free_declared, refine_swing
 from .swing_interval import intervals
@@ -24,6 +24,7 @@ from .words import shares, statement
 
 SEARCH_STEP_S = 4e-3
 RESAMPLES = 500
+NOT_BORNE_OUT = "error on validation trials does not fall"
 
 
 def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Callable[[str], None]) -> tuple:
@@ -32,38 +33,31 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
     stages = [build_swing(rig, fit, SEARCH_STEP_S, w) for w in windows]
     free = free_declared(stages[0])
     declared = fit_stages(stages, [Task(free, vector(stages[0].initial), ())], 15)[0]
-    taken, rounds = compete_swing(stages, declared)
-    say(f"{rig.name}: {', '.join(v.key for v in taken) or 'nothing'}")
+    floor, held = _resolution(rig), bool(rig.select(True))  # without validation recordings the training ones measure
+    whole = build_swing(rig, fit, SEARCH_STEP_S)
+    taken, rounds = compete_swing(stages, declared, floor)
+    kept, rejected = _borne_out(stages, whole, declared, list(zip(taken, rounds, strict=True)), held, floor)
+    say(f"{rig.name}: {', '.join(v.key for v, _ in kept) or 'nothing'}")
     # Last, at the step of the replay; a free swing over whole recordings, for its phase is known well enough by now.
     fine = [build_swing(rig, fit, STEP_S, w) for w in (windows if stages[0].driven else (*windows[1:], np.inf))]
-    held = bool(rig.select(True))  # without validation recordings the training ones measure, and the report says so
-    known: dict[tuple[str, ...], Link] = {}
-    kept, rejected, banned = list(zip(taken, rounds, strict=True)), [], set()
     while True:
-        _chain(known, rig, session, held, fine, declared.theta, [v for v, _ in kept], kept[-1][1].fit.theta if kept else None)
-        chain = [known[tuple(v.key for v, _ in kept[:k])] for k in range(len(kept) + 1)]
+        chain = _chain(rig, session, held, fine, declared.theta, [v for v, _ in kept], kept[-1][1].fit.theta if kept else None)
         figures = [c.replay.figure("position_rmse", held) for c in chain]
-        worse = next((k for k in range(len(kept)) if not figures[k + 1] < (1.0 - LEAST_GAIN) * figures[k]), None)
-        if worse is not None:
-            rejected.append({"effect": kept.pop(worse)[0].key, "reason": "error on validation trials does not fall"})
-            continue
-        resume = bool(rejected) and not banned  # once: what stood in the shadow of those may come forward
-        banned = {r["effect"] for r in rejected}
-        more = _continued(stages, [v for v, _ in kept], chain[-1], banned, resume)
-        if not more:
+        worse = next((k for k in range(len(kept)) if not figures[k + 1] < figures[k]), None)
+        if worse is None:
             break
-        kept += more
+        rejected.append({"effect": kept.pop(worse)[0].key, "reason": NOT_BORNE_OUT})
     found = []
     for k, (variant, round_) in enumerate(kept):
         proof = {"metric": "position_rmse", "unit": rig.unit(rig.joints[0]), "before": figures[k], "after": figures[k + 1],
-                 "noise_floor": _resolution(rig), "ci95_reduction": _fall(chain[k].replay, chain[k + 1].replay, held),
+                 "noise_floor": floor, "ci95_reduction": _fall(chain[k].replay, chain[k + 1].replay, held),
                  "held_out": [t.name for t in rig.select(held)], "engine": "mujoco"}  # fmt: skip
         found.append(_swing_finding(rig, variant, round_, fine[0], chain[-1], proof))
     means = [c.replay.figure("position_mae", held) for c in (chain[0], chain[-1])]
     lack = {"metric": "position_rmse", "unit": rig.unit(rig.joints[0]), "before": figures[0], "after": figures[-1],
             "one_effect": figures[min(1, len(figures) - 1)],
             "two_effects": figures[min(2, len(figures) - 1)], "engine": "mujoco", "mae_before": means[0], "mae_after": means[1],
-            "noise_floor": _resolution(rig),
+            "noise_floor": floor,
             "declared": {n: float(chain[0].fit.theta[INDEX[n]]) for n in free}}  # fmt: skip
     return shares(found), rejected, lack, chain[-1].xml, chain[0].xml
 
@@ -78,30 +72,63 @@ class Link:
     replay: RigResiduals
 
 
-def _chain(known: dict[tuple[str, ...], Link], rig: RigModel, session: Session, held: bool, stages: Sequence[Swing], declared: np.ndarray,
-           taken: Sequence[Variant], last: np.ndarray | None) -> None:  # fmt: skip
-    """Add to `known` the declared model, with the first effect, with the first two, ...: fitted in one batch, written and
-    replayed."""
+def _borne_out(stages: Sequence[Swing], whole: Swing, declared: Fitted, kept: list[tuple[Variant, Round]], held: bool,
+               floor: float) -> tuple[list[tuple[Variant, Round]], list[dict[str, Any]]]:  # fmt: skip
+    """Of the effects that the training recordings chose, those that lower the error on the recordings held out, and what was
+    rejected; the search is resumed once without those, and a closer law of what stands is looked for.
+
+    whole: whole recordings, for the motion in open loop that is measured.
+    """
+    rejected: list[dict[str, Any]] = []
+    banned: set[str] = set()
+    known = {(): (declared, _open_loop(whole, declared.theta, held))}
+    while True:
+        for k in range(1, len(kept) + 1):
+            part = tuple(v for v, _ in kept[:k])
+            if (key := tuple(v.key for v in part)) not in known:
+                free, last = all_free(stages[0], part), kept[-1][1].fit.theta
+                start = np.where(np.isin(PARAMETERS, free), last, vector({}))
+                fitted = fit_stages(stages, [Task(free, start, ())], 8)[0]
+                known[key] = fitted, _open_loop(whole, fitted.theta, held)
+        chain = [known[tuple(v.key for v, _ in kept[:k])] for k in range(len(kept) + 1)]
+        worse = next((k for k in range(len(kept)) if not chain[k + 1][1] < (1.0 - LEAST_GAIN) * chain[k][1]), None)
+        if worse is not None:
+            rejected.append({"effect": kept.pop(worse)[0].key, "reason": NOT_BORNE_OUT})
+            continue
+        resume = bool(rejected) and not banned  # once: what stood in the shadow of those may come forward
+        banned = {r["effect"] for r in rejected}
+        more = _continued(stages, [v for v, _ in kept], chain[-1][0], banned, resume, floor)
+        if not more:
+            return kept, rejected
+        kept += more
+
+
+def _open_loop(whole: Swing, theta: np.ndarray, held: bool) -> float:
+    """Root mean square position error over whole recordings of one side."""
+    lanes = [i for i, lane in enumerate(whole.lanes) if lane.validate == held]
+    error = errors(whole, np.repeat(theta[None], len(lanes), 0), np.array(lanes))
+    return float(np.sqrt(np.sum(error**2) / sum(whole.lanes[i].used.sum() for i in lanes)))
+
+
+def _chain(rig: RigModel, session: Session, held: bool, stages: Sequence[Swing], declared: np.ndarray,
+           taken: Sequence[Variant], last: np.ndarray | None) -> list[Link]:  # fmt: skip
+    """The declared model, with the first effect, with the first two, ...: fitted in one batch, written and replayed."""
     swing = stages[0]
     start = vector(swing.initial)
-    parts = [tuple(taken[:k]) for k in range(len(taken) + 1) if tuple(v.key for v in taken[:k]) not in known]
-    if not parts:
-        return
+    parts = [tuple(taken[:k]) for k in range(len(taken) + 1)]
     sets = [all_free(swing, part) for part in parts]
     starts = [np.where(np.isin(PARAMETERS, s), last, start) if part else declared for s, part in zip(sets, parts, strict=True)]
     fits = fit_stages(stages, [Task(s, t, ()) for s, t in zip(sets, starts, strict=True)], 8)
     files = [write_swing(rig, swing, f.theta) for f in fits]
     replays = Background(_replayed, [(session, x, held) for x in files]).results()
-    for part, s, f, x, r in zip(parts, sets, fits, files, replays, strict=True):
-        known[tuple(v.key for v in part)] = Link(s, f, x, r)
+    return [Link(s, f, x, r) for s, f, x, r in zip(sets, fits, files, replays, strict=True)]
 
 
-def _continued(stages: Sequence[Swing], taken: list[Variant], last: Link, banned: set[str],
-               resume: bool) -> list[tuple[Variant, Round]]:  # fmt: skip
+def _continued(stages: Sequence[Swing], taken: list[Variant], current: Fitted, banned: set[str], resume: bool,
+               floor: float) -> list[tuple[Variant, Round]]:  # fmt: skip
     """What the competition adds to the variants taken once others are banned (resume), or else a closer law of theirs."""
-    current = fit_stages(stages, [Task(last.free, last.fit.theta, ())], 6)[0]
     if resume:
-        variants, rounds = compete_swing(stages, current, taken, banned)
+        variants, rounds = compete_swing(stages, current, floor, taken, banned)
         if rounds:
             return list(zip(variants[len(taken) :], rounds, strict=True))
     return list(refine_swing(stages, current, taken, banned))

@@ -45,13 +45,21 @@ def multiplicities(group: Array, count: int = RESAMPLES, seed: int = 0) -> Array
     return np.stack([np.bincount(row, minlength=total) for row in drawn]).astype(float)[:, unit]
 
 
+def beyond_the_best_of_chance(gain: Array) -> Array:
+    """Probability (rivals,) that each rival's gain is more than the best of all rivals would show by chance; gain (rivals,
+    resamples). The largest of many gains is large even where none is real (White 2000; studentised as in Hansen 2005)."""
+    mean, spread = gain.mean(1), np.maximum(gain.std(1), 1e-300)
+    chance = np.max((gain - mean[:, None]) / spread[:, None], 0)
+    return np.mean(chance < (mean / spread)[:, None], 1)
+
+
 def weigh(none: Array, errors: Array, sizes: Sequence[int], group: Array,
           least: float = BEYOND_DOUBT) -> Verdict | None:  # fmt: skip
     """Compare rivals (errors (rivals, blocks), sizes: parameters) with each other and with "nothing" (none (blocks,)); None
     where none of them beats nothing with probability `least`."""
     draws = multiplicities(group)
     resampled, base, total = errors @ draws.T, draws @ none, errors.sum(1)
-    against = np.mean(resampled < base, 1)
+    against = beyond_the_best_of_chance(base - resampled)
     sure = [k for k in range(len(errors)) if against[k] >= least]
     if not sure:
         return None

@@ -14,7 +14,7 @@ from .laws import Now, law
 from .mjcf import read_effects
 from .model import RigModel, RigTrial, load_rig
 from .overrides import compile_model
-from .states import choose_cutoff, differentiate, fill_gaps, low_pass, uniform_time
+from .states import fill_gaps, local_states, uniform_time
 from .supply import supply_deviation
 
 Array = NDArray[np.float64]
@@ -192,9 +192,9 @@ def recorded_states(rig: RigModel, trial: RigTrial, at_s: Array) -> tuple[Array,
     q0, v0 = [], []
     for joint in rig.joints:
         raw = np.interp(grid, trial.time_s, fill_gaps(trial.time_s, trial.position[joint]))
-        smooth = low_pass(raw, rate, choose_cutoff(raw, rate))
-        q0.append(np.interp(at_s, grid, smooth))
-        v0.append(np.interp(at_s, grid, differentiate(smooth, rate)))
+        position, velocity = local_states(raw, rate)
+        q0.append(np.interp(at_s, grid, position))
+        v0.append(np.interp(at_s, grid, velocity))
     return np.stack(q0, 1), np.stack(v0, 1)
 
 

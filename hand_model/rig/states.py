@@ -13,6 +13,8 @@ Array = NDArray[np.float64]
 
 NOISE_SHARE = 0.03  # acceleration noise allowed, as a share of the acceleration itself
 ORDER = 4
+WINDOWS = (5, 7, 11, 15, 21, 29, 41, 57, 81, 113, 159, 225, 317, 447)  # samples
+SURE = 2.0  # half width of a confidence interval, in standard deviations
 
 
 def fill_gaps(time_s: Array, values: Array) -> Array:
@@ -31,7 +33,7 @@ def noise_std(values: Array) -> float:
     """Standard deviation of the white part of an evenly sampled signal, from fourth differences, or its step/sqrt(12)."""
     fourth = np.diff(values, 4)
     white = float(np.median(np.abs(fourth - np.median(fourth)))) / 0.6745 / np.sqrt(70.0)
-    levels = np.unique(values)
+    levels = np.unique(np.round(values, int(6 - np.floor(np.log10(np.ptp(values) + 1e-300)))))  # but for rounding
     step = float(np.median(np.diff(levels))) if 1 < len(levels) < 0.5 * len(values) else 0.0
     return max(white, step / np.sqrt(12.0), 1e-12 * (np.ptp(values) + 1e-12))
 
@@ -69,3 +71,27 @@ def choose_cutoff(position: Array, rate_hz: float) -> float:
 def velocity_noise(position: Array, rate_hz: float, cutoff_hz: float) -> float:
     """Standard deviation of the smoothed velocity's noise [position unit / s]."""
     return noise_std(position) * np.sqrt(2.0 / rate_hz * (2 * np.pi) ** 2 * cutoff_hz**3 / 3.0)
+
+
+def local_states(values: Array, rate_hz: float) -> tuple[Array, Array]:
+    """Position and velocity (n,) at every sample of an even recording (n,), ends included: local cubics (Savitzky & Golay
+    1964), each over the longest window on which shorter ones do not contradict it (intersection of confidence intervals,
+    Katkovnik 1999)."""
+    from scipy.signal import savgol_coeffs, savgol_filter
+
+    sigma, n = noise_std(values), len(values)
+    if n < WINDOWS[0]:
+        return values, np.gradient(values, 1.0 / rate_hz)
+    position, velocity = values.copy(), np.zeros(n)
+    low, high, open_ = np.full(n, -np.inf), np.full(n, np.inf), np.ones(n, bool)
+    for window in (w for w in WINDOWS if w <= n):
+        q = savgol_filter(values, window, 3, mode="interp")
+        v = savgol_filter(values, window, 3, deriv=1, delta=1.0 / rate_hz, mode="interp")
+        half = window // 2
+        edge = [np.linalg.norm(savgol_coeffs(window, 3, 1, 1.0 / rate_hz, pos=k)) for k in range(half + 1)]
+        spread = np.full(n, edge[half])
+        spread[: half + 1], spread[n - half - 1 :] = edge, edge[::-1]
+        low, high = np.maximum(low, v - SURE * sigma * spread), np.minimum(high, v + SURE * sigma * spread)
+        open_ &= low <= high
+        position[open_], velocity[open_] = q[open_], v[open_]
+    return position, velocity

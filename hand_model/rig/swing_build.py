@@ -10,7 +10,7 @@ from .declared import DeclaredFit
 from .dynamics import inertial_columns, inertial_parameters
 from .model import RigModel, RigTrial
 from .overrides import compile_model
-from .states import choose_cutoff, differentiate, fill_gaps, low_pass, uniform_time
+from .states import fill_gaps, local_states, uniform_time
 from .supply import supply_deviation
 from .swing import STEP_S, Lane, Swing
 
@@ -83,8 +83,7 @@ def _stretches(rig: RigModel, trial: RigTrial, step_s: float, longest_s: float) 
     grid = uniform_time(trial.time_s)
     rate = 1.0 / (grid[1] - grid[0])
     raw = np.interp(grid, trial.time_s, fill_gaps(trial.time_s, trial.position[joint]))
-    smooth = low_pass(raw, rate, choose_cutoff(raw, rate))
-    velocity = differentiate(smooth, rate)
+    smooth, velocity = local_states(raw, rate)
     fine = np.arange(0.0, grid[-1], step_s)
     position = np.interp(fine, trial.time_s, fill_gaps(trial.time_s, trial.position[joint]))
     voltage = trial.voltage.get(joint)

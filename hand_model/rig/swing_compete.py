@@ -136,16 +136,17 @@ def fit_stages(stages: Sequence[Swing], tasks: Sequence[Task], iterations: int =
     return fits
 
 
-def compete_swing(stages: Sequence[Swing], current: Fitted, begin: Sequence[Variant] = (),
+def compete_swing(stages: Sequence[Swing], current: Fitted, floor: float = 0.0, begin: Sequence[Variant] = (),
                   banned: Collection[str] = ()) -> tuple[tuple[Variant, ...], tuple[Round, ...]]:  # fmt: skip
     """Forward selection from the variants that stand already (begin, fitted as current), without those that are banned
-    (keys); returns all variants and the new rounds, each with the fit of all taken so far."""
+    (keys), while the error is above what the recordings can tell (floor [rad or m]); returns all variants and the new
+    rounds, each with the fit of all taken so far."""
     swing = stages[-1]
     train = tuple(int(i) for i in swing.train())
     folds = _folds(swing, train)
     taken: tuple[Variant, ...] = tuple(begin)
     rounds: list[Round] = []
-    while len(taken) < MOST_TERMS:
+    while len(taken) < MOST_TERMS and current.cost > floor**2:
         free = all_free(swing, taken)
         rivals = [v for v in variants(swing) if not set(v.start) <= set(free) and (not v.beside or v.beside & set(free))
                   and v.key not in banned]  # fmt: skip
