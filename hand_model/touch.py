@@ -25,7 +25,7 @@ from .session import Log, Session
 Array = NDArray[np.float64]
 
 ALIGN_S = 0.25  # of a move, within which its own unknowns are found; nothing is tested there
-SLACK = 1.0  # of the cumulative sum, in noise deviations: half the rise that is looked for
+SLACK = 2.0  # of the cumulative sum, in noise deviations: half the rise that is looked for; an object stiffer than the position loop gives that in two samples
 AFTER_S = 1.2  # of pressing that the stiffness is read from
 
 

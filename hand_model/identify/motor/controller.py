@@ -15,7 +15,6 @@ from .balance import NAMES
 from .drive import CONTROLLERS
 from .moves import SETTLED, MoveData, shortened
 from .output_error import COARSE_S, OutputErrorFit
-from .weak_form import GIVE, Regression
 
 CLOSE = 1.15  # mean square of the residuals [noise variances] below which no other kind of friction is tried
 SOME = 12  # moves that the search simulates
@@ -26,19 +25,23 @@ STICK, BRISTLES = {"presliding": 0.0, "bristle": 0.0}, {"presliding": 0.3, "bris
 JUMP = {"rise": 0.0, "fall": 0.0}  # a reference whose speed jumps
 SUDDEN_S = 0.03  # time to full speed [s] below which a jump is tried
 EVIDENCE = 10.0  # fall of the misfit for which two parameters more are believed
-UNREST = 1.3  # mean square of the residuals [noise variances] above which they are weighed anew
 NEAR, FAR = 5.0, 10.0  # a start is not tried when another came near the noise and it began so many times farther off
 
 
 def find_controller(
-    moves: Sequence[MoveData], plain: Regression, sigma: tuple[float, float], bounds: Mapping[str, tuple[float, float]], enough: float
+    moves: Sequence[MoveData],
+    plant: Mapping[str, float],
+    sigma: tuple[float, float],
+    bounds: Mapping[str, tuple[float, float]],
+    enough: float,
 ) -> OutputErrorFit:
     """Fit of plant and controller, the kind of controller chosen by how well it explains the moves.
 
+    plant: values of inertia, friction and spring to search with.
     sigma: noise of position [%] and current [raw]. bounds: parameter -> (low, high). enough: systematic misfit [noise variances]
     below which no other kind is tried.
     """
-    start, some = start_values(moves, plain), _spread(moves)
+    start, some = start_values(moves, plant), _spread(moves)
     moves = [shortened(m, MOVE_S) for m in moves]
     starts = (
         ("profile", {**start, "rise": 0.01, "fall": 0.01, "damping": 0.3 * start["damping"]}),
@@ -68,13 +71,7 @@ def find_controller(
             best = found
         if output_error.lack_of_fit(best) < enough:
             break
-    return _reweighted(best, bounds) if output_error.lack_of_fit(best) < enough and max(best.chi2) > UNREST else best
-
-
-def _reweighted(f: OutputErrorFit, bounds: Mapping[str, tuple[float, float]]) -> OutputErrorFit:
-    """The fit again with both channels weighed by what they were left with: a drive that is not quite alike twice moves by more than its encoder's noise."""
-    sigma = (f.sigma[0] * float(np.sqrt(max(f.chi2[0], 1.0))), f.sigma[1] * float(np.sqrt(max(f.chi2[1], 1.0))))
-    return output_error.fit(f.moves, f.values, f.names, sigma, bounds, f.controller, output_error.STAGES[-1:], f.own)
+    return best
 
 
 def _names(kind: str, values: Mapping[str, float]) -> tuple[str, ...]:
@@ -91,11 +88,8 @@ def _near(
     return output_error.fit(some, values, [n for n in _names(g.controller, values) if n not in NAMES], sigma, bounds, g.controller, SEARCH, g.own)
 
 
-def start_values(moves: Sequence[MoveData], plain: Regression) -> dict[str, float]:
-    """Starting values: plant from the regression, controller from how fast moves go and what holds the drive off its setpoint."""
-    plant = dict(zip(NAMES, map(float, plain.values), strict=True))
-    plant["inertia"] = max(plant["inertia"], 1e-3)
-    plant["coulomb"] = max(plant["coulomb"], 1.0)
+def start_values(moves: Sequence[MoveData], plant: Mapping[str, float]) -> dict[str, float]:
+    """Starting values: the plant as it is, the controller from how fast moves go and what holds the drive off its setpoint."""
     ratio, error, hold = [], [], []
     for m in moves:
         n = len(m.time_s)
@@ -114,7 +108,7 @@ def start_values(moves: Sequence[MoveData], plain: Regression) -> dict[str, floa
     gain = gain if 0.5 < gain < 1e3 else 20.0
     speed = float(np.median(ratio)) * 1.02 if ratio else 100.0
     return {
-        **plant, **(STICK if plain.give <= GIVE[0] else BRISTLES | {"presliding": plain.give}), "static_ratio": 1.0, "stribeck_speed": 20.0, "stribeck_exponent": 1.0,
+        **(BRISTLES if "presliding" in plant else STICK), **plant,
         "speed_full": speed, "rise": 0.1, "fall": 0.1, "delay": 5e-4, "lead": 5e-4, "lag": 0.0, "edge": 0.1,
         "position_gain": 12.0, "deadband": float(np.median(np.abs(error))) if len(error) else 1.0, "gain": gain, "damping": 2 * np.sqrt(gain * plant["inertia"]),
     }  # fmt: skip

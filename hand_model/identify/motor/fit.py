@@ -20,7 +20,7 @@ from .moves import BEFORE, MoveData, moves_from_rest
 from .output_error import STAGES, OutputErrorFit
 from .published import PublishedFit, fit_published, smear_share
 from .recording import MotorTrial, Scale, actuator_trials, check_trials, motor_trial, trial_scale
-from .weak_form import Regression, fit_regressions
+from .weak_form import GIVE, Regression, fit_regressions
 
 Array = NDArray[np.float64]
 
@@ -69,6 +69,7 @@ BOUNDS = {
 LACK_OF_FIT = 0.5  # systematic misfit [noise variances] above which output error does not describe the recording
 CLAIM = 6.0  # standard errors, by a jackknife over some forty strokes, above which the regression claims a Stribeck rise
 REGRESSION_MISFIT = 4.0  # the same for the regression; noise with a memory of a sample or two reaches 3
+UNREST = 1.3  # mean square of the residuals [noise variances] above which they are weighed anew
 EVIDENCE = 16.0  # fall of the misfit (in variances, two parameters and two shapes tried): once in about a thousand by chance
 
 
@@ -218,22 +219,45 @@ def fit_motor(trials: Sequence[MotorTrial], scale: Scale, actuator: str = "motor
 def _fit_output_error(
     moves: Sequence[MoveData], plain: Regression, curved: Regression, sigma: tuple[float, float]
 ) -> tuple[OutputErrorFit, float]:
-    base = find_controller(moves, plain, sigma, BOUNDS, LACK_OF_FIT)
-    # a Stribeck rise is tried where the regression, which knows no controller, leaves room for one
-    if max(base.chi2) > 4.0 or curved.excess_z < 2.0:
-        return base, 0.0
-    ratio = float(np.clip(1 + curved.static_excess / max(base.values["coulomb"], 1.0), 1.1, 3.0))
-    fits = []
-    for exponent in (1.0, 2.0):
-        curve = {**base.values, "static_ratio": ratio, "stribeck_speed": 20.0, "stribeck_exponent": exponent}
-        fits.append(output_error.fit(base.moves, curve, (*base.names, *STRIBECK), base.sigma, BOUNDS, base.controller, STAGES[-1:], base.own))
+    """Fit of plant and controller, with a Stribeck rise where it is worth its parameters, and the fall of the misfit by it."""
+    best, evidence = find_controller(moves, _plant(plain), sigma, BOUNDS, LACK_OF_FIT), 0.0
+    # a rise is tried where the regression, which knows no controller, leaves room for one
+    if curved.excess_z > 2.0 and (_claims(curved) or max(best.chi2) < 4.0):
+        best, evidence = _with_rise(best, curved)
+    if max(best.chi2) > UNREST and output_error.lack_of_fit(best) < LACK_OF_FIT:
+        best = output_error.reweighted(best, BOUNDS)
+    return best, evidence
+
+
+def _with_rise(base: OutputErrorFit, curved: Regression) -> tuple[OutputErrorFit, float]:
+    """The fit with a Stribeck rise of either exponent, or without where it is not worth it, and the fall of the misfit by it."""
+    start = {**base.values, "static_ratio": float(np.clip(1 + curved.static_excess / max(base.values["coulomb"], 1.0), 1.2, 2.0)), "stribeck_speed": 20.0}
+    names = (*base.names, *STRIBECK)
+
+    def refined(values: Mapping[str, float], own: Array) -> OutputErrorFit:
+        return output_error.fit(base.moves, values, names, base.sigma, BOUNDS, base.controller, STAGES[-1:], own)
+
+    fits = [refined({**start, "stribeck_exponent": exponent}, base.own) for exponent in (1.0, 2.0)]
+    fits = [refined(f.values, f.own) if base.cost - f.cost > EVIDENCE else f for f in fits]  # far from where it began: once more
     best, other = sorted(fits, key=lambda f: f.cost)
     evidence = (base.cost - best.cost) / max(1.0, *best.chi2)
-    if evidence < EVIDENCE or _is_at_bound(best):
+    if evidence < EVIDENCE:
         return base, 0.0
     if other.cost - best.cost < EVIDENCE:
-        best = _either_shape(*fits)
+        best = _either_shape(best, other)
     return best, evidence
+
+
+def _claims(curved: Regression) -> bool:
+    """Whether the regression alone claims a Stribeck rise."""
+    return curved.excess_z > CLAIM and curved.values[2] > 0
+
+
+def _plant(r: Regression) -> dict[str, float]:
+    """Plant and friction as a regression found them, within what a drive can be; bristles only where friction was seen to give."""
+    plant = dict(zip(NAMES, map(float, r.values), strict=True))
+    plant["inertia"], plant["coulomb"] = max(plant["inertia"], 1e-3), max(plant["coulomb"], 1.0)
+    return plant | {"static_ratio": 1.0, "stribeck_speed": 20.0, "stribeck_exponent": 1.0} | ({"presliding": r.give} if r.give > GIVE[0] else {})
 
 
 def _either_shape(first: OutputErrorFit, second: OutputErrorFit) -> OutputErrorFit:
@@ -242,13 +266,8 @@ def _either_shape(first: OutputErrorFit, second: OutputErrorFit) -> OutputErrorF
     return dataclasses.replace(first, covariance=first.covariance + np.outer(d, d) / 3.84)
 
 
-def _is_at_bound(f: OutputErrorFit) -> bool:
-    i = f.names.index("static_ratio")
-    return f.values["static_ratio"] - 1 < 2 * np.sqrt(f.covariance[i, i])
-
-
 def _from_regression(plain: Regression, curved: Regression) -> tuple[dict[str, float], tuple[str, ...], Array, bool]:
-    stribeck = curved.excess_z > CLAIM
+    stribeck = _claims(curved)
     used = curved if stribeck else plain
     values = dict(zip(NAMES, map(float, used.values), strict=True))
     if stribeck:

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 COARSE_S = 5e-3
 # steps [s], rounds, fall of the misfit that is worth another round, width [%] over which a deadband sets in: what sets in softly has no kinks
 STAGES = ((COARSE_S, 4, 5.0, 0.5), (STEP_S, 8, 0.5, 0.1))
-BIN_S = 0.08  # over which residuals are averaged before replicates are compared
+BIN_S = 0.04  # over which residuals are averaged before replicates are compared
 ABSOLUTE_REACH = {"preload": 20.0, "viscous": 0.1, "stiffness": 0.2, "coulomb": 10.0, "bristle": 0.01, "damping": 2.0, "rise": 0.02, "fall": 0.02, "deadband": 0.2, "delay": 0.002, "lead": 0.002, "lag": 0.002}
 TICK_S = 1e-3  # what instants of the controller's steps are known to: a current that jumps within it says little
 # differences wide enough that the instants at which a drive sticks or a deadband sets in, held to one step, average out
@@ -228,6 +228,12 @@ def fit(
             if fell < 0.2 * enough:
                 break
     return _finish(data, linear, q, names, sigma, own, cost, controller, bounds)
+
+
+def reweighted(f: OutputErrorFit, bounds: Mapping[str, tuple[float, float]]) -> OutputErrorFit:
+    """The fit again with both channels weighed by what they were left with: a drive that is not quite alike twice moves by more than its encoder's noise."""
+    sigma = (f.sigma[0] * float(np.sqrt(max(f.chi2[0], 1.0))), f.sigma[1] * float(np.sqrt(max(f.chi2[1], 1.0))))
+    return fit(f.moves, f.values, f.names, sigma, bounds, f.controller, STAGES[-1:], f.own)
 
 
 def lack_of_fit(f: OutputErrorFit) -> float:
