@@ -17,7 +17,7 @@ from .balance import NAMES
 from .controller import find_controller
 from .drive import STRIBECK
 from .moves import BEFORE, MoveData, moves_from_rest
-from .output_error import STAGES, OutputErrorFit
+from .output_error import FINE, OutputErrorFit
 from .published import PublishedFit, fit_published, smear_share
 from .recording import MotorTrial, Scale, actuator_trials, check_trials, motor_trial, trial_scale
 from .weak_form import GIVE, Regression, fit_regressions
@@ -68,6 +68,7 @@ BOUNDS = {
 }
 LACK_OF_FIT = 0.5  # systematic misfit [noise variances] above which output error does not describe the recording
 CLAIM = 6.0  # standard errors, by a jackknife over some forty strokes, above which the regression claims a Stribeck rise
+ROOM = 3.0  # the same, above which output error tries one
 REGRESSION_MISFIT = 4.0  # the same for the regression; noise with a memory of a sample or two reaches 3
 UNREST = 1.3  # mean square of the residuals [noise variances] above which they are weighed anew
 EVIDENCE = 16.0  # fall of the misfit (in variances, two parameters and two shapes tried): once in about a thousand by chance
@@ -222,7 +223,7 @@ def _fit_output_error(
     """Fit of plant and controller, with a Stribeck rise where it is worth its parameters, and the fall of the misfit by it."""
     best, evidence = find_controller(moves, _plant(plain), sigma, BOUNDS, LACK_OF_FIT), 0.0
     # a rise is tried where the regression, which knows no controller, leaves room for one
-    if curved.excess_z > 2.0 and (_claims(curved) or max(best.chi2) < 4.0):
+    if curved.excess_z > ROOM and (_claims(curved) or max(best.chi2) < 4.0):
         best, evidence = _with_rise(best, curved)
     if max(best.chi2) > UNREST and output_error.lack_of_fit(best) < LACK_OF_FIT:
         best = output_error.reweighted(best, BOUNDS)
@@ -235,7 +236,7 @@ def _with_rise(base: OutputErrorFit, curved: Regression) -> tuple[OutputErrorFit
     names = (*base.names, *STRIBECK)
 
     def refined(values: Mapping[str, float], own: Array) -> OutputErrorFit:
-        return output_error.fit(base.moves, values, names, base.sigma, BOUNDS, base.controller, STAGES[-1:], own)
+        return output_error.fit(base.moves, values, names, base.sigma, BOUNDS, base.controller, (FINE,), own)
 
     fits = [refined({**start, "stribeck_exponent": exponent}, base.own) for exponent in (1.0, 2.0)]
     fits = [refined(f.values, f.own) if base.cost - f.cost > EVIDENCE else f for f in fits]  # far from where it began: once more

@@ -19,7 +19,8 @@ Array = NDArray[np.float64]
 
 COARSE_S = 5e-3
 # steps [s], rounds, fall of the misfit that is worth another round, width [%] over which a deadband sets in: what sets in softly has no kinks
-STAGES = ((COARSE_S, 4, 5.0, 0.5), (STEP_S, 8, 0.5, 0.1))
+COARSE, SOFT, FINE = (COARSE_S, 4, 5.0, 0.5), (STEP_S, 4, 5.0, 0.25), (STEP_S, 8, 0.5, 0.1)
+STAGES = {"profile": (COARSE, FINE), "cascade": (COARSE, SOFT, FINE)}
 BIN_S = 0.04  # over which residuals are averaged before replicates are compared
 ABSOLUTE_REACH = {"preload": 20.0, "viscous": 0.1, "stiffness": 0.2, "coulomb": 10.0, "bristle": 0.01, "damping": 2.0, "rise": 0.02, "fall": 0.02, "deadband": 0.2, "delay": 0.002, "lead": 0.002, "lag": 0.002}
 TICK_S = 1e-3  # what instants of the controller's steps are known to: a current that jumps within it says little
@@ -191,15 +192,15 @@ def fit(
     sigma: tuple[float, float],
     bounds: Mapping[str, tuple[float, float]],
     controller: str = "profile",
-    stages: Sequence[tuple[float, int, float, float]] = STAGES,
+    stages: Sequence[tuple[float, int, float, float]] = (),
     own: Array | None = None,
 ) -> OutputErrorFit:
     """Fit the named parameters to the moves by damped Gauss-Newton; the others stay at `start_values`.
 
-    sigma: noise of position [%] and current [raw]. bounds: parameter -> (low, high). stages: see STAGES. own: (moves, 4) to start from.
+    sigma: noise of position [%] and current [raw]. bounds: parameter -> (low, high). stages: STAGES of the controller unless given. own: (moves, 4) to start from.
     """
     q, own = dict(start_values), np.array([m.own for m in data]) if own is None else own.copy()
-    for step_s, rounds, enough, edge in stages:
+    for step_s, rounds, enough, edge in stages or STAGES[controller]:
         damping, share, fresh, q = 1e-3, 1.0, True, {**q, "edge": edge}
         for _ in range(rounds):
             if fresh:
@@ -233,7 +234,7 @@ def fit(
 def reweighted(f: OutputErrorFit, bounds: Mapping[str, tuple[float, float]]) -> OutputErrorFit:
     """The fit again with both channels weighed by what they were left with: a drive that is not quite alike twice moves by more than its encoder's noise."""
     sigma = (f.sigma[0] * float(np.sqrt(max(f.chi2[0], 1.0))), f.sigma[1] * float(np.sqrt(max(f.chi2[1], 1.0))))
-    return fit(f.moves, f.values, f.names, sigma, bounds, f.controller, STAGES[-1:], f.own)
+    return fit(f.moves, f.values, f.names, sigma, bounds, f.controller, (FINE,), f.own)
 
 
 def lack_of_fit(f: OutputErrorFit) -> float:
