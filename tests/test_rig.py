@@ -360,3 +360,11 @@ def test_the_start_of_a_recording_is_read_without_bias() -> None:
     assert abs(velocity[0]) < 0.02
     assert abs(position[0] - 1.0) < 1e-4
     assert np.abs(velocity + 8 * np.sin(8 * t))[5:-5].max() < 0.1
+
+
+def test_noise_floor_of_a_balance_is_that_of_its_sensors(tmp_path: Path) -> None:
+    """Where nothing is missing, what is left is noise: the floor says so within a third, and the verdict is "consistent"."""
+    findings = diagnose_rig(read_session(planted(tmp_path / "s")))
+    left = findings.lack_of_fit["joints"]["hinge"]
+    assert findings.verdict == "consistent"
+    assert left["noise_floor"] == pytest.approx(left["after"], rel=0.35)

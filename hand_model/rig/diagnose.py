@@ -19,6 +19,7 @@ from .diagnose_swing import diagnose_swing
 from .findings import CouplingResidual, Finding, RigFindings
 from .horizon import open_loop
 from .model import RigModel, load_rig
+from .noise import effort_noise
 from .patch import write_couplings
 from .proof import Bench
 from .states import fill_gaps
@@ -27,7 +28,7 @@ from .transmission import angle_residual, coupling_candidates, fit_coupling, zer
 from .words import shares, statement
 
 Array = NDArray[np.float64]
-FITS = 2.0  # an error within so many noise floors is taken to be noise
+FITS = 1.6**0.5  # an error within so many noise floors is taken to be noise: a variance 1.6 times as large
 SHAPE_UNITS = {"delay": "s", "lag": "s", "gap": "rad"}
 PROBABILITY = (
     "of an effect: share of resampled blocks of the training recordings, each left out of the fit, on which it lowers the "
@@ -158,8 +159,9 @@ def _diagnose_balance(rig: RigModel, fit: DeclaredFit, say: Callable[[str], None
     joints = [j for j in rig.joints if any(r.joint == j for r in fit.rows)]
     if not fit.rows:
         return [], [], {"metric": None, "before": None, "after": None}, rig.xml, rig.xml
+    floor = effort_noise(rig, fit)
     first = {j: _offset_first(rig, fit, j) for j in joints}  # a sensor's zero is the recording's error: before physics
-    off_axis = _off_axis(rig, fit, [t for _, t in first.values() if t is not None])
+    off_axis = _off_axis(Bench(rig, floor=floor), fit, [t for _, t in first.values() if t is not None])
     base_fit = fit
     if off_axis is not None:
         fit, finding = off_axis
@@ -170,7 +172,7 @@ def _diagnose_balance(rig: RigModel, fit: DeclaredFit, say: Callable[[str], None
         stories += zip(([step] if begin else []) + list(steps), taken, strict=True)
         rejected += [{"effect": s.term.candidate.key, "reason": "held-out error does not fall enough"} for s in scores]
         say(f"{rig.name}: {joint}: {', '.join(t.candidate.key for t in taken) or 'nothing'}")
-    base, bench = solution(pose(base_fit), []), Bench(rig)
+    base, bench = solution(pose(base_fit), []), Bench(rig, floor=floor)
     plain = (base_fit, (), base)
     offsets = [
         (s, t) for s, t in stories if t.candidate.effect == "asymmetric_friction" and first[t.candidate.joint][1] is t
@@ -239,8 +241,9 @@ def _offset_first(rig: RigModel, fit: DeclaredFit, joint: str) -> tuple[Step | N
     return None, None
 
 
-def _off_axis(rig: RigModel, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple[DeclaredFit, Finding] | None:
+def _off_axis(bench: Bench, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple[DeclaredFit, Finding] | None:
     """Centres of mass off their declared axes: one change to the whole chain, tried before anything at a joint."""
+    rig = bench.rig
     refused = {(t.name, j) for t in rig.trials for j in rig.joints} - {(r.trial, r.joint) for r in fit.rows}
     freed = fit_declared(rig, refused, fit.cutoff_hz, off_axis=True)
     if len(freed.columns) == len(fit.columns):
@@ -256,7 +259,6 @@ def _off_axis(rig: RigModel, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple
         return None
     before, after = (solution(p, offsets) for p in sides)
     joints = sorted({r.joint for r in fit.rows})
-    bench = Bench(rig)
     proofs = {j: bench.proof(j, (fit, offsets, before), (freed, offsets, after)) for j in joints}
     best = max(joints, key=lambda j: 1 - proofs[j]["after"] / max(proofs[j]["before"], 1e-300))
     ratio = float(np.sqrt(np.mean([(p["after"] / p["before"]) ** 2 for p in proofs.values()])))
@@ -332,7 +334,7 @@ def _verdict(found: Sequence[Finding], lack: Mapping[str, Any]) -> str:
     if lack.get("before") is None:
         return "unexplained"
     joints = lack.get("joints", {"": lack})
-    beyond = any(p["after"] > 2 * (p.get("noise_floor") or 0.0) for p in joints.values())
+    beyond = any(p["after"] > FITS * (p.get("noise_floor") or 0.0) for p in joints.values())
     return "unexplained" if beyond else "consistent"
 
 
@@ -341,7 +343,7 @@ def _unexplained(lack: Mapping[str, Any], found: Sequence[Finding]) -> tuple[Map
     for joint, p in lack.get("joints", {} if lack.get("before") is None else {"": lack}).items():
         floor = p.get("noise_floor") or 0.0
         excess, whole = p["after"] ** 2 - floor**2, p["before"] ** 2 - floor**2
-        if whole > 0 and excess > 0.02 * whole and p["after"] > 2 * floor:
+        if whole > 0 and excess > 0.02 * whole and p["after"] > FITS * floor:
             out.append({"where": {"joint": joint or None}, "share_of_mismatch": float(min(excess / whole, 1.0)),
                         "shape": "what no effect known here lowers on recordings held out"})  # fmt: skip
     return tuple(out)

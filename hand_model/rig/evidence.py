@@ -2,7 +2,8 @@
 
 Cluster bootstrap (Davison & Hinkley 1997, sec. 3.8): whole recordings are drawn where there are enough of them, since
 blocks of one recording share what is peculiar to it; else blocks. A tie goes to the simpler rival within one standard
-error of the best (Breiman et al. 1984).
+error of the best (Breiman et al. 1984). That anything is there at all is asked first, of
+the best of so many rivals (Bonferroni; a protected comparison, Fisher 1935).
 """
 
 from __future__ import annotations
@@ -45,24 +46,16 @@ def multiplicities(group: Array, count: int = RESAMPLES, seed: int = 0) -> Array
     return np.stack([np.bincount(row, minlength=total) for row in drawn]).astype(float)[:, unit]
 
 
-def beyond_the_best_of_chance(gain: Array) -> Array:
-    """Probability (rivals,) that each rival's gain is more than the best of all rivals would show by chance; gain (rivals,
-    resamples). The largest of many gains is large even where none is real (White 2000; studentised as in Hansen 2005)."""
-    mean, spread = gain.mean(1), np.maximum(gain.std(1), 1e-300)
-    chance = np.max((gain - mean[:, None]) / spread[:, None], 0)
-    return np.mean(chance < (mean / spread)[:, None], 1)
-
-
 def weigh(none: Array, errors: Array, sizes: Sequence[int], group: Array,
           least: float = BEYOND_DOUBT) -> Verdict | None:  # fmt: skip
     """Compare rivals (errors (rivals, blocks), sizes: parameters) with each other and with "nothing" (none (blocks,)); None
-    where none of them beats nothing with probability `least`."""
+    where none of them beats nothing with probability `least`, the number of rivals allowed for."""
     draws = multiplicities(group)
     resampled, base, total = errors @ draws.T, draws @ none, errors.sum(1)
-    against = beyond_the_best_of_chance(base - resampled)
-    sure = [k for k in range(len(errors)) if against[k] >= least]
-    if not sure:
+    against = np.mean(resampled < base, 1)
+    if 1.0 - len(errors) * (1.0 - against.max(initial=0.0)) < least:  # of many rivals some win by chance
         return None
+    sure = [k for k in range(len(errors)) if against[k] >= least]
     best = min(sure, key=lambda k: total[k])
     close = [k for k in sure if np.mean(resampled[best] < resampled[k]) < BEYOND_DOUBT]
     close.sort(key=lambda k: total[k])

@@ -5,7 +5,7 @@ Couplings between encoders have no effort; their angle error is that of the poly
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -28,10 +28,12 @@ PARTS = 24  # blocks that the held-out recordings of a joint are cut into
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """Measures fits. mujoco: by inverse dynamics of the file that holds them (each file once); else by the columns."""
+    """Measures fits. mujoco: by inverse dynamics of the file that holds them (each file once); else by the columns. floor: joint -> noise in
+    its residual, where that is known."""
 
     rig: RigModel
     mujoco: bool = True
+    floor: Mapping[str, float] = field(default_factory=dict)
     known: dict[bytes, tuple[EffortResidual, ...]] = field(default_factory=dict, repr=False)
 
     @property
@@ -72,12 +74,15 @@ class Bench:
         rms = np.sqrt(squares[:, draw].sum(2) / count[draw].sum(1))
         fall = np.percentile(rms[0] - rms[1], [2.5, 97.5])
         whole = np.sqrt(squares.sum(1) / count.sum())
-        floor = [noise_std(r.extra["effort"]) * np.sqrt(min(1.0, 2 * r.cutoff_hz / r.rate_hz))
-                 for r in before[0].rows if r.joint == joint]  # fmt: skip
         return {"metric": "effort_rmse", "unit": self.rig.effort_unit(joint), "before": float(whole[0]),
-                "after": float(whole[1]), "noise_floor": float(np.median(floor)),
+                "after": float(whole[1]), "noise_floor": self._floor(before[0], joint),
                 "ci95_reduction": [float(fall[0]), float(fall[1])], "held_out": [t for t, _ in a],
                 "engine": self.engine}  # fmt: skip
+
+    def _floor(self, fit: DeclaredFit, joint: str) -> float:
+        rows = [r for r in fit.rows if r.joint == joint]
+        own = [noise_std(r.extra["effort"]) * np.sqrt(min(1.0, 2 * r.cutoff_hz / r.rate_hz)) for r in rows]
+        return self.floor.get(joint, float(np.median(own)))
 
     def ratio(self, before: tuple[DeclaredFit, Sequence[Term], Array],
               after: tuple[DeclaredFit, Sequence[Term], Array]) -> float:  # fmt: skip

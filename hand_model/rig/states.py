@@ -33,8 +33,12 @@ def noise_std(values: Array) -> float:
     """Standard deviation of the white part of an evenly sampled signal, from fourth differences, or its step/sqrt(12)."""
     fourth = np.diff(values, 4)
     white = float(np.median(np.abs(fourth - np.median(fourth)))) / 0.6745 / np.sqrt(70.0)
-    levels = np.unique(np.round(values, int(6 - np.floor(np.log10(np.ptp(values) + 1e-300)))))  # but for rounding
-    step = float(np.median(np.diff(levels))) if 1 < len(levels) < 0.5 * len(values) else 0.0
+    grain = 1e-6 * np.ptp(values) + 1e-300  # what differs by less is equal but for rounding
+    levels = grain * np.unique(np.round(values / grain))
+    apart = np.diff(levels) if 1 < len(levels) < 0.5 * len(values) else np.zeros(1)
+    step = float(np.median(apart))
+    if np.percentile(apart, 10) < 0.5 * step:  # no ladder: samples that recur (a periodic motion)
+        step = 0.0
     return max(white, step / np.sqrt(12.0), 1e-12 * (np.ptp(values) + 1e-12))
 
 
