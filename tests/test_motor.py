@@ -176,6 +176,8 @@ def test_good_log_passes() -> None:
         ({"current": np.clip(60 * np.sin(np.arange(600) * 0.018), -40, 40)}, "saturated"),
         ({"current": 20 + 29 * (1 - np.cos(np.arange(600) * 0.018))}, "command"),
         ({"current": 20 + 29 * (1 - np.cos(np.arange(600) * 0.018 + 0.05))}, "command"),  # a reference that the position follows
+        ({"current": np.random.default_rng(2).normal(0, 5, 600)}, "no higher in flexion"),
+        ({"current": 80 * np.sign(np.sin(np.arange(600) * 0.018))}, "holds its value"),
         ({"setpoint": np.repeat([12000.0, 18000.0, 12000.0], 200), "current": np.repeat([5.0, 80.0, 5.0], 200)}, "command"),
     ],
 )

@@ -75,11 +75,12 @@ def simulate(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, contr
     """
     n = int(np.ceil(moves.duration_s.max() / step_s)) + 2
     time_s = np.arange(n) * step_s
-    steer = _Cascade(moves, q, step_s, time_s) if controller == "cascade" else _Profile(moves, q, time_s)
-    position, current = _run(moves, q, steer, step_s, n, np.inf)
-    if np.any(np.abs(current) > moves.limit):
-        steer = _Cascade(moves, q, step_s, time_s) if controller == "cascade" else steer
-        position, current = _run(moves, q, steer, step_s, n, moves.limit)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # values that a search tries may let a drive run away
+        steer = _Cascade(moves, q, step_s, time_s) if controller == "cascade" else _Profile(moves, q, time_s)
+        position, current = _run(moves, q, steer, step_s, n, np.inf)
+        if np.any(np.abs(current) > moves.limit):
+            steer = _Cascade(moves, q, step_s, time_s) if controller == "cascade" else steer
+            position, current = _run(moves, q, steer, step_s, n, moves.limit)
     return time_s, position, current
 
 

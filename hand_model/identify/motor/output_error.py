@@ -145,7 +145,7 @@ def _linearise(
         out_r[i] = ((np.stack([m.position, m.current], axis=1) - base) * weight).T.ravel()
         y = _sample(t, p[:, c], u[:, c], m.time_s, values["lead"][c] if "lead" in q else 0.0) * weight[:, :, None]  # (n, 2, width)
         derivative = (y[:, :, 1:] - y[:, :, :1]) / np.append(steps, own_step)
-        derivative = derivative.transpose(1, 0, 2).reshape(-1, width - 1)
+        derivative = np.nan_to_num(derivative.transpose(1, 0, 2).reshape(-1, width - 1), posinf=0.0, neginf=0.0)
         out_g[i], out_l[i], out_w[i] = derivative[:, :k], derivative[:, k:], weight
     return out_r, out_g, out_l, out_w
 
@@ -163,7 +163,7 @@ def _misfit(residual: list[Array], data: Sequence[MoveData], own: Array, q: Mapp
     """Sum of squares of whitened residuals, of what the moves' own unknowns are off their measured values, and of the priors."""
     total = sum(((q[n] - mean) / sd) ** 2 for n, (mean, sd) in PRIOR.items() if n in q)
     total += sum(float(e @ e) + float(np.sum(((m.own - x) / m.own_sd) ** 2)) for m, e, x in zip(data, residual, own, strict=True))
-    return total if np.isfinite(total) else np.inf
+    return float(total) if np.isfinite(total) else np.inf
 
 
 def _costs(
@@ -206,6 +206,8 @@ def fit(
             if fresh:
                 linear = _linearise(data, q, names, own, sigma, controller, step_s, share)
                 cost = _misfit(linear[0], data, own, q)
+            if not np.isfinite(cost):
+                break
             system = _normal(data, *linear[:3], own, q, names)[:3]
             if (expected := _expected(*system)) < enough:
                 if fresh:
@@ -247,8 +249,8 @@ def lack_of_fit(f: OutputErrorFit) -> float:
     kinds: dict[tuple, list[int]] = {}
     for i, m in enumerate(f.moves):
         kinds.setdefault((round(m.origin), round(m.target), round(float(m.own[2]), 2)), []).append(i)
-    found = [_shared(f, members) for members in kinds.values() if len(members) > 1]
     least = max(f.chi2) - 1.0
+    found = [_shared(f, members) for members in kinds.values() if len(members) > 1 and np.isfinite(least)]
     if len(found) < 3:
         return least
     square, samples = np.array([x for x, _ in found]), np.array([n for _, n in found])
@@ -346,6 +348,9 @@ def _finish(
     controller: str, bounds: Mapping[str, tuple[float, float]],
 ) -> OutputErrorFit:
     r, g, local, weights = linear
+    if not np.isfinite(cost):  # a drive that runs away explains nothing
+        nothing = np.full((len(names), len(names)), np.inf)
+        return OutputErrorFit(dict(q), tuple(names), nothing, sigma, tuple(r), tuple(data), own, np.inf, (np.inf, np.inf), controller)
     normal, gradient, _, score = _normal(data, r, g, local, own, q, names)
     k = len(names)
     meat = score.T @ score * len(score) / max(1, len(score) - 1)

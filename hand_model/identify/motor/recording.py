@@ -112,7 +112,7 @@ def motor_trial(name: str, log: Log, scale: Scale) -> MotorTrial:
 
 
 def check_trials(trials: Sequence[MotorTrial]) -> None:
-    """Raise IdentificationError where the current is constant, saturated or a command, or the motion goes one way only."""
+    """Raise IdentificationError where the current is constant, saturated, a command or no drive's, or the motion goes one way only."""
     for t in trials:
         _check_current(t)
     v = [_coarse_velocity(t) for t in trials]
@@ -122,6 +122,15 @@ def check_trials(trials: Sequence[MotorTrial]) -> None:
         way = "extension" if share[1] < share[0] else "flexion"
         raise IdentificationError(
             f"{', '.join(t.name for t in trials)}: the log holds no {way}; motion in both directions separates friction from spring"
+        )
+
+
+    flexing, extending = (np.concatenate([t.current[sign * x > 0.25 * fastest] for t, x in zip(trials, v, strict=True)]) for sign in (1, -1))
+    friction = flexing.mean() - extending.mean()
+    if friction < 5 * np.sqrt(flexing.var() / len(flexing) + extending.var() / len(extending)):
+        raise IdentificationError(
+            f'{", ".join(t.name for t in trials)}: column "current" is no higher in flexion than in extension ({friction:.3g} raw); '
+            "a drive's current overcomes friction, positive towards flexion"
         )
 
 
@@ -138,6 +147,8 @@ def _check_current(t: MotorTrial) -> None:
     if np.ptp(u) == 0:
         raise IdentificationError(f'{t.name}: column "current" is constant ({u[0]:g}); a measured current varies with the load')
     moving = np.abs(_coarse_velocity(t)) > 5.0
+    if moving.sum() > 20 and np.mean(np.diff(u)[moving[1:]] == 0) > 0.9:
+        raise IdentificationError(f'{t.name}: column "current" holds its value while the finger moves; it is a command, not a measurement')
     for side in (u.max(), u.min()):
         at = u == side
         run = at[1:] & at[:-1]
@@ -152,8 +163,6 @@ def _check_current(t: MotorTrial) -> None:
     command = _follows_command(t)
     if command:
         raise IdentificationError(f'{t.name}: column "current" {command}; it is a command, not a measurement, and is not fitted')
-    if moving.sum() > 20 and np.mean(np.diff(u)[moving[1:]] == 0) > 0.9:
-        raise IdentificationError(f'{t.name}: column "current" holds its value while the finger moves; it is a command, not a measurement')
 
 
 def _follows_command(t: MotorTrial) -> str | None:
