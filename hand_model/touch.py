@@ -75,7 +75,7 @@ def _from_commands(fit: MotorFit, trial: MotorTrial) -> list[tuple[MoveData, Arr
     if not data:
         return []
     early = [shortened(m, ALIGN_S) for m in data]
-    own = output_error.fit(early, fit.simulated, (), noise, {}, fit.output_error.controller).own
+    own = output_error.fit(early, fit.simulated, (), noise, {}, fit.output_error.controller, output_error.ALIGN).own
     found = output_error.whitened(data, fit.simulated, own, noise, fit.output_error.controller)
     return [(m, z[:, 1]) for m, z in zip(data, found, strict=True)]
 

@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 COARSE_S = 5e-3
 # steps [s], rounds, fall of the misfit that is worth another round, width [%] over which a deadband sets in: what sets in softly has no kinks
 COARSE, SOFT, FINE = (COARSE_S, 4, 5.0, 0.5), (STEP_S, 4, 5.0, 0.25), (STEP_S, 8, 0.5, 0.1)
+ALIGN = (COARSE, (STEP_S, 4, 0.5, 0.1))  # where only the moves' own unknowns are sought
 STAGES = {"profile": (COARSE, FINE), "cascade": (COARSE, SOFT, FINE)}
 BIN_S = 0.04  # over which residuals are averaged before replicates are compared
 ABSOLUTE_REACH = {"preload": 20.0, "viscous": 0.1, "stiffness": 0.2, "coulomb": 10.0, "bristle": 0.01, "damping": 2.0, "rise": 0.02, "fall": 0.02, "deadband": 0.2, "delay": 0.002, "lead": 0.002, "lag": 0.002}

@@ -89,7 +89,7 @@ def predict(fit: MotorFit, log: Log, name: str = "log", align: bool = True) -> P
 def _align(fit: MotorFit, data: tuple[MoveData, ...]) -> Array:
     """Own unknowns of every move from its position alone (the current weighs nothing)."""
     blind = (fit.sigma_position, 1e3 * fit.sigma_current)
-    found = output_error.fit(data, fit.simulated, (), blind, {}, fit.output_error.controller)
+    found = output_error.fit(data, fit.simulated, (), blind, {}, fit.output_error.controller, output_error.ALIGN)
     return found.own
 
 
