@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects import DriveState, catalogue
+from ..effects import DriveState, catalogue, effect
 from .balance import Rows
 from .declared import DeclaredFit
 from .model import RigModel
@@ -28,6 +28,7 @@ NOT_FOR_RIGS = frozenset(
     }
 )
 LONGEST_DELAY_S = 0.03
+BY_LEVEL = "in proportion to the trial's friction"
 Bound = tuple[str, str, float, float]
 
 
@@ -75,22 +76,36 @@ def candidates(rig: RigModel, fit: DeclaredFit, joint: str) -> tuple[Candidate, 
     states = {r.trial: drive_state(rig, r, fit.theta) for r in fit.rows if r.joint == joint}
     train = tuple(states[r.trial] for r in rows)
     found = [_from_catalogue(e, joint, train, states) for e in catalogue("drive") if _usable(e)]
-    found += _own(rig, fit, joint, rows)
+    found += [*_own(rig, fit, joint, rows), *_by_level(rig, joint, train, states)]
     return tuple(c for c in found if c.grid)
 
 
-def _usable(effect: Any) -> bool:
-    return effect.name not in NOT_FOR_RIGS and effect.replaces is None and not effect.clips
+def _usable(found: Any) -> bool:
+    return found.name not in NOT_FOR_RIGS and found.replaces is None and not found.clips
 
 
 def _from_catalogue(
-    effect: Any, joint: str, train: tuple[DriveState, ...], states: Mapping[str, DriveState]
+    found: Any, joint: str, train: tuple[DriveState, ...], states: Mapping[str, DriveState]
 ) -> Candidate:
-    grid = tuple(effect.grid(train))
+    grid = tuple(found.grid(train))
     if len(grid) > 16:  # a coarse look first; the winner's shape is refined
         grid = grid[:: int(np.ceil(len(grid) / 16))]
-    return Candidate(effect.name, "", joint, tuple(effect.amplitudes()), grid,
-                     lambda row, shape: np.asarray(effect.columns(states[row.trial], shape), float), bool(effect.warps))  # fmt: skip
+    return Candidate(found.name, "", joint, tuple(found.amplitudes()), grid,
+                     lambda row, shape: np.asarray(found.columns(states[row.trial], shape), float), bool(found.warps))  # fmt: skip
+
+
+def _by_level(
+    rig: RigModel, joint: str, train: tuple[DriveState, ...], states: Mapping[str, DriveState]
+) -> list[Candidate]:
+    """Hysteresis that grows with the Coulomb level where trials declare their own: the friction itself builds up over a
+    distance."""
+    key = f"joint:{joint}:frictionloss"
+    level = {t.name: float(np.atleast_1d(t.set[key])[0]) for t in rig.trials if key in t.set}
+    if len(set(level.values())) < 2 or not all(t.name in level for t in rig.trials):
+        return []
+    mean = float(np.mean(list(level.values())))
+    stop = _from_catalogue(effect("elastoplastic_hysteresis"), joint, train, states)
+    return [replace(stop, variant=BY_LEVEL, columns=lambda r, s: level[r.trial] / mean * stop.columns(r, s))]
 
 
 def _own(rig: RigModel, fit: DeclaredFit, joint: str, rows: list[Rows]) -> list[Candidate]:
@@ -102,7 +117,7 @@ def _own(rig: RigModel, fit: DeclaredFit, joint: str, rows: list[Rows]) -> list[
     load = {r.trial: np.abs(r.load(fit.theta)) for r in fit.rows if r.joint == joint}
     expected = {r.trial: np.abs(r.expected(fit.theta)) for r in fit.rows if r.joint == joint}
     sample = max(float(np.median(np.diff(t.time_s))) for t in rig.trials)
-    late = sorted({k * sample for k in (1, 2, 3, 5, 8)} | {k * LONGEST_DELAY_S / 6 for k in range(1, 7)})
+    late = sorted({k * sample for k in (0.5, 1, 2, 3, 5, 8)} | {k * LONGEST_DELAY_S / 6 for k in range(1, 7)})
     delays = tuple({"delay": sign * d} for d in late if d <= max(8 * sample, LONGEST_DELAY_S) for sign in (-1.0, 1.0))
     own = [
         Candidate("load_dependent_friction", "low speed", joint, (("per_load", "1", 0.0, np.inf),), knees,

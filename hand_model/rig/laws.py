@@ -38,7 +38,7 @@ def law(record: Mapping[str, Any]) -> Law | None:
     if name == "load_dependent_friction":
         return _by_load(variant, shape, size[0])
     if name == "elastoplastic_hysteresis":
-        return _Stop(shape, size[0])
+        return None if variant else _Stop(shape, size[0])  # a trial's own level is not known here
     simple: dict[str, Law] = {
         "asymmetric_friction": lambda n: (size[0], 0.0),
         "asymmetric_viscous_friction": lambda n: (size[0] * abs(n.velocity), 0.0),
