@@ -201,8 +201,11 @@ def fit(
     sigma: noise of position [%] and current [raw]. bounds: parameter -> (low, high). stages: STAGES of the controller unless given. own: (moves, 4) to start from.
     """
     q, own = dict(start_values), np.array([m.own for m in data]) if own is None else own.copy()
+    wanted = tuple(names)
     for step_s, rounds, enough, edge in stages or STAGES[controller]:
         damping, share, fresh, q = 1e-3, 1.0, True, {**q, "edge": edge}
+        # what is finer than the step would only make up for the step
+        names = tuple(n for n in wanted if step_s < COARSE_S or n not in PRIOR)
         for _ in range(rounds):
             if fresh:
                 linear = _linearise(data, q, names, own, sigma, controller, step_s, share)
