@@ -130,6 +130,35 @@ def test_simulation_obeys_the_plant() -> None:
     assert np.max(np.abs((balance - u)[sliding])) < 0.2
 
 
+@pytest.mark.parametrize("speed", [0.2, 1.0])
+def test_friction_that_sticks_is_the_limit_of_stiff_bristles(speed: float) -> None:
+    """Bristles come to hard friction as the square root of their distance; a drive that sticks stays where it is."""
+    q = {k: np.array([v]) for k, v in {**PARAMETERS, "rise": 1e-4, "fall": 1e-4, "damping": 0.6}.items()}
+    moves = _moves(speed=speed, duration_s=1.2)
+    hard = simulate(moves, q | {"presliding": np.zeros(1)}, 2e-4)[1][:6000, 0]
+    off = [np.abs(simulate(moves, q | {"presliding": np.full(1, d)}, 2e-4)[1][:6000, 0] - hard).max() for d in (0.04, 0.01)]
+    assert off[1] < 0.75 * off[0] and off[1] < 0.1
+    assert np.ptp(hard[:240]) == 0.0
+
+
+def test_a_velocity_that_lags_passes_for_less_inertia_while_speed_rises() -> None:
+    """During the rise a reference velocity `lag` behind acts as damping lag less of accelerating current."""
+    q = {k: np.array([v]) for k, v in PARAMETERS.items()}
+    current = [simulate(_moves(), q | {"lag": np.full(1, lag)}, 5e-4) for lag in (0.0, 1e-3)]
+    late, heavy = current[1], simulate(_moves(), q | {"inertia": q["inertia"] + q["damping"] * 1e-3, "lag": np.zeros(1)}, 5e-4)
+    rising = slice(180, 280)
+    assert np.allclose((late[1] - current[0][1])[rising], (heavy[1] - current[0][1])[rising], atol=0.02)
+
+
+def test_jump_within_a_step_counts() -> None:
+    """The command's instant shifts the motion by itself, however coarse the step."""
+    q = {k: np.array([v]) for k, v in {**PARAMETERS, "presliding": 0.0, "rise": 1e-4, "fall": 1e-4, "damping": 0.6}.items()}
+    t, early, _ = simulate(_moves(start_s=0.0500), q, 2e-3)
+    _, later, _ = simulate(_moves(start_s=0.0507), q, 2e-3)
+    k = (t > 0.3) & (t < 0.6)
+    assert np.allclose((early - later)[k, 0], 115 * 0.0007, atol=0.01)
+
+
 def test_friction_state_sticks() -> None:
     z = friction_state(np.r_[0.0, 10.0, 10.0, 10.0, 9.99], 0.5)
     assert z[1] == pytest.approx(1.0, abs=1e-6) and z[1] == z[2] == z[3] and 0.9 < z[4] < 1.0

@@ -15,6 +15,7 @@ from .balance import NAMES
 from .drive import CONTROLLERS
 from .moves import SETTLED, MoveData, shortened
 from .output_error import COARSE_S, OutputErrorFit
+from .replicates import lack_of_fit
 
 CLOSE = 1.15  # mean square of the residuals [noise variances] below which no other kind of friction is tried
 SOME = 12  # moves that the search simulates
@@ -69,7 +70,7 @@ def find_controller(
         found = output_error.fit(moves, near.values, _names(near.controller, near.values), sigma, bounds, near.controller)
         if best is None or found.cost < best.cost:
             best = found
-        if output_error.lack_of_fit(best) < enough:
+        if lack_of_fit(best) < enough:
             break
     return best
 

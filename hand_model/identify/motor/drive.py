@@ -2,13 +2,15 @@
 
 Plant: inertia a = u - viscous v - F - stiffness p - preload, with the friction of LuGre (Canudas de Wit et al. 1995),
     F = f + bristle f',  f' = (level(v) - f sign(v)) v / distance,  level(v) = coulomb (1 + (ratio - 1) exp(-|v / stribeck|^exponent)),
-which sticks (any f within its bounds at v = 0) and becomes Coulomb's as the presliding distance goes to zero.
+which sticks (any f within its bounds at v = 0). Without a presliding distance friction is Coulomb's, set-valued at rest: bristles however
+stiff let a drive off before they hold it, for a time that falls with the square root of their distance only.
 Controller: u = gain (r - p) + damping (r' - v), within the current limit. Two kinds make the reference r:
     "profile": a trapezoidal velocity profile from the old to the new setpoint (a ramp where rise and fall take no time);
     "cascade": r' follows position_gain (setpoint - p) within the speed limit and a slew rate, and holds within a deadband, which sets in over a width `edge`; as r is
     the integral of the wanted speed, this is a position loop round a speed loop with proportional and integral action.
 The recorded current acts `lead` seconds later: a loop that samples holds its value until the next step.
 A loop that samples acts late: p and v reach the controller `delay` seconds old, to first order (p - delay v, v - delay a).
+A generator that sums up its reference step by step has the velocity r' `lag` seconds behind r.
 Integrated by the implicit midpoint rule, linear within a step.
 """
 

@@ -20,6 +20,7 @@ from .moves import BEFORE, MoveData, moves_from_rest
 from .output_error import FINE, OutputErrorFit
 from .published import PublishedFit, fit_published, smear_share
 from .recording import MotorTrial, Scale, actuator_trials, check_trials, motor_trial, trial_scale
+from .replicates import lack_of_fit
 from .weak_form import GIVE, Regression, fit_regressions
 
 Array = NDArray[np.float64]
@@ -183,7 +184,7 @@ def fit_motor(trials: Sequence[MotorTrial], scale: Scale, actuator: str = "motor
     best, evidence = None, 0.0
     if len(moves) >= 4:
         best, evidence = _fit_output_error(moves, plain, curved, (sigma_p, sigma_u))
-    accepted = best is not None and output_error.lack_of_fit(best) < LACK_OF_FIT
+    accepted = best is not None and lack_of_fit(best) < LACK_OF_FIT
     notes = []
     if accepted:
         sigma_p, sigma_u = (s * np.sqrt(c) for s, c in zip(best.sigma, best.chi2, strict=True))
@@ -225,7 +226,7 @@ def _fit_output_error(
     # a rise is tried where the regression, which knows no controller, leaves room for one
     if curved.excess_z > ROOM and (_claims(curved) or max(best.chi2) < 4.0):
         best, evidence = _with_rise(best, curved)
-    if max(best.chi2) > UNREST and output_error.lack_of_fit(best) < LACK_OF_FIT:
+    if max(best.chi2) > UNREST and lack_of_fit(best) < LACK_OF_FIT:
         best = output_error.reweighted(best, BOUNDS)
     return best, evidence
 
