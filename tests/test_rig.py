@@ -368,3 +368,15 @@ def test_noise_floor_of_a_balance_is_that_of_its_sensors(tmp_path: Path) -> None
     left = findings.lack_of_fit["joints"]["hinge"]
     assert findings.verdict == "consistent"
     assert left["noise_floor"] == pytest.approx(left["after"], rel=0.35)
+
+
+def test_shapes_lie_between_those_that_were_tried(tmp_path: Path) -> None:
+    """A channel read 13 ms apart: the delay is none of the grid's, and is found to a millisecond."""
+    folder = planted(tmp_path / "s")
+    for log in (folder / "log").iterdir():
+        t, q, torque = np.loadtxt(log, delimiter=",", skiprows=1).T
+        late = np.stack([t, q, np.interp(t + 0.013, t, torque)], 1)
+        np.savetxt(log, late, delimiter=",", header="time,position,torque", comments="", fmt="%.9g")
+    found = diagnose_rig(read_session(folder)).findings[0]
+    assert found.effect == "current_channel_delay"
+    assert abs(found.parameters["delay"]["value"]) == pytest.approx(0.013, abs=0.001)

@@ -117,7 +117,7 @@ def _own(rig: RigModel, fit: DeclaredFit, joint: str, rows: list[Rows]) -> list[
     load = {r.trial: np.abs(r.load(fit.theta)) for r in fit.rows if r.joint == joint}
     expected = {r.trial: np.abs(r.expected(fit.theta)) for r in fit.rows if r.joint == joint}
     sample = max(float(np.median(np.diff(t.time_s))) for t in rig.trials)
-    late = sorted({k * sample for k in (0.5, 1, 2, 3, 5, 8)} | {k * LONGEST_DELAY_S / 6 for k in range(1, 7)})
+    late = sorted({round(d, 6) for d in [k * sample for k in (0.5, 1, 2, 3, 5, 8)] + [k * LONGEST_DELAY_S / 6 for k in range(1, 7)]})
     delays = tuple({"delay": sign * d} for d in late if d <= max(8 * sample, LONGEST_DELAY_S) for sign in (-1.0, 1.0))
     own = [
         Candidate("load_dependent_friction", "low speed", joint, (("per_load", "1", 0.0, np.inf),), knees,

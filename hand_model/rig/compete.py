@@ -12,12 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..diagnose.balance import DISCRETE
 from .balance import Rows
 from .candidates import Candidate
 from .consistent import consistent
 from .declared import DeclaredFit, bounds, prior
 from .evidence import weigh
 from .solve import solve_bounded
+from .states import later
 
 Array = NDArray[np.float64]
 FOLDS = 6
@@ -94,8 +96,7 @@ def design(row: Rows, terms: Sequence[Term]) -> Array:
     matrix = np.concatenate([row.columns, *(term_columns(row, t) for t in terms)], 1)
     for t in terms:
         if t.candidate.delays and t.candidate.joint == row.joint:
-            grid = row.time_s[:: row.step]
-            matrix = np.stack([np.interp(grid - t.shape["delay"], grid, c) for c in matrix.T], 1)
+            matrix = later(row.time_s[:: row.step], matrix, t.shape["delay"])
     return matrix
 
 
@@ -208,6 +209,29 @@ def score(problem: Problem, terms: Sequence[Term], candidate: Candidate, parts: 
     return best
 
 
+def refined(problem: Problem, terms: Sequence[Term], term: Term, parts: tuple) -> Term:
+    """The term beside others with its continuous shapes between the neighbours on its grid, one after the other, by the
+    training error."""
+    from scipy.optimize import minimize_scalar
+
+    for name in (n for n in term.shape if n not in DISCRETE):
+        values = np.unique([g[name] for g in term.candidate.grid])
+        at = int(np.searchsorted(values, term.shape[name]))
+        low, high = values[max(at - 1, 0)], values[min(at + 1, len(values) - 1)]
+
+        def train(value: float, name: str = name, term: Term = term) -> float:
+            moved = Term(term.candidate, {**term.shape, name: float(value)})
+            delays = term.candidate.delays
+            some = normal(problem, [*terms, moved]) if delays else _extended(problem, terms, moved, parts)
+            return held_out(problem, [*terms, moved], some)[1]
+
+        if high > low:
+            found = minimize_scalar(train, bounds=(low, high), method="bounded", options={"maxiter": 10})
+            if found.fun < train(term.shape[name]):
+                term = Term(term.candidate, {**term.shape, name: float(found.x)})
+    return term
+
+
 def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ...] = (),
             most: int = MOST_TERMS) -> tuple[tuple[Term, ...], tuple[Step, ...], tuple[Score, ...]]:  # fmt: skip
     """Forward selection: the candidate that lowers the held-out error most, while it does so beyond doubt.
@@ -227,7 +251,7 @@ def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ..
         step = judge(none, scores, whole, problem.group)
         if step is None:
             break
-        terms = (*terms, step.winner.term)
+        terms = (*terms, refined(problem, terms, step.winner.term, parts))
         steps.append(step)
     return terms, tuple(steps), tuple(scores)
 

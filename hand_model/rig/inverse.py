@@ -21,6 +21,7 @@ from .declared import DeclaredFit
 from .mjcf import read_effects
 from .model import RigModel, RigTrial
 from .overrides import compile_model
+from .states import later
 
 Array = NDArray[np.float64]
 
@@ -71,10 +72,9 @@ def effort_residuals(
                 if candidate.joint == row.joint:
                     amplitude = np.array([record["amplitude"][a[0]] for a in candidate.amplitudes])
                     expected = expected + row.filtered(candidate.columns(row, record["shape"])) @ amplitude
-            grid = row.time_s[:: row.step]
             for candidate, record in terms:
                 if candidate.joint == row.joint and candidate.delays:
-                    expected = np.interp(grid - record["shape"]["delay"], grid, expected)
+                    expected = later(row.time_s[:: row.step], expected, record["shape"]["delay"])
             out.append(EffortResidual(name, row.joint, row.validate, (row.effort - expected)[row.moving], row, expected))
     return tuple(out)
 

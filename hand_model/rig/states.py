@@ -53,6 +53,14 @@ def low_pass(values: Array, rate_hz: float, cutoff_hz: float) -> Array:
     return sosfiltfilt(sos, values, axis=0, padlen=pad)
 
 
+def later(time_s: Array, values: Array, delay_s: float) -> Array:
+    """Values (n, ...) that come later by delay_s (earlier where negative), constant beyond the ends: cubic spline, since a
+    line between samples of a thinned grid would smooth and so favour delays of whole samples."""
+    from scipy.interpolate import CubicSpline
+
+    return CubicSpline(time_s, values)(np.clip(time_s - delay_s, time_s[0], time_s[-1]))
+
+
 def differentiate(values: Array, rate_hz: float) -> Array:
     """Central differences, second order, (n,)."""
     return np.gradient(values, 1.0 / rate_hz, axis=0, edge_order=2)
