@@ -14,12 +14,13 @@ from .name import ALPHA, Named
 from .station import Station, channel_of, finding_of, unexplained_of, unrepeated_of
 
 UNLIKE_OTHERS = 2.0  # times the wander of the calmest finger
-UNREST = 0.3  # of the noise: wander that a lone finger is granted
+UNREST = 0.3  # of the noise: wander that every machine is granted
 
 
 def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding]], notes: list[str],
              unexplained: Sequence[dict[str, Any]] = ()) -> Findings:
-    """One ranked list from all stations; weight: log likelihood that an effect's model takes off. unexplained: of the markers."""
+    """One ranked list from all stations. A finding's weight, by which findings of different stations compare, is the size of what
+    it adds over the noise of one reading (root mean squares). unexplained: of the markers."""
     ranked: list[tuple[float, Finding]] = list(marker_findings)
     rejected: list[dict[str, str]] = []
     unexplained = list(unexplained)
@@ -50,10 +51,11 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
 
 def _wanders(station: Station, stations: Sequence[Station]) -> bool:
     """Whether one finger repeats itself clearly less well than the others do: how all of them are is how this hand is."""
-    if station.wander == 0:
+    wander = station.naming.wander
+    if wander is None or not wander.real:
         return False
-    others = [s.wander for s in stations if s.signal == station.signal and s is not station and s.joint == station.joint]
-    return station.wander > (UNLIKE_OTHERS * min(others) if others else UNREST)
+    others = [s.wander for s in stations if (s.signal, s.joint) == (station.signal, station.joint) and s is not station]
+    return station.wander > max(UNREST, UNLIKE_OTHERS * min(others, default=0.0))
 
 
 def _one_clock(ranked: list[tuple[float, Finding]]) -> list[tuple[float, Finding]]:

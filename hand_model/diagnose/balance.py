@@ -58,7 +58,8 @@ class Balance:
                  typical: Mapping[str, float] | None = None) -> None:
         self.states, self.typical = states, typical or {}
         self.masks = [np.isfinite(s.effort) & np.isfinite(s.declared).all(1) for s in states]
-        self.effort = np.concatenate([s.effort[m] for s, m in zip(states, self.masks, strict=True)])
+        self._rows = [np.flatnonzero(m) for m in self.masks]
+        self.effort = self.gather(lambda s: s.effort)
         self.train = np.concatenate([np.full(m.sum(), everything or not s.validate)
                                      for s, m in zip(states, self.masks, strict=True)])
         self.names = states[0].declared_names or tuple(f"c{i}" for i in range(states[0].declared.shape[1]))
@@ -72,9 +73,9 @@ class Balance:
         self.wander: Wander | None = None
 
     def wandering(self, wander: Wander | None) -> Balance:
-        """The same balance with a random level per while in its noise."""
+        """The same balance with a random level per while in its noise, where that is real."""
         other = copy(self)
-        other.wander = wander
+        other.wander = wander if wander is not None and wander.real else None
         return other
 
     def whiten(self, values: Array, weight: Array) -> Array:
@@ -83,7 +84,7 @@ class Balance:
 
     def gather(self, value: Any) -> Array:
         """Stack `value(state)` (n, ...) over the compared samples."""
-        return np.concatenate([np.asarray(value(s))[m] for s, m in zip(self.states, self.masks, strict=True)])
+        return np.concatenate([np.asarray(value(s)).take(rows, axis=0) for s, rows in zip(self.states, self._rows, strict=True)])
 
     def _strokes(self) -> NDArray[np.int64]:
         out, count = [], 0
@@ -153,13 +154,22 @@ class Balance:
         declared = dict(zip(self.names, coefficients[:k].tolist(), strict=True))
         return Fit(terms, declared, tuple(amplitudes), prediction, rss, size)
 
+    def unclipped(self, terms: tuple[Term, ...]) -> NDArray[np.bool_]:
+        """Samples (n,) whose prediction no term clips: there the balance is linear."""
+        clips = [t for t in terms if t.effect.clips]
+        if not clips:
+            return np.ones(len(self.effort), bool)
+        free = self.fit(terms).prediction
+        levels = [term.effect.clip(np.full(len(free), sign * np.inf), term.shape) for term in clips for sign in (1, -1)]
+        return ~np.any([np.isclose(free, level) for level in levels], axis=0)
+
     def _own_nuisances(self, matrix: Array, coefficients: Array, w: Array, low: Array) -> Array:
         """Coefficients of columns that act in validation recordings only (their own clock offset, a step in them, an obstacle
         that is still there) from those recordings: they belong to the recording, not to the model, which stays as trained."""
-        idle = (np.abs(matrix * w[:, None]).sum(0) == 0) & (np.abs(matrix).sum(0) > 0)
-        if not idle.any():
+        columns = np.flatnonzero(coefficients == 0)  # least squares leaves a column alone that never acts
+        columns = columns[np.any(matrix[:, columns] != 0, axis=0) & ~np.any(matrix[:, columns][w > 0] != 0, axis=0)]
+        if not len(columns):
             return coefficients
-        columns = np.flatnonzero(idle)
         held = self.weight * ~self.train
         left = (self.effort - matrix @ coefficients) * held
         out = coefficients.copy()
@@ -169,10 +179,10 @@ class Balance:
 
 def bounded_least_squares(matrix: Array, target: Array, low: Array, high: Array) -> Array:
     """min |A x - b| with low <= x <= high, bounds 0 or infinite (active set on the normal equations)."""
-    scale = np.linalg.norm(matrix, axis=0)
+    gram, right = matrix.T @ matrix, matrix.T @ target
+    scale = np.sqrt(np.diag(gram))
     scale = np.where(scale > 0, scale, 1.0)
-    a = matrix / scale
-    gram, right = a.T @ a, a.T @ target
+    gram, right = gram / np.outer(scale, scale), right / scale
     gram = gram + 1e-10 * np.eye(len(gram))
     free = np.ones(len(low), bool)
     x = np.zeros(len(low))

@@ -23,7 +23,8 @@ CEILING_T = 6.0
 @dataclass(frozen=True)
 class CommandFacts:
     """latency_s: (e,) from each setpoint change to the current's answer, motion_s: to the motion's. sag: loss of speed per unit of load, its standard
-    error, and the range of loads; nan where strokes do not tell. ceiling: current [raw] at which the drive is at its limit, or nan."""
+    error, and the range of loads; nan where strokes do not tell. ceiling: current [raw] at which the drive is at its limit, or nan.
+    strokes: how many tell the sag."""
 
     latency_s: Array
     motion_s: Array
@@ -32,6 +33,7 @@ class CommandFacts:
     sag_se: float
     load_range: float
     ceiling: float = float("nan")
+    strokes: int = 0
     trials: tuple[str, ...] = ()
 
 
@@ -53,7 +55,7 @@ def command_facts(states: tuple[DriveState, ...], currents: tuple[Array, ...]) -
     motion = [x for s in states for x in _latencies(s, s.position)]
     step = float(np.median(np.concatenate([np.diff(s.time_s) for s in states])))
     strokes = _strokes(states, currents)
-    return CommandFacts(np.array(latency), np.array(motion), step, *_sag(strokes), _ceiling(strokes),
+    return CommandFacts(np.array(latency), np.array(motion), step, *_sag(strokes), _ceiling(strokes), len(strokes),
                         tuple(s.trial for s in states))
 
 
@@ -93,14 +95,15 @@ def _strokes(states: tuple[DriveState, ...], currents: tuple[Array, ...]) -> lis
 
 def _load_rise(strokes: list[Stroke]) -> tuple[dict[float, np.poly1d], float]:
     """Rise of the load over position [raw/%] flexing and extending, as polynomials of position, and the viscous friction
-    [raw s/%]: current = cubic in position, one for each way, + viscous velocity."""
+    flexing [raw s/%]: current = cubic in position + viscous velocity, each of its own for the two ways."""
     p, v, c = (np.concatenate([getattr(s, name) for s in strokes]) for name in ("position", "velocity", "current"))
     flexing = np.concatenate([np.full(len(s.position), s.way > 0) for s in strokes])
     powers = np.stack([(p / 100) ** k for k in range(4)], axis=-1)
-    design = np.concatenate([powers * flexing[:, None], powers * ~flexing[:, None], v[:, None]], axis=1)
+    ways = [np.concatenate([powers, v[:, None]], axis=1) * way[:, None] for way in (flexing, ~flexing)]
+    design = np.concatenate(ways, axis=1)
     beta = np.linalg.lstsq(design, c, rcond=None)[0]
     scale = 100.0 ** -np.arange(4)
-    return {way: np.poly1d((b * scale)[::-1]).deriv() for way, b in ((1.0, beta[:4]), (-1.0, beta[4:8]))}, float(beta[8])
+    return {way: np.poly1d((b * scale)[::-1]).deriv() for way, b in ((1.0, beta[:4]), (-1.0, beta[5:9]))}, float(beta[4])
 
 
 def _sag(strokes: list[Stroke]) -> tuple[float, float, float]:
@@ -135,6 +138,8 @@ def _ceiling(strokes: list[Stroke]) -> float:
     y = np.concatenate([-viscous * (s.velocity - np.mean(s.velocity)) for s in mine])
     share = float(x @ y / max(x @ x, 1e-12))
     error = float(np.std(y - share * x) / np.sqrt(max(x @ x, 1e-12)))
+    if float(np.sum((y - share * x) ** 2)) > 0.5 * float(y @ y):
+        return np.nan  # speed changes for other reasons: strokes that only accelerate and brake
     followed = float(x @ np.concatenate([s.current - np.mean(s.current) for s in mine]) / max(x @ x, 1e-12))
     if share < CEILING_SHARE or share < CEILING_T * error or followed > 1 - CEILING_SHARE:
         return np.nan
@@ -168,16 +173,17 @@ def _ceiling_finding(actuator: str, finger: str | None, fact: CommandFacts) -> t
     text = (f"The {actuator} motor is at its limit of {fact.ceiling:.0f} raw in its fastest strokes: the current stays, and speed falls "
             "as the load rises.")
     model = {"native": True, "mjcf": f"actuator[@name='{actuator}']/@forcerange", "urdf": "limit effort"}
-    return 1e3, Finding("current_saturation", ("current_saturation",), 0.999, (), where, text,
+    return 1.0, Finding("current_saturation", ("current_saturation",), 0.999, (), where, text,
                         {"limit": {"value": fact.ceiling, "unit": "raw"}}, fit, model)
 
 
-def refused(actuator: str, finger: str | None, trials: tuple[str, ...]) -> tuple[float, Finding]:
-    """The finding of a current channel that is no measurement."""
-    fit = {"metric": "current_rmse", "unit": "raw", "before": None, "after": None, "noise_floor": None, "ci95_reduction": None,
+def refused(actuator: str, finger: str | None, trials: tuple[str, ...], signal: str = "current") -> tuple[float, Finding]:
+    """The finding of a current (or position) channel that is no measurement."""
+    fit = {"metric": f"{signal}_rmse", "unit": "raw", "before": None, "after": None, "noise_floor": None, "ci95_reduction": None,
            "held_out": [], "engine": None}
-    where = {**_where(actuator, finger), "signal": "current", "trials": list(trials)}
-    text = f"The current of {actuator} is no measurement: it does not follow the motion; nothing is fitted to it."
+    where = {**_where(actuator, finger), "signal": signal, "trials": list(trials)}
+    why = "it does not follow the motion" if signal == "current" else "it is at every new setpoint at once"
+    text = f"The {signal} of {actuator} is no measurement: {why}; nothing is fitted to it."
     return 1e9, Finding("command_as_measurement", ("command_as_measurement",), 0.999, (), where, text, {}, fit, None,
                         "the channel is refused")
 
@@ -197,7 +203,7 @@ def _delay(actuator: str, finger: str | None, fact: CommandFacts, healthy: float
     parameters = {"delay": {"value": value, "unit": "s", "ci95": [float(low) - half, float(high) + half]}}
     text = f"The {actuator} motor answers its commands {1e3 * value:.0f} ms late."
     model = {"native": True, "mjcf": f"actuator[@name='{actuator}'] delay", "urdf": "not expressible: kept in hand.json"}
-    weight = float(len(fact.latency_s)) * (value / fact.step_s) ** 2
+    weight = value / fact.step_s
     return weight, Finding("command_delay", ("command_delay",), 0.999, (), _where(actuator, finger), text, parameters, fit, model)
 
 
@@ -208,5 +214,5 @@ def _sag_finding(actuator: str, finger: str | None, fact: CommandFacts) -> tuple
            "ci95_reduction": None, "held_out": [], "engine": "strokes"}
     text = f"The {actuator} motor loses {100 * loss:.1f} % of its speed over the recorded loads."
     model = {"native": False, "mjcf": None, "urdf": "not expressible: kept in hand.json"}
-    return 0.5 * (fact.sag / fact.sag_se) ** 2, Finding("drive_sag", ("drive_sag",), 0.999, (), _where(actuator, finger), text,
-                                                       parameters, fit, model)
+    weight = fact.sag / fact.sag_se / np.sqrt(fact.strokes)
+    return weight, Finding("drive_sag", ("drive_sag",), 0.999, (), _where(actuator, finger), text, parameters, fit, model)

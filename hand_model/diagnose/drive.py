@@ -21,6 +21,7 @@ GIVE_LEAST, GIVE_MOST = 0.02, 1.2  # [%] of the declared Coulomb friction's bris
 GIVE_UNSEEN = 0.12  # [%] differences of bristles below this are within what starts tell
 SETTLE_SAMPLES = (14, 13)  # after a start and before a stop: where acceleration is smeared by the kernel
 
+ECHO = 0.003  # of the range: a third of what a fast motion covers in one sample
 UNMOVED = 0.95  # of a current's standard deviation: more than this left by the motion, and it measures nothing
 SETTLE_TRAVEL = 4.0  # [%] some six bristle lengths of a healthy drive
 
@@ -109,6 +110,21 @@ def is_measured(states: tuple[DriveState, ...]) -> bool:
     left = float(np.std(current - declared @ (np.linalg.lstsq(declared / scale, current, rcond=None)[0] / scale)))
     jitter = float(np.median(np.abs(np.diff(current, 2)))) / 0.6745 / np.sqrt(6)
     return left < UNMOVED * spread and not (jitter < 0.03 * spread and left > 10 * max(jitter, 0.02 * spread))
+
+
+def echoes_command(logs: Sequence[Log]) -> bool:
+    """Whether the position column repeats the setpoint: just after each change of the setpoint it is already there, which no
+    machine of finite speed is."""
+    near = []
+    for log in logs:
+        if "setpoint" not in log.columns:
+            return False
+        position, setpoint = log.column("position"), log.column("setpoint")
+        span = max(float(np.nanmax(setpoint) - np.nanmin(setpoint)), 1e-9)
+        changed = np.r_[False, np.abs(np.diff(setpoint)) > 0]
+        near.append(np.abs(position - setpoint)[changed & np.isfinite(position) & np.isfinite(setpoint)] / span)
+    gaps = np.concatenate(near) if near else np.zeros(0)
+    return len(gaps) >= 5 and float(np.mean(gaps < ECHO)) > 0.9
 
 
 def steady(time_s: Array, motion: Motion) -> NDArray[np.bool_]:

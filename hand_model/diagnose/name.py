@@ -26,8 +26,8 @@ ALPHA = 0.003  # false alarms per channel: 5 % over some fifteen channels of a s
 EVIDENCE_LEAST = 6.0  # log evidence an effect must bring: e^6 against "none", and against the search over shapes
 CLASS_WIDTH = 3.0  # log evidence within which two effects are one class: 20 to 1
 MOST_TERMS = 5
-MOST_WANDERS = 2  # searches begun anew with noise that knows what does not repeat
-GROWN = 1.3  # of that noise, from which another search is worth its time
+MOST_SEARCHES = 3  # each with noise that knows what did not repeat beside the effects of the one before
+GROWN = 1.3  # change of that noise, from which another search is worth its time
 
 
 @dataclass(frozen=True)
@@ -59,12 +59,13 @@ class Named:
 
 @dataclass(frozen=True)
 class Naming:
-    """What a balance says. before, after: lack of fit of the declared model and of the final one. rejected: tried and
+    """What a balance says. wander: what does not repeat beside the fit. before, after: lack of fit of the declared model and of the final one. rejected: tried and
     not kept, with the log evidence that it brought."""
 
     balance: Balance
     declared: Fit
     fit: Fit
+    wander: Wander | None
     before: LackOfFit
     after: LackOfFit
     found: tuple[Named, ...]
@@ -92,20 +93,20 @@ def name_effects(states: tuple[Any, ...], effects: Iterable[Any], progress: Call
 
 
 def _name(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str], None] | None) -> Naming:
-    fit, brought = _search(balance, effects, progress)
-    for _ in range(MOST_WANDERS):
-        wander = _unrepeated(balance, fit)
-        if wander is None or (balance.wander is not None and wander.deviation < GROWN * balance.wander.deviation):
-            break
+    wander = estimate_wander(balance, balance.fit().prediction)
+    for _ in range(MOST_SEARCHES):
         balance = balance.wandering(wander)
         fit, brought = _search(balance, effects, progress)
+        wander = _unrepeated(balance, fit)
+        if _alike(wander, balance.wander):
+            break
     declared = balance.fit()
     before = lack_of_fit(balance, declared.prediction, len(balance.names), ALPHA)
     after = lack_of_fit(balance, fit.prediction, len(balance.names) + fit.size, ALPHA) if fit.terms else before
     found = _findings(balance, effects, fit.terms, fit, declared)
     kept = {t.effect.name for t in fit.terms}
     rejected = tuple(sorted(((n, e) for n, e in brought.items() if n not in kept), key=lambda item: -item[1]))
-    return Naming(balance, declared, fit, before, after, found, rejected)
+    return Naming(balance, declared, fit, estimate_wander(balance, fit.prediction), before, after, found, rejected)
 
 
 def _search(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str], None] | None) -> tuple[Fit, dict[str, float]]:
@@ -132,7 +133,7 @@ def _unrepeated(balance: Balance, fit: Fit) -> Wander | None:
             continue
         rest = balance.fit(tuple(t for i, t in enumerate(fit.terms) if i != which))
         chance = estimate_wander(balance, rest.prediction)
-        if chance is None:
+        if chance is None or not chance.real:
             continue
         free = evidence(balance, fit, rest, which) - gain(balance, fit, rest)
         if _likelihood(balance, fit, wander) - _likelihood(balance, rest, chance) + free < EVIDENCE_LEAST:
@@ -140,10 +141,15 @@ def _unrepeated(balance: Balance, fit: Fit) -> Wander | None:
     return wander
 
 
+def _alike(a: Wander | None, b: Wander | None) -> bool:
+    small, large = sorted(0.0 if w is None or not w.real else w.deviation for w in (a, b))
+    return large <= GROWN * small
+
+
 def _likelihood(balance: Balance, fit: Fit, wander: Wander | None) -> float:
     weight = balance.weight * balance.train
     residual = (balance.effort - fit.prediction) * weight
-    if wander is None:
+    if wander is None or not wander.real:
         return -0.5 * float(np.sum(residual**2)) / balance.inflation
     return wander.log_likelihood(residual, weight, balance.inflation)
 
@@ -182,7 +188,7 @@ def scan(balance: Balance, effect: Any, terms: tuple[Term, ...]) -> Fit | None:
     grid = effect.grid(balance.states)
     if not grid:
         return None
-    if effect.replaces is None and not effect.warps and not effect.clips and not any(t.effect.clips for t in terms):
+    if effect.replaces is None and not effect.warps and not effect.clips:
         grid = _project(balance, effect, terms, grid)
     fits = [balance.fit((*terms, Term(effect, shape))) for shape in grid]
     return min(fits, key=lambda f: f.rss) if fits else None
@@ -191,7 +197,7 @@ def scan(balance: Balance, effect: Any, terms: tuple[Term, ...]) -> Fit | None:
 def _project(balance: Balance, effect: Any, terms: tuple[Term, ...], grid: list[dict[str, float]]) -> list[dict[str, float]]:
     """The two best shapes of a grid by the fall of the RSS that its columns, orthogonal to the design, bring."""
     matrix, _, _ = balance.design(terms)
-    w = balance.weight * balance.train
+    w = balance.weight * balance.train * balance.unclipped(terms)
     matrix = balance.whiten(matrix * w[:, None], w)
     norm = np.linalg.norm(matrix, axis=0)
     q, _ = np.linalg.qr(matrix / np.where(norm > 0, norm, 1.0))
@@ -249,7 +255,7 @@ def polish(balance: Balance, fit: Fit, which: int) -> Fit:
 
 def settle(balance: Balance, effects: tuple[Any, ...], terms: tuple[Term, ...]) -> tuple[tuple[Term, ...], Fit]:
     """Joint refit; terms that no longer pay leave; a term that another effect replaces better is exchanged."""
-    fit = refit(balance, balance.fit(terms))
+    fit = reform(balance, refit(balance, balance.fit(terms)), len(terms) - 1)
     for _ in range(3):
         dropped = _drop(balance, fit)
         if dropped is not None:
@@ -273,6 +279,19 @@ def refit(balance: Balance, fit: Fit, rounds: int = 2) -> Fit:
     return fit
 
 
+def reform(balance: Balance, fit: Fit, which: int) -> Fit:
+    """The likeliest of the forms of one term, each with its shape optimised."""
+    term = fit.terms[which]
+    forms = next((s.starts for s in term.effect.shapes(balance.states) if s.name == "form"), ())
+    fits = [fit]
+    for form in forms:
+        if form != term.shape["form"]:
+            terms = list(fit.terms)
+            terms[which] = Term(term.effect, {**term.shape, "form": form})
+            fits.append(polish(balance, balance.fit(tuple(terms)), which))
+    return min(fits, key=lambda f: f.rss)
+
+
 def _drop(balance: Balance, fit: Fit) -> Fit | None:
     """The fit without the term that costs more than it brings; None where every term pays."""
     for which in range(len(fit.terms)):
@@ -288,7 +307,7 @@ def _swap(balance: Balance, effects: tuple[Any, ...], fit: Fit) -> Fit | None:
         rest = tuple(t for i, t in enumerate(fit.terms) if i != which)
         without = balance.fit(rest)
         own = evidence(balance, fit, without, which, scale_of(balance, fit))
-        ranked = [r for r in rank(balance, effects, rest, without, refine=3) if r.name != fit.terms[which].effect.name]
+        ranked = [r for r in rank(balance, effects, rest, without, refine=1) if r.name != fit.terms[which].effect.name]
         if ranked and ranked[0].evidence > own - 10:
             other = refit(balance, ranked[0].fit)
             scale = min(scale_of(balance, other), scale_of(balance, fit))
@@ -306,7 +325,7 @@ def _findings(balance: Balance, effects: tuple[Any, ...], terms: tuple[Term, ...
     for which, term in enumerate(terms):
         rest = tuple(t for i, t in enumerate(terms) if i != which)
         without = balance.fit(rest)
-        ranked = rank(balance, effects, rest, without)
+        ranked = rank(balance, effects, rest, without, refine=3)
         own = evidence(balance, fit, without, which, scale_of(balance, fit))
         rivals = [r for r in ranked if r.name != term.effect.name]
         rivals.append(Rival(term.effect.name, max([own, *[r.evidence for r in ranked if r.name == term.effect.name]]), fit))

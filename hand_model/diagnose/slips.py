@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..identify.likelihood import OUTLIER_LIMIT
 from .angles import FingerAngles
 from .findings import Finding
 from .markers import ALPHA, HINGE, NO_HINGE, MarkerEffect, MarkerNaming
@@ -26,8 +25,8 @@ SWAP_FRAMES = 5  # shorter exchanges are ghosts
 
 
 def marker_findings(angles: FingerAngles, naming: MarkerNaming) -> list[tuple[float, Finding]]:
-    """Findings of one finger's markers with their weight (log likelihood gained): swaps first, then the named effects,
-    one per marker, support or joint."""
+    """Findings of one finger's markers, one per marker, support or joint, with their weight: how far they move markers over the
+    noise of one reading (root mean squares)."""
     out = _swaps(angles)
     if not naming.believed:
         return out
@@ -40,7 +39,8 @@ def marker_findings(angles: FingerAngles, naming: MarkerNaming) -> list[tuple[fl
             continue
         if sum(e.gain for e in members) < SMALL * total:
             continue  # no more than the form of the large one being another
-        out.append((0.5 * sum(e.gain for e in members), _finding(angles, naming, name, body, label, members)))
+        readings = max(float(naming.blocks.weight.sum()) * 3, 1.0)
+        out.append((float(np.sqrt(sum(e.gain for e in members) / readings)), _finding(angles, naming, name, body, label, members)))
     return out
 
 
@@ -144,9 +144,17 @@ def _swaps(angles: FingerAngles) -> list[tuple[float, Finding]]:
     fit = {"metric": "marker_rmse", "unit": "m", "before": None, "after": None, "noise_floor": angles.noise_m,
            "ci95_reduction": None, "held_out": [], "engine": "chain fitted to the markers, in-sample"}
     text = f"{' and '.join(names)} are exchanged from {begin:.1f} to {end:.1f} s of {trial}."
-    frames = sum(b - a for _, a, b in spans) / float(np.median(np.diff(angles.records[0].mocap.time_s)))
-    weight = 2 * frames * OUTLIER_LIMIT**2  # what the robust likelihood of the chain loses on two wrong labels
-    return [(weight, Finding("marker_swap", ("marker_swap",), 1.0, (), where, text, parameters, fit, None, CORRECTION["marker_swap"]))]
+    return [(_displaced(angles, names, sum(b - a for _, a, b in spans)), Finding("marker_swap", ("marker_swap",), 1.0, (), where, text, parameters, fit, None, CORRECTION["marker_swap"]))]
+
+
+def _displaced(angles: FingerAngles, labels: list[str], lasting_s: float) -> float:
+    """How far an exchange of two labels moves markers over the noise of one reading (root mean squares)."""
+    data = [r.data for r in angles.records]
+    i, j = (data[0].labels.index(label) for label in labels)
+    apart = float(np.nanmedian(np.concatenate([np.linalg.norm(d.position_world[:, i] - d.position_world[:, j], axis=1) for d in data])))
+    share = lasting_s / sum(float(np.ptp(r.mocap.time_s)) for r in angles.records)
+    moved = apart * np.sqrt(2 * min(share, 1.0) / (3 * len(data[0].labels)))
+    return float(moved / max(angles.noise_m, 1e-9))
 
 
 def steps(angles: FingerAngles, naming: MarkerNaming) -> list[tuple[int, float]]:

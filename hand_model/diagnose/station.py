@@ -35,8 +35,8 @@ class Station:
 
     @property
     def wander(self) -> float:
-        """Standard deviation of what does not repeat over that of the noise; zero where nothing of the kind shows."""
-        wander = self.naming.balance.wander
+        """Standard deviation of what does not repeat over that of the noise."""
+        wander = self.naming.wander
         return 0.0 if wander is None else wander.deviation / self.naming.balance.sigma
 
     @property
@@ -92,9 +92,14 @@ def finding_of(station: Station, named: Named, share: float) -> tuple[float, Fin
     members = named.members if effect.name in named.members else (effect.name, *named.members)
     recording = getattr(effect, "correction", None)
     model = None if recording else dict(UNWRITTEN)
-    weight = 0.5 * max(naming.declared.rss - naming.fit.rss, 0.0) * share
-    return weight, Finding(effect.name, members, named.probability, alternatives, where,
+    return _weight(naming, share), Finding(effect.name, members, named.probability, alternatives, where,
                            effect.statement(where, values), parameters, fit, model, recording)
+
+
+def _weight(naming: Naming, share: float) -> float:
+    """What an effect adds to the effort over the noise of one reading (root mean squares, training recordings)."""
+    added = max(naming.declared.rss - naming.fit.rss, 0.0) * share
+    return float(np.sqrt(added / max(naming.balance.train.sum(), 1)))
 
 
 def unexplained_of(station: Station, share: float) -> dict[str, Any]:
@@ -107,7 +112,7 @@ def unexplained_of(station: Station, share: float) -> dict[str, Any]:
 
 def unrepeated_of(station: Station) -> dict[str, Any]:
     """The entry of what changes from one while to the next at the same place, speed and direction."""
-    wander = station.naming.balance.wander
+    wander = station.naming.wander
     length = 0.0 if wander is None else wander.length_s
     span = f"whiles of {length:.1g} s" if np.isfinite(length) else "stroke to stroke"
     entry = unexplained_of(station, station.wander**2 / (1 + station.wander**2))

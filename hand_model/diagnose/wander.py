@@ -33,6 +33,11 @@ class Wander:
     evidence: float
     length_s: float
 
+    @property
+    def real(self) -> bool:
+        """Whether it brings as much evidence as any effect must."""
+        return self.evidence >= EVIDENCE_LEAST
+
     def whiten(self, values: Array, weight: Array, inflation: float) -> Array:
         """Weighted values (n,) or (n, k) with the level of each while shrunk to the size that noise has: uncorrelated again.
 
@@ -55,8 +60,8 @@ class Wander:
 
 
 def estimate_wander(balance: Balance, prediction: Array) -> Wander | None:
-    """The random level that the residual of a prediction (n,) shows in training recordings, beside what repeats; None where
-    it brings less than EVIDENCE_LEAST (likelihood of Laird & Ware 1982, maximised over its size and the length of a while)."""
+    """The random level that the residual of a prediction (n,) shows in training recordings, beside what repeats: the likeliest
+    size and length of a while (Laird & Ware 1982). None where there are too few replicates to tell."""
     from .balance import replicate_deviation
 
     use = balance.train & balance.steady
@@ -70,7 +75,7 @@ def estimate_wander(balance: Balance, prediction: Array) -> Wander | None:
     for length_s in WHILES_S:
         label = whiles(balance, length_s)
         size = np.bincount(label, weight**2) / balance.inflation
-        square = np.bincount(label, z * weight) ** 2 / balance.inflation
+        square = (np.bincount(label, z * weight) / balance.inflation) ** 2
         square, size = square[size > 0], size[size > 0]
         if len(size) < FEWEST:
             continue
@@ -79,7 +84,7 @@ def estimate_wander(balance: Balance, prediction: Array) -> Wander | None:
         k = int(np.argmax(gains))
         if best is None or gains[k] > best.evidence:
             best = Wander(label, float(deviations[k]), float(gains[k]), float(length_s))
-    return best if best is not None and best.evidence >= EVIDENCE_LEAST else None
+    return best
 
 
 def _gain(variance: float, size: Array, square: Array) -> float:

@@ -8,9 +8,8 @@ import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
 
-WHILES = ((0.0, 1.0), (0.2, 1.0), (0.35, 1.0), (0.5, 1.0), (0.65, 1.0), (0.8, 1.0), (0.0, 0.35), (0.0, 0.65), (0.2, 0.5), (0.35, 0.65),
-          (0.5, 0.8))
-MOST_VALIDATION = 6  # validation recordings in which an obstacle can still be told
+WHILES = ((0.0, 1.0), (0.2, 1.0), (0.35, 1.0), (0.5, 1.0), (0.65, 1.0), (0.8, 1.0), (0.0, 0.5), (0.2, 0.5), (0.4, 0.7))
+MOST_VALIDATION = 4  # validation recordings in which an obstacle can still be told
 
 
 class ExternalContact(Effect):
@@ -45,15 +44,18 @@ class ExternalContact(Effect):
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """Depth into the contact in that trial and in each validation recording, (n, 1 + MOST_VALIDATION)."""
+        out = np.zeros((len(state.time_s), 1 + MOST_VALIDATION))
+        index = state.extra.get("trial_index", np.zeros(len(state.time_s)))[0]
+        if index != round(shape["trial"]) and not state.validate:
+            return out
         depth = np.maximum(state.position - shape["begin"], 0.0)
         if shape["form"] > 0.5:
             depth = depth**2 / 10.0
-        out = np.zeros((len(depth), 1 + MOST_VALIDATION))
-        index = state.extra.get("trial_index", np.zeros(len(depth)))
-        share = (state.time_s - state.time_s[0]) / max(float(np.ptp(state.time_s)), 1e-9)
-        out[:, 0] = depth * ((index == round(shape["trial"])) & (share >= shape["since"]) & (share <= shape["until"]))
+        if index == round(shape["trial"]):
+            share = (state.time_s - state.time_s[0]) / max(float(np.ptp(state.time_s)), 1e-9)
+            out[:, 0] = depth * ((share >= shape["since"]) & (share <= shape["until"]))
         if state.validate:
-            rank = int(np.median(state.extra.get("validation_index", np.zeros(len(depth)))))
+            rank = int(state.extra.get("validation_index", np.zeros(1))[0])
             out[:, 1 + rank % MOST_VALIDATION] = depth
         return out
 

@@ -36,7 +36,7 @@ class PositionDependentFriction(Effect):
     def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
                    declared: Mapping[str, float]) -> dict[str, float]:
         """Bell and its height, also as a ratio to Coulomb friction."""
-        return {**shape, **amplitude, "ratio": amplitude["extra_friction"] / declared.get("coulomb", np.nan)}
+        return {**shape, **amplitude, "ratio": amplitude["extra_friction"] / (declared.get("coulomb") or np.nan)}
 
     def region(self, states: tuple[DriveState, ...], shape: Mapping[str, float]) -> dict[str, Any] | None:
         """Two widths about the centre."""

@@ -33,7 +33,9 @@ class TorqueRipple(Effect):
         phase = 2 * np.pi * state.position / shape["period"]
         # Faster than the state estimate sees, inertia takes the ripple up: nothing is claimed there.
         blur = 2 * np.pi * np.abs(state.velocity) / shape["period"] * state.extra.get("bandwidth_s", 0.0)
-        return np.stack([np.sin(phase), np.cos(phase)], axis=-1) * np.exp(-0.5 * blur**2)[:, None]
+        # Where motion starts or stops a slow phase resembles anything that friction does while it turns over.
+        seen = np.exp(-0.5 * blur**2) * state.extra.get("steady", np.ones(len(phase)))
+        return np.stack([np.sin(phase), np.cos(phase)], axis=-1) * seen[:, None]
 
     def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
                    declared: Mapping[str, float]) -> dict[str, float]:

@@ -1,0 +1,116 @@
+"""What does not repeat: random levels are told from noise and from physics; time stamps and echoes from measurements."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_diagnose import drive, planted
+
+from hand_model.diagnose.balance import Balance
+from hand_model.diagnose.drive import echoes_command
+from hand_model.diagnose.name import name_effects
+from hand_model.diagnose.stamps import stamps
+from hand_model.diagnose.wander import Wander, estimate_wander
+from hand_model.effects import catalogue, effect
+from hand_model.session import Log
+
+
+def test_whitening_and_likelihood_are_those_of_the_dense_covariance():
+    rng = np.random.default_rng(4)
+    label = np.repeat([0, 1, 2], [7, 1, 12])
+    weight, inflation = rng.uniform(0.2, 1.0, 20), 1.7
+    wander = Wander(label, 1.3, 9.0, 0.3)
+    cover = np.eye(20) + wander.deviation**2 / inflation * np.outer(weight, weight) * (label[:, None] == label)
+    values = rng.normal(size=(20, 3))
+    white = wander.whiten(values, weight, inflation)
+    assert np.allclose(white.T @ white, values.T @ np.linalg.solve(cover, values), atol=1e-12)
+    residual = values[:, 0]
+    dense = -0.5 * (residual @ np.linalg.solve(cover, residual) / inflation + np.linalg.slogdet(cover)[1])
+    assert wander.log_likelihood(residual, weight, inflation) == pytest.approx(dense, rel=1e-12)
+
+
+def walk(seed: int, size: float, memory_s: float = 6.0):
+    rng = np.random.default_rng(seed)
+
+    def add(state):
+        step = np.diff(state.time_s, prepend=state.time_s[0])
+        out, at = np.zeros(len(step)), rng.normal()
+        for i, d in enumerate(step):
+            keep = np.exp(-d / memory_s)
+            at = keep * at + np.sqrt(1 - keep**2) * rng.normal()
+            out[i] = size * at
+        return out
+
+    return add
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_wandering_zero_is_noise_and_not_physics(seed):
+    states = drive(seed, walk(seed, 4.0))
+    naming = name_effects(states, catalogue("drive"))
+    assert naming.found == ()
+    assert naming.wander.real
+    assert 2.5 < naming.wander.deviation < 5.5
+
+
+@pytest.mark.parametrize(("seed", "colour"), [(0, 0.0), (1, 0.0), (2, 0.5)])
+def test_replicates_that_repeat_have_no_wander(seed, colour):
+    balance = Balance(drive(seed, colour=colour))
+    assert not estimate_wander(balance, balance.fit().prediction).real
+
+
+def test_an_obstacle_in_one_trial_is_still_named_beside_its_rival_chance():
+    shape = {"trial": 1.0, "form": 0.0, "since": 0.4, "until": 1.0, "begin": 55.0}
+    contact = planted("external_contact", shape, [0.6, *[0.0] * 4])
+    naming = name_effects(drive(7, contact), catalogue("drive"))
+    assert [f.term.effect.name for f in naming.found] == ["external_contact"]
+    assert naming.found[0].amplitudes["stiffness"] == pytest.approx(0.6, rel=0.15)
+
+
+def test_physics_is_found_through_a_wandering_zero():
+    extra = planted("position_dependent_friction", {"centre": 45.0, "width": 7.0}, [15.0])
+    wandering = walk(3, 3.0)
+    naming = name_effects(drive(3, lambda s: extra(s) + wandering(s)), catalogue("drive"))
+    assert [f.term.effect.name for f in naming.found] == ["position_dependent_friction"]
+    assert naming.found[0].amplitudes["extra_friction"] == pytest.approx(15.0, rel=0.2)
+
+
+def log_of(state, time_s, position) -> Log:
+    return Log(time_s, {"position": position, "setpoint": np.where(state.velocity > 0, 100.0, 0.0)}, Path("log.csv"))
+
+
+def test_stamps_that_belong_to_their_rows_are_believed_and_packets_are_not():
+    states = drive(11)
+    noise = np.random.default_rng(0)
+    right = [log_of(s, s.time_s, s.position + noise.normal(0, 0.05, len(s.position))) for s in states]
+    judged = stamps(right)
+    assert judged.believed
+    assert judged.followed == pytest.approx(1.0, abs=0.05)
+
+    def packed(t):
+        edges = np.arange(0, len(t), 9)
+        late = np.interp(np.arange(len(t)), edges, t[edges]) + 0.03 * (np.arange(len(t)) // 9 % 2)
+        return np.maximum.accumulate(late) + 1e-6 * np.arange(len(t))
+
+    wrong = stamps([log_of(s, packed(s.time_s), log.columns["position"]) for s, log in zip(states, right, strict=True)])
+    assert not wrong.believed
+    assert wrong.wrong_s > 3e-3
+
+
+def test_a_position_that_repeats_its_setpoint_is_no_measurement():
+    states = drive(12)
+    logs = [log_of(s, s.time_s, s.position) for s in states]
+    assert not echoes_command(logs)
+    assert echoes_command([replace(log, columns={**log.columns, "position": log.columns["setpoint"]}) for log in logs])
+
+
+def test_a_ripple_is_not_read_from_starts_and_stops():
+    state = drive(5)[0]
+    steady = (np.arange(len(state.time_s)) % 7 > 2).astype(float)
+    masked = replace(state, extra={**state.extra, "steady": steady})
+    columns = effect("torque_ripple").columns(masked, {"period": 9.0})
+    assert np.all(columns[steady == 0] == 0)
+    assert np.any(columns[steady == 1] != 0)
