@@ -246,7 +246,7 @@ def _with_rise(base: OutputErrorFit, curved: Regression) -> tuple[OutputErrorFit
     if evidence < EVIDENCE:
         return base, 0.0
     if other.cost - best.cost < EVIDENCE:
-        best = _either_shape(best, other)
+        best = _either_shape(*fits)
     return best, evidence
 
 
