@@ -226,7 +226,7 @@ def refined(problem: Problem, terms: Sequence[Term], term: Term, parts: tuple) -
             return held_out(problem, [*terms, moved], some)[1]
 
         if high > low:
-            found = minimize_scalar(train, bounds=(low, high), method="bounded", options={"maxiter": 10})
+            found = minimize_scalar(train, bounds=(low, high), method="bounded", options={"maxiter": 6})
             if found.fun < train(term.shape[name]):
                 term = Term(term.candidate, {**term.shape, name: float(found.x)})
     return term
