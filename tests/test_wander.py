@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from test_diagnose import drive, planted
 
-from hand_model.diagnose.balance import Balance
+from hand_model.diagnose.balance import Balance, Term
 from hand_model.diagnose.drive import echoes_command
 from hand_model.diagnose.name import name_effects
 from hand_model.diagnose.stamps import stamps
@@ -114,3 +114,30 @@ def test_a_ripple_is_not_read_from_starts_and_stops():
     columns = effect("torque_ripple").columns(masked, {"period": 9.0})
     assert np.all(columns[steady == 0] == 0)
     assert np.any(columns[steady == 1] != 0)
+
+
+def test_a_loud_moment_counts_for_less_and_a_quiet_recording_for_all():
+    from hand_model.diagnose.markers import _calm
+
+    scatter = np.random.default_rng(3).normal(0, 3e-4, (200, 8, 9, 3))
+    assert np.all(_calm(scatter) == 1)
+    scatter[80:120] *= 4
+    scatter[:, :, 4] = np.nan
+    calm = _calm(scatter)
+    assert np.all(calm[84:116] < 0.1)
+    assert np.all(calm[:70] == 1)
+
+
+def test_a_delayed_channel_says_nothing_while_it_reports_rest_and_gains_nothing_by_it():
+    resting = [np.arange(len(s.time_s)) % 150 < 20 for s in drive(4)]
+    states = tuple(replace(s, effort=np.where(rest, np.nan, s.effort)) for s, rest in zip(drive(4), resting, strict=True))
+    delay = effect("current_channel_delay")
+    balance = Balance(states)
+    term = Term(delay, {"form": 0.0, "delay": 0.1})
+    fit = balance.fit((term,))
+    blind = balance.gather(lambda s: delay.blind(s, term.shape))
+    assert 0 < blind.sum() < 0.2 * len(blind)
+    assert np.array_equal(fit.prediction[blind], balance.effort[blind])
+    seen = balance.train & ~blind
+    left = ((balance.effort - fit.prediction) * balance.weight)[seen]
+    assert fit.rss == pytest.approx(float(left @ left) + (blind & balance.train).sum(), rel=1e-9)

@@ -155,7 +155,7 @@ def _delays_apart(drives: dict[str, tuple[DriveState, ...]]) -> dict[str, bool]:
         best[actuator] = polish(balance, fit, 0).terms[0].shape["delay"] if fit is not None else 0.0
     step = {a: float(np.median(np.diff(s[0].time_s))) for a, s in drives.items()}
     # a lone drive cannot tell how the log is read from what its own channel does: twice as much is asked of it
-    common, least = (min(best.values(), key=abs), 0.75) if len(best) > 1 else (0.0, 1.5)
+    common, least = (min(best.values(), key=abs), 0.75) if len(best) > 1 else (0.0, 2.0)
     return {a: abs(value - common) > least * step[a] for a, value in best.items()}
 
 

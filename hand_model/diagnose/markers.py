@@ -20,6 +20,7 @@ from .angles import FARTHEST_M, FingerAngles, refitted
 Array = NDArray[np.float64]
 
 BLOCK = 8  # frames averaged into one row block
+LOUD_BLOCKS, LOUD = 5, 0.6  # blocks over which the noise is read, and the share of the usual variance from which it is louder
 EVIDENCE_LEAST = 15.0  # log evidence of a marker effect, beyond its parameters and the search over moments
 MOST = 4
 LASTING_S = 2.0  # half of it is how long something must last that is no ghost
@@ -131,10 +132,19 @@ def blocks_of(angles: FingerAngles) -> Blocks:
         residual = residual.reshape(len(frames), BLOCK, len(labels), 3)
         weight = np.isfinite(residual[..., 0]).sum(1).astype(float)
         mean = np.nansum(residual, axis=1) / np.maximum(weight, 1)[..., None]
+        weight *= _calm(residual - mean[:, None])[:, None]
         angle = record.pose.angle_rad[frames].mean(1)
         parts.append((mean, weight, angle, np.full(len(frames), index), record.mocap.time_s[frames].mean(1)))
     residual, weight, angle, record_index, time_s = (np.concatenate(p) for p in zip(*parts, strict=True))
     return _assembled(chain, body, labels, residual, weight, angle, record_index, time_s)
+
+
+def _calm(scatter: Array) -> Array:
+    """Usual over present variance of the readings (b,) within blocks, at most one: what is seen while the cameras are disturbed
+    counts for less. scatter: (b, frames, m, 3) [m], nan where nothing is seen."""
+    variance = uniform_filter1d(np.nan_to_num(np.nanmean(scatter**2, axis=(1, 2, 3))), LOUD_BLOCKS, mode="nearest")
+    share = np.median(variance) / np.maximum(variance, 1e-30)
+    return np.where(share < LOUD, share, 1.0)
 
 
 def _passing(flag: NDArray[np.bool_], time_s: Array) -> NDArray[np.bool_]:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..identify.likelihood import OUTLIER_LIMIT
 from .angles import FingerAngles
 from .findings import Finding
 from .markers import ALPHA, HINGE, NO_HINGE, MarkerEffect, MarkerNaming
@@ -148,13 +149,10 @@ def _swaps(angles: FingerAngles) -> list[tuple[float, Finding]]:
 
 
 def _displaced(angles: FingerAngles, labels: list[str], lasting_s: float) -> float:
-    """How far an exchange of two labels moves markers over the noise of one reading (root mean squares)."""
-    data = [r.data for r in angles.records]
-    i, j = (data[0].labels.index(label) for label in labels)
-    apart = float(np.nanmedian(np.concatenate([np.linalg.norm(d.position_world[:, i] - d.position_world[:, j], axis=1) for d in data])))
+    """Size of an exchange of labels over the noise of one reading (root mean squares), as a robust likelihood sees it: a wrong
+    label is no more than an outlier, however far away the right one is."""
     share = lasting_s / sum(float(np.ptp(r.mocap.time_s)) for r in angles.records)
-    moved = apart * np.sqrt(2 * min(share, 1.0) / (3 * len(data[0].labels)))
-    return float(moved / max(angles.noise_m, 1e-9))
+    return float(OUTLIER_LIMIT * np.sqrt(len(labels) * min(share, 1.0) / (3 * len(angles.records[0].data.labels))))
 
 
 def steps(angles: FingerAngles, naming: MarkerNaming) -> list[tuple[int, float]]:
