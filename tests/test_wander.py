@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from test_diagnose import drive, planted
 
-from hand_model.diagnose.balance import Balance, Term
+from hand_model.diagnose.balance import Balance
 from hand_model.diagnose.drive import echoes_command
 from hand_model.diagnose.name import name_effects
 from hand_model.diagnose.stamps import stamps
@@ -126,18 +126,3 @@ def test_a_loud_moment_counts_for_less_and_a_quiet_recording_for_all():
     calm = _calm(scatter)
     assert np.all(calm[84:116] < 0.1)
     assert np.all(calm[:70] == 1)
-
-
-def test_a_delayed_channel_says_nothing_while_it_reports_rest_and_gains_nothing_by_it():
-    resting = [np.arange(len(s.time_s)) % 150 < 20 for s in drive(4)]
-    states = tuple(replace(s, effort=np.where(rest, np.nan, s.effort)) for s, rest in zip(drive(4), resting, strict=True))
-    delay = effect("current_channel_delay")
-    balance = Balance(states)
-    term = Term(delay, {"form": 0.0, "delay": 0.1})
-    fit = balance.fit((term,))
-    blind = balance.gather(lambda s: delay.blind(s, term.shape))
-    assert 0 < blind.sum() < 0.2 * len(blind)
-    assert np.array_equal(fit.prediction[blind], balance.effort[blind])
-    seen = balance.train & ~blind
-    left = ((balance.effort - fit.prediction) * balance.weight)[seen]
-    assert fit.rss == pytest.approx(float(left @ left) + (blind & balance.train).sum(), rel=1e-9)

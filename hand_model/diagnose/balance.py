@@ -133,8 +133,8 @@ class Balance:
         matrix, low, high = self.design(terms)
         w = self.weight * self.train
         clips = [t for t in terms if t.effect.clips]
-        prediction, blind = np.zeros(len(self.effort)), self._blind(terms)
-        inside = ~blind
+        prediction = np.zeros(len(self.effort))
+        inside = np.ones(len(self.effort), bool)
         for _ in range(4 if clips else 1):
             v = w * inside
             coefficients = bounded_least_squares(self.whiten(matrix * v[:, None], v), self.whiten(self.effort * v, v), low, high)
@@ -142,10 +142,8 @@ class Balance:
             prediction = raw = matrix @ coefficients
             for term in clips:
                 prediction = term.effect.clip(prediction, term.shape)
-            inside = (prediction == raw) & ~blind
-        prediction = np.where(blind, self.effort, prediction)
+            inside = prediction == raw
         rss = float(np.sum(self.whiten((self.effort - prediction) * w, w) ** 2))
-        rss += float((blind & self.train).sum())  # what is not predicted costs what noise does: nothing is won by looking away
         k = len(self.names)
         amplitudes, start = [], k
         for term in terms:
@@ -156,21 +154,14 @@ class Balance:
         declared = dict(zip(self.names, coefficients[:k].tolist(), strict=True))
         return Fit(terms, declared, tuple(amplitudes), prediction, rss, size)
 
-    def _blind(self, terms: tuple[Term, ...]) -> NDArray[np.bool_]:
-        warps = [t for t in terms if t.effect.warps]
-        out = np.zeros(len(self.effort), bool)
-        for term in warps:
-            out |= self.gather(lambda s, term=term: term.effect.blind(s, term.shape))
-        return out
-
     def unclipped(self, terms: tuple[Term, ...]) -> NDArray[np.bool_]:
-        """Samples (n,) that are predicted and that no term clips: there the balance is linear."""
-        clips, seen = [t for t in terms if t.effect.clips], ~self._blind(terms)
+        """Samples (n,) whose prediction no term clips: there the balance is linear."""
+        clips = [t for t in terms if t.effect.clips]
         if not clips:
-            return seen
+            return np.ones(len(self.effort), bool)
         free = self.fit(terms).prediction
         levels = [term.effect.clip(np.full(len(free), sign * np.inf), term.shape) for term in clips for sign in (1, -1)]
-        return seen & ~np.any([np.isclose(free, level) for level in levels], axis=0)
+        return ~np.any([np.isclose(free, level) for level in levels], axis=0)
 
     def _own_nuisances(self, matrix: Array, coefficients: Array, w: Array, low: Array) -> Array:
         """Coefficients of columns that act in validation recordings only (their own clock offset, a step in them, an obstacle

@@ -157,10 +157,6 @@ class Effect:
         """All columns as they are."""
         return columns
 
-    def blind(self, state: DriveState, shape: Mapping[str, float]) -> NDArray[np.bool_]:
-        """Samples (n,) of which, with this effect, the declared model says nothing; none."""
-        return np.zeros(len(state.time_s), bool)
-
     def clip(self, prediction: Array, shape: Mapping[str, float]) -> Array:
         """The prediction as it is."""
         return prediction

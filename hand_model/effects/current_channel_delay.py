@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .base import Amplitude, Array, DriveState, Effect, Shape
 from .mjcf import delay, motor_sensor
@@ -43,11 +42,6 @@ class CurrentChannelDelay(Effect):
             return lfilter([1 - keep], [1.0, -keep], columns - columns[0], axis=0) + columns[0]
         then = state.time_s - shape["delay"]
         return np.stack([np.interp(then, state.time_s, column) for column in columns.T], axis=-1)
-
-    def blind(self, state: DriveState, shape: Mapping[str, float]) -> NDArray[np.bool_]:
-        """Samples (n,) that report a rest, in which friction may be anything within its bounds."""
-        back = 2 * shape["delay"] if shape["form"] > 0.5 else shape["delay"]  # two time constants of a filter
-        return np.interp(state.time_s - back, state.time_s, np.isfinite(state.effort)) < 1
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """The delay of the sensor of the motor's current, or of its encoder where the current is read early."""
