@@ -8,14 +8,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..effects.base import DriveState
 from ..effects.path import strokes
-from .wander import Wander
+
+if TYPE_CHECKING:
+    from .wander import Wander
 
 Array = NDArray[np.float64]
 

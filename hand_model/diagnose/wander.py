@@ -8,13 +8,11 @@ accident. It is a random level per while (a random intercept; Laird & Ware 1982)
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from .balance import Balance
+from .balance import Balance, replicate_deviation
 
 Array = NDArray[np.float64]
 
@@ -62,8 +60,6 @@ class Wander:
 def estimate_wander(balance: Balance, prediction: Array) -> Wander | None:
     """The random level that the residual of a prediction (n,) shows in training recordings, beside what repeats: the likeliest
     size and length of a while (Laird & Ware 1982). None where there are too few replicates to tell."""
-    from .balance import replicate_deviation
-
     use = balance.train & balance.steady
     apart, _ = replicate_deviation(balance, balance.effort - prediction, use)
     if not len(apart):
