@@ -10,7 +10,7 @@ import pytest
 
 from hand_model.diagnose import Finding, Findings, diagnose
 from hand_model.diagnose.balance import Balance, bounded_least_squares
-from hand_model.diagnose.interval import held_out, parameter_intervals
+from hand_model.diagnose.interval import held_out, parameter_intervals, undisturbed
 from hand_model.diagnose.motion import estimate_motion, local_quadratic
 from hand_model.diagnose.name import name_effects
 from hand_model.effects import catalogue, effect
@@ -79,13 +79,13 @@ PLANTED = [
 def test_planted_effect_is_named_alone_with_its_parameters(name, shape, amplitude) -> None:
     naming = name_effects(drive(3, planted(name, shape, amplitude)), catalogue("drive"))
     assert [f.term.effect.name for f in naming.found] == [name]
-    entries = parameter_intervals(naming, 0)
+    entries = parameter_intervals(undisturbed(naming), 0)
     for key, value in shape.items():
         if "ci95" in entries.get(key, {}):
             low, high = entries[key]["ci95"]
             wide = 2 * (high - low)
             assert low - wide <= value <= high + wide, (key, entries[key])
-    proof = held_out(naming, 0)
+    proof = held_out(undisturbed(naming), 0)
     assert proof["after"] < proof["before"]
     assert proof["after"] < 1.06 * proof["noise_floor"]
     assert proof["held_out"] == ["trial_3"]
@@ -198,8 +198,8 @@ def test_lack_of_fit_sees_what_repeats_from_stroke_to_stroke() -> None:
 def test_held_out_is_empty_where_validation_took_part() -> None:
     add = planted("detent_load", {"form": 0.0, "centre": 60.0, "width": 6.0}, [-10.0])
     plain = name_effects(drive(3, add), catalogue("drive"))
-    assert held_out(plain, 0)["held_out"] == ["trial_3"] and held_out(plain, 0)["ci95_reduction"][0] > 0
+    assert held_out(undisturbed(plain), 0)["held_out"] == ["trial_3"] and held_out(undisturbed(plain), 0)["ci95_reduction"][0] > 0
     from dataclasses import replace
 
     everything = replace(plain, balance=Balance(plain.balance.states, everything=True))
-    assert held_out(everything, 0)["held_out"] == []
+    assert held_out(undisturbed(everything), 0)["held_out"] == []

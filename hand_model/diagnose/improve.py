@@ -33,13 +33,15 @@ def as_fitted(hand: Hand, stations: Sequence[Any], counts: Mapping[str, tuple[fl
               fit: Callable[[Any], Any]) -> Hand:
     """The hand with the coefficients of a fit of each station: motors, encoder maps, couplings.
 
-    stations: those to take over. counts: actuator -> counts at 0 and 100 %. fit: naming -> its declared fit, or the one with effects.
+    stations: those to take over. counts: actuator -> counts at 0 and 100 %. fit: of the naming or the reading of a station, the declared one or the
+    one with effects.
     """
     motors = {m.actuator: m for m in hand.motors}
     fingers = {f.name: f for f in hand.fingers}
     for station in stations:
-        declared = fit(station.naming).declared
+        declared = dict(fit(station.reading).declared)
         if station.signal == "current":
+            declared["inertia"] = fit(station.naming).declared["inertia"]  # told by starts and stops alone
             motors[station.actuator] = _motor(station, declared, counts[station.actuator], motors.get(station.actuator))
         elif station.signal == "encoder":
             fingers[station.finger] = _with_map(fingers[station.finger], declared, counts[station.actuator])
@@ -119,8 +121,8 @@ def write_improved(hand: Hand, findings: Sequence[Finding], stations: Sequence[A
 
     known = {f.name for f in hand.fingers}
     touched = [s for s in stations if s.finger in known and any(_of(f, s) for f in findings if f.correction is None)]
-    before = as_fitted(hand, touched, counts, lambda naming: naming.declared)
-    after = with_effects(as_fitted(hand, touched, counts, lambda naming: naming.fit), findings)
+    before = as_fitted(hand, touched, counts, lambda source: source.declared)
+    after = with_effects(as_fitted(hand, touched, counts, lambda source: source.fit), findings)
     if not any(f.correction is None for f in findings):
         return tuple(findings), ()
     compile(before, output / "model_before")

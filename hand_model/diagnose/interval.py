@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from copy import copy
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,12 +19,21 @@ Array = NDArray[np.float64]
 MISFIT_LIMIT = 1.5  # residual variance over pure error above which no interval is given
 
 
-def parameter_intervals(naming: Naming, which: int) -> dict[str, dict[str, Any]]:
+@dataclass(frozen=True)
+class Reading:
+    """The balance from which sizes are read, and its fits without and with the named effects (terms as in the naming)."""
+
+    balance: Balance
+    declared: Fit
+    fit: Fit
+
+
+def parameter_intervals(reading: Reading, which: int) -> dict[str, dict[str, Any]]:
     """Parameters of the fit's term `which` with 95 % intervals (Gauss-Newton, delta method), by name.
 
     Where the model does not fit (residual variance more than 1.5 times the pure error) the interval is left out.
     """
-    balance, fit = undisturbed(naming, which)
+    balance, fit = reading.balance, reading.fit
     term = fit.terms[which]
     theta, build = _vector(fit)
     shape, amplitude, declared = build(theta)
@@ -50,24 +60,27 @@ def parameter_intervals(naming: Naming, which: int) -> dict[str, dict[str, Any]]
     return out
 
 
-def undisturbed(naming: Naming, which: int) -> tuple[Balance, Fit]:
-    """Balance and fit from which the parameters of a term are read: steady samples alone, for starts and stops are smeared and
-    bend what happens at low speed; as named for effects that act at starts, and where too few samples are steady. Among the
-    forms of the effect, the one that steady motion likes best."""
+def undisturbed(naming: Naming) -> Reading:
+    """Where sizes are read: from steady samples alone, for starts and stops are smeared and bend what happens at low speed; as
+    named where an effect acts at starts, and where too few samples are steady. Among the forms of each effect, the one that
+    steady motion likes best."""
     balance, fit = naming.balance, naming.fit
     count = (balance.train & balance.steady).sum()
     lively = any(t.effect.warps or t.effect.replaces for t in fit.terms)
-    if lively or balance.steady.all() or count < 20 * (len(balance.names) + fit.size):
-        return balance, fit
+    if not fit.terms or lively or balance.steady.all() or count < 20 * (len(balance.names) + fit.size):
+        return Reading(balance, naming.declared, fit)
     calm = copy(balance)
     calm.weight = np.where(balance.steady, balance.weight, 1e-3 * balance.weight)
-    term, fits = fit.terms[which], []
-    forms = next((s.starts for s in term.effect.shapes(balance.states) if s.name == "form"), (None,))
-    for form in forms:
-        shape = term.shape if form is None else {**term.shape, "form": form}
-        terms = tuple(Term(t.effect, shape) if i == which else t for i, t in enumerate(fit.terms))
-        fits.append(refit(calm, calm.fit(terms)))
-    return calm, min(fits, key=lambda found: 0.5 * found.rss / calm.inflation + oddity(calm, found))
+    best = refit(calm, calm.fit(fit.terms))
+    for which, term in enumerate(fit.terms):
+        fits = [best]
+        forms = next((s.starts for s in term.effect.shapes(balance.states) if s.name == "form"), ())
+        for form in forms:
+            if form != term.shape["form"]:
+                other = Term(term.effect, {**best.terms[which].shape, "form": form})
+                fits.append(refit(calm, calm.fit((*best.terms[:which], other, *best.terms[which + 1:]))))
+        best = min(fits, key=lambda found: 0.5 * found.rss / calm.inflation + oddity(calm, found))
+    return Reading(calm, calm.fit(), best)
 
 
 def _one(term: Term, which: int, name: str, values: Any) -> float:
@@ -132,14 +145,14 @@ def _covariance(balance: Balance, fit: Fit, theta: Array, build: Any) -> Array:
     return inverse / np.outer(size, size)
 
 
-def held_out(naming: Naming, which: int, seed: int = 0) -> dict[str, Any]:
+def held_out(reading: Reading, which: int, seed: int = 0) -> dict[str, Any]:
     """Root-mean-square error on recordings that took no part, without and with the term `which`, the noise floor, and a
     bootstrap interval over strokes of the reduction.
 
     Steady samples; all compared ones for a delay or a give, which act at starts and stops. `held_out` is empty where there
     are no validation recordings or where the naming had to look at them: figures are then in-sample.
     """
-    balance, fit = naming.balance, naming.fit
+    balance, fit = reading.balance, reading.fit
     without = balance.fit(tuple(t for i, t in enumerate(fit.terms) if i != which))
     effect = fit.terms[which].effect
     seen = np.ones(len(balance.train), bool) if effect.warps or effect.replaces else balance.steady

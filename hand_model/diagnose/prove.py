@@ -50,7 +50,7 @@ def proved(finding: Finding, station: Any, before: Path, after: Path) -> tuple[d
     states = kept_out(station.naming.balance.states)
     replay = _currents if station.signal == "current" else _angles
     errors = [replay(station, finding, folder, fit, states)
-              for folder, fit in ((before, station.naming.declared), (after, station.naming.fit))]
+              for folder, fit in ((before, station.reading.declared), (after, station.reading.fit))]
     if errors[0] is None or errors[1] is None:
         return {**finding.fit, "note": "no compiled file has its motor or its joint"}, None
     every = bool(kind.warps or kind.replaces)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from .findings import Finding
-from .interval import held_out, parameter_intervals, proven, sized
+from .interval import held_out, parameter_intervals, proven, sized, undisturbed
 from .name import ALPHA, Named, Naming
 
 # How before and after were computed, said in the findings: no compiled file is involved until one is replayed.
@@ -24,7 +24,8 @@ class Station:
     def __init__(self, signal: str, finger: str | None, actuator: str | None, joint: str | None, naming: Naming) -> None:
         self.signal, self.finger, self.actuator, self.joint, self.naming = signal, finger, actuator, joint, naming
         places = {id(f): naming.fit.terms.index(f.term) for f in naming.found}
-        self.parameters = {which: parameter_intervals(naming, which) for which in places.values() if proven(naming, which)}
+        self.reading = undisturbed(naming)
+        self.parameters = {which: parameter_intervals(self.reading, which) for which in places.values() if proven(naming, which)}
         self.proven = tuple(f for f in naming.found if places[id(f)] in self.parameters and sized(f, self.parameters[places[id(f)]]))
 
     @property
@@ -88,7 +89,7 @@ def finding_of(station: Station, named: Named, share: float) -> tuple[float, Fin
     alternatives = tuple((r.name, float(p)) for r, p in zip(named.rivals, weights[:-1], strict=True)
                          if r.name != effect.name and p > 1e-3)[:4]
     unit = naming.balance.states[0].effort_unit
-    fit = {"metric": f"{station.signal}_rmse", "unit": unit, **held_out(naming, which), "engine": ENGINE[station.signal]}
+    fit = {"metric": f"{station.signal}_rmse", "unit": unit, **held_out(station.reading, which), "engine": ENGINE[station.signal]}
     members = named.members if effect.name in named.members else (effect.name, *named.members)
     recording = getattr(effect, "correction", None)
     model = None if recording else dict(UNWRITTEN)
