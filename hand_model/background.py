@@ -34,5 +34,5 @@ class Background:
             return
         try:
             yield from (future.result() for future in self._futures)
-        finally:
-            self._pool.shutdown(wait=False, cancel_futures=True)
+        finally:  # a pool that has done its work is waited for: its thread would keep the next one from forking
+            self._pool.shutdown(wait=all(f.done() for f in self._futures), cancel_futures=True)

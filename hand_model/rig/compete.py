@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,22 +114,25 @@ def limits(fit: DeclaredFit, terms: Sequence[Term]) -> tuple[Array, Array, Array
 
 def normal(problem: Problem, terms: Sequence[Term]) -> tuple[Array, Array, Array, Array]:
     """Normal equations by block: gram (B, P, P), moment (B, P), square (B,), count (B,)."""
-    count = len(problem.fold)
-    parts = None
+    count, parts = len(problem.fold), None
     for row, block in zip(problem.rows, problem.block, strict=True):
-        x = design(row, terms) / problem.fit.scale[row.joint]
-        y = row.effort / problem.fit.scale[row.joint]
+        x = design(row, terms)[row.moving] / problem.fit.scale[row.joint]
+        y = row.effort[row.moving] / problem.fit.scale[row.joint]
         if parts is None:
             p = x.shape[1]
             parts = np.zeros((count, p, p)), np.zeros((count, p)), np.zeros(count), np.zeros(count)
-        for b in np.unique(block):
-            m = row.moving & (block == b)
-            xb, yb = x[m], y[m]
-            parts[0][b] += xb.T @ xb
-            parts[1][b] += xb.T @ yb
-            parts[2][b] += yb @ yb
-            parts[3][b] += len(yb)
+        for b, s in _pieces(block[row.moving]):
+            parts[0][b] += x[s].T @ x[s]
+            parts[1][b] += x[s].T @ y[s]
+            parts[2][b] += y[s] @ y[s]
+            parts[3][b] += len(y[s])
     return parts
+
+
+def _pieces(block: Array) -> list[tuple[int, slice]]:
+    """Blocks of a row (m,) and where each lies: they follow one another."""
+    edges = [0, *(np.flatnonzero(np.diff(block)) + 1), len(block)]
+    return [(int(block[a]), slice(a, b)) for a, b in pairwise(edges) if b > a]
 
 
 def held_out(problem: Problem, terms: Sequence[Term], parts: tuple) -> tuple[Array, float]:
@@ -172,25 +176,24 @@ def _extended(problem: Problem, terms: Sequence[Term], new: Term, parts: tuple) 
         if row.joint != new.candidate.joint:
             continue
         scale = problem.fit.scale[row.joint]
-        x, y = problem_design(problem, row, terms) / scale, row.effort / scale
-        c = term_columns(row, new) / scale
-        for b in np.unique(block):
-            k = row.moving & (block == b)
-            cross = x[k].T @ c[k]
+        x, y = _moving_design(problem, row, terms), row.effort[row.moving] / scale
+        c = term_columns(row, new)[row.moving] / scale
+        for b, s in _pieces(block[row.moving]):
+            cross = x[s].T @ c[s]
             g[b, :p, p:] += cross
             g[b, p:, :p] += cross.T
-            g[b, p:, p:] += c[k].T @ c[k]
-            m[b, p:] += c[k].T @ y[k]
+            g[b, p:, p:] += c[s].T @ c[s]
+            m[b, p:] += c[s].T @ y[s]
     return g, m, square, count
 
 
-def problem_design(problem: Problem, row: Rows, terms: Sequence[Term]) -> Array:
-    """The design of a row; cached by the caller's round."""
+def _moving_design(problem: Problem, row: Rows, terms: Sequence[Term]) -> Array:
+    """The scaled design of a row's moving samples; cached by the caller's round."""
     key = (row.trial, row.joint, tuple((t.candidate.key, tuple(t.shape.items())) for t in terms))
     if key not in _CACHE:
         if len(_CACHE) > 200:
             _CACHE.clear()
-        _CACHE[key] = design(row, terms)
+        _CACHE[key] = design(row, terms)[row.moving] / problem.fit.scale[row.joint]
     return _CACHE[key]
 
 

@@ -1,24 +1,26 @@
 """Inertial parameters that bodies can have: least squares over pseudo-inertias that are positive definite.
 
-A body is physical exactly when its 4 x 4 pseudo-inertia is positive definite (Wensing, Kim & Slotine 2018); its
-Cholesky factor has no constraint but positive diagonals, and those are exponentials (Rucker & Wensing 2022).
+A body is physical exactly when its 4 x 4 pseudo-inertia is positive definite (Wensing, Kim & Slotine 2018). Least squares
+over such bodies is convex (Traversaro et al. 2016; Sousa & Cortesao 2014): a logarithmic barrier holds every body inside,
+and Newton steps follow it as it is lowered (Boyd & Vandenberghe 2004, ch. 11).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .balance import Column
 from .dynamics import INERTIAL
-from .physical import physical
 
 Array = NDArray[np.float64]
-LOWER = np.tril_indices(4)
-AT = {"hx": (3, 0), "hy": (3, 1), "hz": (3, 2), "Ixy": (1, 0), "Ixz": (2, 0), "Iyz": (2, 1)}
-LEAST = 1e-9  # smallest share of a body's own size that its pseudo-inertia is started from
+DIAGONAL = [INERTIAL.index(k) for k in ("Ixx", "Iyy", "Izz")]
+GAP = 1e-9  # of the squares explained: what the barrier may still cost
+LOWERED = 0.05  # the barrier, from one round of Newton steps to the next
+MOST_STEPS = 50
+ARMIJO = 0.1
 
 
 def pseudo_inertia(p: Array) -> Array:
@@ -31,14 +33,7 @@ def pseudo_inertia(p: Array) -> Array:
     return out
 
 
-def parameters(pseudo: Array) -> Array:
-    """Parameters (10,) of a pseudo-inertia (4, 4)."""
-    second = pseudo[:3, :3]
-    about = np.trace(second) * np.eye(3) - second
-    return np.array([pseudo[3, 3], *pseudo[3, :3], *np.diag(about), about[0, 1], about[0, 2], about[1, 2]])
-
-
-LINEAR = np.array([parameters(e.reshape(4, 4)) for e in np.eye(16)])  # (16, 10): parameters are linear in it
+BASIS = np.array([pseudo_inertia(e) for e in np.eye(10)])  # (10, 4, 4): it is linear in them
 
 
 def is_physical(p: Array) -> bool:
@@ -54,81 +49,93 @@ def consistent(columns: Sequence[Column], declared: Array, theta: Array, gram: A
     declared (bodies, 10): parameters as declared (what is zero there and no column stays zero), in the order in which
     bodies first appear in columns; all others as in `solve_bounded`.
     """
-    from scipy.optimize import least_squares
-
     bodies = list(dict.fromkeys(c.name for c in columns if c.kind == "inertial"))
     index = {(c.name, c.part): i for i, c in enumerate(columns) if c.kind == "inertial"}
-    own = [np.array([index.get((b, part), -1) for part in INERTIAL]) for b in bodies]
-    full = [np.where(i >= 0, theta[i], d) for i, d in zip(own, declared, strict=True)]
-    if all(is_physical(p) for p in full):
+    own = np.array([[index.get((b, part), -1) for part in INERTIAL] for b in bodies])
+    if all(is_physical(p) for p in np.where(own >= 0, theta[own], declared)):
         return theta
-    inertial = np.unique(np.concatenate([i[i >= 0] for i in own]))
+    inertial = np.unique(own[own >= 0])
     rest = np.setdiff1d(np.arange(len(theta)), inertial)
     h, g = gram + np.diag(weight), moment + weight * mean
     unit = 1.0 / np.sqrt(np.maximum(np.diag(h), 1e-300))
-    level, axes = np.linalg.eigh(h * unit[:, None] * unit)
-    root = np.sqrt(np.maximum(level, 1e-14 * level[-1]))
-    matrix, target = (root[:, None] * axes.T) / unit, (axes.T @ (g * unit)) / root
-    start, masks = [], []
-    for p, at in zip((_nearest(d) for d in declared), own, strict=True):
-        factor = np.linalg.cholesky(pseudo_inertia(p))
-        mask = np.abs(factor) > 1e-9 * np.abs(factor).max()
-        np.fill_diagonal(mask, True)
-        for part, place in AT.items():
-            mask[place] |= at[INERTIAL.index(part)] >= 0
-        masks.append(mask[LOWER])
-        values = factor.copy()
-        np.fill_diagonal(values, np.log(np.diag(factor)))
-        start.append(values[LOWER][masks[-1]])
-    sizes = np.cumsum([0] + [len(s) for s in start])
-
-    def factor_of(x: Array, k: int) -> Array:
-        values = np.zeros(10)
-        values[masks[k]] = x
-        factor = np.zeros((4, 4))
-        factor[LOWER] = values
-        np.fill_diagonal(factor, np.exp(np.clip(np.diag(factor), -40, 20)))
-        return factor
-
-    def body(x: Array, k: int) -> Array:
-        factor = factor_of(x, k)
-        return parameters(factor @ factor.T)
-
-    def body_slope(x: Array, k: int) -> Array:
-        """d body / d x (10, len(x)): each entry of the factor changes one row of it."""
-        factor = factor_of(x, k)
-        unit = np.zeros((len(x), 4, 4))
-        row, column = LOWER[0][masks[k]], LOWER[1][masks[k]]
-        unit[np.arange(len(x)), row, column] = np.where(row == column, factor[row, column], 1.0)
-        half = unit @ factor.T
-        return (half + np.swapaxes(half, 1, 2)).reshape(-1, 16).dot(LINEAR).T
-
-    def whole(x: Array) -> Array:
-        out = np.zeros(len(theta))
-        for k, i in enumerate(own):
-            out[i[i >= 0]] = body(x[sizes[k] : sizes[k + 1]], k)[i >= 0]
-        out[rest] = x[sizes[-1] :] * unit[rest]
-        return out
-
-    def slope(x: Array) -> Array:
-        out = np.zeros((len(theta), len(x)))
-        for k, i in enumerate(own):
-            out[i[i >= 0], sizes[k] : sizes[k + 1]] = body_slope(x[sizes[k] : sizes[k + 1]], k)[i >= 0]
-        out[rest, sizes[-1] + np.arange(len(rest))] = unit[rest]
-        return matrix @ out
-
-    x0 = np.concatenate([*start, np.clip(theta[rest], low[rest], high[rest]) / unit[rest]])
-    bound = np.full(sizes[-1], np.inf)
-    lows, highs = np.concatenate([-bound, low[rest] / unit[rest]]), np.concatenate([bound, high[rest] / unit[rest]])
-    x0 = np.clip(x0, lows + 1e-9 * (np.abs(lows) < np.inf), highs)
-    found = least_squares(lambda x: matrix @ whole(x) - target, x0, slope, bounds=(lows, highs), x_scale="jac",
-                          max_nfev=300, xtol=1e-10, ftol=1e-9, gtol=1e-12)  # fmt: skip
-    return whole(found.x)
+    h, g, low, high = h * unit[:, None] * unit, g * unit, low / unit, high / unit
+    x = theta / unit
+    x[rest] = _inside(x[rest], low[rest], high[rest])
+    for i, p in zip(own, declared, strict=True):
+        x[i[i >= 0]] = (_well_inside(p, i >= 0) / unit[i])[i >= 0]
+    edges = [(k, s, b[k]) for b, s in ((low, 1.0), (high, -1.0)) for k in rest if np.isfinite(b[k])]
+    barrier = _barrier(own, declared, unit, edges)
+    weight_of_barrier = abs(float(g @ x)) + 1e-300
+    size = abs(float(g @ np.linalg.solve(h + 1e-13 * np.eye(len(g)), g)))
+    while True:
+        x = _newton(h, g, weight_of_barrier, barrier, x)
+        if weight_of_barrier * (4 * len(bodies) + len(edges)) < GAP * size:
+            return x * unit
+        weight_of_barrier *= LOWERED
 
 
-def _nearest(p: Array) -> Array:
-    """The nearest physical parameters (10,) to declared ones, well inside."""
-    mass, centre, inertia = physical(p)
-    about = inertia + mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-    about = about + LEAST * np.trace(about) * np.eye(3)
-    return np.array([mass, *(mass * centre), *np.diag(about), about[0, 1], about[0, 2], about[1, 2]])
+def _newton(h: Array, g: Array, share: float, barrier: Callable[[Array], tuple[float, Array, Array]], x: Array) -> Array:
+    """argmin of x'hx / 2 - g'x + share barrier(x) from x (n,), inside."""
+
+    def cost(y: Array) -> float:
+        return float(0.5 * y @ h @ y - g @ y + share * barrier(y)[0])
+
+    for _ in range(MOST_STEPS):
+        _, slope, bend = barrier(x)
+        gradient = h @ x - g + share * slope
+        step = -np.linalg.solve(h + share * bend + 1e-14 * np.eye(len(x)), gradient)
+        decrement = -float(gradient @ step)
+        if decrement < 1e-3 * share:
+            break
+        now, length = cost(x), 1.0
+        while length > 1e-10 and not cost(x + length * step) <= now - ARMIJO * length * decrement:
+            length *= 0.5
+        if length <= 1e-10:
+            break
+        x = x + length * step
+    return x
+
+
+def _barrier(own: Array, declared: Array, unit: Array, edges: Sequence[tuple[int, float, float]]) -> Callable[
+    [Array], tuple[float, Array, Array]
+]:  # fmt: skip
+    """Minus the logarithms of every body's determinant and of the distances from the edges of the box: value (infinite
+    outside), gradient (n,), Hessian (n, n). own (bodies, 10): places of their parameters in x; unit (n,): of x."""
+    at, sign, end = (np.array([e[k] for e in edges]) for k in range(3))
+    at = at.astype(int)
+
+    def value(x: Array) -> tuple[float, Array, Array]:
+        slope, bend = np.zeros(len(x)), np.zeros((len(x), len(x)))
+        pseudo = np.einsum("bk,kij->bij", np.where(own >= 0, x[own] * unit[own], declared), BASIS)
+        room = sign * (x[at] - end)
+        if np.any(room <= 0) or np.any(np.linalg.eigvalsh(pseudo)[:, 0] <= 0):
+            return np.inf, slope, bend
+        total = -float(np.sum(np.log(room))) - float(np.sum(np.linalg.slogdet(pseudo)[1]))
+        np.add.at(slope, at, -sign / room)
+        np.add.at(bend, (at, at), room**-2)
+        inverse = np.linalg.inv(pseudo)
+        for i, inv in zip(own, inverse, strict=True):
+            free = i[i >= 0]
+            part = (inv @ BASIS)[i >= 0] * unit[free][:, None, None]
+            slope[free] -= np.trace(part, axis1=1, axis2=2)
+            bend[np.ix_(free, free)] += np.einsum("kij,lji->kl", part, part)
+        return total, slope, bend
+
+    return value
+
+
+def _inside(x: Array, low: Array, high: Array) -> Array:
+    """x (n,) moved off the edges of its box."""
+    room = np.where(np.isfinite(high - low), 1e-3 * (high - low), 1e-3 * np.maximum(np.abs(x), 1.0))
+    return np.clip(x, low + room, high - room)
+
+
+def _well_inside(p: Array, free: Array) -> Array:
+    """Declared parameters (10,) with moments of inertia raised, where they are free (10,) bool, until such a body can be."""
+    out = p.copy()
+    out[0] = max(out[0], 1e-6)
+    more = 1e-3 * max(float(np.max(np.abs(out[DIAGONAL]))), 1e-12)
+    while np.linalg.eigvalsh(pseudo_inertia(out))[0] <= 0 and more < 1e6:
+        out[DIAGONAL] += more * free[DIAGONAL]
+        more *= 2.0
+    return out

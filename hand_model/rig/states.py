@@ -6,6 +6,8 @@ both sides of the balance to pass one filter; the cut-off rule is ours).
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -44,13 +46,20 @@ def noise_std(values: Array) -> float:
 
 def low_pass(values: Array, rate_hz: float, cutoff_hz: float) -> Array:
     """Zero-phase Butterworth low-pass (both ways, order 4) along the first axis; no change where the cut-off is too high."""
-    from scipy.signal import butter, sosfiltfilt
+    from scipy.signal import sosfiltfilt
 
     if cutoff_hz >= 0.45 * rate_hz or len(values) < 30:
         return values
-    sos = butter(ORDER // 2, cutoff_hz / (0.5 * rate_hz), output="sos")
     pad = min(len(values) - 2, int(3 * rate_hz / cutoff_hz))
-    return sosfiltfilt(sos, values, axis=0, padlen=pad)
+    return sosfiltfilt(_butterworth(cutoff_hz / (0.5 * rate_hz)), values, axis=0, padlen=pad)
+
+
+@lru_cache(maxsize=256)
+def _butterworth(cutoff: float) -> Array:
+    """Second-order sections (k, 6) of the filter; cutoff: share of half the sampling rate."""
+    from scipy.signal import butter
+
+    return butter(ORDER // 2, cutoff, output="sos")
 
 
 def later(time_s: Array, values: Array, delay_s: float) -> Array:
@@ -89,7 +98,7 @@ def local_states(values: Array, rate_hz: float) -> tuple[Array, Array]:
     """Position and velocity (n,) at every sample of an even recording (n,), ends included: local cubics (Savitzky & Golay
     1964), each over the longest window on which shorter ones do not contradict it (intersection of confidence intervals,
     Katkovnik 1999)."""
-    from scipy.signal import savgol_coeffs, savgol_filter
+    from scipy.signal import savgol_filter
 
     sigma, n = noise_std(values), len(values)
     if n < WINDOWS[0]:
@@ -100,10 +109,20 @@ def local_states(values: Array, rate_hz: float) -> tuple[Array, Array]:
         q = savgol_filter(values, window, 3, mode="interp")
         v = savgol_filter(values, window, 3, deriv=1, delta=1.0 / rate_hz, mode="interp")
         half = window // 2
-        edge = [np.linalg.norm(savgol_coeffs(window, 3, 1, 1.0 / rate_hz, pos=k)) for k in range(half + 1)]
+        edge = rate_hz * _slope_noise(window)
         spread = np.full(n, edge[half])
         spread[: half + 1], spread[n - half - 1 :] = edge, edge[::-1]
         low, high = np.maximum(low, v - SURE * sigma * spread), np.minimum(high, v + SURE * sigma * spread)
         open_ &= low <= high
         position[open_], velocity[open_] = q[open_], v[open_]
     return position, velocity
+
+
+@lru_cache(maxsize=len(WINDOWS))
+def _slope_noise(window: int) -> Array:
+    """Standard deviation [per sample] of a local cubic's slope at its first, second, ... middle sample (half + 1,), for
+    white noise of one."""
+    at = np.linspace(-1.0, 1.0, window)
+    weights = np.linalg.pinv(np.stack([at**k for k in range(4)], 1))
+    slope = np.stack([k * at ** max(k - 1, 0) for k in range(4)], 1)[: window // 2 + 1]
+    return np.linalg.norm(slope @ weights, axis=1) * 2.0 / (window - 1)
