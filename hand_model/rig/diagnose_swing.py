@@ -15,9 +15,9 @@ from .findings import Finding
 from .model import RigModel, load_rig
 from .replay import RigResiduals, replay_rig
 from .states import fill_gaps, noise_std
-from .swing import INDEX, PARAMETERS, STEP_S, Fitted, Swing, Task, errors, parameter_units, vector
+from .swing import INDEX, PARAMETERS, STEP_S, Fitted, Swing, Task, parameter_units, vector
 from .swing_build import build_swing, windows_s
-from .swing_compete import LEAST_GAIN, Round, Variant, all_free, compete_swing, fit_stages, free_declared, refine_swing
+from .swing_compete import Round, Variant, all_free, compete_swing, fit_stages, free_declared, refine_swing
 from .swing_interval import intervals
 from .swing_patch import write_swing
 from .words import shares, statement
@@ -34,14 +34,16 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
     free = free_declared(stages[0])
     declared = fit_stages(stages, [Task(free, vector(stages[0].initial), ())], 15)[0]
     floor, held = _resolution(rig), bool(rig.select(True))  # without validation recordings the training ones measure
-    whole = build_swing(rig, fit, SEARCH_STEP_S)
     taken, rounds = compete_swing(stages, declared, floor)
-    kept, rejected = _borne_out(stages, whole, declared, list(zip(taken, rounds, strict=True)), held, floor)
+    kept, rejected = list(zip(taken, rounds, strict=True)), []
+    kept += refine_swing(stages, rounds[-1].fit, taken) if rounds else ()
     say(f"{rig.name}: {', '.join(v.key for v, _ in kept) or 'nothing'}")
     # Last, at the step of the replay; a free swing over whole recordings, for its phase is known well enough by now.
     fine = [build_swing(rig, fit, STEP_S, w) for w in (windows if stages[0].driven else (*windows[1:], np.inf))]
+    known: dict[tuple[str, ...], Link] = {}
     while True:
-        chain = _chain(rig, session, held, fine, declared.theta, [v for v, _ in kept], kept[-1][1].fit.theta if kept else None)
+        last = kept[-1][1].fit.theta if kept else declared.theta
+        chain = _chain(rig, session, held, fine, declared.theta, [v for v, _ in kept], last, known)
         figures = [c.replay.figure("position_rmse", held) for c in chain]
         worse = next((k for k in range(len(kept)) if not figures[k + 1] < figures[k]), None)
         if worse is None:
@@ -72,66 +74,22 @@ class Link:
     replay: RigResiduals
 
 
-def _borne_out(stages: Sequence[Swing], whole: Swing, declared: Fitted, kept: list[tuple[Variant, Round]], held: bool,
-               floor: float) -> tuple[list[tuple[Variant, Round]], list[dict[str, Any]]]:  # fmt: skip
-    """Of the effects that the training recordings chose, those that lower the error on the recordings held out, and what was
-    rejected; the search is resumed once without those, and a closer law of what stands is looked for.
-
-    whole: whole recordings, for the motion in open loop that is measured.
-    """
-    rejected: list[dict[str, Any]] = []
-    banned: set[str] = set()
-    known = {(): (declared, _open_loop(whole, declared.theta, held))}
-    while True:
-        for k in range(1, len(kept) + 1):
-            part = tuple(v for v, _ in kept[:k])
-            if (key := tuple(v.key for v in part)) not in known:
-                free, last = all_free(stages[0], part), kept[-1][1].fit.theta
-                start = np.where(np.isin(PARAMETERS, free), last, vector({}))
-                fitted = fit_stages(stages, [Task(free, start, ())], 8)[0]
-                known[key] = fitted, _open_loop(whole, fitted.theta, held)
-        chain = [known[tuple(v.key for v, _ in kept[:k])] for k in range(len(kept) + 1)]
-        worse = next((k for k in range(len(kept)) if not chain[k + 1][1] < (1.0 - LEAST_GAIN) * chain[k][1]), None)
-        if worse is not None:
-            rejected.append({"effect": kept.pop(worse)[0].key, "reason": NOT_BORNE_OUT})
-            continue
-        resume = bool(rejected) and not banned  # once: what stood in the shadow of those may come forward
-        banned = {r["effect"] for r in rejected}
-        more = _continued(stages, [v for v, _ in kept], chain[-1][0], banned, resume, floor)
-        if not more:
-            return kept, rejected
-        kept += more
-
-
-def _open_loop(whole: Swing, theta: np.ndarray, held: bool) -> float:
-    """Root mean square position error over whole recordings of one side."""
-    lanes = [i for i, lane in enumerate(whole.lanes) if lane.validate == held]
-    error = errors(whole, np.repeat(theta[None], len(lanes), 0), np.array(lanes))
-    return float(np.sqrt(np.sum(error**2) / sum(whole.lanes[i].used.sum() for i in lanes)))
-
-
 def _chain(rig: RigModel, session: Session, held: bool, stages: Sequence[Swing], declared: np.ndarray,
-           taken: Sequence[Variant], last: np.ndarray | None) -> list[Link]:  # fmt: skip
-    """The declared model, with the first effect, with the first two, ...: fitted in one batch, written and replayed."""
+           taken: Sequence[Variant], last: np.ndarray, known: dict[tuple[str, ...], Link]) -> list[Link]:  # fmt: skip
+    """The declared model, with the first effect, with the first two, ...: fitted in one batch, written and replayed; known
+    holds those that were before, by the effects in them."""
     swing = stages[0]
-    start = vector(swing.initial)
     parts = [tuple(taken[:k]) for k in range(len(taken) + 1)]
-    sets = [all_free(swing, part) for part in parts]
-    starts = [np.where(np.isin(PARAMETERS, s), last, start) if part else declared for s, part in zip(sets, parts, strict=True)]
-    fits = fit_stages(stages, [Task(s, t, ()) for s, t in zip(sets, starts, strict=True)], 8)
+    keys = [tuple(v.key for v in part) for part in parts]
+    new = [(key, part, all_free(swing, part)) for key, part in zip(keys, parts, strict=True) if key not in known]
+    neutral = vector(swing.initial)
+    tasks = [Task(free, np.where(np.isin(PARAMETERS, free), last, neutral) if part else declared, ()) for _, part, free in new]
+    fits = fit_stages(stages, tasks, 8) if tasks else []
     files = [write_swing(rig, swing, f.theta) for f in fits]
     replays = Background(_replayed, [(session, x, held) for x in files]).results()
-    return [Link(s, f, x, r) for s, f, x, r in zip(sets, fits, files, replays, strict=True)]
-
-
-def _continued(stages: Sequence[Swing], taken: list[Variant], current: Fitted, banned: set[str], resume: bool,
-               floor: float) -> list[tuple[Variant, Round]]:  # fmt: skip
-    """What the competition adds to the variants taken once others are banned (resume), or else a closer law of theirs."""
-    if resume:
-        variants, rounds = compete_swing(stages, current, floor, taken, banned)
-        if rounds:
-            return list(zip(variants[len(taken) :], rounds, strict=True))
-    return list(refine_swing(stages, current, taken, banned))
+    for (key, _, free), f, x, r in zip(new, fits, files, replays, strict=True):
+        known[key] = Link(free, f, x, r)
+    return [known[key] for key in keys]
 
 
 def _replayed(session: Session, xml: bytes, held: bool) -> RigResiduals:

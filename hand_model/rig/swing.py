@@ -32,6 +32,7 @@ PARAMETERS = (
 INDEX = {name: i for i, name in enumerate(PARAMETERS)}
 DECLARED = PARAMETERS[:5]
 NEUTRAL = {"stribeck_speed": 1.0, "stribeck_exponent": 2.0}  # what is not zero where an effect is absent
+BY_LOAD = ("load_gear", "load_motor", "load_external")
 LOW_SPEED = ("static_excess", "load_gear_low", "load_motor_low", "load_external_low", "motor_squared", "external_squared")
 
 
@@ -134,32 +135,18 @@ def _chunks(swing: Swing, theta: Array, lanes: Array, residual: bool) -> Array:
 
 def _run(swing: Swing, theta: Array, lanes: Array, steps: int, residual: bool) -> Array:
     """Positions, or residuals, (steps, L); an effect that no run has costs nothing."""
-    p = {name: np.ascontiguousarray(theta[:, i]) for name, i in INDEX.items()}
-    has = {name: bool(np.any(values)) for name, values in p.items()}
-    has["low"] = any(has[k] for k in LOW_SPEED)
-    has["exponent"] = bool(np.any(p["stribeck_exponent"] != NEUTRAL["stribeck_exponent"]))
-    chosen = [swing.lanes[i] for i in lanes]
-    live = np.array([c.live for c in chosen])
-    q, v = np.array([c.start for c in chosen]).T.copy()
+    p, has = _constants(swing, theta, lanes)
+    q, v = np.array([swing.lanes[i].start for i in lanes]).T.copy()
     h = swing.step_s
-    p["hi"] = h / (p["inertia"] + np.array([c.more_inertia for c in chosen]))
-    p["coulomb"] = p["coulomb"] * np.array([c.coulomb_scale for c in chosen])
-    p["emf"] = p["back_emf"] * live**2
-    p["inverse"] = 1.0 / p["stribeck_speed"]
-    sine, cosine = np.array([c.weight or (swing.sine, swing.cosine) for c in chosen]).T
-    lateral = cosine + p["lateral"]
-    bends = bool(np.any(lateral))
     drive = _drive(swing, theta, lanes, has, steps) if swing.driven else None
     # Semi-implicit Euler is leapfrog when the velocity starts half a step early: second order instead of first.
     if not swing.driven:
-        v = v + 0.5 * p["hi"] * (sine * np.sin(q) + lateral * np.cos(q))
+        v = v - 0.5 * p["hi"] * p["weight"] * np.sin(q + p["phase"])
     out = np.empty((steps, len(lanes)))
     with np.errstate(all="ignore"):
         for k in range(steps):
             out[k] = q
-            external = -sine * np.sin(q)
-            if bends:
-                external -= lateral * np.cos(q)
+            external = p["weight"] * np.sin(q + p["phase"] if has["phase"] else q)
             if has["stiffness"]:
                 external -= p["stiffness"] * q
             v = _next_speed(p, has, v, external, None if drive is None else drive[k])
@@ -171,25 +158,56 @@ def _run(swing: Swing, theta: Array, lanes: Array, steps: int, residual: bool) -
     return out
 
 
+def _constants(swing: Swing, theta: Array, lanes: Array) -> tuple[dict[str, Array], dict[str, bool]]:
+    """Parameters of every run (L,) with what follows from them and from its stretch, and which effects any run has.
+
+    hi: step over inertia; weight, phase: gravity's effort weight sin(q + phase); wet, share: damping with the motor's own
+    and what is left of a free speed after one step of it; shove: hi share; stop: speed that dry friction takes in a step.
+    """
+    p = {name: np.ascontiguousarray(theta[:, i]) for name, i in INDEX.items()}
+    has = {name: bool(np.any(values)) for name, values in p.items()}
+    has["low"] = any(has[k] for k in LOW_SPEED)
+    has["exponent"] = bool(np.any(p["stribeck_exponent"] != NEUTRAL["stribeck_exponent"]))
+    has["dry"] = has["low"] or any(has[k] for k in (*BY_LOAD, "asymmetry"))
+    has["wet"] = any(has[k] for k in ("load_speed", "drag", "damping_asymmetry"))
+    chosen = [swing.lanes[i] for i in lanes]
+    live = np.array([c.live for c in chosen])
+    sine, cosine = np.array([c.weight or (swing.sine, swing.cosine) for c in chosen]).T
+    cosine = cosine + p["lateral"]
+    p["weight"], p["phase"] = -np.hypot(sine, cosine), np.arctan2(cosine, sine)
+    has["phase"] = bool(np.any(p["phase"]))
+    p["hi"] = swing.step_s / (p["inertia"] + np.array([c.more_inertia for c in chosen]))
+    p["coulomb"] = p["coulomb"] * np.array([c.coulomb_scale for c in chosen])
+    p["emf"] = p["back_emf"] * live**2
+    p["inverse"] = 1.0 / p["stribeck_speed"]
+    p["wet"] = p["damping"] + p["emf"] if swing.driven else p["damping"]
+    p["share"] = 1.0 / (1.0 + p["hi"] * p["wet"])
+    p["shove"] = p["hi"] * p["share"]
+    p["stop"] = p["shove"] * p["coulomb"]
+    return p, has
+
+
 def _next_speed(p: Mapping[str, Array], has: Mapping[str, bool], v: Array, external: Array, motor: Array | None) -> Array:
     """Velocity (L,) after one step under external effort and the motor's: implicit damping, clipped dry friction."""
-    friction, b = _friction(p, has, v, external, motor)
-    hi, effort = p["hi"], external
+    share, shove, stop, effort = p["share"], p["shove"], p["stop"], external
     if motor is not None:
         effort = effort + motor
-        b = b + p["emf"]
     if has["offset"]:
         effort = effort + p["offset"]
-    share = 1.0 / (1.0 + hi * b)
-    free = (v + hi * effort) * share
-    stop = hi * share * friction
+    if has["wet"]:
+        share = 1.0 / (1.0 + p["hi"] * (p["wet"] + _wet(p, has, v, external)))
+        shove = p["hi"] * share
+    if has["dry"]:
+        stop = shove * _dry(p, has, v, external, motor)
+    elif has["wet"]:
+        stop = shove * p["coulomb"]
+    free = v * share + shove * effort
     return free - np.minimum(np.maximum(free, -stop), stop)
 
 
-def _friction(p: Mapping[str, Array], has: Mapping[str, bool], v: Array, external: Array,
-              motor: Array | None) -> tuple[Array, Array]:  # fmt: skip
-    """Dry friction's bound (L,) and viscous damping (L,) without the motor's own."""
-    friction, b = p["coulomb"], p["damping"]
+def _dry(p: Mapping[str, Array], has: Mapping[str, bool], v: Array, external: Array, motor: Array | None) -> Array:
+    """Dry friction's bound (L,)."""
+    friction = p["coulomb"]
     shaft = 0.0 if motor is None else motor - p["emf"] * v
     if has["load_gear"]:
         friction = friction + p["load_gear"] * np.abs(external - shaft)
@@ -197,17 +215,23 @@ def _friction(p: Mapping[str, Array], has: Mapping[str, bool], v: Array, externa
         friction = friction + np.abs(p["load_external"] * external - p["load_motor"] * shaft)
     if has["low"]:
         ratio = v * p["inverse"]
-        decay = np.exp(-(np.abs(ratio) ** p["stribeck_exponent"] if has["exponent"] else ratio**2))
+        decay = np.exp(-(np.abs(ratio) ** p["stribeck_exponent"] if has["exponent"] else ratio * ratio))
         friction = friction + _low_speed(p, has, external, shaft) * decay
-    if has["load_speed"]:
-        b = b + p["load_speed"] * np.abs(external)
-    if has["drag"]:
-        b = b + p["drag"] * np.abs(v)
     if has["asymmetry"]:
         friction = np.maximum(friction + p["asymmetry"] * np.sign(v), 0.0)
+    return friction
+
+
+def _wet(p: Mapping[str, Array], has: Mapping[str, bool], v: Array, external: Array) -> Array:
+    """Viscous damping (L,) besides the declared."""
+    b = np.zeros_like(v)
+    if has["load_speed"]:
+        b += p["load_speed"] * np.abs(external)
+    if has["drag"]:
+        b += p["drag"] * np.abs(v)
     if has["damping_asymmetry"]:
-        b = b + p["damping_asymmetry"] * np.sign(v)
-    return friction, b
+        b += p["damping_asymmetry"] * np.sign(v)
+    return b
 
 
 def _low_speed(p: Mapping[str, Array], has: Mapping[str, bool], external: Array, shaft: Array | float) -> Array:

@@ -6,7 +6,7 @@ only the error on those decides. All fits of a round run in one batch of lanes.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from ..background import Background
 from .evidence import ONE_STANDARD_ERROR, weigh
-from .swing import DECLARED, INDEX, LOW_SPEED, Fitted, Swing, Task, errors, fit_together, vector
+from .swing import BY_LOAD, DECLARED, INDEX, LOW_SPEED, Fitted, Swing, Task, errors, fit_together, vector
 
 Array = NDArray[np.float64]
 FOLDS, SHORTLIST, ALIKE = 4, 6, 3
 LEAST_GAIN, MOST_TERMS = 0.025, 5
 BETTER = 1.01  # an exchange of variants has to pay
-BY_LOAD = frozenset({"load_gear", "load_motor", "load_external"})
+FEW_RUNS = 1500
 PARTS = 4  # a recording's error is resampled in so many parts
 
 
@@ -84,9 +84,9 @@ def variants(swing: Swing) -> tuple[Variant, ...]:
                 "load_dependent_friction", "gear, low speed", {"load_gear_low": 0.0, "stribeck_speed": 0.2 * speed}
             ),
             Variant("load_dependent_friction", "driven load squared, low speed",
-                    {"external_squared": 0.0, "stribeck_speed": 0.2 * speed}, BY_LOAD),
+                    {"external_squared": 0.0, "stribeck_speed": 0.2 * speed}, frozenset(BY_LOAD)),
             Variant("load_dependent_friction", "load squared, low speed",
-                    {"motor_squared": 0.0, "external_squared": 0.0, "stribeck_speed": 0.2 * speed}, BY_LOAD),
+                    {"motor_squared": 0.0, "external_squared": 0.0, "stribeck_speed": 0.2 * speed}, frozenset(BY_LOAD)),
             Variant("drive_sag", "", {"sag": 0.0}),
             Variant("command_delay", "", {"delay": 0.005}),
         ]
@@ -115,8 +115,10 @@ def _blocks(swing: Swing, theta: Array, lanes: Sequence[int]) -> Array:
 
 def fit_apart(swing: Swing, tasks: Sequence[Task], iterations: int = 14) -> list[Fitted]:
     """`fit_together` in two halves, one a core: tasks that need low-speed friction together, since all runs of a batch pay
-    for what one of them has."""
+    for what one of them has. Few runs stay together: a step costs them hardly less than many."""
     cost = [len(t.stretches) * (len(t.free) + 1) for t in tasks]
+    if sum(cost) < FEW_RUNS:
+        return fit_together(swing, tasks, iterations)
     order = sorted(range(len(tasks)), key=lambda k: bool(set(LOW_SPEED) & set(tasks[k].free)))
     done = np.cumsum([cost[k] for k in order])
     half = int(np.searchsorted(done, 0.5 * done[-1])) + 1
@@ -136,20 +138,19 @@ def fit_stages(stages: Sequence[Swing], tasks: Sequence[Task], iterations: int =
     return fits
 
 
-def compete_swing(stages: Sequence[Swing], current: Fitted, floor: float = 0.0, begin: Sequence[Variant] = (),
-                  banned: Collection[str] = ()) -> tuple[tuple[Variant, ...], tuple[Round, ...]]:  # fmt: skip
-    """Forward selection from the variants that stand already (begin, fitted as current), without those that are banned
-    (keys), while the error is above what the recordings can tell (floor [rad or m]); returns all variants and the new
-    rounds, each with the fit of all taken so far."""
+def compete_swing(
+    stages: Sequence[Swing], current: Fitted, floor: float = 0.0
+) -> tuple[tuple[Variant, ...], tuple[Round, ...]]:
+    """Forward selection from the declared model (fitted as current), while the error is above what the recordings can tell
+    (floor [rad or m]); returns the variants and their rounds, each with the fit of all taken so far."""
     swing = stages[-1]
     train = tuple(int(i) for i in swing.train())
     folds = _folds(swing, train)
-    taken: tuple[Variant, ...] = tuple(begin)
+    taken: tuple[Variant, ...] = ()
     rounds: list[Round] = []
     while len(taken) < MOST_TERMS and current.cost > floor**2:
         free = all_free(swing, taken)
-        rivals = [v for v in variants(swing) if not set(v.start) <= set(free) and (not v.beside or v.beside & set(free))
-                  and v.key not in banned]  # fmt: skip
+        rivals = [v for v in variants(swing) if not set(v.start) <= set(free) and (not v.beside or v.beside & set(free))]
         tasks = [Task(all_free(swing, (*taken, v)), _started(current.theta, v), ()) for v in rivals]
         fits = fit_stages(stages, tasks, 8)
         order = _shortlist(rivals, fits)
@@ -160,21 +161,19 @@ def compete_swing(stages: Sequence[Swing], current: Fitted, floor: float = 0.0, 
         found = _judge(none, scores, [rivals[k] for k in order], [len(tasks[k].free) for k in order], group)
         if found is None:
             break
-        taken, current = (*taken, rivals[order[found[0]]]), best[found[0]]
+        taken, current = _exchanged(stages, (*taken, rivals[order[found[0]]]), best[found[0]])
         rounds.append(replace(found[1], fit=current))
-        if not banned:  # what has been proven stands as it is
-            taken, current = _exchanged(stages, taken, current)
-        rounds[-1] = replace(rounds[-1], fit=current)
     return taken, tuple(rounds)
 
 
-def refine_swing(stages: Sequence[Swing], current: Fitted, taken: Sequence[Variant],
-                 banned: Collection[str]) -> tuple[tuple[Variant, Round], ...]:  # fmt: skip
+def refine_swing(
+    stages: Sequence[Swing], current: Fitted, taken: Sequence[Variant]
+) -> tuple[tuple[Variant, Round], ...]:
     """A closer law of an effect that stands (Variant.beside), by BIC with every stretch as one sample (Schwarz 1978); or
     none. Its name stands already: what is left to choose is the form, and there the likelihood is enough."""
     swing = stages[-1]
     free, count = all_free(swing, taken), len(swing.train())
-    rivals = [v for v in variants(swing) if v.beside & set(free) and not set(v.start) <= set(free) and v.key not in banned]
+    rivals = [v for v in variants(swing) if v.beside & set(free) and not set(v.start) <= set(free)]
     if not rivals:
         return ()
     fits = fit_stages(stages, [Task(all_free(swing, (*taken, v)), _started(current.theta, v), ()) for v in rivals], 12)
@@ -237,11 +236,12 @@ def _several(swing: Swing, tasks: Sequence[Task], starts: int = 2, iterations: i
 
 def _folds(swing: Swing, train: Sequence[int]) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
     """(kept, left out) stretches: whole recordings are left out where there are several, as the validation trials are; else
-    every fold leaves out some of every recording."""
+    neighbouring stretches together: what is held out then lies elsewhere in the motion, and a term that fits only where it
+    was fitted is told (blocked cross-validation, Roberts et al. 2017)."""
     trials = {name: k for k, name in enumerate(dict.fromkeys(swing.lanes[i].trial for i in train))}
     whole = len(trials) >= FOLDS
     count = FOLDS if whole else min(FOLDS, len(train))
-    fold = [(trials[swing.lanes[i].trial] if whole else k) % count for k, i in enumerate(train)]
+    fold = [trials[swing.lanes[i].trial] % count if whole else k * count // len(train) for k, i in enumerate(train)]
     return [(tuple(i for i, g in zip(train, fold, strict=True) if g != f),
              tuple(i for i, g in zip(train, fold, strict=True) if g == f)) for f in range(count)]  # fmt: skip
 
