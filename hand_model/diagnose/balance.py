@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..effects.base import DriveState
 from ..effects.path import strokes
+from .grid import Grid, GridColumns, stacked
 
 if TYPE_CHECKING:
     from .wander import Wander
@@ -24,6 +25,7 @@ Array = NDArray[np.float64]
 
 # What physics allows of a declared coefficient, by its column's name.
 DECLARED_LOW = {"inertia": 0.0, "viscous": 0.0, "coulomb": 0.0, "spring": 0.0}
+MOST_KEPT = 3e8  # bytes of columns that one balance keeps
 DISCRETE = ("side", "trial", "form", "end")  # shapes that choose among few cases: no continuous parameter is spent on them
 
 
@@ -73,10 +75,14 @@ class Balance:
         self.weight = 1 / np.sqrt(self.sigma**2 + extra**2)
         self.steady = extra <= 0.25 * self.sigma
         self.wander: Wander | None = None
+        self._grids: dict[Any, Grid] = {}
+        self._kept: dict[Any, GridColumns] = {}
+        self._apart: Any = None
 
     def wandering(self, wander: Wander | None) -> Balance:
         """The same balance with a random level per while in its noise, where that is real."""
         other = copy(self)
+        other._kept, other._apart = {}, None
         other.wander = wander if wander is not None and wander.real else None
         return other
 
@@ -107,6 +113,23 @@ class Balance:
             return columns
 
         return self.gather(one)
+
+    def grid(self, effect: Any) -> Grid:
+        """Starting shapes of an effect on these recordings."""
+        if effect not in self._grids:
+            self._grids[effect] = Grid(effect, effect.grid(self.states))
+        return self._grids[effect]
+
+    def grid_columns(self, grid: Grid, weight: Array, warps: tuple[Term, ...] = ()) -> GridColumns:
+        """The columns of every shape of a grid, weighted by `weight` (n,) and whitened; kept under the balance's own weight, for
+        each step of a search asks again."""
+        plain = not warps and np.array_equal(weight, self.weight * self.train)
+        if plain and grid.effect in self._kept:
+            return self._kept[grid.effect]
+        out = stacked([self.whiten(self.columns(grid.effect, shape, warps) * weight[:, None], weight) for shape in grid.shapes])
+        if plain and out.bytes + sum(c.bytes for c in self._kept.values()) < MOST_KEPT:
+            self._kept[grid.effect] = out
+        return out
 
     def design(self, terms: tuple[Term, ...]) -> tuple[Array, Array, Array]:
         """Matrix (n, k + j) of declared and effect columns, lower and upper bounds (k + j,) of their coefficients."""
@@ -155,6 +178,18 @@ class Balance:
         size = sum(len([k for k in t.shape if k not in DISCRETE]) + len(t.effect.amplitudes()) for t in terms)
         declared = dict(zip(self.names, coefficients[:k].tolist(), strict=True))
         return Fit(terms, declared, tuple(amplitudes), prediction, rss, size)
+
+    def apart(self, terms: tuple[Term, ...]) -> tuple[Array, Array, Array]:
+        """Orthonormal basis (n, k) of the design, what it leaves of the effort (n,), and the weight (n,), zero where `terms` clip:
+        weighted and whitened. The last one is kept, for every candidate beside the same terms asks for it."""
+        if self._apart is None or self._apart[0] != terms:
+            w = self.weight * self.train * self.unclipped(terms)
+            matrix = self.whiten(self.design(terms)[0] * w[:, None], w)
+            norm = np.linalg.norm(matrix, axis=0)
+            q, _ = np.linalg.qr(matrix / np.where(norm > 0, norm, 1.0))
+            effort = self.whiten(self.effort * w, w)
+            self._apart = terms, (q, effort - q @ (q.T @ effort), w)
+        return self._apart[1]
 
     def unclipped(self, terms: tuple[Term, ...]) -> NDArray[np.bool_]:
         """Samples (n,) whose prediction no term clips: there the balance is linear."""

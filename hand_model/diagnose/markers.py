@@ -196,7 +196,8 @@ def name_markers(angles: FingerAngles) -> MarkerNaming:
             candidates = _candidates(blocks)
             moments = {id(c.columns): _moments(project(blocks, c.columns), shared, y) for c in candidates}
         known = {e.body for e in found if e.effect in HINGE}
-        best = _choose([_try(c, blocks, moments[id(c.columns)], _chain_part(shared, y), sigma) for c in candidates
+        chain = _chain_part(shared, y)
+        best = _choose([_try(c, blocks, moments[id(c.columns)], chain, sigma) for c in candidates
                         if c.effect != NO_HINGE or c.body not in known])
         more = project(blocks, best.columns)
         wider = np.concatenate([shared, more], axis=-1)

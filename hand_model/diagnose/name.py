@@ -17,6 +17,7 @@ from scipy.optimize import minimize
 
 from .balance import DISCRETE, Balance, Fit, Term
 from .evidence import evidence, gain, rough_evidence, scale_of
+from .grid import Grid
 from .lack_of_fit import LackOfFit, lack_of_fit
 from .wander import Wander, estimate_wander
 
@@ -27,6 +28,7 @@ EVIDENCE_LEAST = 6.0  # log evidence an effect must bring: e^6 against "none", a
 CLASS_WIDTH = 3.0  # log evidence within which two effects are one class: 20 to 1
 MOST_TERMS = 5
 MOST_SEARCHES = 3  # each with noise that knows what did not repeat beside the effects of the one before
+ALONG = 1e-6  # of a column's length: less left beside the design, and it says nothing of its own
 GROWN = 1.3  # change of that noise, from which another search is worth its time
 
 
@@ -185,44 +187,38 @@ def rank(balance: Balance, effects: Iterable[Any], terms: tuple[Term, ...], fit:
 
 def scan(balance: Balance, effect: Any, terms: tuple[Term, ...]) -> Fit | None:
     """Best starting shape of `effect` beside `terms`; columns are projected, anything else is refitted."""
-    grid = effect.grid(balance.states)
-    if not grid:
+    grid = balance.grid(effect)
+    if not grid.shapes:
         return None
+    shapes = grid.shapes
     if effect.replaces is None and not effect.warps and not effect.clips:
-        grid = _project(balance, effect, terms, grid)
-    fits = [balance.fit((*terms, Term(effect, shape))) for shape in grid]
+        shapes = _project(balance, grid, terms)
+    fits = [balance.fit((*terms, Term(effect, shape))) for shape in shapes]
     return min(fits, key=lambda f: f.rss) if fits else None
 
 
-def _project(balance: Balance, effect: Any, terms: tuple[Term, ...], grid: list[dict[str, float]]) -> list[dict[str, float]]:
+def _project(balance: Balance, grid: Grid, terms: tuple[Term, ...]) -> list[dict[str, float]]:
     """The two best shapes of a grid by the fall of the RSS that its columns, orthogonal to the design, bring."""
-    matrix, _, _ = balance.design(terms)
-    w = balance.weight * balance.train * balance.unclipped(terms)
-    matrix = balance.whiten(matrix * w[:, None], w)
-    norm = np.linalg.norm(matrix, axis=0)
-    q, _ = np.linalg.qr(matrix / np.where(norm > 0, norm, 1.0))
-    residual = balance.whiten(balance.effort * w, w)
-    residual = residual - q @ (q.T @ residual)
-    warps = tuple(t for t in terms if t.effect.warps)
-    bounds = effect.amplitudes()
-    gains = []
-    for shape in grid:
-        c = balance.whiten(balance.columns(effect, shape, warps) * w[:, None], w)
-        size = np.linalg.norm(c, axis=0)
-        c, size = c[:, size > 0], size[size > 0]  # what acts in validation recordings only tells nothing here
-        c = c - q @ (q.T @ c)
-        if not c.shape[1] or np.any(np.linalg.norm(c, axis=0) < 1e-6 * size):
-            gains.append(0.0)
+    q, residual, w = balance.apart(terms)
+    columns = balance.grid_columns(grid, w, tuple(t for t in terms if t.effect.warps))
+    inside = columns.products(q)
+    left = np.sqrt(np.maximum(columns.length**2 - np.sum(inside**2, axis=1), 0.0))
+    right = columns.products(residual)
+    bounds = grid.effect.amplitudes()
+    gains = np.zeros(len(grid.shapes))
+    for i in range(len(grid.shapes)):
+        mine = np.flatnonzero(columns.shape == i)  # what acts in validation recordings only tells nothing here
+        if not len(mine) or np.any(left[mine] < ALONG * columns.length[mine]):
             continue
-        if c.shape[1] == 1:
-            slope = float(c[:, 0] @ residual)
+        if len(mine) == 1:
+            slope = float(right[mine[0]])
             allowed = (slope >= 0 or bounds[0][2] < 0) and (slope <= 0 or bounds[0][3] > 0)
-            gains.append(slope**2 / float(c[:, 0] @ c[:, 0]) if allowed else 0.0)
+            gains[i] = slope**2 / left[mine[0]] ** 2 if allowed else 0.0
         else:
-            right = c.T @ residual
-            gains.append(float(right @ np.linalg.lstsq(c.T @ c, right, rcond=None)[0]))
+            gram = columns.gram(mine) - inside[mine] @ inside[mine].T
+            gains[i] = float(right[mine] @ np.linalg.lstsq(gram, right[mine], rcond=None)[0])
     order = np.argsort(gains)[::-1]
-    return [grid[i] for i in order[:2] if gains[i] > 0]
+    return [grid.shapes[i] for i in order[:2] if gains[i] > 0]
 
 
 def polish(balance: Balance, fit: Fit, which: int) -> Fit:

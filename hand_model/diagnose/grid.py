@@ -1,0 +1,65 @@
+"""Grids of starting shapes: the columns of one effect at many shapes, as one matrix."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+SPARSE = 0.2  # share of entries that are not zero, below which a matrix is kept sparse: events act in one trial
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The shapes from which the search for an effect's shape starts."""
+
+    effect: Any
+    shapes: list[dict[str, float]]
+
+
+@dataclass(frozen=True)
+class GridColumns:
+    """matrix: (n, c), dense or sparse, of the columns that act at all. shape: (c,) to which shape of the grid each belongs.
+    length: (c,) Euclidean norms."""
+
+    matrix: Any
+    shape: NDArray[np.int64]
+    length: Array
+
+    @property
+    def bytes(self) -> int:
+        """Memory that the matrix takes."""
+        return int(self.matrix.nbytes if isinstance(self.matrix, np.ndarray) else 1.5 * self.matrix.data.nbytes)
+
+    def products(self, other: Array) -> Array:
+        """matrix^T other, (c,) or (c, k)."""
+        return np.asarray(self.matrix.T @ other)
+
+    def gram(self, which: NDArray[np.int64]) -> Array:
+        """Products (k, k) of some columns with each other."""
+        part = self.matrix[:, which]
+        part = part if isinstance(part, np.ndarray) else part.toarray()
+        return part.T @ part
+
+
+def stacked(columns: Sequence[Array]) -> GridColumns:
+    """One matrix from the columns (n, j) of every shape."""
+    from scipy.sparse import csc_matrix, hstack
+
+    parts, owner, length = [], [], []
+    for i, part in enumerate(columns):
+        size = np.linalg.norm(part, axis=0)
+        acting = np.flatnonzero(size > 0)
+        parts.append(part[:, acting])
+        owner += [i] * len(acting)
+        length += size[acting].tolist()
+    if not owner:
+        return GridColumns(np.zeros((len(columns[0]), 0)), np.zeros(0, int), np.zeros(0))
+    dense = sum(np.count_nonzero(p) for p in parts) > SPARSE * len(parts[0]) * len(owner)
+    matrix = np.concatenate(parts, axis=1) if dense else hstack([csc_matrix(p) for p in parts if p.size], format="csc")
+    return GridColumns(matrix, np.array(owner), np.array(length))
