@@ -11,8 +11,9 @@ import pytest
 from hand_model.errors import IdentificationError
 from hand_model.identify.motor import identify_motor, identify_motors
 from hand_model.identify.motor.balance import NAMES, friction_state
-from hand_model.identify.motor.drive import Moves, profile, simulate
+from hand_model.identify.motor.drive import Moves, profile, run, simulate
 from hand_model.identify.motor.fit import fit_motor, white_noise
+from hand_model.identify.motor.moves import moves_from_rest
 from hand_model.identify.motor.predict import predict, reference, replay_table
 from hand_model.identify.motor.published import MODELS, fit_published, smear_share
 from hand_model.identify.motor.recording import MotorTrial, actuator_trials, check_trials, motor_trial, trial_scale
@@ -103,6 +104,7 @@ PARAMETERS = {
     **TRUTH, "presliding": 0.5, "bristle": 0.0, "speed_full": 115.0, "rise": 0.1, "fall": 0.1, "gain": 22.0, "damping": 3.0, "delay": 0.0, "lag": 0.0, "edge": 0.1,
     "static_ratio": 1.0, "stribeck_speed": 20.0, "stribeck_exponent": 1.0,
 }  # fmt: skip
+CASCADE = {"presliding": 0.0, "gain": 12.0, "damping": 2.0, "position_gain": 14.0, "deadband": 1.0, "rise": 0.07, "edge": 0.02}
 
 
 def test_profile_is_its_velocitys_integral() -> None:
@@ -157,6 +159,32 @@ def test_jump_within_a_step_counts() -> None:
     _, later, _ = simulate(_moves(start_s=0.0507), q, 2e-3)
     k = (t > 0.3) & (t < 0.6)
     assert np.allclose((early - later)[k, 0], 115 * 0.0007, atol=0.01)
+
+
+def test_jump_of_the_current_is_where_the_reference_jumps() -> None:
+    """Between two steps, however coarse: just before the command the current is what held the drive, just after it has jumped."""
+    jump = {"presliding": 0.0, "rise": 1e-4, "fall": 1e-4, "damping": 0.6, "lead": 0.0}
+    q = {k: np.array([v]) for k, v in {**PARAMETERS, **jump}.items()}
+    _, u = run(_moves(start_s=0.0513), q, 5e-3).sample(slice(0, 1), np.array([0.0512, 0.0515]))
+    assert abs(u[0, 0]) < 1.0 and u[1, 0] == pytest.approx(0.6 * 115.0, rel=0.05)
+
+
+def test_cascade_does_not_depend_on_the_step() -> None:
+    """Deadband and slew set in within a step, and where the integral holds decides how the drive creeps on."""
+    q = {k: np.array([v]) for k, v in {**PARAMETERS, **CASCADE}.items()}
+    fine, coarse = (simulate(_moves(duration_s=2.0), q, s, "cascade")[1][:: round(4e-3 / s), 0] for s in (2.5e-4, 2e-3))
+    assert abs(fine[-60] - 80.0) < 1.0
+    assert np.allclose(fine[:499], coarse[:499], atol=0.02)
+
+
+def test_current_of_the_last_sample_before_a_command_belongs_to_no_move(trials) -> None:
+    """Channels of a row are read one after the other: its current may be the next command's already."""
+    touched = dataclasses.replace(trials[0], current=trials[0].current.copy())
+    moves = moves_from_rest(trials[0], (0.06, 5.0), 255.0)
+    for m in moves:
+        touched.current[m.index] += 500.0
+    for a, b in zip(moves, moves_from_rest(touched, (0.06, 5.0), 255.0), strict=True):
+        assert np.array_equal(a.current, b.current) and np.array_equal(a.own, b.own)
 
 
 def test_friction_state_sticks() -> None:

@@ -16,6 +16,7 @@ Integrated by the implicit midpoint rule, linear within a step.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -46,6 +47,11 @@ class Moves:
     duration_s: Array
     velocity: Array | float = 0.0
 
+    def some(self, columns: slice) -> Moves:
+        """The moves of these columns."""
+        every = (getattr(self, f.name) + np.zeros(len(self.target)) for f in dataclasses.fields(self))
+        return Moves(*(x[columns] for x in every))
+
 
 def profile(time_s: Array, moves: Moves, q: Mapping[str, Array]) -> tuple[Array, Array]:
     """Reference [%] and its velocity [%/s], (n, B), of trapezoidal moves at times (n,) [s]; the velocity `lag` [s] behind."""
@@ -68,14 +74,46 @@ def _trapezoid(t: Array, moves: Moves, q: Mapping[str, Array]) -> tuple[Array, A
     return 0.5 * up * a * a + top * b + (top - 0.5 * down * c) * c, up * a - down * c
 
 
-def simulate(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, controller: str = "profile") -> tuple[Array, Array, Array]:
-    """Time (n,) [s], position (n, B) [%] and current (n, B) [raw] of B moves under B parameter sets (each (B,)).
+@dataclass(frozen=True)
+class Run:
+    """Simulated moves. time_s (n,) [s]; position (n, B) [%]; feedback (n, B) [raw]: the current without what a reference that is known
+    beforehand adds, and unlimited; moves and q (each (B,)) that were simulated. Rows after a move's duration are not filled."""
+
+    time_s: Array
+    position: Array
+    feedback: Array
+    moves: Moves
+    q: Mapping[str, Array]
+    controller: str
+
+    def sample(self, columns: slice, at_s: Array) -> tuple[Array, Array]:
+        """Position [%] and, `lead` later, current [raw], (k, columns), of moves at times (k,) [s], the jumps of the reference where they are."""
+        q = {n: self.q[n][columns] for n in ("gain", "damping", "speed_full", "rise", "fall", "lag", "lead") if n in self.q}
+        lead = q.get("lead", 0.0) + np.zeros(self.position[:1, columns].shape[1])
+        position = _interpolated(self.position[:, columns], at_s[:, None] / self.time_s[1])
+        current = _interpolated(self.feedback[:, columns], (at_s[:, None] + lead) / self.time_s[1])
+        moves = self.moves.some(columns)
+        if self.controller == "profile":
+            r, w = profile(at_s, dataclasses.replace(moves, start_s=moves.start_s - lead), q)
+            current += q["gain"] * r + q["damping"] * w
+        return position, np.clip(current, -moves.limit, moves.limit)
+
+
+def _interpolated(y: Array, x: Array) -> Array:
+    """Columns of y (n, B) at steps x (k, B or 1), linearly."""
+    x = np.clip(x, 0.0, len(y) - 1.001)
+    i, column = x.astype(int), np.arange(y.shape[1])
+    share = x - i
+    return y[i, column] * (1 - share) + y[i + 1, column] * share
+
+
+def run(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, controller: str = "profile") -> Run:
+    """Simulate B moves under B parameter sets (each (B,)).
 
     Every move starts at rest in balance, so its friction there is what the controller pushes less the spring; where it creeps,
     friction is that of sliding. Friction without presliding in any set sticks hard.
-    Rows after a move's duration are not filled.
     """
-    n = int(np.ceil(moves.duration_s.max() / step_s)) + 2
+    n = int(np.ceil((moves.duration_s.max() + max(0.0, float(np.max(q.get("lead", 0.0))))) / step_s)) + 2
     time_s = np.arange(n) * step_s
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # values that a search tries may let a drive run away
         steer = _Cascade(moves, q, step_s, time_s) if controller == "cascade" else _Profile(moves, q, time_s)
@@ -83,12 +121,19 @@ def simulate(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, contr
         if np.any(np.abs(current) > moves.limit):
             steer = _Cascade(moves, q, step_s, time_s) if controller == "cascade" else steer
             position, current = _run(moves, q, steer, step_s, n, moves.limit)
-    return time_s, position, current
+    return Run(time_s, position, current if controller == "cascade" else current - steer.at, moves, q, controller)
+
+
+def simulate(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, controller: str = "profile") -> tuple[Array, Array, Array]:
+    """Time (n,) [s], position (n, B) [%] and current (n, B) [raw] of `run`, at its steps."""
+    found = run(moves, {**q, "lead": np.zeros(len(moves.target))}, step_s, controller)
+    return found.time_s, *found.sample(slice(None), found.time_s)
 
 
 def _run(moves: Moves, q: Mapping[str, Array], steer: _Profile | _Cascade, step_s: float, n: int, limit: Array | float) -> tuple[Array, Array]:
-    """Position [%] and current [raw], (n, B), of drives that follow what `steer` says, their current within the limit [raw]."""
-    active = np.searchsorted(-moves.duration_s, -((np.arange(n) - 2) * step_s), side="right")
+    """Position [%] and the current that is asked for [raw], (n, B), of drives that follow what `steer` says, with no more current than the limit [raw]."""
+    over = 2 * step_s + max(0.0, float(np.max(q.get("lead", 0.0))))
+    active = np.searchsorted(-moves.duration_s, over - np.arange(n) * step_s, side="right")
     position, current = np.zeros((n, len(moves.target))), np.zeros((n, len(moves.target)))
     half = 0.5 * step_s
     p, v = moves.position.copy(), np.zeros(len(moves.target)) + moves.velocity
@@ -112,10 +157,9 @@ def _run(moves: Moves, q: Mapping[str, Array], steer: _Profile | _Cascade, step_
                 x[:k] for x in (p, v, a, gain, keep, late_push, moving, sprung, preload, limit, plant, closed, mass)
             )
             friction.narrow(k)
-        now, middle_push = steer.push(i, p)
+        now, middle_push = steer.push(i, p, v)
         position[i, :k] = p
-        u = now - gain * p - keep * v + late_push * a
-        current[i, :k] = np.minimum(np.maximum(u, -limit), limit) if bounded else u
+        current[i, :k] = now - gain * p - keep * v + late_push * a
         total = middle_push - preload + moving * v - sprung * p
         inner = plant
         if contact is not None:
@@ -128,9 +172,9 @@ def _run(moves: Moves, q: Mapping[str, Array], steer: _Profile | _Cascade, step_
             over = np.abs(u_middle) > limit
             if over.any():
                 middle = np.where(over, friction.velocity(own + np.sign(u_middle) * limit, inner, v), middle)
+        fresh, middle = friction.advance(v, middle)
         steer.advance(middle)
         p = p + step_s * middle
-        fresh = friction.advance(v, middle)
         a = (fresh - v) / step_s
         v = fresh
     return position, current
@@ -154,7 +198,7 @@ class _Profile:
         """Current (B,) [raw] before the move, at rest at positions (B,) [%]."""
         return self.hold[0] - self.hold[1] * p
 
-    def push(self, i: int, p: Array) -> tuple[Array, Array]:
+    def push(self, i: int, p: Array, v: Array) -> tuple[Array, Array]:
         """Its part of the current (k,) [raw] at step i and in the middle of the step."""
         return self.at[i, : len(p)], self.between[i, : len(p)]
 
@@ -175,15 +219,18 @@ class _Cascade:
         self.r, self.w = p + (self.moves.hold + self.q["damping"] * v) / self.q["gain"], np.zeros(len(p))
         return self.moves.hold
 
-    def push(self, i: int, p: Array) -> tuple[Array, Array]:
+    def push(self, i: int, p: Array, v: Array) -> tuple[Array, Array]:
         """Its part of the current (k,) [raw] at step i and in the middle of the step."""
         k, q, step_s = len(p), self.q, self.step_s
         r, w = self.r[:k], self.w[:k]
-        share, change = _cascade(q, k, self.moves.target[:k] - p, w, self.top_speed, self.slew)
+        # where the drive will be seen at the middle and at the end of the step
+        seen, fresh = p + (0.5 * step_s - q["delay"][:k]) * v, p + (step_s - q["delay"][:k]) * v
+        target, origin, limits = self.moves.target[:k], self.moves.origin[:k], (step_s * v, w, self.top_speed, self.slew)
+        share, change = _cascade(q, k, target - seen, target - fresh, *limits)
         if self.time_s[i] < self.last_start:
             # the share of this step that lies behind the command, so that its instant counts within a step too
             since = np.minimum(np.maximum((self.time_s[i] + step_s - self.moves.start_s[:k]) / step_s, 0.0), 1.0)
-            old_share, old_change = _cascade(q, k, self.moves.origin[:k] - p, w, self.top_speed, self.slew)
+            old_share, old_change = _cascade(q, k, origin - seen, origin - fresh, *limits)
             share, change = since * share + (1 - since) * old_share, since * change + (1 - since) * old_change
         self.w = w + change
         self.r, self.share, self.r_next = r, share, r + 0.5 * step_s * (w + self.w)
@@ -213,10 +260,11 @@ class _Stick:
         level = self.rise.level(v)
         return (total - np.minimum(np.maximum(total, -level), level)) / inner
 
-    def advance(self, v: Array, middle: Array) -> Array:
-        """Velocity (k,) [%/s] at the end of the step; a drive that would turn round has stopped."""
+    def advance(self, v: Array, middle: Array) -> tuple[Array, Array]:
+        """Velocity (k,) [%/s] at the end of the step and its mean; a drive that would turn round has stopped within the step."""
         fresh = 2.0 * middle - v
-        return np.where(fresh * v < 0.0, 0.0, fresh)
+        stopped = fresh * v < 0.0
+        return np.where(stopped, 0.0, fresh), np.where(stopped, 0.5 * v * v / np.where(stopped, v - fresh, 1.0), middle)
 
 
 class _Bristles:
@@ -245,11 +293,11 @@ class _Bristles:
         slope = (self.level - self.f * np.sign(push)) * -np.expm1(-travel * self.per) / travel
         return push / (inner + self.reach * slope)
 
-    def advance(self, v: Array, middle: Array) -> Array:
-        """Velocity (k,) [%/s] at the end of the step; the bristles go with it."""
+    def advance(self, v: Array, middle: Array) -> tuple[Array, Array]:
+        """Velocity (k,) [%/s] at the end of the step and its mean; the bristles go with it."""
         limit = np.sign(middle) * self.level
         self.f = limit + (self.f - limit) * np.exp(-self.step_s * np.abs(middle) * self.per)
-        return 2.0 * middle - v
+        return 2.0 * middle - v, middle
 
 
 class _Rise:
@@ -284,11 +332,19 @@ class _Contact:
         return pressed * (p - self.at[:k]), pressed * self.reach[:k]
 
 
-def _cascade(q: Mapping[str, Array], k: int, error: Array, speed: Array, top_speed: Array, slew: Array) -> tuple[Array, Array]:
-    """Share (0..1) in which a position error (k,) [%] is outside the deadband, and the change of the wanted speed [%/s] in one step."""
-    share = np.minimum(np.maximum((np.abs(error) - q["deadband"][:k]) / q["edge"][:k] + 0.5, 0.0), 1.0)
-    wanted = share * np.minimum(np.maximum(q["position_gain"][:k] * error, -top_speed[:k]), top_speed[:k])
-    return share, np.minimum(np.maximum(wanted - speed, -slew[:k]), slew[:k])
+def _cascade(
+    q: Mapping[str, Array], k: int, error: Array, next_error: Array, travel: Array, speed: Array, top_speed: Array, slew: Array
+) -> tuple[Array, Array]:
+    """Share (0..1) in which a position error (k,) [%] is outside the deadband, and the change of the wanted speed [%/s] in one step.
+
+    error: in the middle of a step over `travel` [%], next_error: at its end, which is what the wanted speed there follows.
+    """
+    # a deadband narrower than the step's travel sets in within the step
+    share = np.minimum(np.maximum((np.abs(error) - q["deadband"][:k]) / np.maximum(q["edge"][:k], np.abs(travel)) + 0.5, 0.0), 1.0)
+    wanted = np.minimum(np.maximum(q["position_gain"][:k] * next_error, -top_speed[:k]), top_speed[:k])
+    slew = slew[:k]
+    outside, inside = np.minimum(np.maximum(wanted - speed, -slew), slew), np.minimum(np.maximum(-speed, -slew), slew)
+    return share, share * outside + (1 - share) * inside
 
 
 def cascade_step(
@@ -300,7 +356,8 @@ def cascade_step(
     """
     one = {k: np.atleast_1d(np.asarray(q[k], float)) for k in ("deadband", "edge", "position_gain", "speed_full", "rise")}
     slew = step_s * one["speed_full"] / np.maximum(one["rise"], 1e-4)
-    share, change = _cascade(one, 1, np.atleast_1d(error), np.atleast_1d(wanted), one["speed_full"] * speed, slew)
+    seen, fresh = (np.atleast_1d(error - (share * step_s - q["delay"]) * velocity) for share in (0.5, 1.0))
+    share, change = _cascade(one, 1, seen, fresh, np.atleast_1d(step_s * velocity), np.atleast_1d(wanted), one["speed_full"] * speed, slew)
     s, w = float(share[0]), wanted + float(change[0])
     # within the deadband the integral holds: the reference goes with the drive
     return s * (reference + 0.5 * step_s * (wanted + w)) + (1 - s) * (reference + step_s * velocity), w

@@ -41,6 +41,8 @@ class MoveData:
 def moves_from_rest(trial: MotorTrial, sigma: tuple[float, float], speed_full: float) -> tuple[MoveData, ...]:
     """The commanded moves of a log that start with the drive at rest; empty where no setpoint is logged.
 
+    The current of the last sample before a command may be of the command already, as channels are read one after the other: it belongs to no move.
+
     sigma: noise of position [%] and current [raw]. speed_full: raw full scale of the speed column.
     """
     if trial.setpoint is None:
@@ -49,13 +51,13 @@ def moves_from_rest(trial: MotorTrial, sigma: tuple[float, float], speed_full: f
     whole = trial.speed is not None and speed_full > 1 and np.allclose(trial.speed * speed_full, np.round(trial.speed * speed_full))
     speed_sd = 1 / (np.sqrt(12) * speed_full) if whole else 1e-4
     change = np.flatnonzero(np.diff(trial.setpoint) != 0)
-    ends = np.append(change[1:], len(t) - 1)
+    ends = np.append(change[1:] - 1, len(t) - 1)
     found = []
     for i, j in zip(change, ends, strict=True):
         look = slice(max(0, i - BEFORE + 1), i + 1)
         if j - i < 8 or trial.setpoint[i + 1] == trial.setpoint[i] or (rest := _rest(t[look], p[look], sigma_position)) is None:
             continue
-        held = trial.current[look]
+        held = trial.current[look][:-1]
         speed = 1.0 if trial.speed is None else float(trial.speed[i + 1])
         limit = np.inf if trial.limit is None else float(trial.limit[i + 1])
         gap = float(t[i + 1] - t[i])

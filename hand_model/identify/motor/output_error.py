@@ -12,18 +12,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .drive import STEP_S, Moves, simulate
+from .drive import STEP_S, Moves, Run, run
 from .moves import MoveData
 
 Array = NDArray[np.float64]
 
 COARSE_S = 5e-3
 # steps [s], rounds, fall of the misfit that is worth another round, width [%] over which a deadband sets in: what sets in softly has no kinks
-COARSE, SOFT, FINE = (COARSE_S, 4, 5.0, 0.5), (STEP_S, 4, 5.0, 0.25), (STEP_S, 8, 0.5, 0.1)
-ALIGN = (COARSE, (STEP_S, 4, 0.5, 0.1))  # where only the moves' own unknowns are sought
+COARSE, SOFT, FINE = (COARSE_S, 4, 5.0, 0.5), (STEP_S, 4, 5.0, 0.25), (STEP_S, 8, 0.5, 0.02)
+ALIGN = (COARSE, (STEP_S, 4, 0.5, 0.02))  # where only the moves' own unknowns are sought
 STAGES = {"profile": (COARSE, FINE), "cascade": (COARSE, SOFT, FINE)}
 ABSOLUTE_REACH = {"preload": 20.0, "viscous": 0.1, "stiffness": 0.2, "coulomb": 10.0, "bristle": 0.01, "damping": 2.0, "rise": 0.02, "fall": 0.02, "deadband": 0.2, "delay": 0.002, "lead": 0.002, "lag": 0.002}
-TICK_S = 1e-3  # what instants of the controller's steps are known to: a current that jumps within it says little
+TICK_S = 1e-3  # of the controller
+REACH_S = 1.5 * TICK_S  # what the instant of a jump is known to, half a step at its end and one at its begin: a current that jumps within it says little
 # differences wide enough that the instants at which a drive sticks or a deadband sets in, held to one step, average out
 STEP_SHARE, OWN_STEP = 2e-2, (1e-3, 1e-2, 1e-3, 0.5)
 # a loop that holds its value for a step of 0 to 2 ms acts half a step late, and half a step after the value that is logged; a generator that
@@ -81,24 +82,22 @@ def _simulated(
 ) -> list[tuple[Array, Array]]:
     order = np.argsort([-m.time_s[-1] for m in data], kind="stable")
     full = {k: np.full(len(data), v) for k, v in q.items()}
-    t, p, u = simulate(_arrays([data[i] for i in order], own[order], 1), full, step_s, controller)
+    found = run(_arrays([data[i] for i in order], own[order], 1), full, step_s, controller)
     out: list = [None] * len(data)
     for column, i in enumerate(order):
-        c, at = slice(column, column + 1), data[i].time_s
-        out[i] = _sample(t, p[:, c], u[:, c], at, q.get("lead", 0.0))[:, :, 0], _weights(t, u[:, column], at, sigma)
+        out[i] = _one(found, column, data[i].time_s, sigma)
     return out
 
 
-def _sample(t: Array, p: Array, u: Array, at: Array, lead: Array | float = 0.0) -> Array:
-    """Position and current (n, 2, columns) of simulated columns (k, columns) at times `at` (n,) [s], the current `lead` [s] later."""
-    step = t[1] - t[0]
-    out = []
-    for y, shift in ((p, np.zeros_like(lead)), (u, lead)):
-        x = np.clip((at[:, None] + shift) / step, 0.0, len(t) - 1.001)
-        i = x.astype(int)
-        column = np.arange(y.shape[1])
-        out.append(y[i, column] * (1 - (x - i)) + y[i + 1, column] * (x - i))
-    return np.stack(out, axis=1)
+def _one(found: Run, column: int, at_s: Array, sigma: tuple[float, float]) -> tuple[Array, Array]:
+    """Position and current (n, 2) of one simulated move, and the inverse standard deviations to which they are known, (n, 2).
+
+    The current's holds half its change from REACH_S before to REACH_S after the sample: what the controller's steps leave open.
+    """
+    n, c = len(at_s), slice(column, column + 1)
+    p, u = (y[:, 0] for y in found.sample(c, np.concatenate([at_s, at_s - REACH_S, at_s + REACH_S])))
+    change = 0.5 * (u[2 * n :] - u[n : 2 * n])
+    return np.c_[p[:n], u[:n]], np.c_[np.full(n, 1 / sigma[0]), 1 / np.hypot(sigma[1], change)]
 
 
 def _steps(values: Mapping[str, float], names: Sequence[str]) -> Array:
@@ -129,34 +128,23 @@ def _linearise(
     for i, small in enumerate(own_step):
         owns[k + 1 + i :: width, i] += small
     coarse_s = COARSE_S if controller == "profile" else step_s
-    t, p, u = simulate(_arrays(ordered, owns, width), values, coarse_s, controller)
-    if step_s < coarse_s:
-        fine_t, fine_p, fine_u = simulate(_arrays(ordered, own[order], 1), {n: np.full(len(data), v) for n, v in q.items()}, step_s, controller)
-    else:
-        fine_t, fine_p, fine_u = t, p[:, ::width], u[:, ::width]
+    varied = run(_arrays(ordered, owns, width), values, coarse_s, controller)
+    base = run(_arrays(ordered, own[order], 1), {n: np.full(len(data), v) for n, v in q.items()}, step_s, controller) if step_s < coarse_s else varied
+    per = 1 if step_s < coarse_s else width
     out_r: list = [None] * len(data)
     out_g: list = [None] * len(data)
     out_l: list = [None] * len(data)
     out_w: list = [None] * len(data)
     for column, i in enumerate(order):
-        m, c, one = data[i], slice(column * width, (column + 1) * width), slice(column, column + 1)
-        weight = _weights(fine_t, fine_u[:, column], m.time_s, sigma)
-        base = _sample(fine_t, fine_p[:, one], fine_u[:, one], m.time_s, q.get("lead", 0.0))[:, :, 0]
-        out_r[i] = ((np.stack([m.position, m.current], axis=1) - base) * weight).T.ravel()
-        y = _sample(t, p[:, c], u[:, c], m.time_s, values["lead"][c] if "lead" in q else 0.0) * weight[:, :, None]  # (n, 2, width)
-        derivative = (y[:, :, 1:] - y[:, :, :1]) / np.append(steps, own_step)
+        m = data[i]
+        y, weight = _one(base, column * per, m.time_s, sigma)
+        out_r[i] = ((np.stack([m.position, m.current], axis=1) - y) * weight).T.ravel()
+        y = np.stack(varied.sample(slice(column * width, (column + 1) * width), m.time_s), axis=1) * weight[:, :, None]  # (n, 2, width)
+        with np.errstate(invalid="ignore"):  # drives that ran away
+            derivative = (y[:, :, 1:] - y[:, :, :1]) / np.append(steps, own_step)
         derivative = np.nan_to_num(derivative.transpose(1, 0, 2).reshape(-1, width - 1), posinf=0.0, neginf=0.0)
         out_g[i], out_l[i], out_w[i] = derivative[:, :k], derivative[:, k:], weight
     return out_r, out_g, out_l, out_w
-
-
-def _weights(t: Array, u: Array, at: Array, sigma: tuple[float, float]) -> Array:
-    """Inverse standard deviations (n, 2) of position and current: the current's holds its change within TICK_S of the sample."""
-    reach = max(TICK_S, t[1] - t[0])
-    i = np.clip(((at - reach) / (t[1] - t[0])).astype(int), 0, len(t) - 1)
-    j = np.clip(np.ceil((at + reach) / (t[1] - t[0])).astype(int), 0, len(t) - 1)
-    change = (u[j] - u[i]) * (TICK_S / np.maximum((j - i) * (t[1] - t[0]), TICK_S))
-    return np.c_[np.full(len(at), 1 / sigma[0]), 1 / np.hypot(sigma[1], change)]
 
 
 def _misfit(residual: list[Array], data: Sequence[MoveData], own: Array, q: Mapping[str, float]) -> float:
@@ -174,11 +162,11 @@ def _costs(
     order = np.argsort([-m.time_s[-1] for m in data], kind="stable")
     values = {n: np.tile([q[n] for q in qs], len(data)) for n in qs[0]}
     own = np.stack(owns, axis=1)[order].reshape(len(data) * width, -1)
-    t, p, u = simulate(_arrays([data[i] for i in order], own, width), values, step_s, controller)
+    found = run(_arrays([data[i] for i in order], own, width), values, step_s, controller)
     residual: list = [None] * len(data)
     for column, i in enumerate(order):
-        m, c = data[i], slice(column * width, (column + 1) * width)
-        y = _sample(t, p[:, c], u[:, c], m.time_s, values["lead"][c] if "lead" in values else 0.0)
+        m = data[i]
+        y = np.stack(found.sample(slice(column * width, (column + 1) * width), m.time_s), axis=1)
         residual[i] = ((np.stack([m.position, m.current], axis=1)[:, :, None] - y) * weights[i][:, :, None]).transpose(1, 0, 2).reshape(-1, width)
     costs = np.array([_misfit([e[:, j] for e in residual], data, owns[j], qs[j]) for j in range(width)])
     best = int(np.argmin(costs))
