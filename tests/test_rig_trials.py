@@ -233,6 +233,6 @@ def test_a_closer_law_is_taken_where_the_recordings_ask_for_it(tmp_path: Path) -
         lanes = tuple(replace(lane, position=q[: len(lane.position), k] + e[k, : len(lane.position)]) for k, lane in enumerate(blank.lanes))
         swing = replace(blank, lanes=lanes)
         fit = fit_stages([swing], [Task(all_free(swing, [gear]), vector(line), ())], 12)[0]
-        found = refine_swing([swing], fit, [gear], ())
+        found = refine_swing([swing], fit, [gear])
         assert [v.effect for v, _ in found] == (["load_dependent_friction"] if planted is not line else [])
-    assert refine_swing([swing], fit, [], ()) == ()
+    assert refine_swing([swing], fit, []) == ()

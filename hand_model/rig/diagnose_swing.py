@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,21 +16,20 @@ from .model import RigModel, load_rig
 from .replay import RigResiduals, replay_rig
 from .states import fill_gaps, noise_std
 from .swing import INDEX, PARAMETERS, STEP_S, Fitted, Swing, Task, parameter_units, vector
-from .swing_build import build_swing, windows_s
+from .swing_build import build_swing, search_step_s, windows_s
 from .swing_compete import Round, Variant, all_free, compete_swing, fit_stages, free_declared, refine_swing
 from .swing_interval import intervals
 from .swing_patch import write_swing
 from .words import shares, statement
 
-SEARCH_STEP_S = 4e-3
 RESAMPLES = 500
 NOT_BORNE_OUT = "error on validation trials does not fall"
 
 
 def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Callable[[str], None]) -> tuple:
     """The same for one joint driven by a voltage or by nothing: MuJoCo's motion in open loop is what is compared."""
-    windows = windows_s(rig, fit)
-    stages = [build_swing(rig, fit, SEARCH_STEP_S, w) for w in windows]
+    windows, step = windows_s(rig), search_step_s(rig)
+    stages = [build_swing(rig, fit, step, w) for w in windows]
     free = free_declared(stages[0])
     declared = fit_stages(stages, [Task(free, vector(stages[0].initial), ())], 15)[0]
     floor, held = _resolution(rig), bool(rig.select(True))  # without validation recordings the training ones measure
@@ -39,7 +38,8 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
     kept += refine_swing(stages, rounds[-1].fit, taken) if rounds else ()
     say(f"{rig.name}: {', '.join(v.key for v, _ in kept) or 'nothing'}")
     # Last, at the step of the replay; a free swing over whole recordings, for its phase is known well enough by now.
-    fine = [build_swing(rig, fit, STEP_S, w) for w in (windows if stages[0].driven else (*windows[1:], np.inf))]
+    last_stages = [(STEP_S, windows[-1])] if stages[0].driven else [(step, np.inf), (STEP_S, np.inf)]
+    fine = [build_swing(rig, fit, *stage) for stage in last_stages]
     known: dict[tuple[str, ...], Link] = {}
     while True:
         last = kept[-1][1].fit.theta if kept else declared.theta
@@ -50,11 +50,12 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
             break
         rejected.append({"effect": kept.pop(worse)[0].key, "reason": NOT_BORNE_OUT})
     found = []
+    ends = intervals(build_swing(rig, fit, STEP_S, windows[-1]), chain[-1].free, chain[-1].fit.theta)
     for k, (variant, round_) in enumerate(kept):
         proof = {"metric": "position_rmse", "unit": rig.unit(rig.joints[0]), "before": figures[k], "after": figures[k + 1],
                  "noise_floor": floor, "ci95_reduction": _fall(chain[k].replay, chain[k + 1].replay, held),
                  "held_out": [t.name for t in rig.select(held)], "engine": "mujoco"}  # fmt: skip
-        found.append(_swing_finding(rig, variant, round_, fine[0], chain[-1], proof))
+        found.append(_swing_finding(rig, variant, round_, ends, chain[-1], proof))
     means = [c.replay.figure("position_mae", held) for c in (chain[0], chain[-1])]
     lack = {"metric": "position_rmse", "unit": rig.unit(rig.joints[0]), "before": figures[0], "after": figures[-1],
             "one_effect": figures[min(1, len(figures) - 1)],
@@ -116,10 +117,10 @@ def _fall(before: Any, after: Any, held: bool) -> list[float]:
     return [float(x) for x in np.percentile(fall, [2.5, 97.5])]
 
 
-def _swing_finding(rig: RigModel, variant: Variant, round_: Round, swing: Swing, link: Link, proof: dict) -> Finding:
-    """parameters: beside all effects that were kept (link), with intervals."""
+def _swing_finding(rig: RigModel, variant: Variant, round_: Round, ends: Mapping[str, tuple[float, float]], link: Link,
+                   proof: dict) -> Finding:  # fmt: skip
+    """parameters: beside all effects that were kept (link), with their intervals (ends)."""
     joint = rig.joints[0]
-    ends = intervals(swing, link.free, link.fit.theta)
     units = parameter_units(rig.unit(joint), rig.effort_unit(joint))
     parameters = {n: {"value": float(link.fit.theta[INDEX[n]]), "unit": units.get(n, "1"), "ci95": list(ends[n])}
                   for n in variant.start}  # fmt: skip

@@ -195,7 +195,7 @@ def _next_speed(p: Mapping[str, Array], has: Mapping[str, bool], v: Array, exter
     if has["offset"]:
         effort = effort + p["offset"]
     if has["wet"]:
-        share = 1.0 / (1.0 + p["hi"] * (p["wet"] + _wet(p, has, v, external)))
+        share = 1.0 / (1.0 + p["hi"] * _wet(p, has, v, external))
         shove = p["hi"] * share
     if has["dry"]:
         stop = shove * _dry(p, has, v, external, motor)
@@ -223,14 +223,14 @@ def _dry(p: Mapping[str, Array], has: Mapping[str, bool], v: Array, external: Ar
 
 
 def _wet(p: Mapping[str, Array], has: Mapping[str, bool], v: Array, external: Array) -> Array:
-    """Viscous damping (L,) besides the declared."""
-    b = np.zeros_like(v)
+    """Viscous damping (L,), the motor's own included."""
+    b = p["wet"]
     if has["load_speed"]:
-        b += p["load_speed"] * np.abs(external)
+        b = b + p["load_speed"] * np.abs(external)
     if has["drag"]:
-        b += p["drag"] * np.abs(v)
+        b = b + p["drag"] * np.abs(v)
     if has["damping_asymmetry"]:
-        b += p["damping_asymmetry"] * np.sign(v)
+        b = b + p["damping_asymmetry"] * np.sign(v)
     return b
 
 

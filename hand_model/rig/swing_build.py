@@ -17,16 +17,28 @@ from .swing import STEP_S, Lane, Swing
 # A trial is fitted in stretches (multiple shooting, Bock 1981), in periods of the free swing: short ones where a drive
 # keeps the motion going, for then the cost is smooth; longer ones where damping is all there is to see.
 DRIVEN_PERIODS, FREE_PERIODS = (1.3,), (2.5, 10.0)
+DRIVEN_STEP_S, STEPS_A_PERIOD = 4e-3, 200
 LEAST_STRETCHES = 4  # some to fit, some to leave out
 
 
-def windows_s(rig: RigModel, fit: DeclaredFit) -> tuple[float, ...]:
+def free_period_s(rig: RigModel) -> float:
+    """Period [s] of small swings of the declared model about its rest; 1 s where nothing pulls it back."""
+    model = compile_model(rig)
+    sine, cosine, inertia = _rigid(model)
+    weight = max(abs(sine), abs(cosine))
+    return float(2 * np.pi * np.sqrt((inertia + model.dof_armature[0]) / weight)) if weight > 0 else 1.0
+
+
+def windows_s(rig: RigModel) -> tuple[float, ...]:
     """Lengths [s] of the stretches, one stage after the other."""
-    swing = build_swing(rig, fit, 1e-2, np.inf)
-    weight = max(abs(swing.sine), abs(swing.cosine))
-    period = 2 * np.pi * np.sqrt(swing.initial["inertia"] / weight) if weight > 0 else 1.0
     longest = sum(float(t.time_s[-1]) for t in rig.select(False)) / LEAST_STRETCHES
-    return tuple(min(k * period, longest) for k in (DRIVEN_PERIODS if swing.driven else FREE_PERIODS))
+    periods = DRIVEN_PERIODS if rig.drive(rig.joints[0]) is not None else FREE_PERIODS
+    return tuple(min(k * free_period_s(rig), longest) for k in periods)
+
+
+def search_step_s(rig: RigModel) -> float:
+    """Step [s] that is fine enough to choose by: a recorded drive is followed, a free swing has a period to be resolved."""
+    return DRIVEN_STEP_S if rig.drive(rig.joints[0]) is not None else free_period_s(rig) / STEPS_A_PERIOD
 
 
 def can_swing(rig: RigModel) -> bool:
