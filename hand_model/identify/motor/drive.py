@@ -26,6 +26,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 STEP_S = 2e-3
+BEYOND_S = 2e-3  # simulated beyond a move's end, where what is known of a sample needs it
+EARLY_S = 0.01  # simulated before a move's own zero, for a command that took effect before it
 SHARED = ("inertia", "viscous", "coulomb", "stiffness", "preload", "presliding", "bristle", "speed_full", "rise", "gain", "damping", "delay", "lead")
 CONTROLLERS = {"profile": (*SHARED, "fall", "lag"), "cascade": (*SHARED, "position_gain", "deadband")}
 STRIBECK = ("static_ratio", "stribeck_speed")
@@ -56,27 +58,41 @@ class Moves:
 def profile(time_s: Array, moves: Moves, q: Mapping[str, Array]) -> tuple[Array, Array]:
     """Reference [%] and its velocity [%/s], (n, B), of trapezoidal moves at times (n,) [s]; the velocity `lag` [s] behind."""
     t = time_s[:, None] - moves.start_s
-    sign = np.sign(moves.target - moves.origin)
-    return moves.origin + sign * _trapezoid(t, moves, q)[0], sign * _trapezoid(t - q["lag"], moves, q)[1]
+    sign, shape = np.sign(moves.target - moves.origin), _Trapezoid(moves, q)
+    return moves.origin + sign * shape.way(t), sign * shape.speed(t - q["lag"])
 
 
-def _trapezoid(t: Array, moves: Moves, q: Mapping[str, Array]) -> tuple[Array, Array]:
-    """Way [%] and speed [%/s], (n, B), at times (n, B) [s] after the command."""
-    distance = np.abs(moves.target - moves.origin)
-    up, down = q["speed_full"] / np.maximum(q["rise"], 1e-4), q["speed_full"] / np.maximum(q["fall"], 1e-4)
-    top = np.minimum(q["speed_full"] * moves.speed, np.sqrt(2 * distance * up * down / (up + down)))
-    top = np.maximum(top, 1e-9)
-    t_up, t_down = top / up, top / down
-    t_flat = np.maximum(distance / top - 0.5 * (t_up + t_down), 0.0)
-    a = np.minimum(np.maximum(t, 0.0), t_up)
-    b = np.minimum(np.maximum(t - t_up, 0.0), t_flat)
-    c = np.minimum(np.maximum(t - t_up - t_flat, 0.0), t_down)
-    return 0.5 * up * a * a + top * b + (top - 0.5 * down * c) * c, up * a - down * c
+class _Trapezoid:
+    """Way [%] and speed [%/s] of moves over the time since their command."""
+
+    def __init__(self, moves: Moves, q: Mapping[str, Array]) -> None:
+        distance = np.abs(moves.target - moves.origin)
+        self.up, self.down = q["speed_full"] / np.maximum(q["rise"], 1e-4), q["speed_full"] / np.maximum(q["fall"], 1e-4)
+        top = np.minimum(q["speed_full"] * moves.speed, np.sqrt(2 * distance * self.up * self.down / (self.up + self.down)))
+        self.top = np.maximum(top, 1e-9)
+        self.rise, self.fall = self.top / self.up, self.top / self.down
+        self.flat = np.maximum(distance / self.top - 0.5 * (self.rise + self.fall), 0.0)
+
+    def way(self, t: Array) -> Array:
+        """Way [%] at times (n, B) [s] after the command."""
+        a = _within(t, self.rise)
+        b = _within(t - self.rise, self.flat)
+        c = _within(t - (self.rise + self.flat), self.fall)
+        return 0.5 * self.up * a * a + self.top * b + (self.top - 0.5 * self.down * c) * c
+
+    def speed(self, t: Array) -> Array:
+        """Speed [%/s] at times (n, B) [s] after the command."""
+        return self.up * _within(t, self.rise) - self.down * _within(t - (self.rise + self.flat), self.fall)
+
+
+def _within(t: Array, duration: Array) -> Array:
+    """Times (n, B) cut to 0..duration (B,)."""
+    return np.minimum(np.maximum(t, 0.0), duration)
 
 
 @dataclass(frozen=True)
 class Run:
-    """Simulated moves. time_s (n,) [s]; position (n, B) [%]; feedback (n, B) [raw]: the current without what a reference that is known
+    """Simulated moves. time_s (n,) [s], from EARLY_S before their zero; position (n, B) [%]; feedback (n, B) [raw]: the current without what a reference that is known
     beforehand adds, and unlimited; moves and q (each (B,)) that were simulated. Rows after a move's duration are not filled."""
 
     time_s: Array
@@ -88,6 +104,7 @@ class Run:
 
     def sample(self, columns: slice, at_s: Array) -> tuple[Array, Array]:
         """Position [%] and, `lead` later, current [raw], (k, columns), of moves at times (k,) [s], the jumps of the reference where they are."""
+        at_s = at_s + EARLY_S
         q = {n: self.q[n][columns] for n in ("gain", "damping", "speed_full", "rise", "fall", "lag", "lead") if n in self.q}
         lead = q.get("lead", 0.0) + np.zeros(self.position[:1, columns].shape[1])
         position = _interpolated(self.position[:, columns], at_s[:, None] / self.time_s[1])
@@ -113,7 +130,11 @@ def run(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, controller
     Every move starts at rest in balance, so its friction there is what the controller pushes less the spring; where it creeps,
     friction is that of sliding. Friction without presliding in any set sticks hard.
     """
-    n = int(np.ceil((moves.duration_s.max() + max(0.0, float(np.max(q.get("lead", 0.0))))) / step_s)) + 2
+    beyond = BEYOND_S + max(0.0, float(np.max(q.get("lead", 0.0))))
+    moves = dataclasses.replace(
+        moves, start_s=moves.start_s + EARLY_S, position=moves.position - EARLY_S * moves.velocity, duration_s=moves.duration_s + EARLY_S + beyond
+    )
+    n = int(np.ceil(moves.duration_s.max() / step_s)) + 2
     time_s = np.arange(n) * step_s
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # values that a search tries may let a drive run away
         steer = _Cascade(moves, q, step_s, time_s) if controller == "cascade" else _Profile(moves, q, time_s)
@@ -127,13 +148,13 @@ def run(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, controller
 def simulate(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, controller: str = "profile") -> tuple[Array, Array, Array]:
     """Time (n,) [s], position (n, B) [%] and current (n, B) [raw] of `run`, at its steps."""
     found = run(moves, {**q, "lead": np.zeros(len(moves.target))}, step_s, controller)
-    return found.time_s, *found.sample(slice(None), found.time_s)
+    time_s = found.time_s[: -round(EARLY_S / step_s)]
+    return time_s, *found.sample(slice(None), time_s)
 
 
 def _run(moves: Moves, q: Mapping[str, Array], steer: _Profile | _Cascade, step_s: float, n: int, limit: Array | float) -> tuple[Array, Array]:
     """Position [%] and the current that is asked for [raw], (n, B), of drives that follow what `steer` says, with no more current than the limit [raw]."""
-    over = 2 * step_s + max(0.0, float(np.max(q.get("lead", 0.0))))
-    active = np.searchsorted(-moves.duration_s, over - np.arange(n) * step_s, side="right")
+    active = np.searchsorted(-moves.duration_s, -((np.arange(n) - 2) * step_s), side="right")
     position, current = np.zeros((n, len(moves.target))), np.zeros((n, len(moves.target)))
     half = 0.5 * step_s
     p, v = moves.position.copy(), np.zeros(len(moves.target)) + moves.velocity
@@ -185,9 +206,11 @@ class _Profile:
 
     def __init__(self, moves: Moves, q: Mapping[str, Array], time_s: Array) -> None:
         t, sign = time_s[:, None] - moves.start_s, np.sign(moves.target - moves.origin)
-        r = moves.origin + sign * _trapezoid(t, moves, q)[0]
-        way, speed = _trapezoid(t - q["lag"], moves, q)
-        self.at = q["gain"] * r + q["damping"] * sign * speed
+        shape = _Trapezoid(moves, q)
+        r = moves.origin + sign * shape.way(t)
+        t -= q["lag"]
+        way = shape.way(t)
+        self.at = q["gain"] * r + q["damping"] * sign * shape.speed(t)
         # the mean over a step is exact where the velocity jumps within it
         self.between = np.empty_like(r)
         self.between[:-1] = q["gain"] * 0.5 * (r[1:] + r[:-1]) + q["damping"] * sign * np.diff(way, axis=0) / (time_s[1] - time_s[0])
@@ -264,7 +287,11 @@ class _Stick:
         """Velocity (k,) [%/s] at the end of the step and its mean; a drive that would turn round has stopped within the step."""
         fresh = 2.0 * middle - v
         stopped = fresh * v < 0.0
-        return np.where(stopped, 0.0, fresh), np.where(stopped, 0.5 * v * v / np.where(stopped, v - fresh, 1.0), middle)
+        if stopped.any():
+            u = v[stopped]
+            middle = middle.copy()
+            middle[stopped], fresh[stopped] = 0.5 * u * u / (u - fresh[stopped]), 0.0
+        return fresh, middle
 
 
 class _Bristles:

@@ -71,7 +71,6 @@ LACK_OF_FIT = 0.5  # systematic misfit [noise variances] above which output erro
 CLAIM = 6.0  # standard errors, by a jackknife over some forty strokes, above which the regression claims a Stribeck rise
 ROOM = 3.0  # the same, above which output error tries one
 REGRESSION_MISFIT = 4.0  # the same for the regression; noise with a memory of a sample or two reaches 3
-UNREST = 1.3  # mean square of the residuals [noise variances] above which they are weighed anew
 EVIDENCE = 16.0  # fall of the misfit (in variances, two parameters and two shapes tried): once in about a thousand by chance
 
 
@@ -226,7 +225,7 @@ def _fit_output_error(
     # a rise is tried where the regression, which knows no controller, leaves room for one
     if curved.excess_z > ROOM and (_claims(curved) or max(best.chi2) < 4.0):
         best, evidence = _with_rise(best, curved)
-    if max(best.chi2) > UNREST and lack_of_fit(best) < LACK_OF_FIT:
+    if lack_of_fit(best) < LACK_OF_FIT:
         best = output_error.reweighted(best, BOUNDS)
     return best, evidence
 

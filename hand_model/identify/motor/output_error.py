@@ -6,20 +6,23 @@ drive rested. Shared: plant, friction and controller. Gauss-Newton on whitened r
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .covariance import covariance
 from .drive import STEP_S, Moves, Run, run
+from .memory import Predictors, autocorrelation, freed, predictors
 from .moves import MoveData
 
 Array = NDArray[np.float64]
 
 COARSE_S = 5e-3
 # steps [s], rounds, fall of the misfit that is worth another round, width [%] over which a deadband sets in: what sets in softly has no kinks
-COARSE, SOFT, FINE = (COARSE_S, 4, 5.0, 0.5), (STEP_S, 4, 5.0, 0.25), (STEP_S, 8, 0.5, 0.02)
+COARSE, SOFT, FINE = (COARSE_S, 4, 5.0, 0.5), (COARSE_S, 4, 5.0, 0.1), (STEP_S, 8, 0.5, 0.02)
 ALIGN = (COARSE, (STEP_S, 4, 0.5, 0.02))  # where only the moves' own unknowns are sought
 STAGES = {"profile": (COARSE, FINE), "cascade": (COARSE, SOFT, FINE)}
 ABSOLUTE_REACH = {"preload": 20.0, "viscous": 0.1, "stiffness": 0.2, "coulomb": 10.0, "bristle": 0.01, "damping": 2.0, "rise": 0.02, "fall": 0.02, "deadband": 0.2, "delay": 0.002, "lead": 0.002, "lag": 0.002}
@@ -31,15 +34,17 @@ STEP_SHARE, OWN_STEP = 2e-2, (1e-3, 1e-2, 1e-3, 0.5)
 # sums up its reference step by step has the velocity up to half a step behind. Without this the motion alone, which tells inertia less damping
 # times delay, lets the two run off together
 PRIOR = {"lead": (0.5 * TICK_S, 0.5 * TICK_S), "delay": (0.5 * TICK_S, TICK_S), "lag": (0.25 * TICK_S, 0.75 * TICK_S)}
+AGAIN = (STEP_S, 3, 0.5, 0.02)
+UNREST, MEMORY = 1.3, 0.1  # mean square [noise variances] and correlation from sample to sample above which residuals are weighed anew
 SEARCH = 1.15  # scatter of where the search ends, among kinks and in details of the controller, over that of the linear model, on simulated drives (scripts/motor_accuracy.py)
 OWN_REACH = np.array([0.01, 0.3, 0.01, 10.0])  # of one step
 
 
 @dataclass(frozen=True)
 class OutputErrorFit:
-    """values: parameter -> value; names: fitted, in the order of covariance (k, k), a sandwich over moves. sigma: noise of
+    """values: parameter -> value; names: fitted, in the order of covariance (k, k), see `covariance`. sigma: noise of
     position [%] and current [raw]; residual: per move (n, 2), in these units. own: (moves, 4), see MoveData. chi2: mean squared whitened residual per channel.
-    controller: kind of the reference, see `drive`."""
+    controller: kind of the reference, see `drive`. memory: of the noise of both channels, none where empty."""
 
     values: Mapping[str, float]
     names: tuple[str, ...]
@@ -51,6 +56,7 @@ class OutputErrorFit:
     cost: float
     chi2: tuple[float, float]
     controller: str = "profile"
+    memory: tuple[Predictors, ...] = ()
 
 
 def _arrays(data: Sequence[MoveData], own: Array, repeat: int) -> Moves:
@@ -107,7 +113,7 @@ def _steps(values: Mapping[str, float], names: Sequence[str]) -> Array:
 
 def _linearise(
     data: Sequence[MoveData], q: Mapping[str, float], names: Sequence[str], own: Array, sigma: tuple[float, float], controller: str, step_s: float,
-    width_share: float = 1.0,
+    width_share: float = 1.0, memory: tuple[Predictors, ...] = (),
 ) -> tuple[list[Array], list[Array], list[Array], list[Array]]:
     """Whitened residuals (2n,) at steps of step_s [s], shared (2n, k) and own (2n, 4) Jacobian of every move; weights (n, 2).
 
@@ -127,7 +133,7 @@ def _linearise(
     owns = np.repeat(own[order], width, axis=0)
     for i, small in enumerate(own_step):
         owns[k + 1 + i :: width, i] += small
-    coarse_s = COARSE_S if controller == "profile" else step_s
+    coarse_s = COARSE_S
     varied = run(_arrays(ordered, owns, width), values, coarse_s, controller)
     base = run(_arrays(ordered, own[order], 1), {n: np.full(len(data), v) for n, v in q.items()}, step_s, controller) if step_s < coarse_s else varied
     per = 1 if step_s < coarse_s else width
@@ -144,7 +150,7 @@ def _linearise(
             derivative = (y[:, :, 1:] - y[:, :, :1]) / np.append(steps, own_step)
         derivative = np.nan_to_num(derivative.transpose(1, 0, 2).reshape(-1, width - 1), posinf=0.0, neginf=0.0)
         out_g[i], out_l[i], out_w[i] = derivative[:, :k], derivative[:, k:], weight
-    return out_r, out_g, out_l, out_w
+    return [freed(e, memory) for e in out_r], [freed(e, memory) for e in out_g], [freed(e, memory) for e in out_l], out_w
 
 
 def _misfit(residual: list[Array], data: Sequence[MoveData], own: Array, q: Mapping[str, float]) -> float:
@@ -155,7 +161,8 @@ def _misfit(residual: list[Array], data: Sequence[MoveData], own: Array, q: Mapp
 
 
 def _costs(
-    data: Sequence[MoveData], qs: Sequence[Mapping[str, float]], owns: Sequence[Array], weights: list[Array], controller: str, step_s: float
+    data: Sequence[MoveData], qs: Sequence[Mapping[str, float]], owns: Sequence[Array], weights: list[Array], controller: str, step_s: float,
+    memory: tuple[Predictors, ...] = (),
 ) -> tuple[Array, int, list[Array]]:
     """Misfit of several candidates (their shared values and own unknowns) at fixed weights, in one batch of simulations; the best, its residuals."""
     width = len(qs)
@@ -167,7 +174,8 @@ def _costs(
     for column, i in enumerate(order):
         m = data[i]
         y = np.stack(found.sample(slice(column * width, (column + 1) * width), m.time_s), axis=1)
-        residual[i] = ((np.stack([m.position, m.current], axis=1)[:, :, None] - y) * weights[i][:, :, None]).transpose(1, 0, 2).reshape(-1, width)
+        error = ((np.stack([m.position, m.current], axis=1)[:, :, None] - y) * weights[i][:, :, None]).transpose(1, 0, 2).reshape(-1, width)
+        residual[i] = freed(error, memory)
     costs = np.array([_misfit([e[:, j] for e in residual], data, owns[j], qs[j]) for j in range(width)])
     best = int(np.argmin(costs))
     return costs, best, [e[:, best] for e in residual]
@@ -182,10 +190,12 @@ def fit(
     controller: str = "profile",
     stages: Sequence[tuple[float, int, float, float]] = (),
     own: Array | None = None,
+    memory: tuple[Predictors, ...] = (),
 ) -> OutputErrorFit:
     """Fit the named parameters to the moves by damped Gauss-Newton; the others stay at `start_values`.
 
     sigma: noise of position [%] and current [raw]. bounds: parameter -> (low, high). stages: STAGES of the controller unless given. own: (moves, 4) to start from.
+    memory: of the noise of position and current.
     """
     q, own = dict(start_values), np.array([m.own for m in data]) if own is None else own.copy()
     wanted = tuple(names)
@@ -195,7 +205,7 @@ def fit(
         names = tuple(n for n in wanted if step_s < COARSE_S or n not in PRIOR)
         for _ in range(rounds):
             if fresh:
-                linear = _linearise(data, q, names, own, sigma, controller, step_s, share)
+                linear = _linearise(data, q, names, own, sigma, controller, step_s, share, memory)
                 cost = _misfit(linear[0], data, own, q)
             if not np.isfinite(cost):
                 break
@@ -205,7 +215,7 @@ def fit(
                     break
                 fresh = True
                 continue
-            moved = _step(data, q, names, own, linear[3], bounds, system, cost, damping, controller, step_s)
+            moved = _step(data, q, names, own, linear[3], bounds, system, cost, damping, controller, step_s, memory)
             if moved is None:
                 if not fresh:
                     fresh = True
@@ -221,13 +231,21 @@ def fit(
             fresh = fell < 0.5 * expected
             if fell < 0.2 * enough:
                 break
-    return _finish(data, linear, q, names, sigma, own, cost, controller, bounds)
+    return _finish(data, linear, q, names, sigma, own, cost, controller, bounds, memory, step_s)
 
 
 def reweighted(f: OutputErrorFit, bounds: Mapping[str, tuple[float, float]]) -> OutputErrorFit:
-    """The fit again with both channels weighed by what they were left with: a drive that is not quite alike twice moves by more than its encoder's noise."""
+    """The fit again, its noise as large and with the memory that the residuals show: a drive that is not quite alike twice moves by more than its
+    encoder's noise, and for longer. The fit itself where they show nothing of this."""
+    correlation = autocorrelation([e / f.sigma for e in f.residual])
+    if max(f.chi2) < UNREST and correlation[:, 1].max() < MEMORY:
+        return f
     sigma = (f.sigma[0] * float(np.sqrt(max(f.chi2[0], 1.0))), f.sigma[1] * float(np.sqrt(max(f.chi2[1], 1.0))))
-    return fit(f.moves, f.values, f.names, sigma, bounds, f.controller, (FINE,), f.own)
+    memory = tuple(predictors(c) for c in correlation)
+    # means of what has a memory are known less well
+    wider = np.sqrt(np.maximum(1 + 2 * correlation[:, 1:].sum(axis=1), 1.0) * np.maximum(f.chi2, 1.0))
+    moves = [dataclasses.replace(m, own_sd=m.own_sd * [1.0, wider[0], 1.0, wider[1]]) for m in f.moves]
+    return fit(moves, f.values, f.names, sigma, bounds, f.controller, (AGAIN,), f.own, memory)
 
 
 def _expected(normal: Array, gradient: Array, blocks: list[tuple[Array, Array, Array]]) -> float:
@@ -249,6 +267,7 @@ def _step(
     damping: float,
     controller: str,
     step_s: float,
+    memory: tuple[Predictors, ...] = (),
 ) -> tuple[dict[str, float], Array, float, float, list[Array]] | None:
     """One Levenberg-Marquardt step, the best of three dampings, or of four more: new values, own unknowns, cost, damping and residuals;
     None where nothing improves."""
@@ -269,7 +288,7 @@ def _step(
             actual = np.array([new_q[n] - q[n] for n in names])
             local = np.array([inverse @ (b - c @ actual) for inverse, b, c in blocks])
             candidates.append((new_q, own + np.clip(local, -OWN_REACH, OWN_REACH)))
-        costs, best, residual = _costs(data, [c[0] for c in candidates], [c[1] for c in candidates], weights, controller, step_s)
+        costs, best, residual = _costs(data, [c[0] for c in candidates], [c[1] for c in candidates], weights, controller, step_s, memory)
         if costs[best] < cost:
             return (*candidates[best], float(costs[best]), float(np.clip(tried[best], 1e-8, 1e3)), residual)
     return None
@@ -277,47 +296,45 @@ def _step(
 
 def _normal(
     data: Sequence[MoveData], r: list[Array], g: list[Array], local: list[Array], own: Array, q: Mapping[str, float], names: Sequence[str]
-) -> tuple[Array, Array, list[tuple[Array, Array, Array]], Array]:
-    """Shared normal matrix and gradient with every move's own unknowns eliminated, what restores these, and the score per move."""
-    k = g[0].shape[1]
-    normal, scores, blocks = np.zeros((k, k)), [], []
+) -> tuple[Array, Array, list[tuple[Array, Array, Array]], Array, Array]:
+    """Shared normal matrix and gradient with every move's own unknowns eliminated, what restores these, and by move the score and the normal matrix."""
+    parts, scores, blocks = [], [], []
     for m, e, a, b, x in zip(data, r, g, local, own, strict=True):
         w = 1 / m.own_sd**2
         inverse = np.linalg.inv(b.T @ b + np.diag(w))
         rhs, cross = b.T @ e + w * (m.own - x), b.T @ a
-        normal += a.T @ a - cross.T @ inverse @ cross
+        parts.append(a.T @ a - cross.T @ inverse @ cross)
         scores.append(a.T @ e - cross.T @ inverse @ rhs)
         blocks.append((inverse, rhs, cross))
-    gradient = np.sum(scores, axis=0)
+    gradient, normal = np.sum(scores, axis=0), np.sum(parts, axis=0)
     for i, n in enumerate(names):
         if n in PRIOR:
             mean, sd = PRIOR[n]
             normal[i, i] += 1 / sd**2
             gradient[i] -= (q[n] - mean) / sd**2
-    return normal, gradient, blocks, np.array(scores)
+    return normal, gradient, blocks, np.array(scores), np.array(parts)
 
 
 def _finish(
     data: Sequence[MoveData], linear: tuple[list[Array], ...], q: Mapping[str, float], names: Sequence[str], sigma: tuple[float, float], own: Array, cost: float,
-    controller: str, bounds: Mapping[str, tuple[float, float]],
+    controller: str, bounds: Mapping[str, tuple[float, float]], memory: tuple[Predictors, ...], step_s: float,
 ) -> OutputErrorFit:
     r, g, local, weights = linear
     if not np.isfinite(cost):  # a drive that runs away explains nothing
         nothing = np.full((len(names), len(names)), np.inf)
-        return OutputErrorFit(dict(q), tuple(names), nothing, sigma, tuple(r), tuple(data), own, np.inf, (np.inf, np.inf), controller)
-    normal, gradient, _, score = _normal(data, r, g, local, own, q, names)
+        return OutputErrorFit(dict(q), tuple(names), nothing, sigma, tuple(r), tuple(data), own, np.inf, (np.inf, np.inf), controller, memory)
+    normal, gradient, _, scores, parts = _normal(data, r, g, local, own, q, names)
     k = len(names)
-    meat = score.T @ score * len(score) / max(1, len(score) - 1)
-    bread = np.linalg.pinv(normal, hermitian=True)
     n = sum(len(m.time_s) for m in data)
-    residual = tuple(e.reshape(2, -1).T / w for e, w in zip(r, weights, strict=True))
-    squared = np.sum([np.sum(e.reshape(2, -1) ** 2, axis=1) for e in r], axis=0)
+    plain = [e.reshape(2, -1).T for e in r] if not memory else whitened(data, q, own, sigma, controller, step_s)
+    residual = tuple(e / w for e, w in zip(plain, weights, strict=True))
+    squared = np.sum([np.sum(e**2, axis=0) for e in plain], axis=0)
     chi2 = squared / (n - 0.5 * (k + 3 * len(data)))
-    covariance = _conservative(bread * max(1.0, float(chi2.max())), bread @ meat @ bread)
     left = _unresolved(normal, gradient, _limits(names, bounds), np.array([q[n] for n in names]))
-    covariance = SEARCH**2 * covariance + np.outer(left, left)
+    found = covariance(parts, normal - parts.sum(axis=0), scores, gradient, float(chi2.max()))
+    found = SEARCH**2 * found + np.outer(left, left)
     return OutputErrorFit(
-        dict(q), tuple(names), covariance, sigma, residual, tuple(data), own, cost, (float(chi2[0]), float(chi2[1])), controller
+        dict(q), tuple(names), found, sigma, residual, tuple(data), own, cost, (float(chi2[0]), float(chi2[1])), controller, memory
     )
 
 
@@ -343,13 +360,3 @@ def _free(gradient: Array, values: Array, bounds: Array) -> NDArray[np.bool_]:
     low, high = bounds.T
     margin = 1e-9 + 0.01 * np.abs(np.where(np.isfinite(low), low, 0.0))
     return ~(((values <= low + margin) & (gradient < 0)) | ((values >= high - 1e-9 - 0.01 * np.abs(np.where(np.isfinite(high), high, 0.0))) & (gradient > 0)))
-
-
-def _conservative(model: Array, sandwich: Array) -> Array:
-    """The model's covariance, each deviation scaled up where the sandwich says that correlated residuals made it too small.
-
-    The sandwich itself scatters by 1/sqrt(2 moves); a quarter more than the model's is within that scatter.
-    """
-    ratio = np.sqrt(np.maximum(np.diag(sandwich), 0) / np.maximum(np.diag(model), 1e-300))
-    scale = np.where(ratio > 1.25, ratio, 1.0)
-    return model * np.outer(scale, scale)
