@@ -40,7 +40,7 @@ class Term:
 @dataclass(frozen=True)
 class Fit:
     """declared: coefficients by name. amplitudes: one mapping per term. prediction: (n,) over all compared samples.
-    rss: weighted residual sum of squares over the training samples. size: number of effect parameters."""
+    rss: weighted residual sum of squares over the training samples, and what wider errors cost. size: number of effect parameters."""
 
     terms: tuple[Term, ...]
     declared: Mapping[str, float]
@@ -53,7 +53,7 @@ class Fit:
 class Balance:
     """The compared samples of several DriveStates, stacked.
 
-    effort, weight (1 / standard deviation), train (bool): (n,). sigma: noise of the effort; inflation: integrated
+    effort, weight (1 / standard deviation), timing (the part of that deviation that starts and stops bring), train (bool): (n,). sigma: noise of the effort; inflation: integrated
     autocorrelation of that noise (1 where it is white): a sum of squares counts divided by it. typical: declared
     coefficients of other balances of the same kind, by name.
     """
@@ -71,9 +71,9 @@ class Balance:
         self.sigma, self.inflation = 1.0, 1.0
         self.weight = np.ones(len(self.effort))
         self.sigma, self.inflation = noise(self)
-        extra = self.gather(lambda s: s.extra.get("sigma", np.zeros(len(s.time_s))))
-        self.weight = 1 / np.sqrt(self.sigma**2 + extra**2)
-        self.steady = extra <= 0.25 * self.sigma
+        self.timing = self.gather(lambda s: s.extra.get("sigma", np.zeros(len(s.time_s))))
+        self.weight = 1 / np.hypot(self.sigma, self.timing)
+        self.steady = self.timing <= 0.25 * self.sigma
         self.wander: Wander | None = None
         self._grids: dict[Any, Grid] = {}
         self._kept: dict[Any, GridColumns] = {}
@@ -156,7 +156,8 @@ class Balance:
     def fit(self, terms: tuple[Term, ...] = ()) -> Fit:
         """Amplitudes and declared coefficients by bounded weighted least squares on the training samples."""
         matrix, low, high = self.design(terms)
-        w = self.weight * self.train
+        weight = self.weights(terms)
+        w = weight * self.train
         clips = [t for t in terms if t.effect.clips]
         prediction = np.zeros(len(self.effort))
         inside = np.ones(len(self.effort), bool)
@@ -168,7 +169,7 @@ class Balance:
             for term in clips:
                 prediction = term.effect.clip(prediction, term.shape)
             inside = prediction == raw
-        rss = float(np.sum(self.whiten((self.effort - prediction) * w, w) ** 2))
+        rss = float(np.sum(self.whiten((self.effort - prediction) * w, w) ** 2)) + self.vagueness(weight)
         k = len(self.names)
         amplitudes, start = [], k
         for term in terms:
@@ -183,13 +184,38 @@ class Balance:
         """Orthonormal basis (n, k) of the design, what it leaves of the effort (n,), and the weight (n,), zero where `terms` clip:
         weighted and whitened. The last one is kept, for every candidate beside the same terms asks for it."""
         if self._apart is None or self._apart[0] != terms:
-            w = self.weight * self.train * self.unclipped(terms)
+            w = self.weights(terms) * self.train * self.unclipped(terms)
             matrix = self.whiten(self.design(terms)[0] * w[:, None], w)
             norm = np.linalg.norm(matrix, axis=0)
             q, _ = np.linalg.qr(matrix / np.where(norm > 0, norm, 1.0))
             effort = self.whiten(self.effort * w, w)
             self._apart = terms, (q, effort - q @ (q.T @ effort), w)
         return self._apart[1]
+
+    def weights(self, terms: tuple[Term, ...]) -> Array:
+        """1 / standard deviation (n,) beside `terms`: what is not known of starts and stops is delayed with all else, and a delayed
+        channel still shows rest while the drive sets off, when friction holds anything up to its limit."""
+        delays = [t for t in terms if t.effect.warps]
+        if not delays:
+            return self.weight
+
+        def doubt(state: DriveState) -> Array:
+            known = np.zeros(len(state.time_s))
+            timing, held = (state.extra.get(name, known)[:, None] for name in ("sigma", "holding"))
+            late = held
+            for term in delays:
+                timing, late = (term.effect.warp(state, x, term.shape) for x in (timing, late))
+            smear = 2 * float(np.mean(state.extra.get("bandwidth_s", known)))  # what rests and what moves is told no better
+            behind = max(abs(t.shape["delay"]) for t in delays)
+            known_at_once = max(1 - behind / smear, 0.0) if smear else 0.0
+            return np.hypot(timing[:, 0], np.maximum(late - known_at_once * held, 0.0)[:, 0])
+
+        own = np.sqrt(np.maximum(1 / self.weight**2 - self.timing**2, 0.0))
+        return 1 / np.hypot(own, self.gather(doubt))
+
+    def vagueness(self, weight: Array) -> float:
+        """What wider errors cost, on the scale of a sum of squares: a density that says less is lower where it is right."""
+        return 2 * self.inflation * float(np.sum(np.log(self.weight / weight)[self.train]))
 
     def unclipped(self, terms: tuple[Term, ...]) -> NDArray[np.bool_]:
         """Samples (n,) whose prediction no term clips: there the balance is linear."""

@@ -18,6 +18,7 @@ SAG_LEAST = 0.025  # of the speed, over the recorded loads: less is within what 
 SAG_T = 10.0
 CEILING_SHARE = 0.35  # of the load's rise that a drive at its limit takes from its speed: one, where the whole stroke is at it
 CEILING_T = 6.0
+LATE = 1.25  # sample intervals, from which an answer is late
 
 
 @dataclass(frozen=True)
@@ -149,16 +150,16 @@ def _ceiling(strokes: list[Stroke]) -> float:
 def command_findings(facts: dict[str, CommandFacts], fingers: dict[str, str | None]) -> list[tuple[float, Finding]]:
     """Delays and sags of the session's drives; the least delayed drive shows what a healthy one does."""
     out = []
-    medians = {a: float(np.median(f.latency_s)) for a, f in facts.items() if len(f.latency_s) >= 5}
+    answers = {a: _usual(f.latency_s, f.step_s) for a, f in facts.items() if len(f.latency_s) >= 5}
     moved = {a: float(np.median(f.motion_s)) for a, f in facts.items() if len(f.motion_s) >= 5}
     for actuator, fact in facts.items():
-        if actuator in medians:
-            healthy = min(min(medians.values()), fact.step_s)
-            late = fact.latency_s - healthy
+        if actuator in answers:
+            healthy = min(*(float(np.mean(x)) for x in answers.values()), fact.step_s)
+            late = float(np.mean(answers[actuator])) - healthy
             # Late current without late motion is a delayed channel, no delayed drive.
             also = len(moved) < 2 or moved.get(actuator, np.inf) - min(moved.values()) > fact.step_s
-            if also and medians[actuator] - healthy > 1.5 * fact.step_s and np.mean(late > fact.step_s) > 0.7:
-                out.append(_delay(actuator, fingers.get(actuator), fact, healthy))
+            if also and late > LATE * fact.step_s and np.mean(fact.latency_s - healthy > fact.step_s) > 0.7:
+                out.append(_delay(actuator, fingers.get(actuator), fact, answers[actuator] - healthy))
         if np.isfinite(fact.ceiling):
             out.append(_ceiling_finding(actuator, fingers.get(actuator), fact))
         elif np.isfinite(fact.sag) and fact.sag > SAG_T * fact.sag_se and fact.sag * fact.load_range > SAG_LEAST:
@@ -193,14 +194,20 @@ def _where(actuator: str, finger: str | None) -> dict[str, object]:
             "region": None, "share_of_mismatch": 1.0}
 
 
-def _delay(actuator: str, finger: str | None, fact: CommandFacts, healthy: float) -> tuple[float, Finding]:
-    value = float(np.median(fact.latency_s)) - healthy
-    resample = np.random.default_rng(0).integers(0, len(fact.latency_s), (500, len(fact.latency_s)))
-    low, high = np.percentile(np.median(fact.latency_s[resample], axis=1) - healthy, [2.5, 97.5])
-    fit = {"metric": "command_latency", "unit": "s", "before": value, "after": float(np.std(fact.latency_s)),
+def _usual(latency_s: Array, step_s: float) -> Array:
+    """The latencies (k,) without those that noise answered early or that a drive already in motion hid."""
+    apart = np.abs(latency_s - np.median(latency_s))
+    return latency_s[apart <= 3 * max(1.4826 * float(np.median(apart)), 0.5 * step_s)]
+
+
+def _delay(actuator: str, finger: str | None, fact: CommandFacts, late_s: Array) -> tuple[float, Finding]:
+    """Finding of a drive that answers `late_s` (k,) [s] later than a healthy one."""
+    value = float(np.mean(late_s))
+    error = 1.96 * float(np.std(late_s)) / np.sqrt(len(late_s))
+    fit = {"metric": "command_latency", "unit": "s", "before": value, "after": float(np.std(late_s)),
            "noise_floor": fact.step_s, "ci95_reduction": None, "held_out": [], "engine": "events"}
     half = 0.5 * fact.step_s  # the event itself is known to a sample only
-    parameters = {"delay": {"value": value, "unit": "s", "ci95": [float(low) - half, float(high) + half]}}
+    parameters = {"delay": {"value": value, "unit": "s", "ci95": [value - error - half, value + error + half]}}
     text = f"The {actuator} motor answers its commands {1e3 * value:.0f} ms late."
     model = {"native": True, "mjcf": f"actuator[@name='{actuator}'] delay", "urdf": "not expressible: kept in hand.json"}
     weight = value / fact.step_s

@@ -87,6 +87,7 @@ def _prepare(
         extra["validation_index"] = np.full(len(time_s), float(sum(t.validate for t, _ in entries[:index])))
         effort = np.where(motion.moving, current[seen], np.nan)
         extra["bandwidth_s"] = np.full(len(time_s), motion.bandwidth_s)
+        extra["position_noise"] = np.full(len(time_s), motion.noise)
         extra["steady"] = steady(time_s, motion).astype(float)
         declared = np.stack([motion.acceleration, motion.velocity, np.sign(motion.velocity), motion.position,
                              np.ones(len(time_s))], axis=-1)
@@ -133,8 +134,13 @@ def steady(time_s: Array, motion: Motion) -> NDArray[np.bool_]:
     step = float(np.median(np.diff(time_s)))
     after, before = SETTLE_SAMPLES
     settled = motion.moving & (motion.since_start_s > after * step) & (motion.until_stop_s > before * step)
-    begin = np.maximum.accumulate(np.where(~motion.moving, np.arange(len(time_s)), 0))
-    return settled & (np.abs(motion.position - motion.position[begin]) > SETTLE_TRAVEL)
+    return settled & (from_rest(motion.position, motion.moving) > SETTLE_TRAVEL)
+
+
+def from_rest(position: Array, moving: NDArray[np.bool_]) -> Array:
+    """Distance (n,) from where the drive rested last, zero at rest."""
+    begin = np.maximum.accumulate(np.where(~moving, np.arange(len(position)), 0))
+    return np.abs(position - position[begin])
 
 
 def with_coulomb(state: DriveState, give: float, granted: float) -> DriveState:
@@ -148,7 +154,7 @@ def with_coulomb(state: DriveState, give: float, granted: float) -> DriveState:
 
 def with_timing(state: DriveState) -> DriveState:
     """Adds "sigma" around starts and stops, zero in steady motion: what half a sample interval of timing means for the
-    declared prediction, and what is not known of friction while it turns over."""
+    declared prediction, and what is not known of friction while it turns over; and "holding", of friction at rest."""
     seen = np.isfinite(state.effort)
     if seen.sum() < 20:
         return state
@@ -159,7 +165,9 @@ def with_timing(state: DriveState) -> DriveState:
     slope = np.maximum.reduce([np.roll(slope, k) for k in (-2, -1, 0, 1, 2)])
     turning = state.extra["steady"] <= 0
     sigma = np.where(turning, np.hypot(0.5 * step * slope, START_DOUBT * beta[2]), 0.0)
-    return replace(state, extra={**state.extra, "sigma": sigma})
+    seized = from_rest(state.position, seen) < max(2 * float(state.extra["granted"][0]), 6 * float(state.extra["position_noise"][0]))
+    holding = np.where(seized, abs(float(beta[2])), 0.0)  # what friction may hold at rest, either way
+    return replace(state, extra={**state.extra, "sigma": sigma, "holding": holding})
 
 
 def gives(prepared: Mapping[str, Sequence[DriveState]]) -> tuple[dict[str, float], float]:

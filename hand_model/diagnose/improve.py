@@ -107,7 +107,8 @@ def written(before: Path, finding: Finding) -> dict[str, Any]:
         place = kind.write_mjcf(etree.parse(str(file)).getroot(), finding.where, values)
         if place is not None:
             return {"native": True, "mjcf": place, "urdf": urdf, "callback": None}
-    return {"native": False, "mjcf": None, "urdf": urdf, "callback": None, "note": kind.unwritten}
+    return {"native": False, "mjcf": None, "urdf": urdf, "callback": None,
+            "note": kind.unwritten or "no element of MJCF holds it: kept in hand.json"}
 
 
 def write_improved(hand: Hand, findings: Sequence[Finding], stations: Sequence[Any], counts: Mapping[str, tuple[float, float]],

@@ -130,7 +130,7 @@ def predict(balance: Balance, fit: Fit, theta: Array, build: Any) -> Array:
 
 
 def _covariance(balance: Balance, fit: Fit, theta: Array, build: Any) -> Array:
-    w = balance.weight * balance.train
+    w = balance.weights(fit.terms) * balance.train
     columns = []
     for i in range(len(theta)):
         step = 1e-4 * (abs(theta[i]) + 1e-3)
@@ -149,7 +149,7 @@ def held_out(reading: Reading, which: int, seed: int = 0) -> dict[str, Any]:
     """Root-mean-square error on recordings that took no part, without and with the term `which`, the noise floor, and a
     bootstrap interval over strokes of the reduction.
 
-    Steady samples; all compared ones for a delay or a give, which act at starts and stops. `held_out` is empty where there
+    Steady samples; all compared ones for a delay or a give, which act at starts and stops, where the floor is what timing grants. `held_out` is empty where there
     are no validation recordings or where the naming had to look at them: figures are then in-sample.
     """
     balance, fit = reading.balance, reading.fit
@@ -169,7 +169,7 @@ def held_out(reading: Reading, which: int, seed: int = 0) -> dict[str, Any]:
     return {
         "before": float(np.sqrt(r0.mean())),
         "after": float(np.sqrt(r1.mean())),
-        "noise_floor": balance.sigma,
+        "noise_floor": float(np.sqrt(np.mean(1 / balance.weights(fit.terms)[use] ** 2))),
         "ci95_reduction": np.percentile(reduction, [2.5, 97.5]).tolist(),
         "held_out": [s.trial for s in balance.states if s.validate] if untouched else [],
     }
@@ -184,9 +184,14 @@ def proven(naming: Naming, which: int) -> bool:
     if "trial" in fit.terms[which].shape or balance.train.all():
         return True
     without = balance.fit(tuple(t for i, t in enumerate(fit.terms) if i != which))
-    w = balance.weight * ~balance.train
-    r0, r1 = (np.sum(balance.whiten((balance.effort - f.prediction) * w, w) ** 2) for f in (without, fit))
-    return bool(r1 < r0)
+    likelihood = []
+    for f in (without, fit):
+        w = balance.weights(f.terms)[~balance.train]
+        r = np.zeros(len(balance.train))
+        r[~balance.train] = (balance.effort - f.prediction)[~balance.train] * w
+        rss = np.sum(balance.whiten(r, balance.weights(f.terms) * ~balance.train) ** 2)
+        likelihood.append(balance.inflation * float(np.sum(np.log(w))) - 0.5 * float(rss))
+    return likelihood[1] > likelihood[0]
 
 
 def sized(named: Named, entries: Mapping[str, Mapping[str, Any]]) -> bool:

@@ -118,10 +118,13 @@ def started(hand: Hand, state: DriveState) -> Hand:
 
 
 def _read(motor: CompiledMotor, effort: Array, time_s: Array) -> Array:
-    """The effort (n,) through the sensor of the motor's current: its delay against the encoder's, and its cutoff."""
+    """The effort (n,) through the sensor of the motor's current: its delay against the encoder's, what its channel does, its cutoff."""
     sensors = {s.get("name"): s for s in motor.root.iterfind("sensor/*")}
     current, encoder = (sensors.get(f"{motor.actuator}_{kind}") for kind in ("current", "encoder"))
     late = sum(sign * float(s.get("delay", 0.0)) for sign, s in ((1, current), (-1, encoder)) if s is not None)
     effort = np.interp(time_s - late, time_s, effort) if late else effort
+    for e in motor.hand.effects:
+        if e.where.get("actuator") == motor.actuator:
+            effort = effect(e.effect).reading(effort, time_s, {k: v.value for k, v in e.parameters.items()})
     cutoff = np.inf if current is None else float(current.get("cutoff", 0.0)) or np.inf
     return np.clip(effort, -cutoff, cutoff)

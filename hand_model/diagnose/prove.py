@@ -57,7 +57,9 @@ def proved(finding: Finding, station: Any, before: Path, after: Path) -> tuple[d
     used = [_used(s, every) for s in states]
     r0, r1 = ([e[u] for e, u in zip(error, used, strict=True)] for error in errors)
     blocks = [_blocks(s)[u] for s, u in zip(states, used, strict=True)]
-    fit = {**finding.fit, **reduction(r0, r1, blocks), "engine": INVERSE if station.signal == "current" else FORWARD,
+    granted = np.concatenate([s.extra.get("sigma", np.zeros(len(s.time_s)))[u] for s, u in zip(states, used, strict=True)])
+    floor = float(np.hypot(station.naming.balance.sigma, np.sqrt(np.mean(granted**2))))
+    fit = {**finding.fit, **reduction(r0, r1, blocks), "noise_floor": floor, "engine": INVERSE if station.signal == "current" else FORWARD,
            "held_out": [s.trial for s in states if s.validate]}
     x, v = (np.concatenate([getattr(s, k)[u] for s, u in zip(states, used, strict=True)]) for k in ("position", "velocity"))
     return fit, Replay(finding, x, v, np.concatenate(r0), np.concatenate(r1), states[0].position_unit, states[0].effort_unit,

@@ -188,6 +188,10 @@ class Effect:
         """Not native: the passive-force callback applies it, where there is a law."""
         return None
 
+    def reading(self, effort: Array, time_s: Array, parameters: Mapping[str, float]) -> Array:
+        """What a channel shows of the drive's effort (n,): as it is, unless the effect is in the reading and no sensor holds it."""
+        return effort
+
     def started(self, state: DriveState, parameters: Mapping[str, float]) -> dict[str, float]:
         """Parameters that only a recording knows: what went before it. None here."""
         return {}

@@ -35,18 +35,33 @@ class CurrentChannelDelay(Effect):
         """Columns read at t - delay, linearly interpolated, or filtered at the median sample interval."""
         if not columns.shape[1]:
             return columns
-        if shape["form"] > 0.5 and shape["delay"] > 0:
-            from scipy.signal import lfilter
-
-            keep = np.exp(-np.median(np.diff(state.time_s)) / shape["delay"])
-            return lfilter([1 - keep], [1.0, -keep], columns - columns[0], axis=0) + columns[0]
+        if _filters(shape):
+            return _filtered(columns, state.time_s, shape["delay"])
         then = state.time_s - shape["delay"]
         return np.stack([np.interp(then, state.time_s, column) for column in columns.T], axis=-1)
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
-        """The delay of the sensor of the motor's current, or of its encoder where the current is read early."""
+        """The delay of the sensor of the motor's current, or of its encoder where the current is read early; a sensor cannot filter."""
+        if _filters(parameters):
+            return None
         found = motor_sensor(root, where, "current" if parameters["delay"] >= 0 else "encoder")
         return None if found is None else delay(root, found, abs(parameters["delay"]))
+
+    def reading(self, effort: Array, time_s: Array, parameters: Mapping[str, float]) -> Array:
+        """The effort (n,) behind the filter; a plain delay is the sensor's own."""
+        return _filtered(effort, time_s, parameters["delay"]) if _filters(parameters) else effort
+
+
+def _filters(shape: Mapping[str, float]) -> bool:
+    return shape.get("form", 0.0) > 0.5 and shape["delay"] > 0
+
+
+def _filtered(values: Array, time_s: Array, constant_s: float) -> Array:
+    """Values (n,) or (n, k) behind a first-order filter that starts at rest, at the median sample interval."""
+    from scipy.signal import lfilter
+
+    keep = np.exp(-np.median(np.diff(time_s)) / constant_s)
+    return lfilter([1 - keep], [1.0, -keep], values - values[0], axis=0) + values[0]
 
 
 EFFECT = CurrentChannelDelay()
