@@ -84,6 +84,11 @@ def pose(fit: DeclaredFit, joint: str | None = None) -> Problem:
     return Problem(fit, rows, tuple(block), fold, group)
 
 
+def left_out_whole(problem: Problem) -> bool:
+    """Whether the folds leave out whole recordings."""
+    return len(set(problem.group.tolist())) >= FEW
+
+
 def term_columns(row: Rows, term: Term) -> Array:
     """Filtered, thinned columns (m, j) of a term; none of its own joint's rows are anything but zero elsewhere."""
     width = len(term.candidate.amplitudes)
@@ -145,9 +150,14 @@ def held_out(problem: Problem, terms: Sequence[Term], parts: tuple) -> tuple[Arr
         out = problem.fold == f
         theta = solve_bounded(total_g - gram[out].sum(0), total_m - moment[out].sum(0), low, high, mean, weight)
         error[out] = square[out] - 2 * moment[out] @ theta + np.einsum("p,bpq,q->b", theta, gram[out], theta)
-    theta = solve_bounded(total_g, total_m, low, high, mean, weight)
-    train = float(square.sum() - 2 * total_m @ theta + theta @ total_g @ theta)
-    return np.maximum(error, 0.0), train
+    return np.maximum(error, 0.0), training_error(problem, terms, parts)
+
+
+def training_error(problem: Problem, terms: Sequence[Term], parts: tuple) -> float:
+    """Squared error of the fit to all blocks."""
+    gram, moment = parts[0].sum(0), parts[1].sum(0)
+    theta = solve_bounded(gram, moment, *limits(problem.fit, terms))
+    return float(parts[2].sum() - 2 * moment @ theta + theta @ gram @ theta)
 
 
 def solution(problem: Problem, terms: Sequence[Term]) -> Array:
@@ -213,26 +223,32 @@ def score(problem: Problem, terms: Sequence[Term], candidate: Candidate, parts: 
 
 
 def refined(problem: Problem, terms: Sequence[Term], term: Term, parts: tuple) -> Term:
-    """The term beside others with its continuous shapes between the neighbours on its grid, one after the other, by the
-    training error."""
-    from scipy.optimize import minimize_scalar
+    """The term beside others with its continuous shapes moved together within the bounds of its grid (Nelder & Mead 1965),
+    by the training error."""
+    from scipy.optimize import minimize
 
-    for name in (n for n in term.shape if n not in DISCRETE):
-        values = np.unique([g[name] for g in term.candidate.grid])
-        at = int(np.searchsorted(values, term.shape[name]))
-        low, high = values[max(at - 1, 0)], values[min(at + 1, len(values) - 1)]
+    names = [n for n in term.shape if n not in DISCRETE]
+    grid = {n: np.unique([g[n] for g in term.candidate.grid]) for n in names}
+    names = [n for n in names if len(grid[n]) > 1]
+    if not names:
+        return term
+    low, high = (np.array([grid[n][k] for n in names]) for k in (0, -1))
+    start = np.array([term.shape[n] for n in names])
 
-        def train(value: float, name: str = name, term: Term = term) -> float:
-            moved = Term(term.candidate, {**term.shape, name: float(value)})
-            delays = term.candidate.delays
-            some = normal(problem, [*terms, moved]) if delays else _extended(problem, terms, moved, parts)
-            return held_out(problem, [*terms, moved], some)[1]
+    def at(x: Array) -> Term:
+        shape = dict(zip(names, (float(v) for v in np.clip(x, low, high)), strict=True))
+        return Term(term.candidate, {**term.shape, **shape})
 
-        if high > low:
-            found = minimize_scalar(train, bounds=(low, high), method="bounded", options={"maxiter": 6})
-            if found.fun < train(term.shape[name]):
-                term = Term(term.candidate, {**term.shape, name: float(found.x)})
-    return term
+    def train(x: Array) -> float:
+        moved = at(x)
+        some = normal(problem, [*terms, moved]) if term.candidate.delays else _extended(problem, terms, moved, parts)
+        return training_error(problem, [*terms, moved], some)
+
+    near = [grid[n][np.argsort(np.abs(grid[n] - x))[1]] for n, x in zip(names, start, strict=True)]
+    corners = start + np.concatenate([np.zeros((1, len(names))), np.diag(0.5 * (np.array(near) - start))])
+    found = minimize(train, start, method="Nelder-Mead",
+                     options={"initial_simplex": corners, "maxfev": 15 + 20 * len(names), "xatol": 0, "fatol": 1e-4 * train(start)})  # fmt: skip
+    return at(found.x) if found.fun < train(start) else term
 
 
 def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ...] = (),

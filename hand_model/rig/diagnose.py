@@ -13,7 +13,20 @@ from numpy.typing import NDArray
 from ..session import Session
 from .candidates import Candidate, candidates
 from .channels import ChannelIssue, check_balance, check_channels
-from .compete import Score, Step, Term, compete, held_out, judge, normal, pose, resampled, solution
+from .compete import (
+    Problem,
+    Score,
+    Step,
+    Term,
+    compete,
+    held_out,
+    judge,
+    left_out_whole,
+    normal,
+    pose,
+    resampled,
+    solution,
+)
 from .declared import DeclaredFit, fit_declared
 from .diagnose_swing import diagnose_swing
 from .findings import CouplingResidual, Finding, RigFindings
@@ -198,8 +211,13 @@ def _prove(bench: Bench, fit: DeclaredFit, stories: Sequence[tuple[Step, Term]],
     for step, term in stories:
         many = settled(bench, fit, [*kept, term])
         proof = bench.proof(term.candidate.joint, (fit, *few), (fit, *many))
-        if proof["ci95_reduction"][0] <= 0:  # not beyond what resampled validation blocks give by chance
-            rejected.append({"effect": term.candidate.key, "reason": "error on validation trials does not fall"})
+        reason = None
+        if not _holds(proof, pose(fit, term.candidate.joint)):
+            reason = "error on validation trials does not fall"
+        elif bench.mujoco and not _moves_better(bench, (fit, *few), (fit, *many)):
+            reason = "the motion of the training trials, simulated from the commands, gets no better"
+        if reason is not None:
+            rejected.append({"effect": term.candidate.key, "reason": reason})
             continue
         kept.append(term)
         few = many
@@ -209,6 +227,24 @@ def _prove(bench: Bench, fit: DeclaredFit, stories: Sequence[tuple[Step, Term]],
             spread = resampled(pose(fit), many[0])[:, last]
         found.append(_joint_finding(bench.rig, fit, step, term, many[1][last], proof, spread))
     return found, kept
+
+
+def _holds(proof: Mapping[str, Any], problem: Problem) -> bool:
+    """Whether validation recordings bear out a term: it must not be refuted where training left whole recordings out; where
+    it had too few for that, blocks of one and the same recording chose, and the fall must be beyond chance."""
+    return proof["ci95_reduction"][0] > 0 or (left_out_whole(problem) and proof["after"] < proof["before"])
+
+
+def _moves_better(bench: Bench, before: tuple, after: tuple) -> bool:
+    """Whether the file with one term more moves closer to the training recordings; True where efforts are recorded.
+
+    Where they are not, the balance holds what the drives' declared law makes of their commands: only the motion can tell
+    whether they act so.
+    """
+    if any(t.effort for t in bench.rig.trials) or not bench.rig.drives:
+        return True
+    ratio = open_loop(bench.rig, bench.file(*before), bench.file(*after), validate=False).get("ratio", 0.0)
+    return ratio < 1.0
 
 
 def settled(bench: Bench, fit: DeclaredFit, terms: Sequence[Term]) -> tuple[list[Term], Array]:

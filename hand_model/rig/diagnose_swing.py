@@ -17,7 +17,7 @@ from .replay import RigResiduals, replay_rig
 from .states import fill_gaps, noise_std
 from .swing import INDEX, PARAMETERS, STEP_S, Fitted, Swing, Task, parameter_units, vector
 from .swing_build import build_swing, search_step_s, windows_s
-from .swing_compete import Round, Variant, all_free, compete_swing, fit_stages, free_declared, refine_swing
+from .swing_compete import LEAST_GAIN, Round, Variant, all_free, compete_swing, fit_stages, free_declared, refine_swing
 from .swing_interval import intervals
 from .swing_patch import write_swing
 from .words import shares, statement
@@ -42,10 +42,9 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
     fine = [build_swing(rig, fit, *stage) for stage in last_stages]
     known: dict[tuple[str, ...], Link] = {}
     while True:
-        last = kept[-1][1].fit.theta if kept else declared.theta
-        chain = _chain(rig, session, held, fine, declared.theta, [v for v, _ in kept], last, known)
+        chain = _chain(rig, session, held, fine, declared.theta, kept, known)
         figures = [c.replay.figure("position_rmse", held) for c in chain]
-        worse = next((k for k in range(len(kept)) if not figures[k + 1] < figures[k]), None)
+        worse = next((k for k in range(len(kept)) if not figures[k + 1] < (1.0 - LEAST_GAIN) * figures[k]), None)
         if worse is None:
             break
         rejected.append({"effect": kept.pop(worse)[0].key, "reason": NOT_BORNE_OUT})
@@ -76,21 +75,26 @@ class Link:
 
 
 def _chain(rig: RigModel, session: Session, held: bool, stages: Sequence[Swing], declared: np.ndarray,
-           taken: Sequence[Variant], last: np.ndarray, known: dict[tuple[str, ...], Link]) -> list[Link]:  # fmt: skip
+           kept: Sequence[tuple[Variant, Round]], known: dict[tuple[str, ...], Link]) -> list[Link]:  # fmt: skip
     """The declared model, with the first effect, with the first two, ...: fitted in one batch, written and replayed; known
     holds those that were before, by the effects in them."""
     swing = stages[0]
-    parts = [tuple(taken[:k]) for k in range(len(taken) + 1)]
-    keys = [tuple(v.key for v in part) for part in parts]
-    new = [(key, part, all_free(swing, part)) for key, part in zip(keys, parts, strict=True) if key not in known]
-    neutral = vector(swing.initial)
-    tasks = [Task(free, np.where(np.isin(PARAMETERS, free), last, neutral) if part else declared, ()) for _, part, free in new]
-    fits = fit_stages(stages, tasks, 8) if tasks else []
+    keys = [tuple(v.key for v, _ in kept[:k]) for k in range(len(kept) + 1)]
+    new = [k for k, key in enumerate(keys) if key not in known]
+    free = [all_free(swing, [v for v, _ in kept[:k]]) for k in new]
+    starts = [_start(names, kept[k - 1][1].fit.theta, kept[-1][1].fit.theta) if k else declared for k, names in zip(new, free, strict=True)]
+    fits = fit_stages(stages, [Task(names, s, ()) for names, s in zip(free, starts, strict=True)], 12) if new else []
     files = [write_swing(rig, swing, f.theta) for f in fits]
     replays = Background(_replayed, [(session, x, held) for x in files]).results()
-    for (key, _, free), f, x, r in zip(new, fits, files, replays, strict=True):
-        known[key] = Link(free, f, x, r)
+    for k, names, f, x, r in zip(new, free, fits, files, replays, strict=True):
+        known[keys[k]] = Link(names, f, x, r)
     return [known[key] for key in keys]
+
+
+def _start(free: Sequence[str], own: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """Parameters to start a fit from: those of its own round; where an effect has since been exchanged, of the last round."""
+    neutral = vector({})
+    return np.where(np.isin(PARAMETERS, free), np.where(own == neutral, last, own), neutral)
 
 
 def _replayed(session: Session, xml: bytes, held: bool) -> RigResiduals:

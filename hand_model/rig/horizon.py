@@ -24,14 +24,15 @@ HORIZONS_S = (np.inf, 4.0, 2.0, 1.0, 0.5, 0.25, 0.1)
 CARRIES = 0.5  # an error below this share of the recorded motion's standard deviation still predicts it
 
 
-def open_loop(rig: RigModel, before: bytes, after: bytes, refused: Collection[tuple[str, str]] = ()) -> dict[str, Any]:
+def open_loop(rig: RigModel, before: bytes, after: bytes, refused: Collection[tuple[str, str]] = (),
+              validate: bool = True) -> dict[str, Any]:  # fmt: skip
     """Position error of both files on the trials held out (on all where none is), at the longest horizon that carries.
 
-    refused: (trial, joint) whose effort cannot be trusted; their trials are left out. Returns {"not_run": reason} where
+    refused: (trial, joint) whose effort cannot be trusted; their trials are left out. validate: False for the training trials. Returns {"not_run": reason} where
     the files cannot be simulated so, else the horizon ("whole" or [s]), the ratio and each joint's figures.
     """
     wrong = {t for t, _ in refused}
-    trials = [t for t in (rig.select(True) or rig.trials) if t.name not in wrong and can_simulate(rig, t)]
+    trials = [t for t in (rig.select(validate) or rig.trials) if t.name not in wrong and can_simulate(rig, t)]
     if rig.couplings:
         return {"not_run": "coupled joints: what drives the transmission from behind is not recorded as an effort"}
     if not trials:
