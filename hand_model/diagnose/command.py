@@ -16,8 +16,9 @@ Array = NDArray[np.float64]
 RUN_IN_S, RUN_OUT_S = 0.3, 0.25  # a stroke's part at steady speed begins and ends this far from rest
 SAG_LEAST = 0.025  # of the speed, over the recorded loads: less is within what a controller does
 SAG_T = 10.0
-CEILING_SHARE = 0.35  # of the load's rise that a drive at its limit takes from its speed: one, where the whole stroke is at it
-CEILING_T = 6.0
+FULL_SPEED = 0.9  # quantile of the velocity in the fastest strokes
+CEILING_SHARE = 0.6  # of the current beyond its limit that a drive takes from its speed: one, but for noise in the limit
+CEILING_LEFT, CEILING_T = 0.1, 6.0
 LATE = 1.25  # sample intervals, from which an answer is late
 
 
@@ -94,17 +95,16 @@ def _strokes(states: tuple[DriveState, ...], currents: tuple[Array, ...]) -> lis
     return out
 
 
-def _load_rise(strokes: list[Stroke]) -> tuple[dict[float, np.poly1d], float]:
-    """Rise of the load over position [raw/%] flexing and extending, as polynomials of position, and the viscous friction
-    flexing [raw s/%]: current = cubic in position + viscous velocity, each of its own for the two ways."""
-    p, v, c = (np.concatenate([getattr(s, name) for s in strokes]) for name in ("position", "velocity", "current"))
-    flexing = np.concatenate([np.full(len(s.position), s.way > 0) for s in strokes])
-    powers = np.stack([(p / 100) ** k for k in range(4)], axis=-1)
-    ways = [np.concatenate([powers, v[:, None]], axis=1) * way[:, None] for way in (flexing, ~flexing)]
-    design = np.concatenate(ways, axis=1)
-    beta = np.linalg.lstsq(design, c, rcond=None)[0]
+def _load_rise(strokes: list[Stroke]) -> dict[float, np.poly1d]:
+    """Rise of the load over position [raw/%] flexing and extending, as polynomials of position: current = cubic in position +
+    viscous velocity, each of its own for the two ways."""
     scale = 100.0 ** -np.arange(4)
-    return {way: np.poly1d((b * scale)[::-1]).deriv() for way, b in ((1.0, beta[:4]), (-1.0, beta[5:9]))}, float(beta[4])
+    out = {}
+    for way in (1.0, -1.0):
+        mine = [s for s in strokes if s.way == way]
+        beta = np.linalg.lstsq(_load_design(mine), np.concatenate([s.current for s in mine]), rcond=None)[0]
+        out[way] = np.poly1d((beta[:4] * scale)[::-1]).deriv()
+    return out
 
 
 def _sag(strokes: list[Stroke]) -> tuple[float, float, float]:
@@ -112,7 +112,7 @@ def _sag(strokes: list[Stroke]) -> tuple[float, float, float]:
     compared; a reference that a proportional controller follows falls behind by the rise of the load, which is no sag."""
     if len(strokes) < 12 or {s.way for s in strokes} != {1.0, -1.0}:
         return np.nan, np.nan, np.nan
-    rise, _ = _load_rise(strokes)
+    rise = _load_rise(strokes)
     y = np.log([max(s.way * float(np.mean(s.velocity)), 1e-9) for s in strokes])
     load = np.array([s.way * float(np.mean(s.current)) for s in strokes])
     levels = np.array([[float(s.commanded == level) for level in sorted({s.commanded for s in strokes})] for s in strokes])
@@ -125,26 +125,36 @@ def _sag(strokes: list[Stroke]) -> tuple[float, float, float]:
 
 
 def _ceiling(strokes: list[Stroke]) -> float:
-    """Current [raw] at which the drive is at its limit: where the load rises, speed falls by as much as keeps the current
-    the same. The share of the load's rise taken from speed is a regression within the fastest flexing strokes. nan: none."""
+    """Current [raw] at which the drive is at its limit, nan where it is at none: in the fastest flexing strokes speed falls by just
+    what keeps the current from exceeding it. What current each place would need at full speed is told by the slower strokes."""
     fast = max((s.commanded for s in strokes), default=0.0)
     mine = [s for s in strokes if s.way > 0 and s.commanded == fast]
-    if len(mine) < 3 or {s.way for s in strokes} != {1.0, -1.0}:
+    slower = [s for s in strokes if s.way > 0 and s.commanded < fast]
+    if len(mine) < 3 or not slower:
         return np.nan
-    rise, viscous = _load_rise([s for s in strokes if s.commanded < fast] or strokes)
-    if not {s.way for s in strokes if s.commanded < fast} >= {1.0, -1.0} or viscous <= 0:
+    beta = np.linalg.lstsq(_load_design(slower), np.concatenate([s.current for s in slower]), rcond=None)[0]
+    viscous = float(beta[-1])
+    if viscous <= 0:
         return np.nan
-    load = rise[1.0].integ()
-    x = np.concatenate([load(s.position) - np.mean(load(s.position)) for s in mine])
-    y = np.concatenate([-viscous * (s.velocity - np.mean(s.velocity)) for s in mine])
+    velocity, current = (np.concatenate([getattr(s, name) for s in mine]) for name in ("velocity", "current"))
+    lost = float(np.quantile(velocity, FULL_SPEED)) - velocity
+    needed = _load_design(mine) @ beta + viscous * lost
+    limit = float(np.median(current[needed > np.quantile(needed, 0.75)]))
+    over = needed > limit
+    if over.sum() < 10:
+        return np.nan
+    x, y = (needed - limit)[over], viscous * lost[over]
     share = float(x @ y / max(x @ x, 1e-12))
-    error = float(np.std(y - share * x) / np.sqrt(max(x @ x, 1e-12)))
-    if float(np.sum((y - share * x) ** 2)) > 0.5 * float(y @ y):
-        return np.nan  # speed changes for other reasons: strokes that only accelerate and brake
-    followed = float(x @ np.concatenate([s.current - np.mean(s.current) for s in mine]) / max(x @ x, 1e-12))
-    if share < CEILING_SHARE or share < CEILING_T * error or followed > 1 - CEILING_SHARE:
-        return np.nan
-    return float(np.median(np.concatenate([s.current for s in mine])))
+    rest = y - share * x
+    told = share > CEILING_T * float(np.std(rest)) / np.sqrt(max(float(x @ x), 1e-12))
+    alone = float(rest @ rest) < CEILING_LEFT * float(y @ y)  # speed changes for no other reason
+    return limit if told and alone and CEILING_SHARE < share < 1 / CEILING_SHARE else np.nan
+
+
+def _load_design(strokes: list[Stroke]) -> Array:
+    """Columns (n, 5): powers 0 to 3 of position / 100 %, and velocity [%/s]."""
+    position, velocity = (np.concatenate([getattr(s, name) for s in strokes]) for name in ("position", "velocity"))
+    return np.stack([*((position / 100) ** k for k in range(4)), velocity], axis=-1)
 
 
 def command_findings(facts: dict[str, CommandFacts], fingers: dict[str, str | None]) -> list[tuple[float, Finding]]:

@@ -1,0 +1,94 @@
+"""Command station: a drive at its limit, one that sags, one that brakes; answers to commands, early and late."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hand_model.diagnose.command import command_facts, command_findings
+from hand_model.effects.base import DriveState
+
+STEP_S, VISCOUS, LIMIT = 0.018, 0.15, 66.0
+COMMANDED = {40.0: 25.0, 120.0: 60.0, 255.0: 100.0}  # raw -> %/s
+
+
+def load(x: np.ndarray | float) -> np.ndarray | float:
+    return 42.0 + 0.2 * x
+
+
+def healthy(x: float, full: float) -> float:
+    return full
+
+
+def limited(x: float, full: float) -> float:
+    return min(full, (LIMIT - load(x)) / VISCOUS)
+
+
+def sagging(x: float, full: float) -> float:
+    return full * (1 - 0.004 * load(x))
+
+
+def braking(x: float, full: float) -> float:
+    return full * min(1.0, 0.2 + (100 - x) / 25)
+
+
+def strokes(profile, seed: int, repeats: int = 4) -> tuple[DriveState, np.ndarray]:
+    """One recording of strokes there and back at every commanded speed, and its current."""
+    rng = np.random.default_rng(seed)
+    x, v, c, told = [], [], [], []
+    for raw, full in sorted(COMMANDED.items()) * repeats:
+        for way in (1.0, -1.0):
+            at = 0.0
+            while at < 100:
+                place = at if way > 0 else 100 - at
+                speed = profile(place, full) if way > 0 else full
+                x, v, told = [*x, place], [*v, way * speed], [*told, raw]
+                c.append(load(place) + VISCOUS * speed if way > 0 else -25 + 0.2 * place - VISCOUS * speed)
+                at += speed * STEP_S
+        x, v, c, told = x + [0.0] * 5, v + [0.0] * 5, c + [0.0] * 5, told + [raw] * 5
+    x, v, c = (np.array(k) for k in (x, v, c))
+    current = c + rng.normal(0, 5, len(c))
+    state = DriveState("trial", "index", np.arange(len(x)) * STEP_S, x, v + rng.normal(0, 0.5, len(x)), np.zeros(len(x)),
+                       np.where(v == 0, np.nan, current), np.ones((len(x), 1)), extra={"speed": np.array(told)})
+    return state, current
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_drive_at_its_limit_in_part_of_its_strokes_is_seen(seed: int) -> None:
+    state, current = strokes(limited, seed)
+    assert command_facts((state,), (current,)).ceiling == pytest.approx(LIMIT, rel=0.06)
+
+
+@pytest.mark.parametrize("profile", [healthy, sagging, braking])
+def test_what_is_no_limit_has_none(profile) -> None:
+    for seed in range(3):
+        state, current = strokes(profile, seed)
+        assert np.isnan(command_facts((state,), (current,)).ceiling)
+
+
+def answering(delay_s: float, seed: int) -> tuple[DriveState, np.ndarray]:
+    """Eighty commands that current and position answer after `delay_s`, at moments that no sample knows."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(0, 84.0, STEP_S)
+    told = np.arange(1, 81) + rng.uniform(0, 0.5, 80)
+    setpoint = np.searchsorted(told, t) % 2 * 100.0
+    moves = np.sort(np.r_[told + delay_s, told + delay_s + 0.2])
+    level = np.interp(t, moves, np.tile([0.0, 100.0, 100.0, 0.0], 40))
+    current = np.where(np.searchsorted(moves, t) % 2 == 1, np.where(setpoint > 0, 40.0, -40.0), 0.0)
+    position = level + rng.normal(0, 0.02, len(t))
+    state = DriveState("trial", "index", t, position, np.gradient(level, t), np.zeros(len(t)), current, np.ones((len(t), 1)),
+                       extra={"setpoint": setpoint})
+    return state, current + rng.normal(0, 2, len(t))
+
+
+def test_a_late_drive_is_told_by_how_much_beside_a_prompt_one() -> None:
+    facts = {name: command_facts((s,), (c,)) for name, (s, c) in {"index": answering(0.09, 1), "ring": answering(0.0, 2)}.items()}
+    found = command_findings(facts, {"index": "index", "ring": "ring"})
+    assert [(f.effect, f.where["finger"]) for _, f in found] == [("command_delay", "index")]
+    low, high = found[0][1].parameters["delay"]["ci95"]
+    assert low < 0.09 < high and high - low < 2 * STEP_S
+
+
+def test_two_prompt_drives_have_no_delay() -> None:
+    facts = {name: command_facts((s,), (c,)) for name, (s, c) in {"index": answering(0.0, 3), "ring": answering(0.0, 4)}.items()}
+    assert not command_findings(facts, {"index": "index", "ring": "ring"})

@@ -1,0 +1,82 @@
+"""Search for shapes: columns of a grid, projected, and the weight of delayed channels."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from test_diagnose import drive, planted
+
+from hand_model.diagnose.balance import Balance, Term
+from hand_model.diagnose.grid import stacked
+from hand_model.diagnose.name import scan
+from hand_model.effects import effect
+
+
+@pytest.mark.parametrize(("name", "shape", "amplitude"), [
+    ("stribeck_friction", {"form": 0.0, "stribeck_speed": 20.0}, [20.0]),
+    ("detent_load", {"form": 0.0, "centre": 50.0, "width": 6.0}, [12.0]),
+    ("nonlinear_spring", {}, [0.004, 0.0]),
+])
+def test_a_scan_finds_the_shape_of_which_a_refit_is_best(name, shape, amplitude) -> None:
+    balance = Balance(drive(7, planted(name, shape, amplitude), trials=3))
+    kind = effect(name)
+    best = min(balance.fit((Term(kind, s),)).rss for s in balance.grid(kind).shapes)
+    assert scan(balance, kind, ()).rss == pytest.approx(best, rel=1e-9)
+    assert scan(balance, kind, ()).rss == pytest.approx(best, rel=1e-9)  # from kept columns
+
+
+def test_sparse_and_dense_columns_have_the_same_products() -> None:
+    rng = np.random.default_rng(0)
+    columns = [np.where(np.arange(200)[:, None] // 10 == k, rng.normal(size=(200, 2)), 0.0) for k in range(20)]
+    columns[3][:, 1] = 0.0
+    other = rng.normal(size=(200, 3))
+    whole = np.concatenate(columns, axis=1)
+    acting = np.linalg.norm(whole, axis=0) > 0
+    sparse = stacked(columns)
+    assert not isinstance(sparse.matrix, np.ndarray)
+    np.testing.assert_allclose(sparse.products(other), whole[:, acting].T @ other, atol=1e-12)
+    np.testing.assert_array_equal(sparse.shape, np.repeat(np.arange(20), 2)[acting])
+    mine = np.flatnonzero(sparse.shape == 5)
+    np.testing.assert_allclose(sparse.gram(mine), columns[5].T @ columns[5], atol=1e-12)
+
+
+def resting(delay_s: float, seed: int) -> Balance:
+    """A drive that rests between moves with a current that friction leaves free, its channel late by `delay_s`."""
+    rng = np.random.default_rng(seed)
+    out = []
+    for state in drive(seed, trials=3):
+        t = np.arange(1500) * 0.018
+        phase = t % 2.0
+        x = 50 + 40 * np.where((t // 2) % 2 < 1, 1, -1) * (np.clip(phase / 1.2, 0, 1) * 2 - 1)
+        v = np.gradient(x, t)
+        moving = np.abs(v) > 5
+        declared = np.stack([np.zeros_like(v), v, np.sign(v) * moving, x, np.ones_like(v)], axis=-1)
+        held = rng.uniform(-30, 30, 40)[(t // 2).astype(int)]
+        true = np.where(moving, declared @ np.array([0.0, 0.15, 35.0, 0.22, 9.0]), held)
+        shown = np.interp(t - delay_s, t, true) + rng.normal(0, 4, len(t))
+        out.append(type(state)(state.trial, "index", t, x, v, np.zeros_like(v), np.where(moving, shown, np.nan), declared,
+                               extra={**{k: a[:1500] for k, a in state.extra.items()}, "holding": np.where(moving, 0.0, 35.0),
+                                      "bandwidth_s": np.full(len(t), 0.009)}, declared_names=state.declared_names))
+    return Balance(tuple(out))
+
+
+@pytest.mark.parametrize("late_s", [0.036, 0.09])
+def test_a_delay_is_likeliest_where_it_is_though_rest_is_unknown(late_s: float) -> None:
+    balance, kind = resting(late_s, 3), effect("current_channel_delay")
+    tried = np.arange(0.0, 0.145, 0.009)
+    rss = [balance.fit((Term(kind, {"form": 0.0, "delay": d}),)).rss for d in tried]
+    assert abs(tried[int(np.argmin(rss))] - late_s) < 0.0091
+
+
+def test_ignorance_of_rest_is_no_gain_where_nothing_is_late() -> None:
+    balance, kind = resting(0.0, 4), effect("current_channel_delay")
+    for form in (0.0, 1.0):
+        for delay in (0.018, 0.036, 0.072):
+            assert balance.fit((Term(kind, {"form": form, "delay": delay}),)).rss > balance.fit().rss
+
+
+def test_without_a_delay_weights_stay_and_wider_errors_cost() -> None:
+    balance = resting(0.0, 5)
+    assert balance.weights(()) is balance.weight
+    assert balance.vagueness(balance.weight) == 0.0
+    assert balance.vagueness(0.5 * balance.weight) == pytest.approx(2 * np.log(2) * balance.inflation * balance.train.sum())
