@@ -38,8 +38,8 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
     kept += refine_swing(stages, rounds[-1].fit, taken) if rounds else ()
     say(f"{rig.name}: {', '.join(v.key for v, _ in kept) or 'nothing'}")
     # Last, at the step of the replay; a free swing over whole recordings, for its phase is known well enough by now.
-    last_stages = [(STEP_S, windows[-1])] if stages[0].driven else [(step, np.inf), (STEP_S, np.inf)]
-    fine = [build_swing(rig, fit, *stage) for stage in last_stages]
+    last_stages = [(STEP_S, windows[-1], 8)] if stages[0].driven else [(step, np.inf, 12), (STEP_S, np.inf, 3)]
+    fine = [(build_swing(rig, fit, step_s, window_s), most) for step_s, window_s, most in last_stages]
     known: dict[tuple[str, ...], Link] = {}
     while True:
         chain = _chain(rig, session, held, fine, declared.theta, kept, known)
@@ -74,16 +74,19 @@ class Link:
     replay: RigResiduals
 
 
-def _chain(rig: RigModel, session: Session, held: bool, stages: Sequence[Swing], declared: np.ndarray,
+def _chain(rig: RigModel, session: Session, held: bool, stages: Sequence[tuple[Swing, int]], declared: np.ndarray,
            kept: Sequence[tuple[Variant, Round]], known: dict[tuple[str, ...], Link]) -> list[Link]:  # fmt: skip
-    """The declared model, with the first effect, with the first two, ...: fitted in one batch, written and replayed; known
-    holds those that were before, by the effects in them."""
-    swing = stages[0]
+    """The declared model, with the first effect, with the first two, ...: fitted in one batch, written and replayed; stages:
+    each with its most iterations; known holds those that were before, by the effects in them."""
+    swing = stages[0][0]
     keys = [tuple(v.key for v, _ in kept[:k]) for k in range(len(kept) + 1)]
     new = [k for k, key in enumerate(keys) if key not in known]
     free = [all_free(swing, [v for v, _ in kept[:k]]) for k in new]
     starts = [_start(names, kept[k - 1][1].fit.theta, kept[-1][1].fit.theta) if k else declared for k, names in zip(new, free, strict=True)]
-    fits = fit_stages(stages, [Task(names, s, ()) for names, s in zip(free, starts, strict=True)], 12) if new else []
+    fits: list[Fitted] = []
+    for stage, most in stages if new else ():
+        starts = [f.theta for f in fits] or starts
+        fits = fit_stages([stage], [Task(names, s, ()) for names, s in zip(free, starts, strict=True)], most)
     files = [write_swing(rig, swing, f.theta) for f in fits]
     replays = Background(_replayed, [(session, x, held) for x in files]).results()
     for k, names, f, x, r in zip(new, free, fits, files, replays, strict=True):
