@@ -87,6 +87,8 @@ def one_seed(seed: int) -> dict:
 
 def hand_rows(side: str, seed: int | None) -> list[dict]:
     """Every finger of one hand, its held-out trials replayed in MuJoCo."""
+    # the motors of a seed do not depend on the side: another seed for the other hand
+    seed = None if seed is None else 2 * seed + ("left", "right").index(side)
     truth = bebionic(side, seed, list(FINGERS))
     out = []
     for actuator, motor in truth.motors.items():

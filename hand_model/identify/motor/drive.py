@@ -30,7 +30,7 @@ BEYOND_S = 2e-3  # simulated beyond a move's end, where what is known of a sampl
 EARLY_S = 0.01  # simulated before a move's own zero, for a command that took effect before it
 SHARED = ("inertia", "viscous", "coulomb", "stiffness", "preload", "presliding", "bristle", "speed_full", "rise", "gain", "damping", "delay", "lead")
 CONTROLLERS = {"profile": (*SHARED, "fall", "lag"), "cascade": (*SHARED, "position_gain", "deadband")}
-STRIBECK = ("static_ratio", "stribeck_speed")
+STRIBECK = ("static_ratio", "stribeck_speed", "stribeck_exponent")
 
 
 @dataclass(frozen=True)

@@ -66,12 +66,13 @@ BOUNDS = {
     "lag": (-0.005, 0.005),
     "static_ratio": (1.0, 8.0),
     "stribeck_speed": (1.5, 100.0),
+    "stribeck_exponent": (0.7, 3.0),
 }
 LACK_OF_FIT = 0.5  # systematic misfit [noise variances] above which output error does not describe the recording
 CLAIM = 6.0  # standard errors, by a jackknife over some forty strokes, above which the regression claims a Stribeck rise
 ROOM = 3.0  # the same, above which output error tries one
 REGRESSION_MISFIT = 4.0  # the same for the regression; noise with a memory of a sample or two reaches 3
-EVIDENCE = 16.0  # fall of the misfit (in variances, two parameters and two shapes tried): once in about a thousand by chance
+EVIDENCE = 16.0  # fall of the misfit (in variances, of three parameters): once in about a thousand by chance
 
 
 @dataclass(frozen=True)
@@ -223,30 +224,43 @@ def _fit_output_error(
     """Fit of plant and controller, with a Stribeck rise where it is worth its parameters, and the fall of the misfit by it."""
     best, evidence = find_controller(moves, _plant(plain), sigma, BOUNDS, LACK_OF_FIT), 0.0
     # a rise is tried where the regression, which knows no controller, leaves room for one
-    if curved.excess_z > ROOM and (_claims(curved) or max(best.chi2) < 4.0):
+    if curved.excess_z > (ROOM if max(best.chi2) < 4.0 else CLAIM):
         best, evidence = _with_rise(best, curved)
     if lack_of_fit(best) < LACK_OF_FIT:
         best = output_error.reweighted(best, BOUNDS)
+        best = _with_other_shape(best) if evidence else best
     return best, evidence
 
 
 def _with_rise(base: OutputErrorFit, curved: Regression) -> tuple[OutputErrorFit, float]:
-    """The fit with a Stribeck rise of either exponent, or without where it is not worth it, and the fall of the misfit by it."""
-    start = {**base.values, "static_ratio": float(np.clip(1 + curved.static_excess / max(base.values["coulomb"], 1.0), 1.2, 2.0)), "stribeck_speed": 20.0}
-    names = (*base.names, *STRIBECK)
+    """The fit with a Stribeck rise, or without where it is not worth it, and the fall of the misfit by it.
 
-    def refined(values: Mapping[str, float], own: Array) -> OutputErrorFit:
-        return output_error.fit(base.moves, values, names, base.sigma, BOUNDS, base.controller, (FINE,), own)
-
-    fits = [refined({**start, "stribeck_exponent": exponent}, base.own) for exponent in (1.0, 2.0)]
-    fits = [refined(f.values, f.own) if base.cost - f.cost > EVIDENCE else f for f in fits]  # far from where it began: once more
-    best, other = sorted(fits, key=lambda f: f.cost)
+    The shape of the rise is one of its unknowns: held at a wrong one, Coulomb and viscous friction make up for it.
+    """
+    level = max(float(curved.values[2]), 0.2 * base.values["coulomb"])
+    rise = {"static_ratio": float(np.clip(1 + curved.static_excess / level, 1.2, 5.0)), "stribeck_speed": curved.stribeck_speed}
+    start = {**base.values, "viscous": float(curved.values[1]), "coulomb": level, **rise, "stribeck_exponent": curved.stribeck_exponent}
+    best = output_error.fit(base.moves, start, (*base.names, *STRIBECK), base.sigma, BOUNDS, base.controller, (FINE,), base.own)
+    if base.cost - best.cost > EVIDENCE:  # far from where it began: once more
+        best = output_error.fit(base.moves, best.values, best.names, base.sigma, BOUNDS, base.controller, (FINE,), best.own)
     evidence = (base.cost - best.cost) / max(1.0, *best.chi2)
-    if evidence < EVIDENCE:
-        return base, 0.0
-    if other.cost - best.cost < EVIDENCE:
-        best = _either_shape(*fits)
-    return best, evidence
+    return (base, 0.0) if evidence < EVIDENCE else (best, evidence)
+
+
+def _with_other_shape(best: OutputErrorFit) -> OutputErrorFit:
+    """The fit, its covariance as wide as the misfit tells between its own shape of the rise and the other usual one (exponential; Gaussian).
+
+    Along this way the misfit is no parabola: the secant over it says how far the recording allows to go.
+    """
+    exponent = 2.0 if best.values["stribeck_exponent"] < 1.5 else 1.0
+    names = tuple(n for n in best.names if n != "stribeck_exponent")
+    other = output_error.fit(
+        best.moves, {**best.values, "stribeck_exponent": exponent}, names, best.sigma, BOUNDS, best.controller, (FINE,), best.own, best.memory
+    )
+    if (rise := other.cost - best.cost) > EVIDENCE:
+        return best
+    way = np.array([other.values[n] - best.values[n] for n in best.names])
+    return dataclasses.replace(best, covariance=best.covariance + np.outer(way, way) / max(rise, 3.84))
 
 
 def _claims(curved: Regression) -> bool:
@@ -261,18 +275,12 @@ def _plant(r: Regression) -> dict[str, float]:
     return plant | {"static_ratio": 1.0, "stribeck_speed": 20.0, "stribeck_exponent": 1.0} | ({"presliding": r.give} if r.give > GIVE[0] else {})
 
 
-def _either_shape(first: OutputErrorFit, second: OutputErrorFit) -> OutputErrorFit:
-    """The first of two shapes of the rise that the recording cannot tell apart, its covariance widened by their difference."""
-    d = np.array([first.values[n] - second.values[n] for n in first.names])
-    return dataclasses.replace(first, covariance=first.covariance + np.outer(d, d) / 3.84)
-
-
 def _from_regression(plain: Regression, curved: Regression) -> tuple[dict[str, float], tuple[str, ...], Array, bool]:
     stribeck = _claims(curved)
     used = curved if stribeck else plain
     values = dict(zip(NAMES, map(float, used.values), strict=True))
     if stribeck:
-        values |= {"static_ratio": 1 + used.static_excess / used.values[2], "stribeck_speed": used.stribeck_speed, "stribeck_exponent": 1.0}
+        values |= {"static_ratio": 1 + used.static_excess / used.values[2], "stribeck_speed": used.stribeck_speed, "stribeck_exponent": used.stribeck_exponent}
     return values, NAMES, used.covariance, stribeck
 
 
@@ -281,7 +289,7 @@ def _estimates(values: Mapping[str, float], names: Sequence[str], covariance: Ar
     sd = dict(zip(names, np.sqrt(np.maximum(np.diag(covariance), 0)), strict=True))
     kept = values if accepted else {n: v for n, v in values.items() if n in NAMES or n in STRIBECK}
     if accepted and "static_ratio" not in names:
-        kept = {n: v for n, v in kept.items() if not n.startswith(("static", "stribeck")) or n in names}
+        kept = {n: v for n, v in kept.items() if n not in STRIBECK}
     ordered = [*NAMES, *(n for n in kept if n not in NAMES)]
     return {
         n: Estimate(float(kept[n]), (float(kept[n] - 1.96 * sd[n]), float(kept[n] + 1.96 * sd[n])) if n in sd else None, UNITS[n], origin)

@@ -1,6 +1,6 @@
 """The regression done right: the balance in weak form on every stroke, so that nothing recorded is ever differentiated.
 
-current = inertia a + viscous v + coulomb z + stiffness p + preload (+ rise z exp(-|v| / speed)) is multiplied by B-splines that vanish at
+current = inertia a + viscous v + coulomb z + stiffness p + preload (+ rise z exp(-|v / speed|^exponent)) is multiplied by B-splines that vanish at
 both ends of a stroke and integrated by parts (modulating functions, Shinbrot 1957; Preisig & Rippin 1993): position and current pass through the
 same splines. At an end the drive stands still and friction turns round, at an instant known to about a sample; as the splines
 vanish there, an error of it counts only in second order. A rest is not used: friction there is known only within its bounds. Friction builds up from what it
@@ -23,7 +23,8 @@ from .recording import MotorTrial
 Array = NDArray[np.float64]
 
 GIVE = (0.02, 0.3, 0.6, 1.0)  # [%], distances tried first; the least of them is Coulomb's friction to any encoder here
-STRIBECK = (6.0, 10.0, 15.0, 22.0, 32.0, 45.0)  # [%/s], profiled
+STRIBECK = tuple(itertools.product((6.0, 10.0, 15.0, 22.0, 32.0, 45.0), (1.0, 2.0)))  # speed [%/s] and exponent, profiled
+RATIO = 2.0  # most that the rise is of Coulomb friction
 INERTIA = 0.0125  # [raw s^2/%] of a typical finger drive, only to choose how dense the splines are
 WINDOW = 5  # samples that tell motion from rest
 EVIDENCE = 16.0  # fall of the misfit for which a give of the friction is believed
@@ -32,7 +33,7 @@ EVIDENCE = 16.0  # fall of the misfit for which a give of the friction is believ
 @dataclass(frozen=True)
 class Regression:
     """values (5,) of balance.NAMES; covariance (5, 5), a jackknife over strokes; misfit: residual variance over that of the
-    current's noise; give [%]: distance over which friction turns round; static_excess [raw] and stribeck_speed [%/s]; excess_z: the excess over its standard error."""
+    current's noise; give [%]: distance over which friction turns round; static_excess [raw], stribeck_speed [%/s] and its exponent; excess_z: the excess over its standard error."""
 
     values: Array
     covariance: Array
@@ -40,6 +41,7 @@ class Regression:
     give: float = GIVE[0]
     static_excess: float = 0.0
     stribeck_speed: float = 20.0
+    stribeck_exponent: float = 1.0
     excess_z: float = 0.0
 
 
@@ -75,7 +77,7 @@ class _Projected:
 
 
 def fit_regressions(trials: Sequence[MotorTrial], sigma_position: float, sigma_current: float) -> tuple[Regression, Regression]:
-    """Least squares on all strokes, without a Stribeck rise and with one, whose speed is profiled over a grid.
+    """Least squares on all strokes, without a Stribeck rise and with one, whose speed and exponent are profiled over a grid.
 
     sigma_position [%], sigma_current [raw]: noise of one sample. Raises IdentificationError with fewer than six strokes.
     """
@@ -89,15 +91,17 @@ def fit_regressions(trials: Sequence[MotorTrial], sigma_position: float, sigma_c
         sliding = [[_settled(t, s, 2.5 * give + 2 * sigma_position) for s in found] for t, found in zip(trials, moved, strict=True)]
         parts = _without_outliers(_projected(trials, sliding, sigma_position, sigma_current), give)
     noise = sigma_current**2 * float(np.median(np.concatenate([np.diff(t.time_s) for t in trials])))
-    fits = [(*_solve(parts, give, speed), speed) for speed in (None, *STRIBECK)]
+    fits = [(*_solve(parts, give, shape), shape) for shape in (None, *STRIBECK)]
     values, covariance, square, _ = fits[0]
     # what the current does between the last sample outside a stroke and the first inside is not recorded
     shift = _solve([replace(q, current=q.held_current) for q in parts], give, None)[0] - values
     unrecorded = np.outer(shift, shift) / 4
     plain = Regression(values, covariance + unrecorded, square / noise, give)
-    values, covariance, square, speed = min(fits[1:], key=lambda f: f[2])
+    # a rise so broad that hardly any Coulomb friction is left is viscous friction in disguise
+    rises = [f for f in fits[1:] if f[0][5] < RATIO * f[0][2]] or fits[1:]
+    values, covariance, square, shape = min(rises, key=lambda f: f[2])
     excess = float(values[5])
-    curved = Regression(values[:5], covariance[:5, :5] + unrecorded, square / noise, give, excess, speed, excess / float(np.sqrt(covariance[5, 5])))
+    curved = Regression(values[:5], covariance[:5, :5] + unrecorded, square / noise, give, excess, *shape, excess / float(np.sqrt(covariance[5, 5])))
     return plain, curved
 
 
@@ -200,7 +204,7 @@ def _project(t: MotorTrial, s: Stroke, sigma: float, spacing: float, step: float
     return _Projected(s, onto, np.c_[twice @ bent, velocity], position, current, held, speed, np.einsum("ikr,jkr->ij", seen, seen) / 2)
 
 
-def _rows(q: _Projected, give: float, stribeck: float | None) -> tuple[Array, Array]:
+def _rows(q: _Projected, give: float, stribeck: tuple[float, float] | None) -> tuple[Array, Array]:
     """Regressors (k, 5 or 6) and current (k,): from rest friction is exp(-travel / give) of what it held, and slides for the rest."""
     left = np.exp(-np.abs(q.position - q.stroke.rest) / give)
     if q.stroke.hold is None:
@@ -209,12 +213,12 @@ def _rows(q: _Projected, give: float, stribeck: float | None) -> tuple[Array, Ar
         friction, held, hold = q.stroke.sign * (1 - left), left, q.stroke.hold
     columns = [friction, q.position - held * q.stroke.rest, 1 - held]
     if stribeck is not None:
-        columns.append(friction * np.exp(-q.speed / stribeck))
+        columns.append(friction * np.exp(-((q.speed / stribeck[0]) ** stribeck[1])))
     x = q.project @ np.column_stack([*columns, q.current - held * hold])
     return np.c_[q.fixed, x[:, :-1]], x[:, -1]
 
 
-def _system(parts: Sequence[_Projected], give: float, stribeck: float | None) -> tuple[list[Array], list[Array], list[float]]:
+def _system(parts: Sequence[_Projected], give: float, stribeck: tuple[float, float] | None) -> tuple[list[Array], list[Array], list[float]]:
     """Normal matrices less the encoder's noise, right sides and squares of the current, stroke by stroke."""
     gram, right, square = [], [], []
     for q in parts:
@@ -246,7 +250,7 @@ def _give(parts: Sequence[_Projected]) -> float:
     return float(minimize_scalar(lambda g: _cost(parts, g), bounds=bounds, method="bounded", options={"xatol": 0.02}).x)
 
 
-def _solve(parts: Sequence[_Projected], give: float, stribeck: float | None) -> tuple[Array, Array, float]:
+def _solve(parts: Sequence[_Projected], give: float, stribeck: tuple[float, float] | None) -> tuple[Array, Array, float]:
     """Values, their covariance by leaving out one stroke after the other (jackknife), and the mean square left."""
     gram, right, square = _system(parts, give, stribeck)
     total, b = sum(gram), sum(right)
