@@ -11,7 +11,7 @@ import pytest
 
 from hand_model.effects import DriveState, effect
 from hand_model.errors import SessionError
-from hand_model.rig import fit_declared, load_rig, replay_rig
+from hand_model.rig import diagnose_rig, fit_declared, load_rig, replay_rig
 from hand_model.rig.compete import pose, solution
 from hand_model.rig.evidence import multiplicities, weigh
 from hand_model.rig.horizon import open_loop
@@ -236,3 +236,50 @@ def test_a_closer_law_is_taken_where_the_recordings_ask_for_it(tmp_path: Path) -
         found = refine_swing([swing], fit, [gear])
         assert [v.effect for v, _ in found] == (["load_dependent_friction"] if planted is not line else [])
     assert refine_swing([swing], fit, []) == ()
+
+
+COUPLED = """<mujoco><compiler angle="radian"/><option timestep="0.001" integrator="implicitfast" gravity="0 0 0"/><worldbody>
+  <body name="a"><joint name="a" axis="0 0 1" damping="0.01" frictionloss="0.03"/>
+   <inertial pos="0 0 0" mass="0.1" diaginertia="1e-3 1e-3 1e-3"/></body>
+  <body name="b" pos="0 0 0.2"><joint name="b" axis="0 0 1"/>
+   <inertial pos="0 0 0" mass="0.01" diaginertia="1e-5 1e-5 1e-5"/></body></worldbody>
+  <equality><joint name="cable" joint1="b" joint2="a" polycoef="0 0.9 0 0 0"/></equality>
+  <actuator><motor name="m" joint="a"/><motor name="l" joint="b"/></actuator></mujoco>"""
+BOTH_ENDS = """format = "hand-session/1"
+[hand]
+name = "cable"
+[rig]
+model = "rig.xml"
+[signals]
+near = "joint:a:position"
+far = "joint:b:position"
+drive = "actuator:m:force"
+load = "actuator:l:force"
+"""
+
+
+def test_lost_motion_between_encoders_makes_no_load(tmp_path: Path) -> None:
+    """Play of 0.03 rad between two encoders is found with its size, and nothing is named of the efforts, which are healthy: the
+    polynomial that projects them has not bent to the play."""
+    (tmp_path / "log").mkdir()
+    (tmp_path / "rig.xml").write_text(COUPLED)
+    text, random = BOTH_ENDS, np.random.default_rng(1)
+    for k in range(5):
+        t = np.arange(0, 15, 0.005)
+        w, size, phase = 2 * np.pi * random.uniform([0.15, 0.4], [0.35, 0.9]), random.uniform([0.4, 0.1], [0.7, 0.2]), random.uniform(0, 6, 2)
+        near, speed, acceleration = (sum(s * w_**d * np.sin(w_ * t + p + d * np.pi / 2) for s, w_, p in zip(size, w, phase, strict=True))
+                                     for d in range(3))  # fmt: skip
+        far, slack = np.empty(len(t)), near[0]
+        for i, q in enumerate(near):
+            slack = min(max(slack, q - 0.015), q + 0.015)
+            far[i] = 0.9 * slack
+        load = -(0.1 + 0.05 * k + 0.15 * np.sin(2 * np.pi * 0.23 * (1 + 0.2 * k) * t + k))
+        drive = 1e-3 * acceleration + 0.015 * speed + 0.04 * np.sign(speed) - 0.9 * load
+        noise = 2e-3 * random.standard_normal((2, len(t)))
+        table = np.stack([t, *(np.round(x / 2e-4) * 2e-4 for x in (near, far)), drive + noise[0], load + noise[1]], 1)
+        np.savetxt(tmp_path / f"log/{k}.csv", table, delimiter=",", header="time,near,far,drive,load", comments="", fmt="%.8g")
+        text += f'[[trial]]\nkind = "motion"\nlog = "log/{k}.csv"\n' + ('purpose = "validate"\n' if k == 4 else "")
+    (tmp_path / "session.toml").write_text(text)
+    found = diagnose_rig(read_session(tmp_path)).findings
+    assert [(f.effect, f.where["joint"]) for f in found] == [("drive_backlash", "b")]
+    assert abs(found[0].parameters["half_gap"]["value"]) == pytest.approx(0.9 * 0.015, rel=0.05)

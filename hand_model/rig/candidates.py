@@ -27,6 +27,7 @@ NOT_FOR_RIGS = frozenset(
         "current_channel_delay",
     }
 )
+PERIODIC = frozenset({"torque_ripple"})  # between two periods of a grid there is nothing to descend from
 LONGEST_DELAY_S = 0.03
 BY_LEVEL = "in proportion to the trial's friction"
 Bound = tuple[str, str, float, float]
@@ -88,7 +89,7 @@ def _from_catalogue(
     found: Any, joint: str, train: tuple[DriveState, ...], states: Mapping[str, DriveState]
 ) -> Candidate:
     grid = tuple(found.grid(train))
-    if len(grid) > 16:  # a coarse look first; the winner's shape is refined
+    if len(grid) > 16 and found.name not in PERIODIC:  # a coarse look first; the winner's shape is refined
         grid = grid[:: int(np.ceil(len(grid) / 16))]
     return Candidate(found.name, "", joint, tuple(found.amplitudes()), grid,
                      lambda row, shape: np.asarray(found.columns(states[row.trial], shape), float), bool(found.warps))  # fmt: skip

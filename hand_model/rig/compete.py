@@ -6,7 +6,7 @@ the best is the share of resampled sets of blocks in which it is (Efron's bootst
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -25,7 +25,7 @@ from .states import later
 Array = NDArray[np.float64]
 FOLDS = 6
 FEW = 4  # recordings from which on whole ones are left out
-LEAST_SHARE = 0.05  # of the declared model's held-out residual variance: less is not worth a name
+LEAST_SHARE = 0.05  # of the held-out residual variance that is left: less is not worth a name
 MOST_TERMS = 4
 
 
@@ -223,32 +223,42 @@ def score(problem: Problem, terms: Sequence[Term], candidate: Candidate, parts: 
 
 
 def refined(problem: Problem, terms: Sequence[Term], term: Term, parts: tuple) -> Term:
-    """The term beside others with its continuous shapes moved together within the bounds of its grid (Nelder & Mead 1965),
-    by the training error."""
-    from scipy.optimize import minimize
+    """The term beside others in the best of its forms, its continuous shapes moved together, by the training error."""
 
-    names = [n for n in term.shape if n not in DISCRETE]
-    grid = {n: np.unique([g[n] for g in term.candidate.grid]) for n in names}
-    names = [n for n in names if len(grid[n]) > 1]
-    if not names:
-        return term
-    low, high = (np.array([grid[n][k] for n in names]) for k in (0, -1))
-    start = np.array([term.shape[n] for n in names])
-
-    def at(x: Array) -> Term:
-        shape = dict(zip(names, (float(v) for v in np.clip(x, low, high)), strict=True))
-        return Term(term.candidate, {**term.shape, **shape})
-
-    def train(x: Array) -> float:
-        moved = at(x)
+    def train(shape: Mapping[str, float]) -> float:
+        moved = Term(term.candidate, shape)
         some = normal(problem, [*terms, moved]) if term.candidate.delays else _extended(problem, terms, moved, parts)
         return training_error(problem, [*terms, moved], some)
 
-    near = [grid[n][np.argsort(np.abs(grid[n] - x))[1]] for n, x in zip(names, start, strict=True)]
-    corners = start + np.concatenate([np.zeros((1, len(names))), np.diag(0.5 * (np.array(near) - start))])
-    found = minimize(train, start, method="Nelder-Mead",
-                     options={"initial_simplex": corners, "maxfev": 15 + 20 * len(names), "xatol": 0, "fatol": 1e-4 * train(start)})  # fmt: skip
-    return at(found.x) if found.fun < train(start) else term
+    forms: dict[tuple, list[dict[str, float]]] = {}
+    for shape in term.candidate.grid:
+        forms.setdefault(tuple(v for n, v in shape.items() if n in DISCRETE), []).append(shape)
+    starts = [min(grid, key=train) for grid in forms.values()] if len(forms) > 1 else [dict(term.shape)]
+    ends = [_descended(train, term.candidate.grid, shape) for shape in starts]
+    return Term(term.candidate, min(ends, key=train))
+
+
+def _descended(train: Callable[[Mapping[str, float]], float], shapes: Sequence[Mapping[str, float]],
+               start: Mapping[str, float]) -> Mapping[str, float]:  # fmt: skip
+    """The shape of least training error near one of a grid of shapes and within their bounds (Nelder & Mead 1965)."""
+    from scipy.optimize import minimize
+
+    grid = {n: np.unique([g[n] for g in shapes]) for n in start if n not in DISCRETE}
+    names = [n for n, values in grid.items() if len(values) > 1]
+    if not names:
+        return start
+    low, high = (np.array([grid[n][k] for n in names]) for k in (0, -1))
+    at = np.array([start[n] for n in names])
+
+    def shape(x: Array) -> dict[str, float]:
+        return {**start, **dict(zip(names, (float(v) for v in np.clip(x, low, high)), strict=True))}
+
+    near = np.array([grid[n][np.argsort(np.abs(grid[n] - x))[1]] for n, x in zip(names, at, strict=True)])
+    corners = at + np.concatenate([np.zeros((1, len(names))), np.diag(0.5 * (near - at))])
+    begin = train(start)
+    found = minimize(lambda x: train(shape(x)), at, method="Nelder-Mead", options={
+        "initial_simplex": corners, "maxfev": 15 + 20 * len(names), "xatol": 0, "fatol": 1e-4 * begin})  # fmt: skip
+    return shape(found.x) if found.fun < begin else start
 
 
 def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ...] = (),
@@ -261,13 +271,12 @@ def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ..
     terms = begin
     steps: list[Step] = []
     scores: list[Score] = []
-    whole = held_out(problem, (), normal(problem, ()))[0].sum()
     while len(terms) < most:
         parts = normal(problem, terms)
         none, _ = held_out(problem, terms, parts)
         taken = {t.candidate.key for t in terms}
         scores = [score(problem, terms, c, parts) for c in rivals if c.key not in taken]
-        step = judge(none, scores, whole, problem.group)
+        step = judge(none, scores, problem.group)
         if step is None:
             break
         terms = (*terms, refined(problem, terms, step.winner.term, parts))
@@ -275,13 +284,12 @@ def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ..
     return terms, tuple(steps), tuple(scores)
 
 
-def judge(none: Array, scores: Sequence[Score], whole: float, group: Array) -> Step | None:
-    """The winner of a round, or None where no candidate beats "nothing" (none (B,)) beyond doubt and by enough of the
-    declared model's error (whole)."""
+def judge(none: Array, scores: Sequence[Score], group: Array) -> Step | None:
+    """The winner of a round, or None where no candidate beats "nothing" (none (B,)) beyond doubt and by enough."""
     if not scores:
         return None
     said = weigh(none, np.array([s.error for s in scores]), [_size(s.term) for s in scores], group)
-    if said is None or none.sum() - scores[said.best].error.sum() < LEAST_SHARE * whole:
+    if said is None or none.sum() - scores[said.best].error.sum() < LEAST_SHARE * none.sum():
         return None
     rivals = tuple((scores[i].term.candidate.key, float(said.wins[i])) for i in np.argsort(-said.wins) if said.wins[i] > 0.005)
     equals = tuple(dict.fromkeys(scores[k].term.candidate.effect for k in said.close))

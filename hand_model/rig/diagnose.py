@@ -25,19 +25,20 @@ from .compete import (
     normal,
     pose,
     resampled,
+    score,
     solution,
 )
+from .couplings import coupling_terms, with_couplings
 from .declared import DeclaredFit, fit_declared
 from .diagnose_swing import diagnose_swing
 from .findings import CouplingResidual, Finding, RigFindings
 from .horizon import open_loop
 from .model import RigModel, load_rig
 from .noise import effort_noise
-from .patch import write_couplings
 from .proof import Bench
 from .states import fill_gaps
 from .swing_build import can_swing
-from .transmission import angle_residual, coupling_candidates, fit_coupling, zero_shift
+from .transmission import angle_residual
 from .words import shares, statement
 
 Array = NDArray[np.float64]
@@ -135,16 +136,6 @@ def repeated_trajectory(rig: RigModel) -> bool:
 
     held = rig.select(True)
     return bool(held) and all(any(same(v, t) for t in rig.select(False)) for v in held)
-
-
-def with_couplings(rig: RigModel) -> RigModel:
-    """The rig with its couplings' polynomials fitted to the encoders: what follows projects efforts through them."""
-    couplings, values = [], {}
-    for c in rig.couplings:
-        fit = fit_coupling(rig, c)
-        values[c.name] = c.polycoef if fit is None else fit.theta
-        couplings.append(replace(c, polycoef=values[c.name]))
-    return replace(rig, couplings=tuple(couplings), xml=write_couplings(rig.xml, values)) if couplings else rig
 
 
 def _rate(rig: RigModel) -> float:
@@ -290,8 +281,8 @@ def _off_axis(bench: Bench, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple[
     shape = Candidate(
         "gravity_load", "centres of mass off their axes", "*", (), ({},), lambda r, s: np.zeros((len(r.time_s), 0))
     )
-    step = judge(errors[0], [Score(Term(shape, {}), errors[1], 0.0)], errors[0].sum(), sides[0].group)
-    if step is None:
+    step = judge(errors[0], [Score(Term(shape, {}), errors[1], 0.0)], sides[0].group)
+    if step is None or _better_alone(rig, fit, offsets, errors[1].sum()):
         return None
     before, after = (solution(p, offsets) for p in sides)
     joints = sorted({r.joint for r in fit.rows})
@@ -310,6 +301,14 @@ def _off_axis(bench: Bench, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple[
     )
     return freed, Finding("gravity_load", ("gravity_load",), step.probability, (), where, words, moved, proofs[best],
                           {"native": True, "mjcf": "body/inertial/@pos", "urdf": "link/inertial/origin"})  # fmt: skip
+
+
+def _better_alone(rig: RigModel, fit: DeclaredFit, terms: Sequence[Term], error: float) -> bool:
+    """Whether any effect at one joint leaves less held-out error than `error` of a change to the whole chain."""
+    problem = pose(fit)
+    parts = normal(problem, terms)
+    every = (c for j in dict.fromkeys(r.joint for r in fit.rows) for c in candidates(rig, fit, j))
+    return any(score(problem, terms, c, parts).error.sum() < error for c in every)
 
 
 def _joint_finding(rig: RigModel, fit: DeclaredFit, step: Step, term: Term, amplitude: Array, proof: dict,
@@ -338,14 +337,10 @@ def _joint_finding(rig: RigModel, fit: DeclaredFit, step: Step, term: Term, ampl
 def _diagnose_coupling(
     rig: RigModel, coupling: Any
 ) -> tuple[list[Finding], list[dict[str, Any]], CouplingResidual | None]:
-    fit = fit_coupling(rig, coupling)
-    if fit is None:
+    known = coupling_terms(rig, coupling)
+    if known is None:
         return [], [], None
-    taken, steps, scores = compete(pose(fit), coupling_candidates(fit, coupling))
-    moved = zero_shift(fit, solution(pose(fit), taken), taken)
-    if moved is not None:
-        fit = moved
-        taken, steps, scores = compete(pose(fit), coupling_candidates(fit, coupling))
+    fit, taken, steps, scores, moved = known
     rejected = [{"effect": s.term.candidate.key, "reason": "held-out error does not fall enough"} for s in scores]
     found, kept = _prove(Bench(rig, mujoco=False), fit, list(zip(steps, taken, strict=True)), [], rejected)
     named = []
@@ -355,7 +350,7 @@ def _diagnose_coupling(
         words = f.statement.replace("effort rmse", "angle rmse").replace(
             rig.effort_unit(coupling.dependent), proof["unit"]
         )
-        if moved is not None:
+        if moved:
             words += " The zero between the two encoders differs between recordings and was taken out of each."
         named.append(replace(f, fit=proof, where=where, statement=words))
     return shares(named), rejected, angle_residual(rig, coupling, fit, kept)
