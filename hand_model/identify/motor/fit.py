@@ -66,7 +66,7 @@ BOUNDS = {
     "lag": (-0.005, 0.005),
     "static_ratio": (1.0, 8.0),
     "stribeck_speed": (1.5, 100.0),
-    "stribeck_exponent": (0.7, 3.0),
+    "stribeck_exponent": (1.0, 3.0),  # below 1 the rise would be infinitely steep at rest
 }
 LACK_OF_FIT = 0.5  # systematic misfit [noise variances] above which output error does not describe the recording
 CLAIM = 6.0  # standard errors, by a jackknife over some forty strokes, above which the regression claims a Stribeck rise
