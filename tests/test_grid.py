@@ -55,8 +55,8 @@ def resting(delay_s: float, seed: int) -> Balance:
         true = np.where(moving, declared @ np.array([0.0, 0.15, 35.0, 0.22, 9.0]), held)
         shown = np.interp(t - delay_s, t, true) + rng.normal(0, 4, len(t))
         out.append(type(state)(state.trial, "index", t, x, v, np.zeros_like(v), np.where(moving, shown, np.nan), declared,
-                               extra={**{k: a[:1500] for k, a in state.extra.items()}, "holding": np.where(moving, 0.0, 35.0),
-                                      "bandwidth_s": np.full(len(t), 0.009)}, declared_names=state.declared_names))
+                               extra={**{k: a[:1500] for k, a in state.extra.items()}, "sigma": np.where(moving, 0.0, 35.0)},
+                               declared_names=state.declared_names))
     return Balance(tuple(out))
 
 

@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 # What physics allows of a declared coefficient, by its column's name.
 DECLARED_LOW = {"inertia": 0.0, "viscous": 0.0, "coulomb": 0.0, "spring": 0.0}
 MOST_KEPT = 3e8  # bytes of columns that one balance keeps
+UNSETTLED = 1e-3  # weight left to a start or stop where steady motion alone is asked
 DISCRETE = ("side", "trial", "form", "end")  # shapes that choose among few cases: no continuous parameter is spent on them
 
 
@@ -84,6 +85,13 @@ class Balance:
         other = copy(self)
         other._kept, other._apart = {}, None
         other.wander = wander if wander is not None and wander.real else None
+        return other
+
+    def settled(self) -> Balance:
+        """The same balance with next to no weight on starts and stops."""
+        other = copy(self)
+        other._kept, other._apart = {}, None
+        other.weight = np.where(self.steady, self.weight, UNSETTLED * self.weight)
         return other
 
     def whiten(self, values: Array, weight: Array) -> Array:
@@ -193,22 +201,16 @@ class Balance:
         return self._apart[1]
 
     def weights(self, terms: tuple[Term, ...]) -> Array:
-        """1 / standard deviation (n,) beside `terms`: what is not known of starts and stops is delayed with all else, and a delayed
-        channel still shows rest while the drive sets off, when friction holds anything up to its limit."""
+        """1 / standard deviation (n,) beside `terms`: what is not known of rest, starts and stops stays, and is delayed with all else."""
         delays = [t for t in terms if t.effect.warps]
         if not delays:
             return self.weight
 
         def doubt(state: DriveState) -> Array:
-            known = np.zeros(len(state.time_s))
-            timing, held = (state.extra.get(name, known)[:, None] for name in ("sigma", "holding"))
-            late = held
+            at_once = timing = state.extra.get("sigma", np.zeros(len(state.time_s)))[:, None]
             for term in delays:
-                timing, late = (term.effect.warp(state, x, term.shape) for x in (timing, late))
-            smear = 2 * float(np.mean(state.extra.get("bandwidth_s", known)))  # what rests and what moves is told no better
-            behind = max(abs(t.shape["delay"]) for t in delays)
-            known_at_once = max(1 - behind / smear, 0.0) if smear else 0.0
-            return np.hypot(timing[:, 0], np.maximum(late - known_at_once * held, 0.0)[:, 0])
+                timing = term.effect.warp(state, timing, term.shape)
+            return np.maximum(timing, at_once)[:, 0]
 
         own = np.sqrt(np.maximum(1 / self.weight**2 - self.timing**2, 0.0))
         return 1 / np.hypot(own, self.gather(doubt))

@@ -154,7 +154,7 @@ def with_coulomb(state: DriveState, give: float, granted: float) -> DriveState:
 
 def with_timing(state: DriveState) -> DriveState:
     """Adds "sigma" around starts and stops, zero in steady motion: what half a sample interval of timing means for the
-    declared prediction, and what is not known of friction while it turns over; and "holding", of friction at rest."""
+    declared prediction, what is not known of friction while it turns over, and all that it may hold where the drive rests or has not left its place."""
     seen = np.isfinite(state.effort)
     if seen.sum() < 20:
         return state
@@ -165,9 +165,10 @@ def with_timing(state: DriveState) -> DriveState:
     slope = np.maximum.reduce([np.roll(slope, k) for k in (-2, -1, 0, 1, 2)])
     turning = state.extra["steady"] <= 0
     sigma = np.where(turning, np.hypot(0.5 * step * slope, START_DOUBT * beta[2]), 0.0)
-    seized = from_rest(state.position, seen) < max(2 * float(state.extra["granted"][0]), 6 * float(state.extra["position_noise"][0]))
-    holding = np.where(seized, abs(float(beta[2])), 0.0)  # what friction may hold at rest, either way
-    return replace(state, extra={**state.extra, "sigma": sigma, "holding": holding})
+    near = np.minimum(from_rest(state.position, seen), from_rest(state.position[::-1], seen[::-1])[::-1])
+    held = near < max(2 * float(state.extra["granted"][0]), 6 * float(state.extra["position_noise"][0]))
+    sigma = np.where(held, np.hypot(sigma, beta[2]), sigma)
+    return replace(state, extra={**state.extra, "sigma": sigma})
 
 
 def gives(prepared: Mapping[str, Sequence[DriveState]]) -> tuple[dict[str, float], float]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from copy import copy
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .balance import DISCRETE, Balance, Fit, Term
-from .evidence import oddity
-from .name import Named, Naming, refit
+from .evidence import gain, oddity
+from .name import Naming, refit
 
 Array = NDArray[np.float64]
 
@@ -69,8 +67,7 @@ def undisturbed(naming: Naming) -> Reading:
     lively = any(t.effect.warps or t.effect.replaces for t in fit.terms)
     if not fit.terms or lively or balance.steady.all() or count < 20 * (len(balance.names) + fit.size):
         return Reading(balance, naming.declared, fit)
-    calm = copy(balance)
-    calm.weight = np.where(balance.steady, balance.weight, 1e-3 * balance.weight)
+    calm = balance.settled()
     best = refit(calm, calm.fit(fit.terms))
     for which, term in enumerate(fit.terms):
         fits = [best]
@@ -194,10 +191,18 @@ def proven(naming: Naming, which: int) -> bool:
     return likelihood[1] > likelihood[0]
 
 
-def sized(named: Named, entries: Mapping[str, Mapping[str, Any]]) -> bool:
-    """Whether the size of an effect is told from zero by its `entries` (of `parameter_intervals`); True without an interval."""
-    bounds = [entries[name]["ci95"] for name in named.amplitudes if "ci95" in entries.get(name, {})]
-    return not bounds or any(low > 0 or high < 0 for low, high in bounds)
+def sized(reading: Reading, which: int) -> bool:
+    """Whether the size of the term `which` is told from zero where sizes are read: a likelihood ratio of all its amplitudes
+    together (Wilks 1938), for some go together; True of a term without any, and where the model does not fit."""
+    balance, fit = reading.balance, reading.fit
+    count = len(fit.amplitudes[which])
+    scale = max(fit.rss / max(balance.train.sum(), 1), 1.0)
+    if not count or scale >= MISFIT_LIMIT:
+        return True
+    from scipy.stats import chi2
+
+    without = balance.fit(tuple(t for i, t in enumerate(fit.terms) if i != which))
+    return 2 * gain(balance, fit, without, scale) > float(chi2.ppf(0.95, count))
 
 
 def variance_ratio(naming: Naming, fit: Fit) -> float:

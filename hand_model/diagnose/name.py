@@ -87,10 +87,15 @@ def name_effects(states: tuple[Any, ...], effects: Iterable[Any], progress: Call
     whether anything is missing; without it no effect is named, however well it fits. typical: declared coefficients of the
     hand's other motors, by name.
     """
-    naming = _name(Balance(tuple(states), typical=typical), tuple(effects), progress)
+    balance = Balance(tuple(states), typical=typical)
+    naming = _name(balance, tuple(effects), progress)
     if naming.before.p < ALPHA and not naming.found and any(s.validate for s in states):
         # What happened in a validation recording only cannot be learned from the others.
-        return _name(Balance(tuple(states), True, typical), tuple(effects), progress)
+        naming = _name(Balance(tuple(states), True, typical), tuple(effects), progress)
+    if naming.after.p < ALPHA and not balance.steady.all():
+        # Where starts mislead, steady motion may still be explained.
+        calm = _name(balance.settled(), tuple(effects), progress)
+        return calm if calm.found and calm.after.p >= ALPHA else naming
     return naming
 
 

@@ -25,8 +25,9 @@ class Station:
         self.signal, self.finger, self.actuator, self.joint, self.naming = signal, finger, actuator, joint, naming
         places = {id(f): naming.fit.terms.index(f.term) for f in naming.found}
         self.reading = undisturbed(naming)
-        self.parameters = {which: parameter_intervals(self.reading, which) for which in places.values() if proven(naming, which)}
-        self.proven = tuple(f for f in naming.found if places[id(f)] in self.parameters and sized(f, self.parameters[places[id(f)]]))
+        stand = [which for which in places.values() if proven(naming, which) and sized(self.reading, which)]
+        self.parameters = {which: parameter_intervals(self.reading, which) for which in stand}
+        self.proven = tuple(f for f in naming.found if places[id(f)] in stand)
 
     @property
     def missing(self) -> bool:

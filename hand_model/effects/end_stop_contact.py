@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
-from .mjcf import free_name, motor_joint, section
+from .mjcf import joint_tendon, motor_joint
 
 
 class EndStopContact(Effect):
@@ -52,18 +52,12 @@ class EndStopContact(Effect):
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """A fixed tendon along the motor joint that is slack until the stop begins: the same line of force, exact in MuJoCo."""
-        from lxml import etree
-
         found = motor_joint(root, where)
         if found is None:
             return None
         joint, unit = found
         ends = (-1e6, parameters["begin"]) if parameters["side"] >= 0 else (parameters["begin"], 1e6)
-        name = free_name(root, f"{where['actuator']}_stop")
-        tendon = etree.SubElement(section(root, "tendon"), "fixed", name=name, springlength=f"{ends[0]!r} {ends[1]!r}",
-                                  stiffness=repr(unit * parameters["stiffness"]))
-        etree.SubElement(tendon, "joint", joint=joint.get("name"), coef="1")
-        return f"tendon/fixed[@name='{name}']"
+        return joint_tendon(root, joint, f"{where['actuator']}_stop", springlength=ends, stiffness=unit * parameters["stiffness"])
 
 
 def _side(shape: Mapping[str, float]) -> float:

@@ -1,4 +1,4 @@
-"""Nonlinear spring: the return spring stiffens or softens over the range."""
+"""Nonlinear spring: the return spring stiffens or softens."""
 
 from __future__ import annotations
 
@@ -7,30 +7,61 @@ from typing import Any
 
 import numpy as np
 
-from .base import Amplitude, Array, DriveState, Effect
-from .mjcf import motor_joint
+from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
+from .law import Law
+from .mjcf import joint_tendon, motor_joint
 
 
 class NonlinearSpring(Effect):
-    """F = b x^2 + c x^3 beyond the declared line."""
+    """Beyond the declared line: b x^2 + c x^3 (form 0), or another stiffness from a knee on, c max(0, x - knee) (form 1).
+
+    A knee lies in the inner part of the range; what bends in the outer third is an end stop.
+    """
 
     name = "nonlinear_spring"
 
+    def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
+        """Smooth or with a knee, and where that lies."""
+        low, high = position_range(states)
+        span = high - low
+        return (Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),
+                Shape("knee", states[0].position_unit, low + 0.15 * span, high - span / 3, tuple(low + span * np.linspace(0.2, 0.65, 7))))
+
+    def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
+        """One smooth spring, and every knee."""
+        points = super().grid(states)
+        return [p for p in points if p["form"] > 0.5 or p["knee"] == points[0]["knee"]]
+
     def amplitudes(self) -> tuple[Amplitude, ...]:
-        """Quadratic and cubic stiffness, either sign."""
+        """Quadratic and cubic stiffness, or, with a knee, none and the change of stiffness; either sign."""
         return (("quadratic_stiffness", "effort/position^2", -np.inf, np.inf),
                 ("cubic_stiffness", "effort/position^3", -np.inf, np.inf))
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """x^2 and x^3, (n, 2), x in the drive's unit."""
-        return np.stack([state.position**2, state.position**3], axis=-1)
+        """x^2 and x^3, or nothing and the way beyond the knee, (n, 2), x in the drive's unit."""
+        x = state.position
+        if shape.get("form", 0.0) > 0.5:
+            return np.stack([np.zeros(len(x)), np.maximum(x - shape["knee"], 0.0)], axis=-1)
+        return np.stack([x**2, x**3], axis=-1)
+
+    def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
+                   declared: Mapping[str, float]) -> dict[str, float]:
+        """The two stiffnesses of a smooth spring; the knee and the stiffness that begins there."""
+        if shape.get("form", 0.0) > 0.5:
+            return {"form": 1.0, "knee": shape["knee"], "stiffness_beyond": amplitude["cubic_stiffness"]}
+        return {"form": 0.0, **amplitude}
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
-        """`stiffness` and `springref`: k x + p + b x^2 + c x^3 around its root r; MuJoCo's force is -(A y + B y^2 + C y^3), y = x - r."""
+        """`stiffness` and `springref`: k x + p + b x^2 + c x^3 around its root r; MuJoCo's force is -(A y + B y^2 + C y^3), y = x - r.
+        A knee: a fixed tendon that is slack until there."""
         found = motor_joint(root, where)
         if found is None:
             return None
         joint, unit = found
+        if parameters.get("form", 0.0) > 0.5:
+            stiffness = unit * parameters["stiffness_beyond"]
+            name = f"{where['actuator']}_spring"
+            return joint_tendon(root, joint, name, springlength=(-1e6, parameters["knee"]), stiffness=stiffness) if stiffness >= 0 else None
         square, cubic = unit * parameters.get("quadratic_stiffness", 0.0), unit * parameters["cubic_stiffness"]
         linear = float((joint.get("stiffness") or "0").split()[0])
         preload = -linear * float(joint.get("springref") or 0.0)
@@ -40,6 +71,12 @@ class NonlinearSpring(Effect):
         joint.set("stiffness", f"{linear + 2 * square * r + 3 * cubic * r * r!r} {square + 3 * cubic * r!r} {cubic!r}")
         joint.set("springref", repr(r))
         return f"joint[@name='{joint.get('name')}']/@stiffness"
+
+    def law(self, parameters: Mapping[str, float]) -> Law | None:
+        """A knee from which the spring is softer: no tendon pushes where it should pull."""
+        if parameters.get("form", 0.0) < 0.5 or parameters["stiffness_beyond"] >= 0:
+            return None
+        return lambda now: parameters["stiffness_beyond"] * max(now.position - parameters["knee"], 0.0)
 
 
 EFFECT = NonlinearSpring()
