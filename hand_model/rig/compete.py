@@ -25,7 +25,7 @@ from .states import later
 Array = NDArray[np.float64]
 FOLDS = 6
 FEW = 4  # recordings from which on whole ones are left out
-LEAST_SHARE = 0.05  # of the held-out residual variance that is left: less is not worth a name
+LEAST_SHARE = 0.05  # of the held-out residual variance: less is not worth a name
 MOST_TERMS = 4
 
 
@@ -271,12 +271,14 @@ def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ..
     terms = begin
     steps: list[Step] = []
     scores: list[Score] = []
+    # Of what is left, where whole recordings were left out; within one and the same recording small terms always pay.
+    declared = 0.0 if left_out_whole(problem) else held_out(problem, (), normal(problem, ()))[0].sum()
     while len(terms) < most:
         parts = normal(problem, terms)
         none, _ = held_out(problem, terms, parts)
         taken = {t.candidate.key for t in terms}
         scores = [score(problem, terms, c, parts) for c in rivals if c.key not in taken]
-        step = judge(none, scores, problem.group)
+        step = judge(none, scores, problem.group, max(declared, none.sum()))
         if step is None:
             break
         terms = (*terms, refined(problem, terms, step.winner.term, parts))
@@ -284,12 +286,13 @@ def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ..
     return terms, tuple(steps), tuple(scores)
 
 
-def judge(none: Array, scores: Sequence[Score], group: Array) -> Step | None:
-    """The winner of a round, or None where no candidate beats "nothing" (none (B,)) beyond doubt and by enough."""
+def judge(none: Array, scores: Sequence[Score], group: Array, whole: float) -> Step | None:
+    """The winner of a round, or None where no candidate beats "nothing" (none (B,)) beyond doubt and by enough of an error
+    (whole)."""
     if not scores:
         return None
     said = weigh(none, np.array([s.error for s in scores]), [_size(s.term) for s in scores], group)
-    if said is None or none.sum() - scores[said.best].error.sum() < LEAST_SHARE * none.sum():
+    if said is None or none.sum() - scores[said.best].error.sum() < LEAST_SHARE * whole:
         return None
     rivals = tuple((scores[i].term.candidate.key, float(said.wins[i])) for i in np.argsort(-said.wins) if said.wins[i] > 0.005)
     equals = tuple(dict.fromkeys(scores[k].term.candidate.effect for k in said.close))

@@ -281,7 +281,7 @@ def _off_axis(bench: Bench, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple[
     shape = Candidate(
         "gravity_load", "centres of mass off their axes", "*", (), ({},), lambda r, s: np.zeros((len(r.time_s), 0))
     )
-    step = judge(errors[0], [Score(Term(shape, {}), errors[1], 0.0)], sides[0].group)
+    step = judge(errors[0], [Score(Term(shape, {}), errors[1], 0.0)], sides[0].group, errors[0].sum())
     if step is None or _better_alone(rig, fit, offsets, errors[1].sum()):
         return None
     before, after = (solution(p, offsets) for p in sides)
