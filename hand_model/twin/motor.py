@@ -219,6 +219,7 @@ def _bristles(motor: MotorTruth, now: DriveNow, drive: float, level: float, step
     stiffness = motor.coulomb / motor.give
     damping = 0.3 * math.sqrt(stiffness * motor.inertia)
     half = 0.5 * step_s
+    now.bristle = max(-level / stiffness, min(level / stiffness, now.bristle))  # the level may have fallen since
     # midpoint rule: a step that is late in the bristles adds to inertia and friction at every stop
     free = motor.inertia * now.velocity + half * (drive - stiffness * now.bristle)  # its sign is that of the motion
     share = 1.0 - math.copysign(now.bristle, now.bristle * free) * stiffness / level  # of the motion that bends the bristles
