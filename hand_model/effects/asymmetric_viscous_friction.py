@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
-from .base import Amplitude, Array, DriveState, Effect
+from .base import Amplitude, Array, DriveState, Effect, figure
 from .law import Law
 
 
@@ -29,6 +30,11 @@ class AsymmetricViscousFriction(Effect):
         half, viscous = amplitude["half_difference"], declared.get("viscous", np.nan)
         return {"viscous_flexion": viscous + half, "viscous_extension": viscous - half,
                 "ratio": (viscous + half) / (viscous - half) if viscous != half else np.inf}
+
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """How much each way."""
+        flexion, extension = figure(parameters["viscous_flexion"]), figure(parameters["viscous_extension"])
+        return f"viscous friction differs with direction: {flexion} raw s/% in flexion, {extension} raw s/% in extension"
 
     def law(self, parameters: Mapping[str, float]) -> Law:
         """Half the difference of the coefficients times |v|."""

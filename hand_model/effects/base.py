@@ -12,8 +12,10 @@ The same interface serves three balances, told apart by `station`:
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from numbers import Real
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
@@ -179,10 +181,22 @@ class Effect:
         return None
 
     def statement(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
-        """A plain sentence from the name, the place and the parameters."""
-        listed = ", ".join(f"{key} {value:.4g}" for key, value in parameters.items() if np.isfinite(value))
-        place = where.get("actuator") or where.get("finger")
-        return f"{place}: {self.name.replace('_', ' ')} ({listed})."
+        """The place and the effect's sentence; the name and the figures there are, where one that it needs is missing or not finite."""
+        known = {key: float(v) for key, v in parameters.items() if isinstance(v, Real) and math.isfinite(v)}
+        of_motor = self.station in ("drive", "command")
+        place = (of_motor and where.get("actuator")) or where.get("finger") or where.get("actuator")
+        try:
+            return f"{place}: {self.sentence(where, known)}."
+        except KeyError:
+            listed = ", ".join(f"{key} {figure(v)}" for key, v in known.items())
+            return f"{place}: " + f"{self.name}{f' ({listed})' if listed else ''}.".replace("_", " ")
+
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """What was left out, in plain words with figures and units, without place and full stop. parameters: the finite ones.
+
+        Raises KeyError where a figure that it needs is missing: `statement` then falls back to a list.
+        """
+        raise KeyError(self.name)
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """Not native: the passive-force callback applies it, where there is a law."""
@@ -199,6 +213,11 @@ class Effect:
     def law(self, parameters: Mapping[str, float]) -> Law | None:
         """What the passive-force callback applies (`hand_model.effects_on`); None where MJCF holds it, or nothing can."""
         return None
+
+
+def figure(value: float) -> str:
+    """A number for a sentence: three significant digits, whole from a hundred on."""
+    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
 
 
 def position_range(states: tuple[DriveState, ...]) -> tuple[float, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -29,8 +30,13 @@ class ClockDrift(Effect):
 
     def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
                    declared: Mapping[str, float]) -> dict[str, float]:
-        """Rate of the log's clock over the mocap clock, minus one."""
+        """Rate of the mocap clock over the log's, minus one: what a correction stretches the log's times by."""
         return {"rate_minus_one": -amplitude["drift"]}
+
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """Time gained or lost in every second."""
+        rate = parameters["rate_minus_one"]
+        return f"the log's clock {'loses' if rate > 0 else 'gains'} {1e3 * abs(rate):.2f} ms on the mocap clock in every second"
 
 
 EFFECT = ClockDrift()

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from .base import Effect
 
 
@@ -12,6 +15,10 @@ class CommandAsMeasurement(Effect):
     station = "command"
     of_the_hand = False
     unwritten = "the channel is refused: there is nothing to model"
+
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """That nothing is fitted."""
+        return f"the {where.get('signal') or 'current'} is no measurement, but a command or a dead channel: nothing is fitted to it"
 
 
 EFFECT = CommandAsMeasurement()

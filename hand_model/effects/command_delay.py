@@ -16,6 +16,10 @@ class CommandDelay(Effect):
     station = "command"
     unwritten = "shown by events: the answer to a command, not an error along a motion"
 
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """The dead time."""
+        return f"the motor answers its commands {1e3 * parameters['delay']:.0f} ms late"
+
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """The delay of the motor's actuator."""
         found = motor_joint(root, where)

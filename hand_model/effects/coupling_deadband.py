@@ -41,6 +41,10 @@ class CouplingDeadband(Effect):
         low, _ = position_range(states)
         return {"position": [low, shape["until"]], "unit": states[0].position_unit}
 
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """Up to which angle."""
+        return f"the distal segment does not move until the proximal joint has come to {parameters['until']:.1f} deg"
+
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """An input joint behind the driver that does not go below where the motion begins."""
         equality = map_of(root, where, self.station)

@@ -40,6 +40,14 @@ class CurrentChannelDelay(Effect):
         then = state.time_s - shape["delay"]
         return np.stack([np.interp(then, state.time_s, column) for column in columns.T], axis=-1)
 
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """Which channel comes first and by how much, or the filter's time constant."""
+        delay_ms = 1e3 * parameters["delay"]
+        if _filters(parameters):
+            return f"the current is read behind a low-pass filter with a time constant of {delay_ms:.1f} ms"
+        when = "later" if delay_ms < 0 else "earlier"
+        return f"the current was sampled {abs(delay_ms):.1f} ms {when} than the position beside it in the log"
+
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """The delay of the sensor of the motor's current, or of its encoder where the current is read early; a sensor cannot filter."""
         if _filters(parameters):

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .base import Amplitude, Array, DriveState, Effect, Shape
+from .base import Amplitude, Array, DriveState, Effect, Shape, figure
 from .mjcf import motor_joint, motor_sensor
 
 
@@ -30,6 +30,10 @@ class CurrentSaturation(Effect):
     def clip(self, prediction: Array, shape: Mapping[str, float]) -> Array:
         """The prediction within the limits."""
         return np.clip(prediction, -shape["limit"], shape["limit"])
+
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """The limit."""
+        return f"the current does not exceed {figure(parameters['limit'])} raw: its reading, or the drive, clips there"
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """The cutoff of the sensor of the motor's current: the motion goes on, so what clips is the reading."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
+from .base import Amplitude, Array, DriveState, Effect, Shape, figure, position_range
 from .law import Law, Moment
 
 
@@ -39,6 +39,16 @@ class DetentLoad(Effect):
         """Two widths about the centre."""
         c, w = shape["centre"], shape["width"]
         return {"position": [c - 2 * w, c + 2 * w], "unit": states[0].position_unit}
+
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """Where, how large, and whether it is a load, a notch or a hump."""
+        at, width, load = parameters["centre"], parameters["width"], parameters["load"]
+        if parameters["form"] < 0.5:
+            side = "against" if load > 0 else "towards"
+            return (f"between {at - 2 * width:.1f} and {at + 2 * width:.1f} % a load acts {side} flexion whichever way the motor moves, "
+                    f"up to {figure(abs(load))} raw at {at:.1f} %")
+        kind, way = ("notch", "towards") if load > 0 else ("hump", "away from")
+        return f"a {kind} at {at:.1f} %: a load of up to {figure(abs(load))} raw {way} it, largest {width:.1f} % on either side"
 
     def law(self, parameters: Mapping[str, float]) -> Law:
         """A bell over position, or its slope."""

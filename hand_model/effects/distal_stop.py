@@ -41,6 +41,12 @@ class DistalStop(Effect):
         _, high = position_range(states)
         return {"position": [shape["from"], high], "unit": states[0].position_unit}
 
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """From which angle on, and what still passes."""
+        passing = parameters.get("passing", 0.0)
+        still = f", {100 * passing:.0f} % of the motion still passes beyond" if passing >= 0.005 else ""
+        return f"the distal segment stops when the proximal joint comes to {parameters['from']:.1f} deg{still}"
+
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """An input joint behind the driver that does not go beyond the stop, save for what passes."""
         equality = map_of(root, where, self.station)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
+from .base import Amplitude, Array, DriveState, Effect, Shape, figure, position_range
 from .mjcf import bristle_friction, joint_tendon, motor_joint
 from .path import dahl, jenkins
 
@@ -32,6 +32,12 @@ class ElastoplasticHysteresis(Effect):
         """State along the recorded path, (n, 1), in [-1, 1]."""
         operator = jenkins if shape["form"] < 0.5 else dahl
         return operator(state.position, shape["reach"])[:, None]
+
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """How large, and over which way it builds up."""
+        load, reach = figure(parameters["yield_load"]), parameters["reach"]
+        way = f"evenly over {2 * reach:.1f} %" if parameters["form"] < 0.5 else f"gradually, two thirds of it over {reach:.1f} %"
+        return f"after each reversal a load against the motion, up to {load} raw, builds up {way} of travel"
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """Form 0: a tendon along the motor joint that yields. Form 1: the bristle of a passive DC motor's LuGre friction."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -37,6 +38,11 @@ class EncoderPeriodicError(Effect):
         """Amplitude, period and phase [rad]."""
         return {"amplitude": float(np.hypot(amplitude["sine"], amplitude["cosine"])), "period": shape["period"],
                 "phase": float(np.arctan2(amplitude["cosine"], amplitude["sine"]))}
+
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """Error in degrees of the segment, and its period."""
+        return (f"against the proximal segment the encoder errs by ±{parameters['amplitude']:.2f} deg, "
+                f"repeating every {parameters['period']:.2f} % of its range")
 
 
 EFFECT = EncoderPeriodicError()

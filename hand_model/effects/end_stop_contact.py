@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
+from .base import Amplitude, Array, DriveState, Effect, Shape, figure, position_range
 from .mjcf import joint_tendon, motor_joint
 
 
@@ -49,6 +49,11 @@ class EndStopContact(Effect):
         """From where the stop begins to the end of the range."""
         ends = sorted((_begin(shape), shape["end"]))
         return {"position": ends, "unit": states[0].position_unit}
+
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """Where it begins and how stiff it is."""
+        side, stiffness = "beyond" if parameters["side"] >= 0 else "below", figure(parameters["stiffness"])
+        return f"{side} {parameters['begin']:.1f} % the motor runs into an elastic stop, {stiffness} raw for every further %"
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """A fixed tendon along the motor joint that is slack until the stop begins: the same line of force, exact in MuJoCo."""

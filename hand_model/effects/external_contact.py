@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
-from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
+from .base import Amplitude, Array, DriveState, Effect, Shape, figure, position_range
 
 WHILES = ((0.0, 1.0), (0.2, 1.0), (0.35, 1.0), (0.5, 1.0), (0.65, 1.0), (0.8, 1.0), (0.0, 0.5), (0.2, 0.5), (0.4, 0.7))
 MOST_VALIDATION = 4  # validation recordings in which an obstacle can still be told
@@ -64,6 +65,15 @@ class ExternalContact(Effect):
         """Where it begins and how stiff it is."""
         return {"trial": shape["trial"], "since": shape["since"], "until": shape["until"],
                 "begin": shape["begin"], "stiffness": amplitude["stiffness"]}
+
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """When, from where on, and the load a tenth of the range further (of either form the same)."""
+        trials, index = where.get("trials") or (), round(parameters["trial"])
+        name = trials[index] if 0 <= index < len(trials) else "one recording"
+        since, until = (round(100 * parameters[k]) for k in ("since", "until"))
+        part = "" if since <= 0 and until >= 100 else f", {since} to {until} % of the way through"
+        return (f"in {name}{part}, the finger meets an elastic obstacle at {parameters['begin']:.1f} %: "
+                f"10 % further it takes {figure(10 * parameters['stiffness'])} raw more current")
 
 
 EFFECT = ExternalContact()

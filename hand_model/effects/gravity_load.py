@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
-from .base import Amplitude, Array, DriveState, Effect, Shape
+from .base import Amplitude, Array, DriveState, Effect, Shape, figure
 from .law import Law, Moment
 
 
@@ -33,6 +34,11 @@ class GravityLoad(Effect):
         angle = shape["sweep"] * state.position / 100.0
         along, across = state.extra["gravity_along"] / 9.81, state.extra["gravity_across"] / 9.81
         return np.stack([across * np.cos(angle) - along * np.sin(angle), along * np.cos(angle) + across * np.sin(angle)], axis=-1)
+
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """The largest load that the weight can be."""
+        load = figure(math.hypot(parameters["along"], parameters["across"]))
+        return f"weight loads the motor with up to {load} raw, changing with the pose of the hand and the angle of the finger"
 
     def law(self, parameters: Mapping[str, float]) -> Law:
         """Gravity in the finger's plane, turned with the finger."""

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+from typing import Any
+
 from .base import Amplitude, Effect
 
 
@@ -15,6 +19,12 @@ class JointWobble(Effect):
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """None: no balance holds it."""
         return ()
+
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """The largest tilt."""
+        tilt_deg = math.degrees(parameters["amplitude"])
+        joint = f"the {where['joint']} joint" if where.get("joint") else "a joint"
+        return f"{joint} tilts by up to {tilt_deg:.2f} deg about a second axis as its angle grows"
 
 
 EFFECT = JointWobble()

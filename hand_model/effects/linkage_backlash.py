@@ -16,10 +16,11 @@ class LinkageBacklash(Backlash):
     name = "linkage_backlash"
     station = "linkage"
 
-    def statement(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """How much motion is lost, on both sides."""
         seen = f", {parameters['segment_gap']:.2f} deg of the segment" if "segment_gap" in parameters else ""
-        return f"{where.get('finger')}: the distal segment loses {parameters['gap']:.2f} deg of the proximal joint when the motion turns{seen}."
+        ends = ", with ends that give" if parameters.get("form", 0.0) > 0.5 else ""
+        return f"the distal segment loses {parameters['gap']:.2f} deg of the proximal joint when the motion turns{seen}{ends}"
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """An input joint behind the driver, within the gap."""

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
-from .base import Amplitude, Array, DriveState, Effect
+from .base import Amplitude, Array, DriveState, Effect, figure
 from .law import Law
 
 
@@ -29,6 +30,12 @@ class LoadDependentFriction(Effect):
         """Friction per unit of load (coefficient), from friction per position and the spring's stiffness."""
         spring = declared.get("spring", np.nan)
         return {"load_coefficient": amplitude["per_load"] / spring if spring else np.nan, "per_load": amplitude["per_load"]}
+
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """Friction over the whole range, and as a part of the spring's load."""
+        part = parameters.get("load_coefficient", 0.0)
+        rate = f"by {100 * part:.0f} % of it, " if part > 0 else ""
+        return f"friction grows with the load of the spring: {rate}{figure(100 * parameters['per_load'])} raw over the motor's whole range"
 
     def law(self, parameters: Mapping[str, float]) -> Law:
         """Friction in proportion to the position: the spring's load."""

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from .base import Amplitude, Effect
 
 
@@ -15,6 +18,11 @@ class MovingCentre(Effect):
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """None: no balance holds it."""
         return ()
+
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """The longest way."""
+        joint = f"the {where['joint']} joint" if where.get("joint") else "a joint"
+        return f"the centre of rotation of {joint} travels by up to {1e3 * parameters['travel']:.2f} mm as the angle grows"
 
 
 EFFECT = MovingCentre()

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
+from .base import Amplitude, Array, DriveState, Effect, Shape, figure, position_range
 from .law import Law
 from .mjcf import joint_tendon, motor_joint
 
@@ -51,6 +52,20 @@ class NonlinearSpring(Effect):
             return {"form": 1.0, "knee": shape["knee"], "stiffness_beyond": amplitude["cubic_stiffness"]}
         return {"form": 0.0, **amplitude}
 
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """Where it is stiffer or softer, and by how much."""
+        if parameters["form"] > 0.5:
+            change = parameters["stiffness_beyond"]
+            return f"beyond {parameters['knee']:.1f} % the return spring is {figure(abs(change))} raw/% {_stiffer(change)}"
+        square, cubic = parameters["quadratic_stiffness"], parameters["cubic_stiffness"]
+        turn = -square / (3 * cubic) if cubic else math.inf  # where the stiffness is largest or smallest
+        if 0 < turn < 100:
+            early, late = square * turn, cubic * (100 - turn) ** 2 * 3
+            return (f"the return spring is {figure(abs(early))} raw/% {_stiffer(early)} at {turn:.1f} % than at 0 %, "
+                    f"and {figure(abs(late))} raw/% {_stiffer(late)} at 100 % than there")
+        change = 200 * square + 3e4 * cubic
+        return f"the return spring is {figure(abs(change))} raw/% {_stiffer(change)} at 100 % than at 0 %"
+
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """`stiffness` and `springref`: k x + p + b x^2 + c x^3 around its root r; MuJoCo's force is -(A y + B y^2 + C y^3), y = x - r.
         A knee: a fixed tendon that is slack until there."""
@@ -77,6 +92,10 @@ class NonlinearSpring(Effect):
         if parameters.get("form", 0.0) < 0.5 or parameters["stiffness_beyond"] >= 0:
             return None
         return lambda now: parameters["stiffness_beyond"] * max(now.position - parameters["knee"], 0.0)
+
+
+def _stiffer(change: float) -> str:
+    return "stiffer" if change > 0 else "softer"
 
 
 EFFECT = NonlinearSpring()

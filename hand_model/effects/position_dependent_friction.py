@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
+from .base import Amplitude, Array, DriveState, Effect, Shape, figure, position_range
 from .law import Law, Moment
 
 
@@ -42,6 +42,13 @@ class PositionDependentFriction(Effect):
         """Two widths about the centre."""
         c, w = shape["centre"], shape["width"]
         return {"position": [c - 2 * w, c + 2 * w], "unit": states[0].position_unit}
+
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """Where, how large, and against the friction elsewhere."""
+        at, width, extra = parameters["centre"], parameters["width"], parameters["extra_friction"]
+        ratio = f", {figure(parameters['ratio'])} times the Coulomb friction" if parameters.get("ratio", 0.0) > 0 else ""
+        return (f"a tight spot between {at - 2 * width:.1f} and {at + 2 * width:.1f} %: up to {figure(extra)} raw more friction "
+                f"both ways{ratio}, most at {at:.1f} %")
 
     def law(self, parameters: Mapping[str, float]) -> Law:
         """Friction under a bell, read where the bristles are."""

@@ -39,6 +39,11 @@ class PreslidingFriction(Effect):
         out[:, state.declared_names.index("coulomb")] = dahl(state.position, shape["bristle_length"])
         return out
 
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """The way over which friction turns over."""
+        length = parameters["bristle_length"]
+        return f"the drive gives before it slides: after a reversal two thirds of the friction turn over within {length:.1f} % of travel"
+
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """A passive DC motor's LuGre friction in place of the joint's `frictionloss`."""
         return lugre_friction(root, where, parameters)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
-from .base import Amplitude, Array, DriveState, Effect, Shape
+from .base import Amplitude, Array, DriveState, Effect, Shape, figure
 from .law import Law
 
 
@@ -33,6 +34,11 @@ class SeriesElasticity(Effect):
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """Minus the load, (n, 1), times the map's slope where the give is at the driver's end."""
         return -(state.extra["load"] * (state.slope if shape["form"] == 0.0 else 1.0))[:, None]
+
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """How far the segment stays back, at which end."""
+        give, end = figure(100 * parameters["compliance"]), "% of the encoder's range" if parameters["form"] == 0.0 else "deg"
+        return f"the drive train gives: the proximal segment stays back by {give} {end} for every 100 raw of the motor's load"
 
     def law(self, parameters: Mapping[str, float]) -> Law:
         """Minus compliance times load, through the map's slope where the give is at the driver's end."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
+from .base import Amplitude, Array, DriveState, Effect, Shape, figure, position_range
 
 
 class SpringDecoupling(Effect):
@@ -46,6 +46,19 @@ class SpringDecoupling(Effect):
             return {"time": {s.trial: _spans(s) for s in states if _spans(s)}, "unit": "s"}
         low, _ = position_range(states)
         return {"position": [low, shape["below"]], "unit": states[0].position_unit}
+
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """When the finger runs ahead, or where it stays behind."""
+        if parameters["form"] > 0.5:
+            return (f"below {parameters['below']:.1f} % of the encoder's range the finger does not follow its motor open: it stays bent by "
+                    f"{figure(parameters['lead'])} deg more for every %")
+        times = (where.get("region") or {}).get("time") or {}
+        spans = [(b - a, a, b, trial) for trial, some in times.items() for a, b in some]
+        if not spans:
+            return "the finger leaves its actuator and runs ahead of it for a while"
+        _, begin, end, trial = max(spans)
+        longest = "" if len(spans) == 1 else f"{len(spans)} times, longest "
+        return f"the finger leaves its actuator and runs ahead of it, {longest}from {begin:.1f} to {end:.1f} s of {trial}"
 
 
 def _spans(state: DriveState) -> list[list[float]]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .base import Amplitude, Array, DriveState, Effect, Shape, speed_range
+from .base import Amplitude, Array, DriveState, Effect, Shape, figure, speed_range
 from .mjcf import add_damping, lugre_friction, motor_joint
 
 # exp(-u) is c + e exp(-(u / w)^2) + d u + f u^2 to 1.3 % (root mean square, 0.25 < u < 9); without damping c, e, w to 4 %.
@@ -53,6 +53,15 @@ class StribeckFriction(Effect):
     def region(self, states: tuple[DriveState, ...], shape: Mapping[str, float]) -> dict[str, Any] | None:
         """Speeds below two Stribeck speeds hold 86 % of it."""
         return {"speed": [0.0, 2.0 * shape["stribeck_speed"]], "unit": f"{states[0].position_unit}/s"}
+
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """Below which speed, by how much, and against the friction in motion."""
+        below, excess = figure(2 * parameters["stribeck_speed"]), figure(parameters["static_excess"])
+        ratio = parameters.get("static_ratio", 0.0)
+        exponent = f", exponent {parameters['exponent']:.0f}" if "exponent" in parameters else ""
+        to = f", up to {figure(ratio)} times the Coulomb friction" if ratio > 1 else ""
+        return (f"below {below} %/s the motor needs up to {excess} raw more current than simulated: "
+                f"friction rises as speed falls (Stribeck{exponent}){to}")
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """A passive DC motor's LuGre friction, whose rise is exp(-(v / vs)^2), and damping: the nearest to exp(-|v| / vs)."""

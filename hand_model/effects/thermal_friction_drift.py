@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
-from .base import Amplitude, Array, DriveState, Effect, Shape
+from .base import Amplitude, Array, DriveState, Effect, Shape, figure
 from .law import Law, Moment
 
 MOVING = 1.0  # %/s: below, a drive is at rest
@@ -52,6 +53,15 @@ class ThermalFrictionDrift(Effect):
                    declared: Mapping[str, float]) -> dict[str, float]:
         """Cold excess, also as a ratio to the warm Coulomb friction, and the times."""
         return {**amplitude, **shape, "ratio": amplitude["cold_excess"] / (declared.get("coulomb") or np.nan)}
+
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """By how much cold friction differs, and how it fades."""
+        excess, warm_up = parameters["cold_excess"], figure(parameters["warm_up_time"])
+        cold = f"friction is {figure(abs(excess))} raw {'higher' if excess > 0 else 'lower'} cold than warm and"
+        if parameters["form"] < 0.5:
+            return f"{cold} settles with a time constant of {warm_up} s from the session's first sample on"
+        cooling = figure(parameters["cooling_time"])
+        return f"{cold} settles with a time constant of {warm_up} s in motion; at rest it returns with one of {cooling} s"
 
     def started(self, state: DriveState, parameters: Mapping[str, float]) -> dict[str, float]:
         """Share of the excess that is left when a recording begins."""

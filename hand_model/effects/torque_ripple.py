@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
+from .base import Amplitude, Array, DriveState, Effect, Shape, figure, position_range
 from .mjcf import free_name, motor_joint, section
 
 
@@ -42,6 +42,11 @@ class TorqueRipple(Effect):
         """Amplitude, period and phase [rad]."""
         return {"amplitude": float(np.hypot(amplitude["sine"], amplitude["cosine"])), "period": shape["period"],
                 "phase": float(np.arctan2(amplitude["cosine"], amplitude["sine"]))}
+
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """Swing and period."""
+        swing = figure(parameters["amplitude"])
+        return f"the motor's load swings by ±{swing} raw, repeating every {parameters['period']:.2f} % of its range"
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """A passive DC motor with cogging: its torque is -A sin(2 pi x / P + phase), what the drive must overcome."""

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
-from .base import Amplitude, Array, DriveState, Effect, Shape
+from .base import Amplitude, Array, DriveState, Effect, Shape, figure
 from .law import Law, Moment
 from .path import lowpass
 
@@ -31,6 +32,11 @@ class ViscoelasticSpring(Effect):
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """x minus its low pass, (n, 1)."""
         return (state.position - lowpass(state.time_s, state.position, shape["relaxation_time"]))[:, None]
+
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """Stiffness that relaxes, and how fast."""
+        stiffness, time_s = figure(parameters["stiffness"]), figure(parameters["relaxation_time"])
+        return f"the spring relaxes: {stiffness} raw for every % of a move fade with a time constant of {time_s} s"
 
     def law(self, parameters: Mapping[str, float]) -> Law:
         """A Maxwell branch that starts relaxed: stiffness times the position beyond its low pass."""
