@@ -160,6 +160,13 @@ def test_statement_never_raises_and_shows_no_figure_that_is_none(candidate, para
             assert candidate.statement(where, partial).endswith(".")
 
 
+@pytest.mark.parametrize("candidate", [e for e in (*catalogue("encoder"), *catalogue("linkage")) if not hasattr(e, "signal")
+                                       and e.name != "spring_decoupling"], ids=lambda e: e.name)
+def test_statement_names_the_segment_that_follows(candidate) -> None:
+    parameters = candidate.parameters(candidate.grid((state(),))[0], {n: 0.1 for n, *_ in candidate.amplitudes()}, DECLARED)
+    assert "the middle segment" in candidate.statement({**PLACE, "joint": "middle"}, parameters)
+
+
 OPPOSITES = [
     ("nonlinear_spring", {"form": 0.0, "cubic_stiffness": 0.0}, "quadratic_stiffness", "stiffer", "softer"),
     ("nonlinear_spring", {"form": 1.0, "knee": 40.0}, "stiffness_beyond", "stiffer", "softer"),

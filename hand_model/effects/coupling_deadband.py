@@ -43,7 +43,8 @@ class CouplingDeadband(Effect):
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """Up to which angle."""
-        return f"the distal segment does not move until the proximal joint has come to {parameters['until']:.1f} deg"
+        segment, until = where.get("joint") or "distal", parameters["until"]
+        return f"the {segment} segment does not move until the joint before it has come to {until:.1f} deg"
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """An input joint behind the driver that does not go below where the motion begins."""

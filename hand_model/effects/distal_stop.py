@@ -45,7 +45,8 @@ class DistalStop(Effect):
         """From which angle on, and what still passes."""
         passing = parameters.get("passing", 0.0)
         still = f", {100 * passing:.0f} % of the motion still passes beyond" if passing >= 0.005 else ""
-        return f"the distal segment stops when the proximal joint comes to {parameters['from']:.1f} deg{still}"
+        segment, at = where.get("joint") or "distal", parameters["from"]
+        return f"the {segment} segment stops when the joint before it comes to {at:.1f} deg{still}"
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """An input joint behind the driver that does not go beyond the stop, save for what passes."""

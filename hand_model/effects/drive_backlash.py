@@ -19,7 +19,8 @@ class DriveBacklash(Backlash):
         """How much motion is lost, on both sides."""
         seen = f", {parameters['segment_gap']:.2f} deg of the segment" if "segment_gap" in parameters else ""
         ends = ", with ends that give" if parameters.get("form", 0.0) > 0.5 else ""
-        return f"the proximal segment loses {parameters['gap']:.2f} % of the encoder's range when the motion turns{seen}{ends}"
+        segment, gap = where.get("joint") or "proximal", parameters["gap"]
+        return f"the {segment} segment loses {gap:.2f} % of the encoder's range when the motion turns{seen}{ends}"
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """An input joint behind the motor joint, within the gap."""

@@ -41,8 +41,8 @@ class EncoderPeriodicError(Effect):
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """Error in degrees of the segment, and its period."""
-        return (f"against the proximal segment the encoder errs by ±{parameters['amplitude']:.2f} deg, "
-                f"repeating every {parameters['period']:.2f} % of its range")
+        segment, error, period = where.get("joint") or "proximal", parameters["amplitude"], parameters["period"]
+        return f"against the {segment} segment the encoder errs by ±{error:.2f} deg, repeating every {period:.2f} % of its range"
 
 
 EFFECT = EncoderPeriodicError()

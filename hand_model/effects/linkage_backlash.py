@@ -20,7 +20,8 @@ class LinkageBacklash(Backlash):
         """How much motion is lost, on both sides."""
         seen = f", {parameters['segment_gap']:.2f} deg of the segment" if "segment_gap" in parameters else ""
         ends = ", with ends that give" if parameters.get("form", 0.0) > 0.5 else ""
-        return f"the distal segment loses {parameters['gap']:.2f} deg of the proximal joint when the motion turns{seen}{ends}"
+        segment, gap = where.get("joint") or "distal", parameters["gap"]
+        return f"the {segment} segment loses {gap:.2f} deg of the joint before it when the motion turns{seen}{ends}"
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """An input joint behind the driver, within the gap."""

@@ -38,7 +38,8 @@ class SeriesElasticity(Effect):
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """How far the segment stays back, at which end."""
         give, end = figure(100 * parameters["compliance"]), "% of the encoder's range" if parameters["form"] == 0.0 else "deg"
-        return f"the drive train gives: the proximal segment stays back by {give} {end} for every 100 raw of the motor's load"
+        segment = where.get("joint") or "proximal"
+        return f"the drive train gives: the {segment} segment stays back by {give} {end} for every 100 raw of the motor's load"
 
     def law(self, parameters: Mapping[str, float]) -> Law:
         """Minus compliance times load, through the map's slope where the give is at the driver's end."""
