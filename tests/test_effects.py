@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -258,3 +259,10 @@ def test_lugre_replaces_the_joints_friction(name, parameters, lugre) -> None:
     assert mujoco.MjModel.from_xml_string(etree.tostring(root).decode()).dof_frictionloss[0] == 0
     written = [float(x) for x in root.find("actuator/dcmotor").get("lugre").split()]
     np.testing.assert_allclose(written, lugre, rtol=1e-9)
+
+
+def test_a_recording_without_the_pose_of_the_hand_bears_no_weight_out() -> None:
+    plain = state()
+    posed = replace(plain, extra={**plain.extra, "pose_seen": np.ones(len(plain.time_s))})
+    assert not effect("gravity_load").told_by(plain) and effect("gravity_load").told_by(posed)
+    assert effect("stribeck_friction").told_by(plain)

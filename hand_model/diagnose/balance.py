@@ -219,6 +219,10 @@ class Balance:
         """What wider errors cost, on the scale of a sum of squares: a density that says less is lower where it is right."""
         return 2 * self.inflation * float(np.sum(np.log(self.weight / weight)[self.train]))
 
+    def telling(self, effect: Any) -> NDArray[np.bool_]:
+        """Samples (n,) of the recordings that can bear an effect out."""
+        return self.gather(lambda s: np.full(len(s.time_s), effect.told_by(s)))
+
     def unclipped(self, terms: tuple[Term, ...]) -> NDArray[np.bool_]:
         """Samples (n,) whose prediction no term clips: there the balance is linear."""
         clips = [t for t in terms if t.effect.clips]

@@ -26,7 +26,7 @@ TURNED = 0.05  # spread of gravity's direction below which nothing can be learne
 def with_gravity(session: Session, fingers: Mapping[str, FingerAngles], states: tuple[DriveState, ...]) -> tuple[DriveState, ...]:
     """The states with `gravity_along` and `gravity_across` [m/s^2] in `extra`: gravity along the open finger and across it.
 
-    fingers: by name. Recordings without markers get the mean of the others, as a hand left where it was. Unchanged where the session names no
+    fingers: by name. Recordings without markers get the mean of the others, as a hand left where it was; those with them have `pose_seen`. Unchanged where the session names no
     gravity, where no recording shows the palm, or where it never turned.
     """
     if session.gravity_world is None:
@@ -41,7 +41,9 @@ def with_gravity(session: Session, fingers: Mapping[str, FingerAngles], states: 
     out = []
     for state in states:
         g = seen.get(state.trial, np.broadcast_to(everything.mean(0), (len(state.time_s), 2)))
-        extra: Mapping[str, Array] = {**state.extra, "gravity_along": g[:, 0], "gravity_across": g[:, 1]}
+        extra: dict[str, Array] = {**state.extra, "gravity_along": g[:, 0], "gravity_across": g[:, 1]}
+        if state.trial in seen:
+            extra["pose_seen"] = np.ones(len(state.time_s))
         out.append(replace(state, extra=extra))
     return tuple(out)
 
@@ -53,11 +55,15 @@ def _in_finger(session: Session, fingers: Mapping[str, FingerAngles], trial: Tri
     angles = fingers[trial.finger]
     mocap, chain = trial.mocap(), angles.chain
     data, _ = observations(session, angles.finger, mocap)
-    tip, base = (np.nanmean(data.position_world[:, data.body == k], axis=1) for k in (data.body.max(), 0))
-    reach = np.linalg.norm(tip - base, axis=1)  # shrinks as the finger flexes
-    good = np.isfinite(reach)
+    record = next((r for r in angles.records if r.trial.name == trial.name), None)
+    if record is not None:
+        time_s, flexed = record.mocap.time_s, record.angle_rad[:, 0]
+    else:
+        tip, base = (np.nanmean(data.position_world[:, data.body == k], axis=1) for k in (data.body.max(), 0))
+        time_s, flexed = mocap.time_s, -np.linalg.norm(tip - base, axis=1)  # the finger's reach shrinks as it flexes
+    good = np.isfinite(flexed)
     try:
-        clock = align(mocap.time_s[good], -reach[good], state.time_s, state.position, trial.name)
+        clock = align(time_s[good], flexed[good], state.time_s, state.position, trial.name)
     except IdentificationError:
         return None
     gravity_palm = np.einsum("nij,i->nj", palm_pose(chain, data).rotation, session.gravity_world)

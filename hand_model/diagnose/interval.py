@@ -153,7 +153,7 @@ def held_out(reading: Reading, which: int, seed: int = 0) -> dict[str, Any]:
     without = balance.fit(tuple(t for i, t in enumerate(fit.terms) if i != which))
     effect = fit.terms[which].effect
     seen = np.ones(len(balance.train), bool) if effect.warps or effect.replaces else balance.steady
-    use = ~balance.train & seen
+    use = ~balance.train & seen & balance.telling(effect)
     untouched = bool(use.any())
     if not untouched:
         use = seen
@@ -168,7 +168,7 @@ def held_out(reading: Reading, which: int, seed: int = 0) -> dict[str, Any]:
         "after": float(np.sqrt(r1.mean())),
         "noise_floor": float(np.sqrt(np.mean(1 / balance.weights(fit.terms)[use] ** 2))),
         "ci95_reduction": np.percentile(reduction, [2.5, 97.5]).tolist(),
-        "held_out": [s.trial for s in balance.states if s.validate] if untouched else [],
+        "held_out": [s.trial for s in balance.states if s.validate and effect.told_by(s)] if untouched else [],
     }
 
 
@@ -181,13 +181,15 @@ def proven(naming: Naming, which: int) -> bool:
     if "trial" in fit.terms[which].shape or balance.train.all():
         return True
     without = balance.fit(tuple(t for i, t in enumerate(fit.terms) if i != which))
+    held = ~balance.train & balance.telling(fit.terms[which].effect)
+    if not held.any():
+        return True
     likelihood = []
     for f in (without, fit):
-        w = balance.weights(f.terms)[~balance.train]
-        r = np.zeros(len(balance.train))
-        r[~balance.train] = (balance.effort - f.prediction)[~balance.train] * w
-        rss = np.sum(balance.whiten(r, balance.weights(f.terms) * ~balance.train) ** 2)
-        likelihood.append(balance.inflation * float(np.sum(np.log(w))) - 0.5 * float(rss))
+        weight = balance.weights(f.terms)
+        w = weight * held
+        rss = np.sum(balance.whiten((balance.effort - f.prediction) * w, w) ** 2)
+        likelihood.append(balance.inflation * float(np.sum(np.log(weight[held]))) - 0.5 * float(rss))
     return likelihood[1] > likelihood[0]
 
 

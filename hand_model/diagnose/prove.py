@@ -47,7 +47,7 @@ def proved(finding: Finding, station: Any, before: Path, after: Path) -> tuple[d
     kind = effect(finding.effect)
     if station is None or not kind.of_the_hand or kind.unwritten:
         return {**finding.fit, "note": kind.unwritten or "read from events, not from a balance"}, None
-    states = kept_out(station.naming.balance.states)
+    states = kept_out(tuple(s for s in station.naming.balance.states if kind.told_by(s)))
     replay = _currents if station.signal == "current" else _angles
     errors = [replay(station, finding, folder, fit, states)
               for folder, fit in ((before, station.reading.declared), (after, station.reading.fit))]

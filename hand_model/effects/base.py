@@ -159,6 +159,10 @@ class Effect:
         """All columns as they are."""
         return columns
 
+    def told_by(self, state: DriveState) -> bool:
+        """Whether a recording says what the effect depends on, so that it can bear the effect out: every one."""
+        return True
+
     def clip(self, prediction: Array, shape: Mapping[str, float]) -> Array:
         """The prediction as it is."""
         return prediction

@@ -35,6 +35,10 @@ class GravityLoad(Effect):
         along, across = state.extra["gravity_along"] / 9.81, state.extra["gravity_across"] / 9.81
         return np.stack([across * np.cos(angle) - along * np.sin(angle), along * np.cos(angle) + across * np.sin(angle)], axis=-1)
 
+    def told_by(self, state: DriveState) -> bool:
+        """One in which the pose of the hand was recorded."""
+        return "pose_seen" in state.extra
+
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """The largest load that the weight can be."""
         load = figure(math.hypot(parameters["along"], parameters["across"]))

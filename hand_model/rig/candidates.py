@@ -28,6 +28,7 @@ NOT_FOR_RIGS = frozenset(
     }
 )
 PERIODIC = frozenset({"torque_ripple"})  # between two periods of a grid there is nothing to descend from
+SMOOTH = ("nonlinear_spring",)  # its knee belongs to fingers with a return spring; a joint has stops and detents
 LONGEST_DELAY_S = 0.03
 BY_LEVEL = "in proportion to the trial's friction"
 Bound = tuple[str, str, float, float]
@@ -88,7 +89,7 @@ def _usable(found: Any) -> bool:
 def _from_catalogue(
     found: Any, joint: str, train: tuple[DriveState, ...], states: Mapping[str, DriveState]
 ) -> Candidate:
-    grid = tuple(found.grid(train))
+    grid = ({},) if found.name in SMOOTH else tuple(found.grid(train))
     if len(grid) > 16 and found.name not in PERIODIC:  # a coarse look first; the winner's shape is refined
         grid = grid[:: int(np.ceil(len(grid) / 16))]
     return Candidate(found.name, "", joint, tuple(found.amplitudes()), grid,
