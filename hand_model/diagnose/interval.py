@@ -14,6 +14,7 @@ from .name import Naming, refit
 
 Array = NDArray[np.float64]
 
+REFUTED = 1.1  # held-out variance over that of the fit as named, from which a reading is none
 MISFIT_LIMIT = 1.5  # residual variance over pure error above which no interval is given
 
 
@@ -77,6 +78,10 @@ def undisturbed(naming: Naming) -> Reading:
                 other = Term(term.effect, {**best.terms[which].shape, "form": form})
                 fits.append(refit(calm, calm.fit((*best.terms[:which], other, *best.terms[which + 1:]))))
         best = min(fits, key=lambda found: 0.5 * found.rss / calm.inflation + oddity(calm, found))
+    held = balance.steady & ~balance.train
+    errors = [float(np.mean((balance.effort - f.prediction)[held] ** 2)) for f in (fit, best)] if held.any() else [1.0, 1.0]
+    if errors[1] > REFUTED * errors[0]:  # slow moves that the training recordings did not have
+        return Reading(balance, naming.declared, fit)
     return Reading(calm, calm.fit(), best)
 
 
@@ -190,7 +195,9 @@ def proven(naming: Naming, which: int) -> bool:
         w = weight * held
         rss = np.sum(balance.whiten((balance.effort - f.prediction) * w, w) ** 2)
         likelihood.append(balance.inflation * float(np.sum(np.log(weight[held]))) - 0.5 * float(rss))
-    return likelihood[1] > likelihood[0]
+    w = balance.weight * held  # and not by claiming to know less alone
+    plain = [np.sum(balance.whiten((balance.effort - f.prediction) * w, w) ** 2) for f in (without, fit)]
+    return bool(likelihood[1] > likelihood[0] and plain[1] < plain[0])
 
 
 def sized(reading: Reading, which: int) -> bool:
