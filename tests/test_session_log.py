@@ -122,13 +122,16 @@ def test_reading_again_is_free(tmp_path):
 
 def test_speed(tmp_path):
     file = write_log(tmp_path / "log.csv", n=3000)
-    best_s = np.inf  # of processor time: the machine may be busy with something else
+    best_s = yardstick_s = np.inf  # of processor time, beside a yardstick: the machine may be busy with something else
     for i in range(15):
         file = file.rename(tmp_path / f"log{i}.csv")
         start = time.process_time()
         assert len(read_log(file).time_s) == 3000
         best_s = min(best_s, time.process_time() - start)
-    assert best_s < 0.015
+        start = time.process_time()
+        assert sum(k % 7 for k in range(200_000)) > 0  # 9 ms where reading takes 7
+        yardstick_s = min(yardstick_s, time.process_time() - start)
+    assert best_s < 1.8 * yardstick_s
 
 
 FLOAT = "std_msgs/msg/Float64"
