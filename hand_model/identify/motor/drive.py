@@ -136,13 +136,15 @@ def run(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, controller
     )
     n = int(np.ceil(moves.duration_s.max() / step_s)) + 2
     time_s = np.arange(n) * step_s
+    kind = _Cascade if controller == "cascade" else _Profile
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # values that a search tries may let a drive run away
-        steer = _Cascade(moves, q, step_s, time_s) if controller == "cascade" else _Profile(moves, q, time_s)
-        position, current = _run(moves, q, steer, step_s, n, np.inf)
-        if np.any(np.abs(current) > moves.limit):
-            steer = _Cascade(moves, q, step_s, time_s) if controller == "cascade" else steer
-            position, current = _run(moves, q, steer, step_s, n, moves.limit)
-    return Run(time_s, position, current if controller == "cascade" else current - steer.at, moves, q, controller)
+        steer = kind(moves, q, step_s, time_s)
+        position, feedback = _run(moves, q, steer, step_s, n, np.inf)
+        simulated = (np.arange(n)[:, None] - 2) * step_s <= moves.duration_s
+        if np.any(np.isfinite(moves.limit)) and np.any(simulated & (np.abs(steer.at + feedback) > moves.limit)):
+            steer = kind(moves, q, step_s, time_s)
+            position, feedback = _run(moves, q, steer, step_s, n, moves.limit)
+        return Run(time_s, position, steer.at + feedback if controller == "cascade" else feedback, moves, q, controller)
 
 
 def simulate(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, controller: str = "profile") -> tuple[Array, Array, Array]:
@@ -153,9 +155,9 @@ def simulate(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, contr
 
 
 def _run(moves: Moves, q: Mapping[str, Array], steer: _Profile | _Cascade, step_s: float, n: int, limit: Array | float) -> tuple[Array, Array]:
-    """Position [%] and the current that is asked for [raw], (n, B), of drives that follow what `steer` says, with no more current than the limit [raw]."""
-    active = np.searchsorted(-moves.duration_s, -((np.arange(n) - 2) * step_s), side="right")
-    position, current = np.zeros((n, len(moves.target))), np.zeros((n, len(moves.target)))
+    """Position [%] and what it adds to the current that is asked for [raw], (n, B), of drives that follow what `steer` says, with no more current than the limit [raw]."""
+    active = np.searchsorted(-moves.duration_s, -((np.arange(n) - 2) * step_s), side="right").tolist()
+    position, velocity, acceleration = np.zeros((3, n, len(moves.target)))
     half = 0.5 * step_s
     p, v = moves.position.copy(), np.zeros(len(moves.target)) + moves.velocity
     a = np.zeros(len(p))
@@ -164,9 +166,10 @@ def _run(moves: Moves, q: Mapping[str, Array], steer: _Profile | _Cascade, step_
     late = np.minimum(q["delay"], 0.8 * q["inertia"] / np.maximum(q["damping"], 1e-9))
     mass, sprung = q["inertia"] / half, q["stiffness"] + q["gain"]
     gain, keep, late_push = q["gain"], q["damping"] - q["gain"] * late, q["damping"] * late
-    moving, preload, limit = mass - late_push / half, q["preload"], limit + np.zeros(len(p))
-    plant = mass + q["viscous"] + half * q["stiffness"]
+    moving, preload, limit, late_move = mass - late_push / half, q["preload"], limit + np.zeros(len(p)), late_push / half
     closed = gain * (half - late) + q["damping"] * (1.0 - late / half)
+    inner = mass + q["viscous"] + half * q["stiffness"] + closed
+    every = gain, keep, late_push
     contact = _Contact(q, half) if "contact_stiffness" in q else None
     bounded = bool(np.isfinite(limit).any())
     for i in range(n):
@@ -174,37 +177,38 @@ def _run(moves: Moves, q: Mapping[str, Array], steer: _Profile | _Cascade, step_
         if k == 0:
             break
         if k < len(p):
-            p, v, a, gain, keep, late_push, moving, sprung, preload, limit, plant, closed, mass = (
-                x[:k] for x in (p, v, a, gain, keep, late_push, moving, sprung, preload, limit, plant, closed, mass)
+            p, v, a, gain, late_move, moving, sprung, preload, limit, closed, inner = (
+                x[:k] for x in (p, v, a, gain, late_move, moving, sprung, preload, limit, closed, inner)
             )
             friction.narrow(k)
-        now, middle_push = steer.push(i, p, v)
-        position[i, :k] = p
-        current[i, :k] = now - gain * p - keep * v + late_push * a
-        total = middle_push - preload + moving * v - sprung * p
-        inner = plant
+            steer.narrow(k)
+        push = steer.push(i, p, v)
+        position[i, :k], velocity[i, :k], acceleration[i, :k] = p, v, a
+        total = push - preload + moving * v - sprung * p
+        resisting = inner
         if contact is not None:
             pressed, stiffer = contact.load(p)
-            total, inner = total - pressed, plant + stiffer
-        middle = friction.velocity(total, inner + closed, v)
+            total, resisting = total - pressed, inner + stiffer
+        middle = friction.velocity(total, resisting, v)
         if bounded:
-            own = total - (middle_push - gain * p - (late_push / half) * v)  # what is left without the controller
+            own = total - (push - gain * p - late_move * v)  # what is left without the controller
             u_middle = total - own - closed * middle
             over = np.abs(u_middle) > limit
             if over.any():
-                middle = np.where(over, friction.velocity(own + np.sign(u_middle) * limit, inner, v), middle)
+                middle = np.where(over, friction.velocity(own + np.sign(u_middle) * limit, resisting - closed, v), middle)
         fresh, middle = friction.advance(v, middle)
         steer.advance(middle)
         p = p + step_s * middle
         a = (fresh - v) / step_s
         v = fresh
-    return position, current
+    gain, keep, late_push = every
+    return position, late_push * acceleration - gain * position - keep * velocity
 
 
 class _Profile:
-    """What a trapezoidal profile adds to the current: gain r + damping r', at the steps and between them."""
+    """What a trapezoidal profile adds to the current: gain r + damping r', at the steps (at) and between them."""
 
-    def __init__(self, moves: Moves, q: Mapping[str, Array], time_s: Array) -> None:
+    def __init__(self, moves: Moves, q: Mapping[str, Array], step_s: float, time_s: Array) -> None:
         t, sign = time_s[:, None] - moves.start_s, np.sign(moves.target - moves.origin)
         shape = _Trapezoid(moves, q)
         r = moves.origin + sign * shape.way(t)
@@ -213,7 +217,7 @@ class _Profile:
         self.at = q["gain"] * r + q["damping"] * sign * shape.speed(t)
         # the mean over a step is exact where the velocity jumps within it
         self.between = np.empty_like(r)
-        self.between[:-1] = q["gain"] * 0.5 * (r[1:] + r[:-1]) + q["damping"] * sign * np.diff(way, axis=0) / (time_s[1] - time_s[0])
+        self.between[:-1] = q["gain"] * 0.5 * (r[1:] + r[:-1]) + q["damping"] * sign * np.diff(way, axis=0) / step_s
         self.between[-1] = self.at[-1]
         self.hold = q["gain"] * r[0], q["gain"]
 
@@ -221,48 +225,81 @@ class _Profile:
         """Current (B,) [raw] before the move, at rest at positions (B,) [%]."""
         return self.hold[0] - self.hold[1] * p
 
-    def push(self, i: int, p: Array, v: Array) -> tuple[Array, Array]:
-        """Its part of the current (k,) [raw] at step i and in the middle of the step."""
-        return self.at[i, : len(p)], self.between[i, : len(p)]
+    def narrow(self, k: int) -> None:
+        """Nothing: the drives that are left say how many they are."""
+
+    def push(self, i: int, p: Array, v: Array) -> Array:
+        """Its part of the current (k,) [raw] in the middle of step i."""
+        return self.between[i, : len(p)]
 
     def advance(self, middle: Array) -> None:
         """Nothing: the profile does not see the drive."""
 
 
 class _Cascade:
-    """What a position loop round a speed loop adds to the current; r goes with the drive within the deadband."""
+    """What a position loop round a speed loop adds to the current, at the steps (at); r goes with the drive within the deadband."""
 
     def __init__(self, moves: Moves, q: Mapping[str, Array], step_s: float, time_s: Array) -> None:
-        self.q, self.moves, self.step_s, self.time_s = q, moves, step_s, time_s
-        self.slew, self.top_speed = step_s * q["speed_full"] / np.maximum(q["rise"], 1e-4), q["speed_full"] * moves.speed
-        self.last_start = float(moves.start_s.max())
+        self.step_s, self.time_s, self.last_start = step_s, time_s, float(moves.start_s.max())
+        self.at, self.hold = np.zeros((len(time_s), len(moves.target))), moves.hold
+        self.gain, self.damping, self.half_gain, self.half_damping = q["gain"], q["damping"], 0.5 * q["gain"], 0.5 * q["damping"]
+        self.start_s, self.target, self.origin, self.loop = moves.start_s, moves.target, moves.origin, _Loop(q, step_s, moves.speed)
 
     def first(self, p: Array, v: Array) -> Array:
         """Current (B,) [raw] before the move: what held the drive."""
-        self.r, self.w = p + (self.moves.hold + self.q["damping"] * v) / self.q["gain"], np.zeros(len(p))
-        return self.moves.hold
+        self.r, self.w = p + (self.hold + self.damping * v) / self.gain, np.zeros(len(p))
+        return self.hold
 
-    def push(self, i: int, p: Array, v: Array) -> tuple[Array, Array]:
-        """Its part of the current (k,) [raw] at step i and in the middle of the step."""
-        k, q, step_s = len(p), self.q, self.step_s
-        r, w = self.r[:k], self.w[:k]
-        # where the drive will be seen at the middle and at the end of the step
-        seen, fresh = p + (0.5 * step_s - q["delay"][:k]) * v, p + (step_s - q["delay"][:k]) * v
-        target, origin, limits = self.moves.target[:k], self.moves.origin[:k], (step_s * v, w, self.top_speed, self.slew)
-        share, change = _cascade(q, k, target - seen, target - fresh, *limits)
+    def narrow(self, k: int) -> None:
+        """Keep the first k drives."""
+        for name in ("gain", "damping", "half_gain", "half_damping", "start_s", "target", "origin", "r", "w"):
+            setattr(self, name, getattr(self, name)[:k])
+        self.loop.narrow(k)
+
+    def push(self, i: int, p: Array, v: Array) -> Array:
+        """Its part of the current (k,) [raw] in the middle of step i."""
+        r, w = self.r, self.w
+        share, change = self.loop.step(self.target - p, v, w)
         if self.time_s[i] < self.last_start:
             # the share of this step that lies behind the command, so that its instant counts within a step too
-            since = np.minimum(np.maximum((self.time_s[i] + step_s - self.moves.start_s[:k]) / step_s, 0.0), 1.0)
-            old_share, old_change = _cascade(q, k, origin - seen, origin - fresh, *limits)
+            since = np.minimum(np.maximum((self.time_s[i] + self.step_s - self.start_s) / self.step_s, 0.0), 1.0)
+            old_share, old_change = self.loop.step(self.origin - p, v, w)
             share, change = since * share + (1 - since) * old_share, since * change + (1 - since) * old_change
         self.w = w + change
-        self.r, self.share, self.r_next = r, share, r + 0.5 * step_s * (w + self.w)
-        now = q["gain"][:k] * r + q["damping"][:k] * w
-        return now, 0.5 * (now + q["gain"][:k] * self.r_next + q["damping"][:k] * self.w)
+        both = w + self.w
+        self.share, self.r_next = share, r + (0.5 * self.step_s) * both
+        self.at[i, : len(p)] = self.gain * r + self.damping * w
+        return self.half_gain * (r + self.r_next) + self.half_damping * both
 
     def advance(self, middle: Array) -> None:
         """One step with the drive at velocity `middle` (k,) [%/s]: within the deadband the integral holds."""
-        self.r = self.share * self.r_next + (1 - self.share) * (self.r + self.step_s * middle)
+        held = self.r + self.step_s * middle
+        self.r = held + self.share * (self.r_next - held)
+
+
+class _Loop:
+    """The position loop of cascades: the wanted speed, within a slew rate, of a position error."""
+
+    def __init__(self, q: Mapping[str, Array], step_s: float, speed: Array) -> None:
+        self.step_s, self.slew, self.top = step_s, step_s * q["speed_full"] / np.maximum(q["rise"], 1e-4), q["speed_full"] * speed
+        # where the drive will be seen at the middle and at the end of the step
+        self.middle, self.end = 0.5 * step_s - q["delay"], step_s - q["delay"]
+        self.deadband, self.edge, self.gain = q["deadband"], q["edge"], q["position_gain"]
+
+    def narrow(self, k: int) -> None:
+        """Keep the first k drives."""
+        for name in ("slew", "top", "middle", "end", "deadband", "edge", "gain"):
+            setattr(self, name, getattr(self, name)[:k])
+
+    def step(self, error: Array, v: Array, wanted: Array) -> tuple[Array, Array]:
+        """Share (k,) (0..1) in which position errors (k,) [%] at velocities v (k,) [%/s] are outside the deadband, and the change of the wanted speed [%/s], in one step."""
+        # a deadband narrower than the step's travel sets in within the step
+        width = np.maximum(np.abs(self.step_s * v), self.edge)
+        share = np.minimum(np.maximum((np.abs(error - self.middle * v) - self.deadband) / width + 0.5, 0.0), 1.0)
+        outside = np.minimum(np.maximum(self.gain * (error - self.end * v), -self.top), self.top) - wanted
+        outside = np.minimum(np.maximum(outside, -self.slew), self.slew)
+        inside = np.minimum(np.maximum(-wanted, -self.slew), self.slew)
+        return share, inside + share * (outside - inside)
 
 
 class _Stick:
@@ -286,8 +323,9 @@ class _Stick:
     def advance(self, v: Array, middle: Array) -> tuple[Array, Array]:
         """Velocity (k,) [%/s] at the end of the step and its mean; a drive that would turn round has stopped within the step."""
         fresh = 2.0 * middle - v
-        stopped = fresh * v < 0.0
-        if stopped.any():
+        turned = fresh * v
+        if np.minimum.reduce(turned) < 0.0:
+            stopped = turned < 0.0
             u = v[stopped]
             middle = middle.copy()
             middle[stopped], fresh[stopped] = 0.5 * u * u / (u - fresh[stopped]), 0.0
@@ -299,8 +337,9 @@ class _Bristles:
 
     def __init__(self, q: Mapping[str, Array], step_s: float) -> None:
         self.rise, self.step_s = _Rise(q), step_s
-        self.distance, self.reach = np.maximum(q["presliding"], 1e-4), 0.5 * step_s + q["bristle"]
-        self.per = 1.0 / self.distance
+        distance = np.maximum(q["presliding"], 1e-4)
+        self.reach, self.least, self.per = 0.5 * step_s + q["bristle"], 1e-6 * distance, -1.0 / distance
+        self.step_per = step_s * self.per
 
     def begin(self, load: Array, v: Array) -> None:
         """Friction of drives in balance with a load (B,) [raw], or sliding at v (B,) [%/s]."""
@@ -310,20 +349,20 @@ class _Bristles:
     def narrow(self, k: int) -> None:
         """Keep the first k drives."""
         self.rise.narrow(k)
-        self.f, self.distance, self.reach, self.per = self.f[:k], self.distance[:k], self.reach[:k], self.per[:k]
+        self.f, self.reach, self.least, self.per, self.step_per = self.f[:k], self.reach[:k], self.least[:k], self.per[:k], self.step_per[:k]
 
     def velocity(self, total: Array, inner: Array, v: Array) -> Array:
         """Velocity (k,) [%/s] in the middle of a step, of all other efforts [raw] and what resists velocity [raw s/%]."""
         push = total - self.f
         self.level = self.rise.level(v)
-        travel = np.maximum(self.step_s * np.abs(v), 1e-6 * self.distance)
-        slope = (self.level - self.f * np.sign(push)) * -np.expm1(-travel * self.per) / travel
+        travel = np.maximum(self.step_s * np.abs(v), self.least)
+        slope = (np.copysign(self.f, self.f * push) - self.level) * np.expm1(travel * self.per) / travel
         return push / (inner + self.reach * slope)
 
     def advance(self, v: Array, middle: Array) -> tuple[Array, Array]:
         """Velocity (k,) [%/s] at the end of the step and its mean; the bristles go with it."""
-        limit = np.sign(middle) * self.level
-        self.f = limit + (self.f - limit) * np.exp(-self.step_s * np.abs(middle) * self.per)
+        limit = np.copysign(self.level, middle)
+        self.f = limit + (self.f - limit) * np.exp(self.step_per * np.abs(middle))
         return 2.0 * middle - v, middle
 
 
@@ -359,21 +398,6 @@ class _Contact:
         return pressed * (p - self.at[:k]), pressed * self.reach[:k]
 
 
-def _cascade(
-    q: Mapping[str, Array], k: int, error: Array, next_error: Array, travel: Array, speed: Array, top_speed: Array, slew: Array
-) -> tuple[Array, Array]:
-    """Share (0..1) in which a position error (k,) [%] is outside the deadband, and the change of the wanted speed [%/s] in one step.
-
-    error: in the middle of a step over `travel` [%], next_error: at its end, which is what the wanted speed there follows.
-    """
-    # a deadband narrower than the step's travel sets in within the step
-    share = np.minimum(np.maximum((np.abs(error) - q["deadband"][:k]) / np.maximum(q["edge"][:k], np.abs(travel)) + 0.5, 0.0), 1.0)
-    wanted = np.minimum(np.maximum(q["position_gain"][:k] * next_error, -top_speed[:k]), top_speed[:k])
-    slew = slew[:k]
-    outside, inside = np.minimum(np.maximum(wanted - speed, -slew), slew), np.minimum(np.maximum(-speed, -slew), slew)
-    return share, share * outside + (1 - share) * inside
-
-
 def cascade_step(
     q: Mapping[str, float], error: float, speed: float, reference: float, wanted: float, velocity: float, step_s: float
 ) -> tuple[float, float]:
@@ -381,10 +405,8 @@ def cascade_step(
 
     error [%]: setpoint less position; speed: share of full; velocity [%/s] of the drive.
     """
-    one = {k: np.atleast_1d(np.asarray(q[k], float)) for k in ("deadband", "edge", "position_gain", "speed_full", "rise")}
-    slew = step_s * one["speed_full"] / np.maximum(one["rise"], 1e-4)
-    seen, fresh = (np.atleast_1d(error - (share * step_s - q["delay"]) * velocity) for share in (0.5, 1.0))
-    share, change = _cascade(one, 1, seen, fresh, np.atleast_1d(step_s * velocity), np.atleast_1d(wanted), one["speed_full"] * speed, slew)
-    s, w = float(share[0]), wanted + float(change[0])
+    one = {k: np.atleast_1d(np.asarray(q[k], float)) for k in ("deadband", "edge", "position_gain", "speed_full", "rise", "delay")}
+    share, change = (float(x[0]) for x in _Loop(one, step_s, np.atleast_1d(speed)).step(*map(np.atleast_1d, (error, velocity, wanted))))
+    w = wanted + change
     # within the deadband the integral holds: the reference goes with the drive
-    return s * (reference + 0.5 * step_s * (wanted + w)) + (1 - s) * (reference + step_s * velocity), w
+    return share * (reference + 0.5 * step_s * (wanted + w)) + (1 - share) * (reference + step_s * velocity), w

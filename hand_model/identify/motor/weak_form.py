@@ -62,18 +62,23 @@ class Stroke:
 
 @dataclass(frozen=True)
 class _Projected:
-    """A stroke on its splines, whitened: project (k, n) from n grid points; fixed (k, 2) acceleration and velocity; position, current
-    (interpolated between samples; held_current: from those inside only) and speed (n,) on the grid; noise (3, 3) expected in the products
-    of acceleration, velocity and position."""
+    """A stroke on its splines: onto (k, n) from n grid points, to be whitened by white (k, k); fixed (k, 2) acceleration and velocity, whitened;
+    position, current (interpolated between samples; held_current: from those inside only) and speed (n,) on the grid; noise (3, 3) expected in the
+    products of acceleration, velocity and position."""
 
     stroke: Stroke
-    project: Array
+    white: Array
+    onto: Array
     fixed: Array
     position: Array
     current: Array
     held_current: Array
     speed: Array
     noise: Array
+
+    def project(self, y: Array) -> Array:
+        """Columns y (n, ...) on the splines, whitened (k, ...)."""
+        return self.white @ (self.onto @ y)
 
 
 def fit_regressions(trials: Sequence[MotorTrial], sigma_position: float, sigma_current: float) -> tuple[Regression, Regression]:
@@ -91,15 +96,18 @@ def fit_regressions(trials: Sequence[MotorTrial], sigma_position: float, sigma_c
         sliding = [[_settled(t, s, 2.5 * give + 2 * sigma_position) for s in found] for t, found in zip(trials, moved, strict=True)]
         parts = _without_outliers(_projected(trials, sliding, sigma_position, sigma_current), give)
     noise = sigma_current**2 * float(np.median(np.concatenate([np.diff(t.time_s) for t in trials])))
-    fits = [(*_solve(parts, give, shape), shape) for shape in (None, *STRIBECK)]
-    values, covariance, square, _ = fits[0]
+    system = _system(parts, give)
+    values, covariance, square = _solve(system)
     # what the current does between the last sample outside a stroke and the first inside is not recorded
-    shift = _solve([replace(q, current=q.held_current) for q in parts], give, None)[0] - values
+    shift = _values(_system([replace(q, current=q.held_current) for q in parts], give)) - values
     unrecorded = np.outer(shift, shift) / 4
     plain = Regression(values, covariance + unrecorded, square / noise, give)
     # a rise so broad that hardly any Coulomb friction is left is viscous friction in disguise
-    rises = [f for f in fits[1:] if f[0][5] < RATIO * f[0][2]] or fits[1:]
-    values, covariance, square, shape = min(rises, key=lambda f: f[2])
+    systems = _rising(parts, give)
+    found = [_values(x) for x in systems]
+    rises = [i for i, x in enumerate(found) if x[5] < RATIO * x[2]] or range(len(found))
+    best = min(rises, key=lambda i: _misfit(systems[i], found[i]))
+    shape, (values, covariance, square) = STRIBECK[best], _solve(systems[best])
     excess = float(values[5])
     curved = Regression(values[:5], covariance[:5, :5] + unrecorded, square / noise, give, excess, *shape, excess / float(np.sqrt(covariance[5, 5])))
     return plain, curved
@@ -186,8 +194,8 @@ def _project(t: MotorTrial, s: Stroke, sigma: float, spacing: float, step: float
     weight[[0, -1]] *= 0.5
     spline = BSpline(knots, np.eye(len(knots) - 4)[:, 1:-1], 3)
     value, first, second = spline(grid), spline(grid, 1), spline(grid, 2)
-    white = np.linalg.inv(np.linalg.cholesky(value.T @ (weight[:, None] * value)))
-    onto, along, twice = ((white @ x.T) * weight for x in (value, -first, second))
+    onto = np.ascontiguousarray((value * weight[:, None]).T)
+    white = np.linalg.inv(np.linalg.cholesky(onto @ value))
     share = (grid - s.begin_s) / (s.end_s - s.begin_s)
     position = make_interp_spline(at, np.r_[s.begin, t.position[k], s.end], k=3)(grid)
     # less its chord the position vanishes at both ends, and with it what integration by parts leaves there
@@ -196,77 +204,99 @@ def _project(t: MotorTrial, s: Stroke, sigma: float, spacing: float, step: float
     noise[[0, -1]] *= 0.5  # means of a rest
     shaken = make_interp_spline(at, noise, k=3)(grid)
     curved = shaken - shaken[0] - (shaken[-1] - shaken[0]) * share[:, None]
-    seen = np.stack([twice @ curved, along @ shaken, onto @ shaken])
     chord = (position[-1] - position[0]) / (s.end_s - s.begin_s)
-    velocity = along @ bent + chord * onto.sum(axis=1)
-    speed = np.abs(chord + first @ (white.T @ (onto @ bent)))
+    heavy = weight[:, None] * np.c_[bent, curved, shaken]
+    accelerated, moved, placed = white @ (second.T @ heavy), white @ -(first.T @ heavy), white @ (value.T @ heavy)
+    velocity = moved[:, 0] + chord * (white @ onto.sum(axis=1))
+    speed = np.abs(chord + first @ (white.T @ placed[:, 0]))
+    seen = np.stack([accelerated[:, 1:3], moved[:, 3:], placed[:, 3:]])
     current, held = np.interp(grid, t.time_s, t.current), np.interp(grid, t.time_s[k], t.current[k])
-    return _Projected(s, onto, np.c_[twice @ bent, velocity], position, current, held, speed, np.einsum("ikr,jkr->ij", seen, seen) / 2)
+    noise = np.einsum("ikr,jkr->ij", seen, seen) / 2
+    return _Projected(s, white, onto, np.c_[accelerated[:, 0], velocity], position, current, held, speed, noise)
 
 
-def _rows(q: _Projected, give: float, stribeck: tuple[float, float] | None) -> tuple[Array, Array]:
-    """Regressors (k, 5 or 6) and current (k,): from rest friction is exp(-travel / give) of what it held, and slides for the rest."""
+def _rows(q: _Projected, give: float, shapes: Sequence[tuple[float, float]] = ()) -> tuple[Array, Array]:
+    """Regressors (k, 5), with what each shape of a Stribeck rise adds (k, 5 + shapes), and current (k,): from rest friction is exp(-travel / give) of
+    what it held, and slides for the rest."""
     left = np.exp(-np.abs(q.position - q.stroke.rest) / give)
     if q.stroke.hold is None:
         friction, held, hold = q.stroke.sign * (1 - 2 * left), np.zeros_like(left), 0.0
     else:
         friction, held, hold = q.stroke.sign * (1 - left), left, q.stroke.hold
-    columns = [friction, q.position - held * q.stroke.rest, 1 - held]
-    if stribeck is not None:
-        columns.append(friction * np.exp(-((q.speed / stribeck[0]) ** stribeck[1])))
-    x = q.project @ np.column_stack([*columns, q.current - held * hold])
+    rises = [friction * np.exp(-((q.speed / speed) ** exponent)) for speed, exponent in shapes]
+    x = q.project(np.column_stack([friction, q.position - held * q.stroke.rest, 1 - held, *rises, q.current - held * hold]))
     return np.c_[q.fixed, x[:, :-1]], x[:, -1]
 
 
-def _system(parts: Sequence[_Projected], give: float, stribeck: tuple[float, float] | None) -> tuple[list[Array], list[Array], list[float]]:
-    """Normal matrices less the encoder's noise, right sides and squares of the current, stroke by stroke."""
-    gram, right, square = [], [], []
+_System = tuple[Array, Array, float, int]  # by stroke: normal matrices (strokes, k, k), right sides (strokes, k); square of the current, and its rows
+
+
+def _system(parts: Sequence[_Projected], give: float) -> _System:
+    """Normal matrices less the encoder's noise, and right sides, without a Stribeck rise."""
+    return _systems(parts, give, ())[0]
+
+
+def _rising(parts: Sequence[_Projected], give: float) -> list[_System]:
+    """The same with each shape of STRIBECK."""
+    return _systems(parts, give, STRIBECK)
+
+
+def _systems(parts: Sequence[_Projected], give: float, shapes: Sequence[tuple[float, float]]) -> list[_System]:
+    gram, right, square, rows = [], [], 0.0, 0
     for q in parts:
-        x, y = _rows(q, give, stribeck)
+        x, y = _rows(q, give, shapes)
         g = x.T @ x
         g[np.ix_([0, 1, 3], [0, 1, 3])] -= q.noise
         gram.append(g)
         right.append(x.T @ y)
-        square.append(float(y @ y))
-    return gram, right, square
+        square, rows = square + float(y @ y), rows + len(y)
+    columns = [[*range(5), 5 + i] for i in range(len(shapes))] or [[*range(5)]]
+    gram, right = np.array(gram), np.array(right)
+    return [(gram[:, k][:, :, k], right[:, k], square, rows) for k in columns]
 
 
-def _cost(parts: Sequence[_Projected], give: float) -> float:
-    gram, right, square = _system(parts, give, None)
-    b = sum(right)
-    return float(sum(square) - b @ np.linalg.solve(sum(gram), b))
+def _values(system: _System) -> Array:
+    gram, right, *_ = system
+    return np.linalg.solve(gram.sum(axis=0), right.sum(axis=0))
+
+
+def _misfit(system: _System, values: Array) -> float:
+    """Mean square that values leave."""
+    _, right, square, rows = system
+    return float(max(square - right.sum(axis=0) @ values, 0.0) / rows)
 
 
 def _give(parts: Sequence[_Projected]) -> float:
     """Distance over which friction turns round [%]; the least of GIVE where the strokes show none."""
     from scipy.optimize import minimize_scalar
 
-    costs = [_cost(parts, g) for g in GIVE]
+    def cost(give: float) -> float:
+        system = _system(parts, give)
+        return _misfit(system, _values(system))
+
+    costs = [cost(g) for g in GIVE]
     best = int(np.argmin(costs))
     count = sum(len(q.fixed) for q in parts)
     if best == 0 or costs[0] - costs[best] < EVIDENCE * costs[best] / count:
         return GIVE[0]
     bounds = (GIVE[best - 1] if best > 1 else 0.1, 1.8 if best == len(GIVE) - 1 else GIVE[best + 1])
-    return float(minimize_scalar(lambda g: _cost(parts, g), bounds=bounds, method="bounded", options={"xatol": 0.02}).x)
+    return float(minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": 0.02}).x)
 
 
-def _solve(parts: Sequence[_Projected], give: float, stribeck: tuple[float, float] | None) -> tuple[Array, Array, float]:
+def _solve(system: _System) -> tuple[Array, Array, float]:
     """Values, their covariance by leaving out one stroke after the other (jackknife), and the mean square left."""
-    gram, right, square = _system(parts, give, stribeck)
-    total, b = sum(gram), sum(right)
-    values = np.linalg.solve(total, b)
-    left = float(max(sum(square) - b @ values, 0.0) / sum(len(q.fixed) for q in parts))
-    d = np.array([np.linalg.solve(total - g, g @ values - r) for g, r in zip(gram, right, strict=True)])
+    gram, right, *_ = system
+    values, n = _values(system), len(gram)
+    d = np.linalg.solve(gram.sum(axis=0) - gram, (gram @ values - right)[..., None])[..., 0]
     d -= d.mean(axis=0)
-    return values, (len(parts) - 1) / len(parts) * d.T @ d, left
+    return values, (n - 1) / n * d.T @ d, _misfit(system, values)
 
 
 def _without_outliers(parts: list[_Projected], give: float = GIVE[0]) -> list[_Projected]:
     """The strokes without those that the others do not explain: something held the drive, or their ends were misjudged."""
     for _ in range(3):
-        gram, right, _ = _system(parts, give, None)
-        values = np.linalg.solve(sum(gram), sum(right))
-        misfit = np.array([np.mean((y - x @ values) ** 2) for x, y in (_rows(q, give, None) for q in parts)])
+        values = _values(_system(parts, give))
+        misfit = np.array([np.mean((y - x @ values) ** 2) for x, y in (_rows(q, give) for q in parts)])
         kept = [q for q, m in zip(parts, misfit, strict=True) if m < 6 * np.median(misfit)]
         if len(kept) == len(parts) or len(kept) < 6:
             break
