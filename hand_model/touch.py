@@ -18,7 +18,8 @@ from .errors import IdentificationError
 from .hand import Estimate
 from .identify.motor import MotorFit, identify_motor, output_error
 from .identify.motor.balance import NAMES, balance, friction_state
-from .identify.motor.moves import MoveData, moves_from_rest, shortened
+from .identify.motor.moves import MoveData, shortened
+from .identify.motor.predict import known_moves
 from .identify.motor.recording import MotorTrial, actuator_trials, motor_trial
 from .session import Log, Session
 
@@ -71,7 +72,7 @@ def residuals(fit: MotorFit, log: Log, name: str = "log") -> list[tuple[MoveData
 def _from_commands(fit: MotorFit, trial: MotorTrial) -> list[tuple[MoveData, Array]]:
     """Measured less simulated current [noise deviations] of the moves from rest into flexion."""
     noise = (fit.sigma_position, fit.sigma_current)
-    data = [m for m in moves_from_rest(trial, noise, fit.scale.speed_full) if m.target > m.origin and (m.time_s > ALIGN_S).sum() > 3]
+    data = [m for m in known_moves(fit, trial) if m.target > m.origin and (m.time_s > ALIGN_S).sum() > 3]
     if not data:
         return []
     early = [shortened(m, ALIGN_S) for m in data]

@@ -13,7 +13,7 @@ from hand_model.identify.motor import identify_motor, identify_motors
 from hand_model.identify.motor.balance import NAMES, friction_state
 from hand_model.identify.motor.drive import Moves, profile, run, simulate
 from hand_model.identify.motor.fit import fit_motor, white_noise
-from hand_model.identify.motor.moves import moves_from_rest
+from hand_model.identify.motor.moves import levelled, moves_from_rest, speed_levels
 from hand_model.identify.motor.predict import predict, reference, replay_table
 from hand_model.identify.motor.published import MODELS, fit_published, smear_share
 from hand_model.identify.motor.recording import MotorTrial, actuator_trials, check_trials, motor_trial, trial_scale
@@ -162,11 +162,12 @@ def test_jump_within_a_step_counts() -> None:
 
 
 def test_jump_of_the_current_is_where_the_reference_jumps() -> None:
-    """Between two steps, however coarse: just before the command the current is what held the drive, just after it has jumped."""
+    """Between two steps, however coarse: just before the command the current is what held the drive, a tick later it has jumped, half of it between."""
     jump = {"presliding": 0.0, "rise": 1e-4, "fall": 1e-4, "damping": 0.6, "lead": 0.0}
     q = {k: np.array([v]) for k, v in {**PARAMETERS, **jump}.items()}
-    _, u = run(_moves(start_s=0.0513), q, 5e-3).sample(slice(0, 1), np.array([0.0512, 0.0515]))
-    assert abs(u[0, 0]) < 1.0 and u[1, 0] == pytest.approx(0.6 * 115.0, rel=0.05)
+    _, u = run(_moves(start_s=0.0513), q, 5e-3).sample(slice(0, 1), np.array([0.0507, 0.0513, 0.0519]))
+    assert abs(u[0, 0]) < 1.0 and u[2, 0] == pytest.approx(0.6 * 115.0, rel=0.05)
+    assert u[1, 0] == pytest.approx(0.5 * u[2, 0], rel=0.15)
 
 
 def test_cascade_does_not_depend_on_the_step() -> None:
@@ -175,6 +176,20 @@ def test_cascade_does_not_depend_on_the_step() -> None:
     fine, coarse = (simulate(_moves(duration_s=2.0), q, s, "cascade")[1][:: round(4e-3 / s), 0] for s in (2.5e-4, 2e-3))
     assert abs(fine[-60] - 80.0) < 1.0
     assert np.allclose(fine[:499], coarse[:499], atol=0.02)
+
+
+def test_a_logged_speed_stands_for_one_speed(trials) -> None:
+    """Moves of one logged speed tell it together: each one's own scatter averages out, a move that is alone keeps what the log says of it."""
+    moves = [m for t in trials for m in moves_from_rest(t, (0.06, 5.0), 255.0)]
+    rng, alone = np.random.default_rng(0), min(range(len(moves)), key=lambda i: moves[i].logged)
+    moves[alone] = dataclasses.replace(moves[alone], logged=-1.0)
+    own = np.array([[0.0, 0.0, m.logged * 1.002 + 3e-4 * rng.normal(), 0.0] for m in moves])
+    levels = speed_levels(moves, own)
+    for logged, (speed, sd) in levels.items():
+        if logged > 0 and sum(m.logged == logged for m in moves) > 3:
+            assert abs(speed - 1.002 * logged) < 4e-4 and sd < 3e-4
+    assert levels[-1.0] == (own[alone, 2], moves[alone].own_sd[2])
+    assert [m.own[2] for m in levelled(moves, levels)] == [levels[m.logged][0] for m in moves]
 
 
 def test_current_of_the_last_sample_before_a_command_belongs_to_no_move(trials) -> None:

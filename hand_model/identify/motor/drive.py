@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 
 STEP_S = 2e-3
 BEYOND_S = 2e-3  # simulated beyond a move's end, where what is known of a sample needs it
+TICK_S = 1e-3  # of the controller
 EARLY_S = 0.01  # simulated before a move's own zero, for a command that took effect before it
 SHARED = ("inertia", "viscous", "coulomb", "stiffness", "preload", "presliding", "bristle", "speed_full", "rise", "gain", "damping", "delay", "lead")
 CONTROLLERS = {"profile": (*SHARED, "fall", "lag"), "cascade": (*SHARED, "position_gain", "deadband")}
@@ -103,7 +104,8 @@ class Run:
     controller: str
 
     def sample(self, columns: slice, at_s: Array) -> tuple[Array, Array]:
-        """Position [%] and, `lead` later, current [raw], (k, columns), of moves at times (k,) [s], the jumps of the reference where they are."""
+        """Position [%] and, `lead` later, current [raw], (k, columns), of moves at times (k,) [s]; where the reference's speed jumps, the mean over a
+        controller's tick, as nobody knows where in a tick a sample falls."""
         at_s = at_s + EARLY_S
         q = {n: self.q[n][columns] for n in ("gain", "damping", "speed_full", "rise", "fall", "lag", "lead") if n in self.q}
         lead = q.get("lead", 0.0) + np.zeros(self.position[:1, columns].shape[1])
@@ -111,8 +113,9 @@ class Run:
         current = _interpolated(self.feedback[:, columns], (at_s[:, None] + lead) / self.time_s[1])
         moves = self.moves.some(columns)
         if self.controller == "profile":
-            r, w = profile(at_s, dataclasses.replace(moves, start_s=moves.start_s - lead), q)
-            current += q["gain"] * r + q["damping"] * w
+            t, sign, shape = at_s[:, None] + lead - moves.start_s, np.sign(moves.target - moves.origin), _Trapezoid(moves, q)
+            ahead, behind = (shape.way(t - q["lag"] + way * TICK_S) for way in (0.5, -0.5))
+            current += q["gain"] * (moves.origin + sign * shape.way(t)) + q["damping"] / TICK_S * sign * (ahead - behind)
         return position, np.clip(current, -moves.limit, moves.limit)
 
 

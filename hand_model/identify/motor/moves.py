@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from .recording import MotorTrial
 Array = NDArray[np.float64]
 
 SETTLED = 0.6  # [%]: movement allowed over the samples before a move that starts from rest
+SURE = 0.05  # share of what one logged speed is known to, below which no level of speeds is known
 BEFORE = 12  # samples at rest that a move looks back to
 
 
@@ -22,7 +24,7 @@ class MoveData:
 
     Known only so well, and estimated with the fit: own = when the command took effect (within one sample of the log) [s], where
     the drive rested [%], the speed [share of full] (logged in whole raw units), and the current that held it at rest [raw].
-    own_sd: (4,) standard deviations. velocity [%/s]: of a drive that creeps before the command; 0 at rest.
+    own_sd: (4,) standard deviations. velocity [%/s]: of a drive that creeps before the command; 0 at rest. logged: the speed as it is logged.
     """
 
     trial: str
@@ -36,6 +38,7 @@ class MoveData:
     own: Array
     own_sd: Array
     velocity: float = 0.0
+    logged: float = 1.0
 
 
 def moves_from_rest(trial: MotorTrial, sigma: tuple[float, float], speed_full: float) -> tuple[MoveData, ...]:
@@ -66,10 +69,35 @@ def moves_from_rest(trial: MotorTrial, sigma: tuple[float, float], speed_full: f
             MoveData(
                 trial.name, int(i), t[k] - t[i], p[k], trial.current[k], float(trial.setpoint[i]), float(trial.setpoint[i + 1]),
                 limit, np.array([0.5 * gap, rest[0], speed, held.mean()]),
-                np.array([max(gap / np.sqrt(12), 5e-3), rest[1], speed_sd, sigma[1] / np.sqrt(len(held))]), rest[2],
+                np.array([max(gap / np.sqrt(12), 5e-3), rest[1], speed_sd, sigma[1] / np.sqrt(len(held))]), rest[2], speed,
             )
         )  # fmt: skip
     return tuple(found)
+
+
+def speed_levels(moves: Sequence[MoveData], own: Array) -> dict[float, tuple[float, float]]:
+    """What each logged speed stands for [share of full], and its standard deviation, from what a fit found for every move, own (moves, 4).
+
+    A log in whole units rounds a speed alike each time, so that moves tell it together; long ones tell more, as the square of a duration times its samples.
+    """
+    found = {}
+    for logged in {m.logged for m in moves}:
+        k = [i for i, m in enumerate(moves) if m.logged == logged]
+        weight = np.array([abs(moves[i].target - moves[i].origin) ** 3 for i in k])
+        mean = float(weight @ own[k, 2] / weight.sum())
+        sd = float(np.sqrt(weight**2 @ (own[k, 2] - mean) ** 2 * len(k) / max(len(k) - 1, 1)) / weight.sum())
+        known = float(min(moves[i].own_sd[2] for i in k))
+        found[logged] = mean, known if len(k) == 1 else float(np.clip(sd, SURE * known, known))
+    return found
+
+
+def levelled(moves: Sequence[MoveData], levels: Mapping[float, tuple[float, float]]) -> tuple[MoveData, ...]:
+    """The moves with what is known of their speeds: logged speed -> share of full and its deviation; as logged where it is not among them."""
+    out = []
+    for m in moves:
+        mean, sd = levels.get(m.logged, (m.own[2], m.own_sd[2]))
+        out.append(dataclasses.replace(m, own=np.array([*m.own[:2], mean, m.own[3]]), own_sd=np.array([*m.own_sd[:2], sd, m.own_sd[3]])))
+    return tuple(out)
 
 
 def shortened(m: MoveData, end_s: float) -> MoveData:

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .covariance import covariance
-from .drive import STEP_S, Moves, Run, run
+from .drive import STEP_S, TICK_S, Moves, Run, run
 from .memory import Predictors, autocorrelation, freed, predictors
-from .moves import MoveData
+from .moves import MoveData, speed_levels
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,6 @@ COARSE, SOFT, FINE = (COARSE_S, 4, 5.0, 0.5), (COARSE_S, 4, 5.0, 0.1), (STEP_S, 
 ALIGN = (COARSE, (STEP_S, 4, 0.5, 0.02))  # where only the moves' own unknowns are sought
 STAGES = {"profile": (COARSE, FINE), "cascade": (COARSE, SOFT, FINE)}
 ABSOLUTE_REACH = {"preload": 20.0, "viscous": 0.1, "stiffness": 0.2, "coulomb": 10.0, "bristle": 0.01, "damping": 2.0, "rise": 0.02, "fall": 0.02, "deadband": 0.2, "delay": 0.002, "lead": 0.002, "lag": 0.002}
-TICK_S = 1e-3  # of the controller
 REACH_S = 1.5 * TICK_S  # what the instant of a jump is known to, half a step at its end and one at its begin: a current that jumps within it says little
 # differences wide enough that the instants at which a drive sticks or a deadband sets in, held to one step, average out
 STEP_SHARE, OWN_STEP = 2e-2, (1e-3, 1e-2, 1e-3, 0.5)
@@ -36,7 +35,7 @@ STEP_SHARE, OWN_STEP = 2e-2, (1e-3, 1e-2, 1e-3, 0.5)
 PRIOR = {"lead": (0.5 * TICK_S, 0.5 * TICK_S), "delay": (0.5 * TICK_S, TICK_S), "lag": (0.25 * TICK_S, 0.75 * TICK_S)}
 AGAIN = (STEP_S, 3, 0.5, 0.02)
 UNREST, MEMORY = 1.3, 0.1  # mean square [noise variances] and correlation from sample to sample above which residuals are weighed anew
-SEARCH = 1.15  # scatter of where the search ends, among kinks and in details of the controller, over that of the linear model, on simulated drives (scripts/motor_accuracy.py)
+SEARCH = 1.0
 OWN_REACH = np.array([0.01, 0.3, 0.01, 10.0])  # of one step
 
 
@@ -57,6 +56,11 @@ class OutputErrorFit:
     chi2: tuple[float, float]
     controller: str = "profile"
     memory: tuple[Predictors, ...] = ()
+
+    @property
+    def speeds(self) -> dict[float, tuple[float, float]]:
+        """Logged speed -> what it stands for [share of full], and its standard deviation."""
+        return speed_levels(self.moves, self.own)
 
 
 def _arrays(data: Sequence[MoveData], own: Array, repeat: int) -> Moves:

@@ -15,7 +15,7 @@ from . import output_error
 from .balance import NAMES, balance
 from .drive import Moves, profile
 from .fit import MotorFit
-from .moves import MoveData, moves_from_rest
+from .moves import MoveData, levelled, moves_from_rest
 from .recording import MotorTrial, motor_trial
 
 Array = NDArray[np.float64]
@@ -60,7 +60,7 @@ def predict(fit: MotorFit, log: Log, name: str = "log", align: bool = True) -> P
     if fit.simulated is None or trial.setpoint is None:
         return _from_motion(fit, trial)
     values = fit.simulated
-    data = moves_from_rest(trial, (fit.sigma_position, fit.sigma_current), fit.scale.speed_full)
+    data = known_moves(fit, trial)
     if not data:
         raise IdentificationError(f"{name}: no move from rest with a logged setpoint; a prediction needs setpoints")
     own = _align(fit, data) if align else np.array([m.own for m in data])
@@ -68,13 +68,13 @@ def predict(fit: MotorFit, log: Log, name: str = "log", align: bool = True) -> P
     phase, predicted = np.full(len(trial.time_s), PHASES.index("rest")), np.zeros(len(trial.time_s), bool)
     controller, last = fit.output_error.controller, None
     for m, x in zip(data, own, strict=True):
-        first = last is None or abs(last[2] - m.origin) > 1e-6
+        first = last is None or m.index != last[2]
         x = x.copy()
         if not first:
             x[1], x[3] = last[0], last[1]
             m = dataclasses.replace(m, velocity=last[3])
         else:  # the drive's state before its first move is no prediction: it is where the recording starts
-            k = slice(0 if last is None else m.index, m.index + 1)
+            k = slice(0 if last is None else m.index, m.index)  # the last sample before a command may be of the command already
             position[k], current[k] = x[1], (values["gain"] * (m.origin - x[1]) if controller == "profile" else x[3])
             predicted[k] = True
         y = output_error.simulate_moves([m], values, x[None], controller, 1e-3)[0]
@@ -82,8 +82,14 @@ def predict(fit: MotorFit, log: Log, name: str = "log", align: bool = True) -> P
         position[k], current[k], predicted[k] = y[:, 0], y[:, 1], True
         phase[k] = _phases(m, x, y[:, 0])
         creep = float((y[-1, 0] - y[-4, 0]) / (m.time_s[-1] - m.time_s[-4]))
-        last = (y[-1, 0], y[-1, 1], m.target, creep if abs(creep) > 1e-3 else 0.0)
+        last = (y[-1, 0], y[-1, 1], k.stop, creep if abs(creep) > 1e-3 else 0.0)
     return Prediction(trial.time_s, position, current, trial.position, trial.current, phase, predicted)
+
+
+def known_moves(fit: MotorFit, trial: MotorTrial) -> tuple[MoveData, ...]:
+    """The moves of a trial that start from rest, their speeds as the fit knows those that are logged."""
+    data = moves_from_rest(trial, (fit.sigma_position, fit.sigma_current), fit.scale.speed_full)
+    return data if fit.output_error is None else levelled(data, fit.output_error.speeds)
 
 
 def _align(fit: MotorFit, data: tuple[MoveData, ...]) -> Array:
@@ -114,7 +120,7 @@ def _phases(m: MoveData, own: Array, position: Array) -> NDArray[np.int64]:
 
 def aligned_moves(fit: MotorFit, trial: MotorTrial) -> tuple[tuple[MoveData, ...], Array]:
     """The moves of a trial that start from rest, and for each when its command took effect, where the drive rested, its speed and hold."""
-    data = moves_from_rest(trial, (fit.sigma_position, fit.sigma_current), fit.scale.speed_full)
+    data = known_moves(fit, trial)
     return data, (_align(fit, data) if data else np.empty((0, 4)))
 
 
