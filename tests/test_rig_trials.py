@@ -23,7 +23,7 @@ from hand_model.rig.replay import can_simulate
 from hand_model.rig.supply import supply_channel, supply_deviation
 from hand_model.rig.swing import INDEX, Task, fit_together, simulate, vector
 from hand_model.rig.swing_build import build_swing, can_swing
-from hand_model.rig.swing_compete import all_free, fit_stages, refine_swing, variants
+from hand_model.rig.swing_compete import all_free, compete_swing, fit_stages
 from hand_model.rig.swing_interval import intervals
 from hand_model.rig.swing_patch import write_swing
 from hand_model.session import read_session
@@ -218,24 +218,24 @@ def test_effort_recorded_of_a_voltage_drive_is_the_effort(tmp_path: Path, torque
     assert np.isnan(replay_rig(read_session(folder), efforts=False, validate=False).joints[0].position_rmse)
 
 
-def test_a_closer_law_is_taken_where_the_recordings_ask_for_it(tmp_path: Path) -> None:
-    """Beside friction by the gear's load, a planted square of the driven load at low speed is found by likelihood; where the
-    line alone was planted, or no load friction stands, nothing is added."""
+def test_the_form_of_a_friction_by_load_is_the_one_that_was_planted(tmp_path: Path) -> None:
+    """Friction by the gear's load, or by the square of the load that the motor drives at low speed: the first effect is it, in
+    that form, and explains the recordings down to their noise."""
     t = np.arange(0, 5, 0.002)
     volts = [2.5 * np.sin(2.2 * t + k) + 1.5 * np.sin(5.1 * t + 2 * k) for k in range(4)]
     folder = session(tmp_path / "s", VOLTAGE, "voltage", [np.stack([t, 0 * t, u], 1) for u in volts], "time,position,voltage")
     blank = build_swing(rig := load_rig(read_session(folder)), fit_declared(rig), 4e-3, 1.0)
-    line = {"inertia": 0.0085, "gain": 0.13, "back_emf": 0.05, "damping": 0.012, "coulomb": 0.02, "load_gear": 0.1}
-    gear = next(v for v in variants(blank) if v.name == "gear")
+    line = {"inertia": 0.0085, "gain": 0.13, "back_emf": 0.05, "damping": 0.012, "coulomb": 0.02}
     noise = 1e-3 * np.random.default_rng(0).standard_normal((2, len(blank.lanes), len(t)))
-    for planted, e in zip((line, {**line, "external_squared": 0.6, "stribeck_speed": 1.5}), noise, strict=True):
-        q = simulate(blank, np.repeat(vector(planted)[None], len(blank.lanes), 0), np.arange(len(blank.lanes)))
+    squared = {"external_squared": 0.6, "stribeck_speed": 1.5}
+    for planted, form, e in zip(({"load_gear": 0.1}, squared), ("gear", "squared"), noise, strict=True):
+        q = simulate(blank, np.repeat(vector({**line, **planted})[None], len(blank.lanes), 0), np.arange(len(blank.lanes)))
         lanes = tuple(replace(lane, position=q[: len(lane.position), k] + e[k, : len(lane.position)]) for k, lane in enumerate(blank.lanes))
         swing = replace(blank, lanes=lanes)
-        fit = fit_stages([swing], [Task(all_free(swing, [gear]), vector(line), ())], 12)[0]
-        found = refine_swing([swing], fit, [gear])
-        assert [v.effect for v, _ in found] == (["load_dependent_friction"] if planted is not line else [])
-    assert refine_swing([swing], fit, []) == ()
+        declared = fit_stages([swing], [Task(all_free(swing, []), vector(line), ())], 12)[0]
+        taken, rounds = compete_swing([swing], declared, 2e-3)
+        assert taken[0].effect == "load_dependent_friction" and form in taken[0].name
+        assert rounds[0].fit.cost < 1.1e-6
 
 
 COUPLED = """<mujoco><compiler angle="radian"/><option timestep="0.001" integrator="implicitfast" gravity="0 0 0"/><worldbody>

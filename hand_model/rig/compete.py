@@ -43,14 +43,12 @@ class Score:
 
     term: Term
     error: Array
-    train: float
 
 
 @dataclass(frozen=True)
 class Step:
-    """One round of the competition: winner, its probability against none, rivals with theirs, share of variance."""
+    """One round of the competition: the winner's probability against none, rivals with theirs, share of variance."""
 
-    winner: Score
     probability: float
     rivals: tuple[tuple[str, float], ...]
     gain: float
@@ -59,13 +57,15 @@ class Step:
 
 @dataclass(frozen=True)
 class Problem:
-    """Training rows cut into blocks. fit: with scale; fold (B,): which fold leaves a block out; group (B,): its recording."""
+    """Training rows cut into blocks. fit: with scale; fold (B,): which fold leaves a block out; group (B,): its recording;
+    box: lower and upper bounds, prior mean and weight of the declared parameters (P,) each."""
 
     fit: DeclaredFit
     rows: tuple[Rows, ...]
     block: tuple[Array, ...]
     fold: Array
     group: Array
+    box: tuple[Array, Array, Array, Array]
 
 
 def pose(fit: DeclaredFit, joint: str | None = None) -> Problem:
@@ -81,7 +81,7 @@ def pose(fit: DeclaredFit, joint: str | None = None) -> Problem:
     count = each * len(trials)
     group = np.arange(count) // each
     fold = group % FOLDS if len(trials) >= FEW else np.arange(count) % min(FOLDS, count)
-    return Problem(fit, rows, tuple(block), fold, group)
+    return Problem(fit, rows, tuple(block), fold, group, (*bounds(fit.columns), *prior(fit.columns, fit.anchored)))
 
 
 def left_out_whole(problem: Problem) -> bool:
@@ -106,10 +106,9 @@ def design(row: Rows, terms: Sequence[Term]) -> Array:
     return matrix
 
 
-def limits(fit: DeclaredFit, terms: Sequence[Term]) -> tuple[Array, Array, Array, Array]:
+def limits(problem: Problem, terms: Sequence[Term]) -> tuple[Array, Array, Array, Array]:
     """Lower and upper bounds, prior mean and weight of all parameters (P + J,)."""
-    low, high = bounds(fit.columns)
-    mean, weight = prior(fit.columns, fit.anchored)
+    low, high, mean, weight = problem.box
     extra = [a for t in terms for a in t.candidate.amplitudes]
     more = np.array([[a[2], a[3]] for a in extra]).reshape(-1, 2)
     zero = np.zeros(len(extra))
@@ -140,30 +139,30 @@ def _pieces(block: Array) -> list[tuple[int, slice]]:
     return [(int(block[a]), slice(a, b)) for a, b in pairwise(edges) if b > a]
 
 
-def held_out(problem: Problem, terms: Sequence[Term], parts: tuple) -> tuple[Array, float]:
-    """Squared error (B,) of every block under the fit to the other folds, and the training error of the whole fit."""
+def held_out(problem: Problem, terms: Sequence[Term], parts: tuple) -> Array:
+    """Squared error (B,) of every block under the fit to the other folds."""
     gram, moment, square, _ = parts
-    low, high, mean, weight = limits(problem.fit, terms)
+    low, high, mean, weight = limits(problem, terms)
     error = np.zeros(len(square))
     total_g, total_m = gram.sum(0), moment.sum(0)
     for f in np.unique(problem.fold):
         out = problem.fold == f
         theta = solve_bounded(total_g - gram[out].sum(0), total_m - moment[out].sum(0), low, high, mean, weight)
         error[out] = square[out] - 2 * moment[out] @ theta + np.einsum("p,bpq,q->b", theta, gram[out], theta)
-    return np.maximum(error, 0.0), training_error(problem, terms, parts)
+    return np.maximum(error, 0.0)
 
 
 def training_error(problem: Problem, terms: Sequence[Term], parts: tuple) -> float:
     """Squared error of the fit to all blocks."""
     gram, moment = parts[0].sum(0), parts[1].sum(0)
-    theta = solve_bounded(gram, moment, *limits(problem.fit, terms))
+    theta = solve_bounded(gram, moment, *limits(problem, terms))
     return float(parts[2].sum() - 2 * moment @ theta + theta @ gram @ theta)
 
 
 def solution(problem: Problem, terms: Sequence[Term]) -> Array:
     """All parameters (P + J,) on all training blocks; bodies are such as can exist."""
     gram, moment, _, _ = normal(problem, terms)
-    sums, box, fit = (gram.sum(0), moment.sum(0)), limits(problem.fit, terms), problem.fit
+    sums, box, fit = (gram.sum(0), moment.sum(0)), limits(problem, terms), problem.fit
     theta = solve_bounded(*sums, *box)
     return consistent(fit.columns, fit.bodies, theta, *sums, *box) if len(fit.bodies) else theta
 
@@ -171,7 +170,7 @@ def solution(problem: Problem, terms: Sequence[Term]) -> Array:
 def resampled(problem: Problem, terms: Sequence[Term], draws: int = 200) -> Array:
     """All parameters (draws, P + J) on resampled sets of training blocks (block bootstrap, Kuensch 1989)."""
     gram, moment, _, _ = normal(problem, terms)
-    box = limits(problem.fit, terms)
+    box = limits(problem, terms)
     pick = np.random.default_rng(0).integers(0, len(gram), (draws, len(gram)))
     return np.array([solve_bounded(gram[k].sum(0), moment[k].sum(0), *box) for k in pick])
 
@@ -211,15 +210,15 @@ _CACHE: dict = {}
 
 
 def score(problem: Problem, terms: Sequence[Term], candidate: Candidate, parts: tuple) -> Score:
-    """The candidate at the best of its starting shapes (by held-out error over its own few shapes)."""
-    best: Score | None = None
+    """The candidate at the best of its starting shapes, by the training error."""
+    best: tuple[float, Term, tuple] | None = None
     for shape in candidate.grid:
         term = Term(candidate, shape)
         extended = normal(problem, [*terms, term]) if candidate.delays else _extended(problem, terms, term, parts)
-        error, train = held_out(problem, [*terms, term], extended)
-        if best is None or train < best.train:
-            best = Score(term, error, train)
-    return best
+        train = training_error(problem, [*terms, term], extended)
+        if best is None or train < best[0]:
+            best = train, term, extended
+    return Score(best[1], held_out(problem, [*terms, best[1]], best[2]))
 
 
 def refined(problem: Problem, terms: Sequence[Term], term: Term, parts: tuple) -> Term:
@@ -272,22 +271,22 @@ def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ..
     steps: list[Step] = []
     scores: list[Score] = []
     # Of what is left, where whole recordings were left out; within one and the same recording small terms always pay.
-    declared = 0.0 if left_out_whole(problem) else held_out(problem, (), normal(problem, ()))[0].sum()
+    declared = 0.0 if left_out_whole(problem) else held_out(problem, (), normal(problem, ())).sum()
     while len(terms) < most:
         parts = normal(problem, terms)
-        none, _ = held_out(problem, terms, parts)
+        none = held_out(problem, terms, parts)
         taken = {t.candidate.key for t in terms}
         scores = [score(problem, terms, c, parts) for c in rivals if c.key not in taken]
-        step = judge(none, scores, problem.group, max(declared, none.sum()))
-        if step is None:
+        found = judge(none, scores, problem.group, max(declared, none.sum()))
+        if found is None:
             break
-        terms = (*terms, refined(problem, terms, step.winner.term, parts))
-        steps.append(step)
+        terms = (*terms, refined(problem, terms, scores[found[0]].term, parts))
+        steps.append(found[1])
     return terms, tuple(steps), tuple(scores)
 
 
-def judge(none: Array, scores: Sequence[Score], group: Array, whole: float) -> Step | None:
-    """The winner of a round, or None where no candidate beats "nothing" (none (B,)) beyond doubt and by enough of an error
+def judge(none: Array, scores: Sequence[Score], group: Array, whole: float) -> tuple[int, Step] | None:
+    """Index of the winner and what the round says, or None where no candidate beats "nothing" (none (B,)) beyond doubt and by enough of an error
     (whole)."""
     if not scores:
         return None
@@ -296,7 +295,7 @@ def judge(none: Array, scores: Sequence[Score], group: Array, whole: float) -> S
         return None
     rivals = tuple((scores[i].term.candidate.key, float(said.wins[i])) for i in np.argsort(-said.wins) if said.wins[i] > 0.005)
     equals = tuple(dict.fromkeys(scores[k].term.candidate.effect for k in said.close))
-    return Step(scores[said.chosen], said.probability, rivals, said.gain, equals)
+    return said.chosen, Step(said.probability, rivals, said.gain, equals)
 
 
 def _size(term: Term) -> int:

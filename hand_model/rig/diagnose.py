@@ -18,7 +18,6 @@ from .compete import (
     Score,
     Step,
     Term,
-    compete,
     held_out,
     judge,
     left_out_whole,
@@ -33,6 +32,7 @@ from .declared import DeclaredFit, fit_declared
 from .diagnose_swing import diagnose_swing
 from .findings import CouplingResidual, Finding, RigFindings
 from .horizon import open_loop
+from .joint_search import as_term, offsets_first, search_joints
 from .model import RigModel, load_rig
 from .noise import effort_noise
 from .proof import Bench
@@ -164,27 +164,22 @@ def _diagnose_balance(rig: RigModel, fit: DeclaredFit, say: Callable[[str], None
     if not fit.rows:
         return [], [], {"metric": None, "before": None, "after": None}, rig.xml, rig.xml
     floor = effort_noise(rig, fit)
-    first = {j: _offset_first(rig, fit, j) for j in joints}  # a sensor's zero is the recording's error: before physics
-    off_axis = _off_axis(Bench(rig, floor=floor), fit, [t for _, t in first.values() if t is not None])
+    first = offsets_first(rig, fit, joints)  # a sensor's zero is the recording's error: before physics
+    offsets = [(w.step, as_term(rig, fit, w)) for w in first.values() if w is not None]
+    off_axis = _off_axis(Bench(rig, floor=floor), fit, [t for _, t in offsets])
     base_fit = fit
     if off_axis is not None:
         fit, finding = off_axis
-    for joint in joints:
-        step, term = first[joint]
-        begin = () if term is None else (term,)
-        taken, steps, scores = compete(pose(fit, joint), candidates(rig, fit, joint), begin)
-        stories += zip(([step] if begin else []) + list(steps), taken, strict=True)
-        rejected += [{"effect": s.term.candidate.key, "reason": "held-out error does not fall enough"} for s in scores]
-        say(f"{rig.name}: {joint}: {', '.join(t.candidate.key for t in taken) or 'nothing'}")
+    for joint, (won, left) in zip(joints, search_joints(rig, fit, first), strict=True):
+        stories += [(w.step, as_term(rig, fit, w)) for w in won]
+        rejected += [{"effect": key, "reason": "held-out error does not fall enough"} for key in left]
+        say(f"{rig.name}: {joint}: {', '.join(w.key for w in (first[joint], *won) if w) or 'nothing'}")
     base, bench = solution(pose(base_fit), []), Bench(rig, floor=floor)
     plain = (base_fit, (), base)
-    offsets = [
-        (s, t) for s, t in stories if t.candidate.effect == "asymmetric_friction" and first[t.candidate.joint][1] is t
-    ]
     found, kept = _prove(bench, base_fit, offsets, [], rejected)
     if off_axis is not None:
         found.append(finding)
-    later, kept = _prove(bench, fit, [s for s in stories if s not in offsets], kept, rejected)
+    later, kept = _prove(bench, fit, stories, kept, rejected)
     found += later
     one, two, every = ((fit, *settled(bench, fit, _first(kept, k))) for k in (1, 2, len(kept)))
     lack = {"metric": "effort_rmse", "unit": "share of the declared model's", "before": 1.0,
@@ -255,19 +250,6 @@ def _first(terms: Sequence[Term], count: int) -> list[Term]:
     return [t for k, t in enumerate(terms) if sum(o.candidate.joint == t.candidate.joint for o in terms[:k]) < count]
 
 
-def _offset_first(rig: RigModel, fit: DeclaredFit, joint: str) -> tuple[Step | None, Term | None]:
-    """A constant offset of a joint's effort, where it wins the first round; (None, None) else."""
-    everything = candidates(rig, fit, joint)
-    offset = [c for c in everything if c.effect == "asymmetric_friction"]
-    problem = pose(fit, joint)
-    if not compete(problem, offset, most=1)[0]:
-        return None, None
-    taken, steps, _ = compete(problem, everything, most=1)
-    if taken and taken[0].candidate.effect == "asymmetric_friction":
-        return steps[0], taken[0]
-    return None, None
-
-
 def _off_axis(bench: Bench, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple[DeclaredFit, Finding] | None:
     """Centres of mass off their declared axes: one change to the whole chain, tried before anything at a joint."""
     rig = bench.rig
@@ -277,12 +259,12 @@ def _off_axis(bench: Bench, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple[
         return None
     freed = replace(freed, scale=fit.scale)
     sides = pose(fit), pose(freed)
-    errors = [held_out(p, offsets, normal(p, offsets))[0] for p in sides]
+    errors = [held_out(p, offsets, normal(p, offsets)) for p in sides]
     shape = Candidate(
         "gravity_load", "centres of mass off their axes", "*", (), ({},), lambda r, s: np.zeros((len(r.time_s), 0))
     )
-    step = judge(errors[0], [Score(Term(shape, {}), errors[1], 0.0)], sides[0].group, errors[0].sum())
-    if step is None or _better_alone(rig, fit, offsets, errors[1].sum()):
+    found = judge(errors[0], [Score(Term(shape, {}), errors[1])], sides[0].group, errors[0].sum())
+    if found is None or _better_alone(rig, fit, offsets, errors[1].sum()):
         return None
     before, after = (solution(p, offsets) for p in sides)
     joints = sorted({r.joint for r in fit.rows})
@@ -299,7 +281,7 @@ def _off_axis(bench: Bench, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple[
         f"Centres of mass lie off the axes on which they are declared: held-out effort error falls to "
         f"{100 * ratio:.0f} % over all joints (most at {best}: {proofs[best]['before']:.4g} to {proofs[best]['after']:.4g})."
     )
-    return freed, Finding("gravity_load", ("gravity_load",), step.probability, (), where, words, moved, proofs[best],
+    return freed, Finding("gravity_load", ("gravity_load",), found[1].probability, (), where, words, moved, proofs[best],
                           {"native": True, "mjcf": "body/inertial/@pos", "urdf": "link/inertial/origin"})  # fmt: skip
 
 

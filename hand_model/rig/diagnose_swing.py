@@ -16,8 +16,8 @@ from .model import RigModel, load_rig
 from .replay import RigResiduals, replay_rig
 from .states import fill_gaps, noise_std
 from .swing import INDEX, PARAMETERS, STEP_S, Fitted, Swing, Task, parameter_units, vector
-from .swing_build import build_swing, search_step_s, windows_s
-from .swing_compete import LEAST_GAIN, Round, Variant, all_free, compete_swing, fit_stages, free_declared, refine_swing
+from .swing_build import build_swing, search_step_s, thinned, windows_s
+from .swing_compete import LEAST_GAIN, Round, Variant, all_free, compete_swing, fit_stages, free_declared
 from .swing_interval import intervals
 from .swing_patch import write_swing
 from .words import shares, statement
@@ -29,13 +29,12 @@ NOT_BORNE_OUT = "error on validation trials does not fall"
 def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Callable[[str], None]) -> tuple:
     """The same for one joint driven by a voltage or by nothing: MuJoCo's motion in open loop is what is compared."""
     windows, step = windows_s(rig), search_step_s(rig)
-    stages = [build_swing(rig, fit, step, w) for w in windows]
+    stages = [thinned(build_swing(rig, fit, step, w)) for w in windows]
     free = free_declared(stages[0])
     declared = fit_stages(stages, [Task(free, vector(stages[0].initial), ())], 15)[0]
     floor, held = _resolution(rig), bool(rig.select(True))  # without validation recordings the training ones measure
     taken, rounds = compete_swing(stages, declared, floor)
     kept, rejected = list(zip(taken, rounds, strict=True)), []
-    kept += refine_swing(stages, rounds[-1].fit, taken) if rounds else ()
     say(f"{rig.name}: {', '.join(v.key for v, _ in kept) or 'nothing'}")
     # Last, at the step of the replay; a free swing over whole recordings, for its phase is known well enough by now.
     last_stages = [(STEP_S, windows[-1], 8)] if stages[0].driven else [(step, np.inf, 12), (STEP_S, np.inf, 3)]

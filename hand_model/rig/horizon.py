@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from .mjcf import read_effects
 from .model import RigModel, RigTrial
 from .overrides import compile_model
-from .replay import EffectStepper, can_simulate, simulate_trial
+from .replay import EffectStepper, States, can_simulate, recorded_states, simulate_trial
 from .states import fill_gaps
 
 Array = NDArray[np.float64]
@@ -40,11 +40,12 @@ def open_loop(rig: RigModel, before: bytes, after: bytes, refused: Collection[tu
     unknown = EffectStepper(compile_model(replace(rig, xml=after)), read_effects(after)).unknown
     if unknown:
         return {"not_run": f"no law in open loop for {', '.join(sorted(set(unknown)))}"}
+    states = [recorded_states(rig, t) for t in trials]
     for horizon in HORIZONS_S:
-        old = _error(replace(rig, xml=before), trials, horizon)
+        old = _error(replace(rig, xml=before), trials, states, horizon)
         spread = np.sqrt(np.mean([np.nanvar(np.stack([t.position[j] for j in rig.joints], 1), 0) for t in trials], 0))
         if (old < CARRIES * spread).all():
-            new = _error(replace(rig, xml=after), trials, horizon)
+            new = _error(replace(rig, xml=after), trials, states, horizon)
             joints = {j: {"before": float(a), "after": float(b), "unit": rig.unit(j)}
                       for j, a, b in zip(rig.joints, old, new, strict=True)}  # fmt: skip
             return {"metric": "position_rmse", "horizon_s": "whole" if np.isinf(horizon) else horizon, "engine": "mujoco",
@@ -53,12 +54,12 @@ def open_loop(rig: RigModel, before: bytes, after: bytes, refused: Collection[tu
     return {"not_run": f"the declared model leaves the recordings within {HORIZONS_S[-1]:g} s"}
 
 
-def _error(rig: RigModel, trials: Sequence[RigTrial], horizon_s: float) -> Array:
+def _error(rig: RigModel, trials: Sequence[RigTrial], states: Sequence[States], horizon_s: float) -> Array:
     """Root mean square position error (joints,) over the trials; infinite where a simulation breaks down."""
     squares, count = np.zeros(len(rig.joints)), 0
-    for trial in trials:
+    for trial, known in zip(trials, states, strict=True):
         recorded = np.stack([fill_gaps(trial.time_s, trial.position[j]) for j in rig.joints], 1)
-        error = simulate_trial(rig, trial, horizon_s)[1] - recorded
+        error = simulate_trial(rig, trial, horizon_s, known)[1] - recorded
         squares += np.where(np.isfinite(error).all(0), np.sum(np.nan_to_num(error) ** 2, 0), np.inf)
         count += len(error)
     return np.sqrt(squares / count)

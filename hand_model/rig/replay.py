@@ -18,6 +18,7 @@ from .states import fill_gaps, local_states, uniform_time
 from .supply import supply_deviation
 
 Array = NDArray[np.float64]
+States = tuple[Array, Array, Array]  # times [s], positions, velocities
 
 
 @dataclass(frozen=True)
@@ -134,11 +135,13 @@ def _low_speed(e: dict[str, float], v: float, external: float, shaft: float) -> 
     return level * np.exp(-(abs(v / get("stribeck_speed", 1.0)) ** get("stribeck_exponent", 2.0)))
 
 
-def simulate_trial(rig: RigModel, trial: RigTrial, horizon_s: float = np.inf) -> tuple[Array, Array]:
+def simulate_trial(
+    rig: RigModel, trial: RigTrial, horizon_s: float = np.inf, recorded: States | None = None
+) -> tuple[Array, Array]:
     """Positions (n, joints) simulated in open loop at the trial's time stamps (n,), and those stamps.
 
-    Start: recorded position and smoothed velocity, taken again after every horizon_s [s]. Recorded effort or control goes
-    in; nothing is fed back.
+    Start: recorded position and smoothed velocity, taken again after every horizon_s [s] (recorded: `recorded_states`,
+    where they are known already). Recorded effort or control goes in; nothing is fed back.
     """
     import mujoco
 
@@ -150,7 +153,7 @@ def simulate_trial(rig: RigModel, trial: RigTrial, horizon_s: float = np.inf) ->
     grid = np.arange(0.0, trial.time_s[-1] + step, step)
     control, applied = _controls(rig, trial, model, effects, grid)
     stride = len(grid) if np.isinf(horizon_s) else max(1, round(horizon_s / step))
-    starts = recorded_states(rig, trial, grid[::stride])
+    starts = _states_at(recorded or recorded_states(rig, trial), grid[::stride])
     data.qpos[:], data.qvel[:] = (s[0] for s in starts)
     if not model.nu:  # semi-implicit Euler is leapfrog when the velocity starts half a step early
         mujoco.mj_forward(model, data)
@@ -185,17 +188,19 @@ def can_simulate(rig: RigModel, trial: RigTrial) -> bool:
     )
 
 
-def recorded_states(rig: RigModel, trial: RigTrial, at_s: Array) -> tuple[Array, Array]:
-    """Recorded position and velocity, both smoothed, (m, joints) each at times at_s (m,) [s]."""
+def recorded_states(rig: RigModel, trial: RigTrial) -> States:
+    """Recorded position and velocity, both smoothed: (n,) [s], (n, joints) each."""
     grid = uniform_time(trial.time_s)
     rate = 1.0 / (grid[1] - grid[0])
-    q0, v0 = [], []
-    for joint in rig.joints:
-        raw = np.interp(grid, trial.time_s, fill_gaps(trial.time_s, trial.position[joint]))
-        position, velocity = local_states(raw, rate)
-        q0.append(np.interp(at_s, grid, position))
-        v0.append(np.interp(at_s, grid, velocity))
-    return np.stack(q0, 1), np.stack(v0, 1)
+    raw = (np.interp(grid, trial.time_s, fill_gaps(trial.time_s, trial.position[j])) for j in rig.joints)
+    smooth = [local_states(values, rate) for values in raw]
+    return grid, np.stack([q for q, _ in smooth], 1), np.stack([v for _, v in smooth], 1)
+
+
+def _states_at(recorded: States, at_s: Array) -> tuple[Array, Array]:
+    """Position and velocity (m, joints) each at times at_s (m,) [s]."""
+    grid, q, v = recorded
+    return tuple(np.stack([np.interp(at_s, grid, column) for column in x.T], 1) for x in (q, v))
 
 
 def _controls(rig: RigModel, trial: RigTrial, model: Any, effects: EffectStepper, grid: Array) -> tuple[Array, Array]:

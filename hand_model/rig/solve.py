@@ -24,9 +24,8 @@ def solve_bounded(gram: Array, moment: Array, low: Array, high: Array, prior: Ar
         free = ~fixed
         trial = theta.copy()
         if free.any():
-            sub = h[np.ix_(free, free)]
-            rhs = g[free] - h[np.ix_(free, fixed)] @ theta[fixed]
-            trial[free] = np.linalg.solve(sub + 1e-13 * np.eye(len(rhs)), rhs)
+            rows = h[free]
+            trial[free] = np.linalg.solve(rows[:, free] + 1e-13 * np.eye(len(rows)), g[free] - rows[:, fixed] @ theta[fixed])
         beyond = free & ((trial < low) | (trial > high))
         if beyond.any():
             theta = np.clip(trial, low, high)

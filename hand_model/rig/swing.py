@@ -276,11 +276,12 @@ class Task:
 
 @dataclass(frozen=True)
 class Fitted:
-    """A task's result: theta (len(PARAMETERS),), its mean squared error on its stretches, evaluations used."""
+    """A task's result: theta (len(PARAMETERS),), its mean squared error on its stretches, evaluations used, parameters free."""
 
     theta: Array
     cost: float
     evaluations: int
+    free: int
 
 
 LOW = {"inertia": 1e-9, "stribeck_speed": 1e-3, "stribeck_exponent": 0.3, "asymmetry": -np.inf, "damping_asymmetry": -np.inf, "offset": -np.inf,
@@ -339,7 +340,7 @@ def fit_together(swing: Swing, tasks: Sequence[Task], iterations: int = 14) -> l
                 damping[k] *= 300.0
                 active[k] = damping[k] < 1e6
     size = [sum(swing.lanes[i].used.sum() for i in t.stretches) for t in tasks]
-    return [Fitted(th, c / max(s, 1), int(n)) for th, c, s, n in zip(theta, cost, size, count, strict=True)]
+    return [Fitted(th, c / max(s, 1), int(n), len(t.free)) for t, th, c, s, n in zip(tasks, theta, cost, size, count, strict=True)]
 
 
 def _moved(task: Task, theta: Array, r: Array, jac: Array, damping: float, unit: Array, low: Array) -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +21,7 @@ from .swing import STEP_S, Lane, Swing
 DRIVEN_PERIODS, FREE_PERIODS = (1.3,), (2.5, 10.0)
 DRIVEN_STEP_S, STEPS_A_PERIOD = 4e-3, 200
 LEAST_STRETCHES = 4  # some to fit, some to leave out
+ENOUGH_STEPS = 25_000  # simulated at once: with more, effects are chosen on some of the stretches and fitted to all
 
 
 def free_period_s(rig: RigModel) -> float:
@@ -39,6 +42,18 @@ def windows_s(rig: RigModel) -> tuple[float, ...]:
 def search_step_s(rig: RigModel) -> float:
     """Step [s] that is fine enough to choose by: a recorded drive is followed, a free swing has a period to be resolved."""
     return DRIVEN_STEP_S if rig.drive(rig.joints[0]) is not None else free_period_s(rig) / STEPS_A_PERIOD
+
+
+def thinned(swing: Swing) -> Swing:
+    """The swing with every second, third, ... training stretch of each trial, where all of them are more than a choice needs."""
+    steps = sum(len(swing.lanes[i].position) for i in swing.train())
+    every, seen, lanes = int(np.ceil(steps / ENOUGH_STEPS)), Counter(), []
+    for lane in swing.lanes:
+        if lane.validate or seen[lane.trial] % every == 0:
+            lanes.append(lane)
+        seen[lane.trial] += 1
+    few = len(lanes) - sum(lane.validate for lane in lanes) < LEAST_STRETCHES
+    return swing if few else replace(swing, lanes=tuple(lanes))
 
 
 def can_swing(rig: RigModel) -> bool:

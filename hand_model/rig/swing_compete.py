@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..background import Background
 from .evidence import ONE_STANDARD_ERROR, weigh
-from .swing import BY_LOAD, DECLARED, INDEX, LOW_SPEED, Fitted, Swing, Task, errors, fit_together, vector
+from .swing import DECLARED, INDEX, LOW_SPEED, Fitted, Swing, Task, errors, fit_together, vector
 
 Array = NDArray[np.float64]
 FOLDS, SHORTLIST, ALIKE = 4, 6, 3
@@ -31,7 +31,6 @@ class Variant:
     effect: str
     name: str
     start: Mapping[str, float]
-    beside: frozenset[str] = frozenset()  # refines an effect that frees one of these: no square without its line (Nelder 1977)
 
     @property
     def key(self) -> str:
@@ -83,10 +82,9 @@ def variants(swing: Swing) -> tuple[Variant, ...]:
             Variant(
                 "load_dependent_friction", "gear, low speed", {"load_gear_low": 0.0, "stribeck_speed": 0.2 * speed}
             ),
-            Variant("load_dependent_friction", "driven load squared, low speed",
-                    {"external_squared": 0.0, "stribeck_speed": 0.2 * speed}, frozenset(BY_LOAD)),
+            Variant("load_dependent_friction", "driven load squared, low speed", {"external_squared": 0.0, "stribeck_speed": speed}),
             Variant("load_dependent_friction", "load squared, low speed",
-                    {"motor_squared": 0.0, "external_squared": 0.0, "stribeck_speed": 0.2 * speed}, frozenset(BY_LOAD)),
+                    {"motor_squared": 0.0, "external_squared": 0.0, "stribeck_speed": speed}),
             Variant("drive_sag", "", {"sag": 0.0}),
             Variant("command_delay", "", {"delay": 0.005}),
         ]
@@ -150,7 +148,7 @@ def compete_swing(
     rounds: list[Round] = []
     while len(taken) < MOST_TERMS and current.cost > floor**2:
         free = all_free(swing, taken)
-        rivals = [v for v in variants(swing) if not set(v.start) <= set(free) and (not v.beside or v.beside & set(free))]
+        rivals = [v for v in variants(swing) if not set(v.start) <= set(free)]
         tasks = [Task(all_free(swing, (*taken, v)), _started(current.theta, v), ()) for v in rivals]
         fits = fit_stages(stages, tasks, 8)
         order = _shortlist(rivals, fits)
@@ -158,33 +156,12 @@ def compete_swing(
         none, scores = _left_out(swing, folds, (Task(free, current.theta, train), current),
                                  [(tasks[k], f) for k, f in zip(order, best, strict=True)])  # fmt: skip
         group = np.array([name for _, left in folds for i in left for name in [swing.lanes[i].trial] * PARTS])
-        found = _judge(none, scores, [rivals[k] for k in order], [len(tasks[k].free) for k in order], group)
+        found = _judge(none, scores, [rivals[k] for k in order], best, group, len(train))
         if found is None:
             break
         taken, current = _exchanged(stages, (*taken, rivals[order[found[0]]]), best[found[0]])
         rounds.append(replace(found[1], fit=current))
     return taken, tuple(rounds)
-
-
-def refine_swing(
-    stages: Sequence[Swing], current: Fitted, taken: Sequence[Variant]
-) -> tuple[tuple[Variant, Round], ...]:
-    """A closer law of an effect that stands (Variant.beside), by BIC with every stretch as one sample (Schwarz 1978); or
-    none. Its name stands already: what is left to choose is the form, and there the likelihood is enough."""
-    swing = stages[-1]
-    free, count = all_free(swing, taken), len(swing.train())
-    rivals = [v for v in variants(swing) if v.beside & set(free) and not set(v.start) <= set(free)]
-    if not rivals:
-        return ()
-    fits = fit_stages(stages, [Task(all_free(swing, (*taken, v)), _started(current.theta, v), ()) for v in rivals], 12)
-    more = [len(all_free(swing, (*taken, v))) - len(free) for v in rivals]
-    change = [count * np.log(f.cost / current.cost) + m * np.log(count) for f, m in zip(fits, more, strict=True)]
-    best = int(np.argmin(change))
-    if change[best] >= 0:
-        return ()
-    probability = float(1.0 / (1.0 + np.exp(0.5 * change[best])))
-    gain = 1.0 - np.sqrt(fits[best].cost / current.cost)
-    return ((rivals[best], Round(rivals[best], probability, float(gain), (), (rivals[best].effect,), fits[best])),)
 
 
 def _shortlist(rivals: Sequence[Variant], fits: Sequence[Fitted]) -> list[int]:
@@ -275,12 +252,17 @@ def _left_out(
 
 
 def _judge(
-    none: Array, scores: list[Array], rivals: Sequence[Variant], sizes: Sequence[int], group: Array
+    none: Array, scores: list[Array], rivals: Sequence[Variant], fits: Sequence[Fitted], group: Array, stretches: int
 ) -> tuple[int, Round] | None:
-    """Index of the winner and what the round says, or None where nothing beats "none" by a standard error."""
-    said = weigh(none, np.array(scores), sizes, group, ONE_STANDARD_ERROR)
+    """Index of the winner and what the round says, or None where nothing beats "none" by a standard error. Which effect it
+    is, recordings left out decide; between forms of it that they cannot tell apart, the likelihood: BIC with every
+    stretch as one sample (Schwarz 1978)."""
+    said = weigh(none, np.array(scores), [f.free for f in fits], group, ONE_STANDARD_ERROR)
     if said is None or none.sum() - scores[said.best].sum() < LEAST_GAIN * none.sum():
         return None
     same = tuple(dict.fromkeys(rivals[k].effect for k in said.close))
     wins = tuple((rivals[k].key, float(said.wins[k])) for k in np.argsort(-said.wins) if said.wins[k] > 0.005)
-    return said.chosen, Round(rivals[said.chosen], said.probability, said.gain, wins, same)
+    forms = [k for k in {*said.close, said.chosen} if rivals[k].effect == rivals[said.chosen].effect]
+    best = min(forms, key=lambda k: stretches * np.log(fits[k].cost) + fits[k].free * np.log(stretches))
+    gain = float(1.0 - scores[best].sum() / max(none.sum(), 1e-300))
+    return best, Round(rivals[best], said.probability, gain, wins, same)

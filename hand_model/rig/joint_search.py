@@ -1,0 +1,67 @@
+"""The competition at every joint of a rig: joints know nothing of each other there, so two processes share them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ..background import Background
+from .candidates import candidates
+from .compete import Step, Term, compete, pose
+from .declared import DeclaredFit
+from .model import RigModel
+
+
+@dataclass(frozen=True)
+class Won:
+    """A round of the competition at a joint and its winner, by the key and shape of the candidate: these, unlike its
+    columns, a process can hand back."""
+
+    step: Step
+    joint: str
+    key: str
+    shape: Mapping[str, float]
+
+
+def offsets_first(rig: RigModel, fit: DeclaredFit, joints: Sequence[str]) -> dict[str, Won | None]:
+    """Of every joint, a constant offset of its effort, where it wins the first round."""
+    return dict(zip(joints, _each(_offset_first, [(rig, _own(fit, j), j) for j in joints]), strict=True))
+
+
+def search_joints(rig: RigModel, fit: DeclaredFit, begin: Mapping[str, Won | None]) -> Iterator[tuple[list[Won], list[str]]]:
+    """Of every joint (begin: what stands there already), what was won beside that and the keys of what was not."""
+    return _each(_search, [(rig, _own(fit, joint), joint, won) for joint, won in begin.items()])
+
+
+def as_term(rig: RigModel, fit: DeclaredFit, won: Won) -> Term:
+    """The winner of a round as a term of the balance."""
+    return Term(next(c for c in candidates(rig, fit, won.joint) if c.key == won.key), won.shape)
+
+
+def _each(function: Callable[..., Any], calls: Sequence[tuple[Any, ...]]) -> Iterator[Any]:
+    if len(calls) < 2:
+        return iter([function(*call) for call in calls])
+    return Background(function, calls).results()
+
+
+def _own(fit: DeclaredFit, joint: str) -> DeclaredFit:
+    return replace(fit, rows=tuple(r for r in fit.rows if r.joint == joint))
+
+
+def _offset_first(rig: RigModel, fit: DeclaredFit, joint: str) -> Won | None:
+    everything, problem = candidates(rig, fit, joint), pose(fit, joint)
+    offset = [c for c in everything if c.effect == "asymmetric_friction"]
+    if not compete(problem, offset, most=1)[0]:
+        return None
+    taken, steps, _ = compete(problem, everything, most=1)
+    if taken and taken[0].candidate.effect == "asymmetric_friction":
+        return Won(steps[0], joint, taken[0].candidate.key, taken[0].shape)
+    return None
+
+
+def _search(rig: RigModel, fit: DeclaredFit, joint: str, begin: Won | None) -> tuple[list[Won], list[str]]:
+    stands = () if begin is None else (as_term(rig, fit, begin),)
+    taken, steps, scores = compete(pose(fit, joint), candidates(rig, fit, joint), stands)
+    won = [Won(s, joint, t.candidate.key, t.shape) for s, t in zip(steps, taken[len(stands) :], strict=True)]
+    return won, [s.term.candidate.key for s in scores]
