@@ -13,7 +13,7 @@ import numpy as np
 from . import output_error
 from .balance import NAMES
 from .drive import CONTROLLERS
-from .moves import SETTLED, MoveData, shortened
+from .moves import SETTLED, MoveData, shortened, without_rest
 from .output_error import COARSE_S, OutputErrorFit
 from .replicates import lack_of_fit
 
@@ -67,7 +67,9 @@ def find_controller(
         if near.controller == "profile" and min(near.values["rise"], near.values["fall"]) < SUDDEN_S:
             jump = _near(some, near, JUMP, sigma, bounds)
             near = jump if jump.cost < near.cost + EVIDENCE else near
-        found = output_error.fit(moves, near.values, _names(near.controller, near.values), sigma, bounds, near.controller)
+        # bristles at rest let go under every tremor: what they hold there is not known
+        whole = moves if near.values["presliding"] == 0 else [without_rest(m) for m in moves]
+        found = output_error.fit(whole, near.values, _names(near.controller, near.values), sigma, bounds, near.controller)
         if best is None or found.cost < best.cost:
             best = found
         if lack_of_fit(best) < enough:

@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 
 SETTLED = 0.6  # [%]: movement allowed over the samples before a move that starts from rest
 SURE = 0.05  # share of what one logged speed is known to, below which no level of speeds is known
+AFTER_S = 0.05  # after which a move that is settled counts as over
 BEFORE = 12  # samples at rest that a move looks back to
 
 
@@ -104,6 +105,12 @@ def shortened(m: MoveData, end_s: float) -> MoveData:
     """The move's samples up to `end_s` [s]."""
     k = m.time_s <= end_s
     return dataclasses.replace(m, time_s=m.time_s[k], position=m.position[k], current=m.current[k])
+
+
+def without_rest(m: MoveData) -> MoveData:
+    """The move until AFTER_S after it is within SETTLED of where it ends."""
+    far = np.flatnonzero(np.abs(m.position - m.position[-3:].mean()) > SETTLED)
+    return shortened(m, float(m.time_s[far[-1]]) + AFTER_S) if len(far) else m
 
 
 def _rest(t: Array, p: Array, sigma: float) -> tuple[float, float, float] | None:
