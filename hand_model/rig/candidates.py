@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..effects import DriveState, catalogue, effect
 from .balance import Rows
 from .declared import DeclaredFit
+from .laws import TURNING
 from .model import RigModel
 
 Array = NDArray[np.float64]
@@ -30,7 +31,9 @@ NOT_FOR_RIGS = frozenset(
 PERIODIC = frozenset({"torque_ripple"})  # between two periods of a grid there is nothing to descend from
 SMOOTH = ("nonlinear_spring",)  # its knee belongs to fingers with a return spring; a joint has stops and detents
 LONGEST_DELAY_S = 0.03
-BY_LEVEL = "in proportion to the trial's friction"
+BY_LEVEL = "a level for each that trials declare"
+REACHES = tuple(np.geomspace(0.004, 0.5, 8))  # of the range, over which friction turns round
+PLACED = frozenset({"reach", "period", "centre"})  # what has one of these can be there twice: two springs, two tight spots
 Bound = tuple[str, str, float, float]
 
 
@@ -46,6 +49,11 @@ class Candidate:
     grid: tuple[dict[str, float], ...]
     columns: Callable[[Rows, Mapping[str, float]], Array]
     delays: bool = False
+
+    @property
+    def repeats(self) -> bool:
+        """Whether it can act at a joint more than once, at different places."""
+        return bool(PLACED & self.grid[0].keys())
 
     @property
     def key(self) -> str:
@@ -78,7 +86,7 @@ def candidates(rig: RigModel, fit: DeclaredFit, joint: str) -> tuple[Candidate, 
     states = {r.trial: drive_state(rig, r, fit.theta) for r in fit.rows if r.joint == joint}
     train = tuple(states[r.trial] for r in rows)
     found = [_from_catalogue(e, joint, train, states) for e in catalogue("drive") if _usable(e)]
-    found += [*_own(rig, fit, joint, rows), *_by_level(rig, joint, train, states)]
+    found += [*_own(rig, fit, joint, rows), *_turning_round(rig, fit, joint, train, states)]
     return tuple(c for c in found if c.grid)
 
 
@@ -96,18 +104,23 @@ def _from_catalogue(
                      lambda row, shape: np.asarray(found.columns(states[row.trial], shape), float), bool(found.warps))  # fmt: skip
 
 
-def _by_level(
-    rig: RigModel, joint: str, train: tuple[DriveState, ...], states: Mapping[str, DriveState]
+def _turning_round(
+    rig: RigModel, fit: DeclaredFit, joint: str, train: tuple[DriveState, ...], states: Mapping[str, DriveState]
 ) -> list[Candidate]:
-    """Hysteresis that grows with the Coulomb level where trials declare their own: the friction itself builds up over a
-    distance."""
+    """Friction that needs a distance to turn round: in proportion to the load, and of each Coulomb level that trials declare."""
+    stop = _from_catalogue(effect("elastoplastic_hysteresis"), joint, train, states)
+    span = max(float(np.ptp(state.position)) for state in train)
+    stop = replace(stop, grid=tuple({"form": form, "reach": float(share * span)} for form in (0.0, 1.0) for share in REACHES))
+    load = {r.trial: np.abs(r.load(fit.theta))[:, None] for r in fit.rows if r.joint == joint}
+    found = [replace(stop, effect="load_dependent_friction", variant=TURNING, amplitudes=(("per_load", "1", 0.0, np.inf),),
+                     columns=lambda r, s: load[r.trial] * stop.columns(r, s))]  # fmt: skip
     key = f"joint:{joint}:frictionloss"
     level = {t.name: float(np.atleast_1d(t.set[key])[0]) for t in rig.trials if key in t.set}
-    if len(set(level.values())) < 2 or not all(t.name in level for t in rig.trials):
-        return []
-    mean = float(np.mean(list(level.values())))
-    stop = _from_catalogue(effect("elastoplastic_hysteresis"), joint, train, states)
-    return [replace(stop, variant=BY_LEVEL, columns=lambda r, s: level[r.trial] / mean * stop.columns(r, s))]
+    levels = np.unique(list(level.values()))
+    if len(levels) > 1 and all(t.name in level for t in rig.trials):
+        found.append(replace(stop, variant=BY_LEVEL, amplitudes=tuple((f"yield_load_{k:g}", "effort", 0.0, np.inf) for k in levels),
+                             columns=lambda r, s: (levels == level[r.trial]) * stop.columns(r, s)))  # fmt: skip
+    return found
 
 
 def _own(rig: RigModel, fit: DeclaredFit, joint: str, rows: list[Rows]) -> list[Candidate]:

@@ -264,7 +264,7 @@ def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ..
             most: int = MOST_TERMS) -> tuple[tuple[Term, ...], tuple[Step, ...], tuple[Score, ...]]:  # fmt: skip
     """Forward selection: the candidate that lowers the held-out error most, while it does so beyond doubt.
 
-    begin: terms that stand already. Returns all terms, the rounds, and the scores of the last round (all not taken).
+    begin: terms that stand already. Returns all terms, the rounds, and the scores of the last round.
     """
     _CACHE.clear()
     terms = begin
@@ -276,7 +276,7 @@ def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ..
         parts = normal(problem, terms)
         none = held_out(problem, terms, parts)
         taken = {t.candidate.key for t in terms}
-        scores = [score(problem, terms, c, parts) for c in rivals if c.key not in taken]
+        scores = [score(problem, terms, c, parts) for c in rivals if c.repeats or c.key not in taken]
         found = judge(none, scores, problem.group, max(declared, none.sum()))
         if found is None:
             break

@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 NONNEGATIVE = ("damping", "frictionloss", "armature", "back_emf", "spring", "stiffness")
 CORRELATED = 30.0  # neighbouring samples say the same thing: so many of them weigh as one against the prior
 NEAR_BEST = 1.1
+ENOUGH_POWER = 1e-4  # share of the effort's power: a hundredth of its amplitude
 CUTOFFS = (2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 35.0, 60.0)
 
 
@@ -104,8 +105,9 @@ def fit_declared(
 
 
 def _choose_cutoff(rig: RigModel, columns: tuple[Column, ...], refused: set[tuple[str, str]]) -> float | None:
-    """The highest cut-off at which the share left is within NEAR_BEST of the least; None where none can be tried."""
-    sample, most, shares = _sample(rig), 0.0, {}
+    """The highest cut-off at which the share left is within NEAR_BEST of the least, below the first band that adds more to
+    the residual than to the effort: there is nothing of the motion in it; None where none can be tried."""
+    sample, most, shares, last = _sample(rig), 0.0, {}, None
     for cutoff in CUTOFFS:
         rows = [r for t in sample for r in trial_rows(rig, t, columns, cutoff) if (r.trial, r.joint) not in refused]
         if not rows or cutoff > 0.3 * min(r.rate_hz for r in rows):
@@ -114,9 +116,27 @@ def _choose_cutoff(rig: RigModel, columns: tuple[Column, ...], refused: set[tupl
         most = max(most, seen)
         if seen < 0.9 * most:  # noise hides when the joint moves
             break
-        shares[cutoff] = _unexplained(_robust_fit(columns, tuple(rows), cutoff))
+        fit = _robust_fit(columns, tuple(rows), cutoff)
+        powers = _powers(fit)
+        if last is not None and _only_noise(last, powers):
+            break
+        shares[cutoff], last = _unexplained(fit), powers
     least = min(shares.values(), default=1.0)
     return max((c for c, share in shares.items() if share <= NEAR_BEST * least), default=None)
+
+
+def _powers(fit: DeclaredFit) -> Array:
+    """Mean squares of what the balance has to explain and of what it leaves, (joints, 2)."""
+    joints = sorted({r.joint for r in fit.rows})
+    sides = [[np.concatenate([side(r) for r in fit.rows if r.joint == j]) for side in (lambda r: _known(r, fit.columns), fit.residual)]
+             for j in joints]  # fmt: skip
+    return np.array([[np.mean(known**2), np.mean(left**2)] for known, left in sides])
+
+
+def _only_noise(before: Array, after: Array) -> bool:
+    """Whether a wider band adds more to the residual than to the effort, and enough of it to matter; powers (joints, 2)."""
+    effort, left = np.mean((after - before) / (after[:, :1] + 1e-300), 0)
+    return bool(left > max(effort, ENOUGH_POWER))
 
 
 def _sample(rig: RigModel, most: int = 5) -> list[RigTrial]:

@@ -64,4 +64,5 @@ def _search(rig: RigModel, fit: DeclaredFit, joint: str, begin: Won | None) -> t
     stands = () if begin is None else (as_term(rig, fit, begin),)
     taken, steps, scores = compete(pose(fit, joint), candidates(rig, fit, joint), stands)
     won = [Won(s, joint, t.candidate.key, t.shape) for s, t in zip(steps, taken[len(stands) :], strict=True)]
-    return won, [s.term.candidate.key for s in scores]
+    stand = {t.candidate.key for t in taken}
+    return won, [s.term.candidate.key for s in scores if s.term.candidate.key not in stand]

@@ -13,6 +13,7 @@ from ..effects import DriveState, effect
 
 # Effects that depend on the present state alone; of those, the frictions.
 FRICTION = frozenset({"stribeck_friction", "position_dependent_friction"})
+TURNING = "turning round over a distance"  # variant of friction by load
 OF_STATE = FRICTION | {"nonlinear_spring", "end_stop_contact", "detent_load", "torque_ripple"}
 
 
@@ -35,6 +36,8 @@ def law(record: Mapping[str, Any]) -> Law | None:
     """The law of a record {"effect", "variant", "shape", "amplitude"} of a file; None where it has none in open loop."""
     name, variant = record["effect"], record.get("variant", "")
     shape, size = record.get("shape", {}), tuple(record.get("amplitude", {}).values())
+    if name == "load_dependent_friction" and variant == TURNING:
+        return _Stop(shape, size[0], by_load=True)
     if name == "load_dependent_friction":
         return _by_load(variant, shape, size[0])
     if name == "elastoplastic_hysteresis":
@@ -75,10 +78,10 @@ def _by_load(variant: str, shape: Mapping[str, float], size: float) -> Law:
 
 
 class _Stop:
-    """Stop operator (form 0) or exponential build-up (form 1) along the path, step by step."""
+    """Stop operator (form 0) or exponential build-up (form 1) along the path, step by step; by_load: times the load."""
 
-    def __init__(self, shape: Mapping[str, float], size: float) -> None:
-        self.reach, self.abrupt, self.size = max(shape["reach"], 1e-12), shape["form"] < 0.5, size
+    def __init__(self, shape: Mapping[str, float], size: float, by_load: bool = False) -> None:
+        self.reach, self.abrupt, self.size, self.by_load = max(shape["reach"], 1e-12), shape["form"] < 0.5, size, by_load
         self.state, self.last = 0.0, math.nan
 
     def __call__(self, now: Now) -> tuple[float, float]:
@@ -90,4 +93,4 @@ class _Stop:
         elif moved:
             way = math.copysign(1.0, moved)
             self.state = way + (self.state - way) * math.exp(-abs(moved) / self.reach)
-        return self.size * self.state, 0.0
+        return self.size * self.state * (abs(now.load) if self.by_load else 1.0), 0.0
