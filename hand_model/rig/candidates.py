@@ -26,6 +26,7 @@ NOT_FOR_RIGS = frozenset(
         "drive_sag",
         "command_delay",
         "current_channel_delay",
+        "elastoplastic_hysteresis",
     }
 )
 PERIODIC = frozenset({"torque_ripple"})  # between two periods of a grid there is nothing to descend from
@@ -107,13 +108,14 @@ def _from_catalogue(
 def _turning_round(
     rig: RigModel, fit: DeclaredFit, joint: str, train: tuple[DriveState, ...], states: Mapping[str, DriveState]
 ) -> list[Candidate]:
-    """Friction that needs a distance to turn round: in proportion to the load, and of each Coulomb level that trials declare."""
+    """Friction that needs a distance to turn round: a constant one, one in proportion to the load, and where trials declare
+    Coulomb levels, one for each."""
     stop = _from_catalogue(effect("elastoplastic_hysteresis"), joint, train, states)
     span = max(float(np.ptp(state.position)) for state in train)
     stop = replace(stop, grid=tuple({"form": form, "reach": float(share * span)} for form in (0.0, 1.0) for share in REACHES))
     load = {r.trial: np.abs(r.load(fit.theta))[:, None] for r in fit.rows if r.joint == joint}
-    found = [replace(stop, effect="load_dependent_friction", variant=TURNING, amplitudes=(("per_load", "1", 0.0, np.inf),),
-                     columns=lambda r, s: load[r.trial] * stop.columns(r, s))]  # fmt: skip
+    found = [stop, replace(stop, effect="load_dependent_friction", variant=TURNING, amplitudes=(("per_load", "1", 0.0, np.inf),),
+                           columns=lambda r, s: load[r.trial] * stop.columns(r, s))]  # fmt: skip
     key = f"joint:{joint}:frictionloss"
     level = {t.name: float(np.atleast_1d(t.set[key])[0]) for t in rig.trials if key in t.set}
     levels = np.unique(list(level.values()))
