@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hand_model.diagnose.answers import Answers, lateness
 from hand_model.diagnose.command import command_facts, command_findings
 from hand_model.effects.base import DriveState
 
@@ -92,3 +93,32 @@ def test_a_late_drive_is_told_by_how_much_beside_a_prompt_one() -> None:
 def test_two_prompt_drives_have_no_delay() -> None:
     facts = {name: command_facts((s,), (c,)) for name, (s, c) in {"index": answering(0.0, 3), "ring": answering(0.0, 4)}.items()}
     assert not command_findings(facts, {"index": "index", "ring": "ring"})
+
+
+def late_answers(current: float, motion: float, seed: int) -> Answers:
+    """Answers of a drive whose current and motion follow their commands that many sample intervals late, with scatter."""
+    rng = np.random.default_rng(seed)
+    return Answers(STEP_S * np.round(current + rng.uniform(0, 1, 58)), STEP_S * np.round(motion + rng.uniform(0, 2, 58)), STEP_S)
+
+
+def test_a_late_current_beside_a_punctual_motion_is_a_late_channel() -> None:
+    told = lateness({"index": late_answers(4, 0, 1), "ring": late_answers(0, 0, 2)})
+    assert not len(told["index"].drive_s)
+    assert told["index"].channel_s == pytest.approx(4 * STEP_S, abs=2 * told["index"].doubt_s)
+    assert told["ring"].channel_s < told["ring"].doubt_s
+
+
+def test_a_drive_that_answers_late_in_both_has_a_punctual_channel() -> None:
+    told = lateness({"index": late_answers(5, 5, 3), "ring": late_answers(0, 0, 4)})
+    assert np.mean(told["index"].drive_s) == pytest.approx(5 * STEP_S, abs=STEP_S)
+    assert told["index"].channel_s < 2 * told["index"].doubt_s
+
+
+def test_a_lone_drive_is_held_against_a_usual_one() -> None:
+    late, punctual = (lateness({"index": late_answers(k, 0, 5)})["index"] for k in (5, 0))
+    assert late.channel_s > 3 * late.doubt_s and punctual.channel_s < punctual.doubt_s
+    assert len(lateness({"index": late_answers(5, 5, 6)})["index"].drive_s)
+
+
+def test_answers_too_few_say_nothing() -> None:
+    assert not lateness({"index": Answers(np.full(4, 0.09), np.full(4, 0.09), STEP_S)})

@@ -117,7 +117,7 @@ def test_a_ripple_is_not_read_from_starts_and_stops():
 
 
 def test_a_loud_moment_counts_for_less_and_a_quiet_recording_for_all():
-    from hand_model.diagnose.markers import _calm
+    from hand_model.diagnose.blocks import _calm
 
     scatter = np.random.default_rng(3).normal(0, 3e-4, (200, 8, 9, 3))
     assert np.all(_calm(scatter) == 1)

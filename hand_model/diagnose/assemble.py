@@ -26,7 +26,7 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
     unexplained = list(unexplained)
     for station in stations:
         if station.believed:
-            ranked += [finding_of(station, named, share) for named, share in _merged(station.kept)]
+            ranked += [finding_of(station, *merged) for merged in _merged(station.kept)]
         elif station.missing:
             unexplained.append(unexplained_of(station, 1.0))
         if station.believed and station.naming.after.p < ALPHA and station.explained < 0.95:
@@ -68,12 +68,12 @@ def _one_clock(ranked: list[tuple[float, Finding]]) -> list[tuple[float, Finding
     return [i for i in ranked if i[1].effect != "clock_drift"] + drifts
 
 
-def _merged(found: tuple[Named, ...]) -> list[tuple[Named, float]]:
-    """One entry per effect with its share: further harmonics of a periodic one belong to its first."""
-    out: dict[str, tuple[Named, float]] = {}
+def _merged(found: tuple[Named, ...]) -> list[tuple[Named, float, float]]:
+    """One entry per effect with its share and size: further harmonics of a periodic one belong to its first."""
+    out: dict[str, tuple[Named, float, float]] = {}
     for named in found:
-        first, share = out.get(named.term.effect.name, (named, 0.0))
-        out[named.term.effect.name] = (first, share + named.share)
+        first, share, size = out.get(named.term.effect.name, (named, 0.0, 0.0))
+        out[named.term.effect.name] = (first, share + named.share, float(np.hypot(size, named.size)))
     return list(out.values())
 
 

@@ -41,7 +41,7 @@ class Term:
 @dataclass(frozen=True)
 class Fit:
     """declared: coefficients by name. amplitudes: one mapping per term. prediction: (n,) over all compared samples.
-    rss: weighted residual sum of squares over the training samples, and what wider errors cost. size: number of effect parameters."""
+    rss: weighted residual sum of squares over the training samples, what wider errors cost, and what answers to commands hold against it. size: number of effect parameters."""
 
     terms: tuple[Term, ...]
     declared: Mapping[str, float]
@@ -177,7 +177,7 @@ class Balance:
             for term in clips:
                 prediction = term.effect.clip(prediction, term.shape)
             inside = prediction == raw
-        rss = float(np.sum(self.whiten((self.effort - prediction) * w, w) ** 2)) + self.vagueness(weight)
+        rss = float(np.sum(self.whiten((self.effort - prediction) * w, w) ** 2)) + self.vagueness(weight) + self.unanswered(terms)
         k = len(self.names)
         amplitudes, start = [], k
         for term in terms:
@@ -187,6 +187,17 @@ class Balance:
         size = sum(len([k for k in t.shape if k not in DISCRETE]) + len(t.effect.amplitudes()) for t in terms)
         declared = dict(zip(self.names, coefficients[:k].tolist(), strict=True))
         return Fit(terms, declared, tuple(amplitudes), prediction, rss, size)
+
+    def removed(self, fit: Fit, which: int) -> Array:
+        """Prediction (n,) of a fit with one term taken out and all coefficients as they are."""
+        kept = [i for i in range(len(fit.terms)) if i != which]
+        terms = tuple(fit.terms[i] for i in kept)
+        values = [*fit.declared.values(), *(v for i in kept for v in fit.amplitudes[i].values())]
+        prediction = self.design(terms)[0] @ np.array(values)
+        for term in terms:
+            if term.effect.clips:
+                prediction = term.effect.clip(prediction, term.shape)
+        return prediction
 
     def apart(self, terms: tuple[Term, ...]) -> tuple[Array, Array, Array]:
         """Orthonormal basis (n, k) of the design, what it leaves of the effort (n,), and the weight (n,), zero where `terms` clip:
@@ -201,9 +212,10 @@ class Balance:
         return self._apart[1]
 
     def weights(self, terms: tuple[Term, ...]) -> Array:
-        """1 / standard deviation (n,) beside `terms`: what is not known of rest, starts and stops stays, and is delayed with all else."""
+        """1 / standard deviation (n,) beside `terms`: what is not known of rest, starts and stops stays, and is delayed with all else
+        (where answers to commands tell how late the current is, that is in the weight)."""
         delays = [t for t in terms if t.effect.warps]
-        if not delays:
+        if not delays or "late" in self.states[0].extra:
             return self.weight
 
         def doubt(state: DriveState) -> Array:
@@ -218,6 +230,16 @@ class Balance:
     def vagueness(self, weight: Array) -> float:
         """What wider errors cost, on the scale of a sum of squares: a density that says less is lower where it is right."""
         return 2 * self.inflation * float(np.sum(np.log(self.weight / weight)[self.train]))
+
+    def unanswered(self, terms: tuple[Term, ...]) -> float:
+        """What the answers to commands hold against `terms`, on the scale of a sum of squares: "late" in `extra`, by how much [s] the
+        current's answers come late and how far that may be wrong, is one more observation."""
+        late = self.states[0].extra.get("late")
+        if late is None:
+            return 0.0
+        spans = [t.effect.lateness(t.shape) for t in terms if t.effect.warps]
+        low, high = (sum(span[i] for span in spans) for i in (0, 1))
+        return self.inflation * float((max(low - late[0], late[0] - high, 0.0) / late[1]) ** 2)
 
     def telling(self, effect: Any) -> NDArray[np.bool_]:
         """Samples (n,) of the recordings that can bear an effect out."""

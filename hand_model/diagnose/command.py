@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..effects.base import DriveState
+from .answers import Answers, answers_of, lateness
 from .findings import Finding
 
 Array = NDArray[np.float64]
@@ -19,22 +21,20 @@ SAG_T = 10.0
 FULL_SPEED = 0.9  # quantile of the velocity in the fastest strokes
 CEILING_SHARE = 0.6  # of the current beyond its limit that a drive takes from its speed: one, but for noise in the limit
 CEILING_LEFT, CEILING_T = 0.1, 6.0
-LATE = 1.25  # sample intervals, from which an answer is late
+REACTION_S = 0.15  # a person's quickest: a delay counts beside it
 
 
 @dataclass(frozen=True)
 class CommandFacts:
-    """latency_s: (e,) from each setpoint change to the current's answer, motion_s: to the motion's. sag: loss of speed per unit of load, its standard
-    error, and the range of loads; nan where strokes do not tell. ceiling: current [raw] at which the drive is at its limit, or nan.
-    strokes: how many tell the sag."""
+    """answers: to commands. sag: loss of speed per unit of load, its standard error, and the range of loads; nan where strokes do not tell. ceiling: current [raw] at which the drive is at its limit, or nan;
+    cut: what it takes away, over the noise of one reading (root mean squares). strokes: how many tell the sag."""
 
-    latency_s: Array
-    motion_s: Array
-    step_s: float
+    answers: Answers
     sag: float
     sag_se: float
     load_range: float
     ceiling: float = float("nan")
+    cut: float = 0.0
     strokes: int = 0
     trials: tuple[str, ...] = ()
 
@@ -53,30 +53,9 @@ class Stroke:
 
 def command_facts(states: tuple[DriveState, ...], currents: tuple[Array, ...]) -> CommandFacts:
     """Facts of one drive. currents: raw current (n,) of each state (its `effort` is masked at rest)."""
-    latency = [x for s, c in zip(states, currents, strict=True) for x in _latencies(s, c)]
-    motion = [x for s in states for x in _latencies(s, s.position)]
-    step = float(np.median(np.concatenate([np.diff(s.time_s) for s in states])))
     strokes = _strokes(states, currents)
-    return CommandFacts(np.array(latency), np.array(motion), step, *_sag(strokes), _ceiling(strokes), len(strokes),
+    return CommandFacts(answers_of(states, currents), *_sag(strokes), *_ceiling(strokes), len(strokes),
                         tuple(s.trial for s in states))
-
-
-def _latencies(state: DriveState, channel: Array) -> list[float]:
-    """Time from each setpoint change to the first two samples beyond three standard deviations, in its direction."""
-    if "setpoint" not in state.extra:
-        return []
-    setpoint, t = state.extra["setpoint"], state.time_s
-    out = []
-    for k in np.flatnonzero(np.diff(setpoint)) + 1:
-        before = channel[(t > t[k] - 0.2) & (t < t[k])]
-        if len(before) < 5:
-            continue
-        way = np.sign(setpoint[k] - setpoint[k - 1])
-        away = way * (channel[k : k + 60] - np.median(before)) > 3 * max(float(np.std(before)), 1e-9)
-        hit = np.flatnonzero(away[:-1] & away[1:])
-        if len(hit):
-            out.append(float(t[k + hit[0]] - t[k]))
-    return out
 
 
 def _strokes(states: tuple[DriveState, ...], currents: tuple[Array, ...]) -> list[Stroke]:
@@ -124,31 +103,36 @@ def _sag(strokes: list[Stroke]) -> tuple[float, float, float]:
     return -float(beta[-1]), float(np.sqrt(covariance[-1, -1])), float(np.ptp(load))
 
 
-def _ceiling(strokes: list[Stroke]) -> float:
-    """Current [raw] at which the drive is at its limit, nan where it is at none: in the fastest flexing strokes speed falls by just
-    what keeps the current from exceeding it. What current each place would need at full speed is told by the slower strokes."""
+def _ceiling(strokes: list[Stroke]) -> tuple[float, float]:
+    """Current [raw] at which the drive is at its limit, nan where it is at none, and what that cuts over the noise of one reading
+    (root mean squares): in the fastest flexing strokes speed falls by just what keeps the current from exceeding it. What
+    current each place would need at full speed is told by the slower strokes."""
+    none = np.nan, 0.0
     fast = max((s.commanded for s in strokes), default=0.0)
     mine = [s for s in strokes if s.way > 0 and s.commanded == fast]
     slower = [s for s in strokes if s.way > 0 and s.commanded < fast]
     if len(mine) < 3 or not slower:
-        return np.nan
+        return none
     beta = np.linalg.lstsq(_load_design(slower), np.concatenate([s.current for s in slower]), rcond=None)[0]
     viscous = float(beta[-1])
     if viscous <= 0:
-        return np.nan
+        return none
     velocity, current = (np.concatenate([getattr(s, name) for s in mine]) for name in ("velocity", "current"))
     lost = float(np.quantile(velocity, FULL_SPEED)) - velocity
     needed = _load_design(mine) @ beta + viscous * lost
     limit = float(np.median(current[needed > np.quantile(needed, 0.75)]))
     over = needed > limit
     if over.sum() < 10:
-        return np.nan
+        return none
     x, y = (needed - limit)[over], viscous * lost[over]
     share = float(x @ y / max(x @ x, 1e-12))
     rest = y - share * x
     told = share > CEILING_T * float(np.std(rest)) / np.sqrt(max(float(x @ x), 1e-12))
     alone = float(rest @ rest) < CEILING_LEFT * float(y @ y)  # speed changes for no other reason
-    return limit if told and alone and CEILING_SHARE < share < 1 / CEILING_SHARE else np.nan
+    if not (told and alone and CEILING_SHARE < share < 1 / CEILING_SHARE):
+        return none
+    noise = float(np.std(np.concatenate([s.current for s in slower]) - _load_design(slower) @ beta))
+    return limit, float(np.sqrt(y @ y / sum(len(s.current) for s in strokes))) / max(noise, 1e-9)
 
 
 def _load_design(strokes: list[Stroke]) -> Array:
@@ -160,21 +144,34 @@ def _load_design(strokes: list[Stroke]) -> Array:
 def command_findings(facts: dict[str, CommandFacts], fingers: dict[str, str | None]) -> list[tuple[float, Finding]]:
     """Delays and sags of the session's drives; the least delayed drive shows what a healthy one does."""
     out = []
-    answers = {a: _usual(f.latency_s, f.step_s) for a, f in facts.items() if len(f.latency_s) >= 5}
-    moved = {a: float(np.median(f.motion_s)) for a, f in facts.items() if len(f.motion_s) >= 5}
+    late = lateness({a: f.answers for a, f in facts.items()})
     for actuator, fact in facts.items():
-        if actuator in answers:
-            healthy = min(*(float(np.mean(x)) for x in answers.values()), fact.step_s)
-            late = float(np.mean(answers[actuator])) - healthy
-            # Late current without late motion is a delayed channel, no delayed drive.
-            also = len(moved) < 2 or moved.get(actuator, np.inf) - min(moved.values()) > fact.step_s
-            if also and late > LATE * fact.step_s and np.mean(fact.latency_s - healthy > fact.step_s) > 0.7:
-                out.append(_delay(actuator, fingers.get(actuator), fact, answers[actuator] - healthy))
+        if actuator in late and len(late[actuator].drive_s):
+            out.append(_delay(actuator, fingers.get(actuator), fact.answers.step_s, late[actuator].drive_s))
         if np.isfinite(fact.ceiling):
             out.append(_ceiling_finding(actuator, fingers.get(actuator), fact))
         elif np.isfinite(fact.sag) and fact.sag > SAG_T * fact.sag_se and fact.sag * fact.load_range > SAG_LEAST:
             out.append(_sag_finding(actuator, fingers.get(actuator), fact))
     return out
+
+
+def with_lateness(drives: Mapping[str, tuple[DriveState, ...]], facts: Mapping[str, CommandFacts]) -> dict[str, tuple[DriveState, ...]]:
+    """The states with what answers to commands say of their current channel: "late" (2,) [s], by how much and its doubt; a late
+    current shows starts and stops late as well, whatever model it is held against."""
+    out = dict(drives)
+    for actuator, told in lateness({a: f.answers for a, f in facts.items()}).items():
+        late = np.array([told.channel_s, told.doubt_s])
+        out[actuator] = tuple(replace(s, extra={**s.extra, "late": late, "sigma": _lasting(s, told.channel_s)})
+                              for s in drives[actuator])
+    return out
+
+
+def _lasting(state: DriveState, late_s: float) -> Array:
+    """What is not known of starts and stops (n,), as long as a current that late may show it."""
+    sigma = state.extra.get("sigma", np.zeros(len(state.time_s)))
+    step = float(np.median(np.diff(state.time_s)))
+    shifts = np.arange(step, late_s + 0.5 * step, step)
+    return np.maximum.reduce([sigma, *(np.interp(state.time_s - shift, state.time_s, sigma) for shift in shifts)])
 
 
 def _ceiling_finding(actuator: str, finger: str | None, fact: CommandFacts) -> tuple[float, Finding]:
@@ -184,7 +181,7 @@ def _ceiling_finding(actuator: str, finger: str | None, fact: CommandFacts) -> t
     text = (f"The {actuator} motor is at its limit of {fact.ceiling:.0f} raw in its fastest strokes: the current stays, and speed falls "
             "as the load rises.")
     model = {"native": True, "mjcf": f"actuator[@name='{actuator}']/@forcerange", "urdf": "limit effort"}
-    return 1.0, Finding("current_saturation", ("current_saturation",), 0.999, (), where, text,
+    return fact.cut, Finding("current_saturation", ("current_saturation",), 0.999, (), where, text,
                         {"limit": {"value": fact.ceiling, "unit": "raw"}}, fit, model)
 
 
@@ -204,24 +201,17 @@ def _where(actuator: str, finger: str | None) -> dict[str, object]:
             "region": None, "share_of_mismatch": 1.0}
 
 
-def _usual(latency_s: Array, step_s: float) -> Array:
-    """The latencies (k,) without those that noise answered early or that a drive already in motion hid."""
-    apart = np.abs(latency_s - np.median(latency_s))
-    return latency_s[apart <= 3 * max(1.4826 * float(np.median(apart)), 0.5 * step_s)]
-
-
-def _delay(actuator: str, finger: str | None, fact: CommandFacts, late_s: Array) -> tuple[float, Finding]:
+def _delay(actuator: str, finger: str | None, step_s: float, late_s: Array) -> tuple[float, Finding]:
     """Finding of a drive that answers `late_s` (k,) [s] later than a healthy one."""
     value = float(np.mean(late_s))
     error = 1.96 * float(np.std(late_s)) / np.sqrt(len(late_s))
     fit = {"metric": "command_latency", "unit": "s", "before": value, "after": float(np.std(late_s)),
-           "noise_floor": fact.step_s, "ci95_reduction": None, "held_out": [], "engine": "events"}
-    half = 0.5 * fact.step_s  # the event itself is known to a sample only
+           "noise_floor": step_s, "ci95_reduction": None, "held_out": [], "engine": "events"}
+    half = 0.5 * step_s  # the event itself is known to a sample only
     parameters = {"delay": {"value": value, "unit": "s", "ci95": [value - error - half, value + error + half]}}
     text = f"The {actuator} motor answers its commands {1e3 * value:.0f} ms late."
     model = {"native": True, "mjcf": f"actuator[@name='{actuator}'] delay", "urdf": "not expressible: kept in hand.json"}
-    weight = value / fact.step_s
-    return weight, Finding("command_delay", ("command_delay",), 0.999, (), _where(actuator, finger), text, parameters, fit, model)
+    return value / REACTION_S, Finding("command_delay", ("command_delay",), 0.999, (), _where(actuator, finger), text, parameters, fit, model)
 
 
 def _sag_finding(actuator: str, finger: str | None, fact: CommandFacts) -> tuple[float, Finding]:

@@ -17,18 +17,18 @@ from ..session import Finger, Session, read_session
 from .angles import FingerAngles
 from .assemble import assemble
 from .balance import Balance
-from .command import command_facts, command_findings, refused
+from .command import CommandFacts, command_facts, command_findings, refused, with_lateness
 from .correct import write_corrected
 from .drive import drive_states, drive_trials, echoes_command, is_measured
 from .evidence import typical_coefficients
 from .findings import Finding, Findings
 from .gravity import with_gravity
 from .improve import read_model, write_improved
-from .name import name_effects, polish, scan
+from .name import polish, scan
 from .page import write_page
 from .prove import Replay
 from .stamps import Stamps, stamps
-from .station import Station
+from .station import Station, judged
 
 
 def diagnose(session: Session | str | Path, model: Any = None, output: str | Path | None = None,
@@ -58,15 +58,16 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
               for a, states in drive_states(session, _encoder_corrections(stations)).items() if a not in unread}
     for actuator in [a for a, states in drives.items() if not is_measured(states)]:
         found.append(refused(actuator, _finger_of(session, actuator), tuple(s.trial for s in drives.pop(actuator))))
-    found += _command(session, drives)
+    facts = _command(session, drives)
+    found += command_findings(facts, {a: _finger_of(session, a) for a in facts})
+    drives = with_lateness(drives, facts)
     for _, finding in found:
         tell(finding.statement)
     allowed, alone = _delays_apart(drives), {a: Balance(states).fit() for a, states in drives.items()}
     for actuator, states in drives.items():
         effects = [e for e in catalogue("drive") if not e.warps or allowed[actuator]]
         typical = typical_coefficients([fit for a, fit in alone.items() if a != actuator])
-        stations.append(Station("current", _finger_of(session, actuator), actuator, None,
-                                name_effects(states, effects, typical=typical)))
+        stations.append(judged("current", _finger_of(session, actuator), actuator, None, states, effects, typical))
         tell(stations[-1].line())
     clipped = {s.actuator for s in stations if s.believed for f in s.kept if f.term.effect.clips}
     # a reading that clips says little of the load, on which a sag is judged
@@ -146,20 +147,24 @@ def _periodic(period: float, sine: float, cosine: float, further: Callable[[Any]
 
 
 def _delays_apart(drives: dict[str, tuple[DriveState, ...]]) -> dict[str, bool]:
-    """Whether each drive's current may be delayed: a delay that all drives of a session share is how the log is read."""
+    """Whether each drive's current may be delayed: a delay that all drives of a session share is how the log is read. Answers to
+    commands tell a late current better than the balance does."""
     best: dict[str, float] = {}
     for actuator, states in drives.items():
-        balance = Balance(states)
+        balance = Balance(tuple(replace(s, extra={k: v for k, v in s.extra.items() if k != "late"}) for s in states))
         delay = next(e for e in catalogue("drive") if e.warps)
         fit = scan(balance, delay, ())
         best[actuator] = polish(balance, fit, 0).terms[0].shape["delay"] if fit is not None else 0.0
     step = {a: float(np.median(np.diff(s[0].time_s))) for a, s in drives.items()}
     # a lone drive cannot tell how the log is read from what its own channel does: twice as much is asked of it
     common, least = (min(best.values(), key=abs), 0.75) if len(best) > 1 else (0.0, 2.0)
-    return {a: abs(value - common) > least * step[a] for a, value in best.items()}
+    late = {a: s[0].extra["late"] for a, s in drives.items() if "late" in s[0].extra}
+    apart = {a: value - common for a, value in best.items()}
+    return {a: x < -least * step[a] or (float(np.sum(late[a])) > least * step[a] if a in late else x > least * step[a])
+            for a, x in apart.items()}
 
 
-def _command(session: Session, drives: dict[str, tuple[DriveState, ...]]) -> list[tuple[float, Finding]]:
+def _command(session: Session, drives: dict[str, tuple[DriveState, ...]]) -> dict[str, CommandFacts]:
     facts = {}
     for actuator, trials in drive_trials(session).items():
         logs = {t.name: t.log() for t in trials}
@@ -167,7 +172,7 @@ def _command(session: Session, drives: dict[str, tuple[DriveState, ...]]) -> lis
         currents = tuple(np.interp(s.time_s, logs[s.trial].time_s, np.nan_to_num(logs[s.trial].column("current"))) for s in states)
         if states:
             facts[actuator] = command_facts(states, currents)
-    return command_findings(facts, {a: _finger_of(session, a) for a in facts})
+    return facts
 
 
 def _once(found: list[tuple[float, Finding]]) -> list[tuple[float, Finding]]:
@@ -229,14 +234,12 @@ def _finger_stations(session: Session, finger: Finger, shape: Any, counts: dict[
     out: list[Station] = []
     states = encoder_states(angles, *counts[finger.actuator], moments) if finger.actuator in counts else ()
     if states:
-        out.append(Station("encoder", finger.name, finger.actuator, finger.segments[0].name,
-                           name_effects(states, catalogue("encoder"))))
+        out.append(judged("encoder", finger.name, finger.actuator, finger.segments[0].name, states, catalogue("encoder")))
         tell(out[-1].line())
     for joint in range(1, len(finger.segments)):
         expected = expected_angles(out[0].naming) if out and joint == 1 else {}
         states = linkage_states(angles, joint, moments, expected)
         if states:
-            out.append(Station("markers", finger.name, finger.actuator, finger.segments[joint].name,
-                               name_effects(states, catalogue("linkage"))))
+            out.append(judged("markers", finger.name, finger.actuator, finger.segments[joint].name, states, catalogue("linkage")))
             tell(out[-1].line())
     return out

@@ -38,7 +38,7 @@ def with_excursions(states: Sequence[DriveState]) -> tuple[DriveState, ...]:
         start += len(mine)
         ahead = np.zeros(len(state.time_s))
         if len(mine) > 50:
-            ahead[mask] = _course(state.time_s[mask], mine)
+            ahead[mask] = _course(state.time_s[mask], mine, balance.sigma * np.sqrt(balance.inflation) if balance.inflation > 1 else 0.0)
         out.append(replace(state, extra={**state.extra, "ahead": ahead}))
     return tuple(out)
 
@@ -59,12 +59,13 @@ def _beside_replicates(balance: Balance, residual: Array) -> Array:
     return out
 
 
-def _course(time_s: Array, residual: Array) -> Array:
-    """Smoothed residual (n,) within the excursions of one recording, zero elsewhere."""
+def _course(time_s: Array, residual: Array, coloured: float) -> Array:
+    """Smoothed residual (n,) within the excursions of one recording, zero elsewhere. coloured: deviation of one reading that a mean over
+    many has, where noise is not white, else zero."""
     step = float(np.median(np.diff(time_s)))
     left = residual.copy()
     inside = np.zeros(len(left), bool)
-    quiet = float(np.sqrt(np.median(np.diff(residual) ** 2) / 0.9099))
+    quiet = max(float(np.sqrt(np.median(np.diff(residual) ** 2) / 0.9099)), coloured)
     lengths = np.unique(np.geomspace(SHORTEST_S / step, LONGEST_S / step, 1 + int(np.log(LONGEST_S / SHORTEST_S) / np.log(GROWTH))).astype(int))
     for _ in range(len(left)):
         gain, begin, end = _best_window(left, quiet, lengths)

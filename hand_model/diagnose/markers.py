@@ -11,51 +11,21 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
 
-from ..identify.chain import Chain, jacobians, propagate
-from ..identify.likelihood import OUTLIER_LIMIT
-from .angles import FARTHEST_M, FingerAngles, refitted
+from .angles import FingerAngles, refitted
+from .blocks import Blocks, blocks_of, project
+from .displacement import NO_HINGE, Candidate, candidates_of
 
 Array = NDArray[np.float64]
 
-BLOCK = 8  # frames averaged into one row block
-LOUD_BLOCKS, LOUD = 5, 0.6  # blocks over which the noise is read, and the share of the usual variance from which it is louder
 EVIDENCE_LEAST = 15.0  # log evidence of a marker effect, beyond its parameters and the search over moments
 MOST = 4
-LASTING_S = 2.0  # half of it is how long something must last that is no ghost
 SKIP_P = 0.3  # lack of fit above which no candidate is tried
-BOTH = (True, False)
 ALPHA = 0.003  # false alarms per finger
 EXPLAINED_LEAST = 0.7  # of the misfit: below, the names are not believed
 SPELL = 12  # blocks, about a second, whose mean shows what stays correlated
 HINGE = ("joint_wobble", "moving_centre")
 MOSTLY = 0.7  # share of what any motion in step with the angle explains
-NO_HINGE = "no plain hinge"  # a joint whose markers leave the hinge in step with its angle, by none of the known ways
-
-
-@dataclass(frozen=True)
-class Blocks:
-    """Block means of all flexion recordings of one finger, in order of time.
-
-    residual: (b, m, 3) [m] observed minus chain, palm frame. weight: (b, m) frames behind a mean. pose_columns: (b, 3m, 6+k)
-    orthonormal basis of what poses explain. chain_columns: (b, 3m, s). rotation: (b, m, 3, 3) body to palm. position: (b, m, 3).
-    angle: (b, k). record, time_s: (b,). labels, body: of the markers.
-    """
-
-    residual: Array
-    weight: Array
-    pose_basis: Array
-    chain_columns: Array
-    rotation: Array
-    position: Array
-    axes: Array
-    centres: Array
-    angle: Array
-    record: NDArray[np.int64]
-    time_s: Array
-    labels: tuple[str, ...]
-    body: NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -110,79 +80,13 @@ class MarkerNaming:
         return bool(self.found) and (self.p_after >= ALPHA or self.excess_after < (1 - EXPLAINED_LEAST) * self.excess_before)
 
 
-def blocks_of(angles: FingerAngles) -> Blocks:
-    """Residuals, Jacobians and projections in blocks of frames."""
-    labels, body = angles.records[0].data.labels, angles.records[0].data.body
-    chain = angles.chain
-    parts: list[tuple[Array, ...]] = []
-    for index, record in enumerate(angles.records):
-        observed = record.data.position_world
-        residual = record.pose.to_palm(observed) - propagate(chain, body, record.pose.angle_rad)[0]
-        size = np.linalg.norm(residual, axis=-1)
-        sound = np.isfinite(record.angle_rad).all(1)
-        far = ~(size < FARTHEST_M) | _passing(size > OUTLIER_LIMIT * angles.noise_m, record.mocap.time_s)
-        good = np.flatnonzero(sound | (~far.any(1) & ~_passing(~sound, record.mocap.time_s)))
-        count = len(good) // BLOCK
-        if count < 20:
-            continue
-        frames = good[: count * BLOCK].reshape(count, BLOCK)
-        frames = frames[(frames[:, -1] - frames[:, 0]) < 3 * BLOCK]
-        residual[far] = np.nan
-        residual = residual[frames.ravel()]
-        residual = residual.reshape(len(frames), BLOCK, len(labels), 3)
-        weight = np.isfinite(residual[..., 0]).sum(1).astype(float)
-        mean = np.nansum(residual, axis=1) / np.maximum(weight, 1)[..., None]
-        weight *= _calm(residual - mean[:, None])[:, None]
-        angle = record.pose.angle_rad[frames].mean(1)
-        parts.append((mean, weight, angle, np.full(len(frames), index), record.mocap.time_s[frames].mean(1)))
-    residual, weight, angle, record_index, time_s = (np.concatenate(p) for p in zip(*parts, strict=True))
-    return _assembled(chain, body, labels, residual, weight, angle, record_index, time_s)
-
-
-def _calm(scatter: Array) -> Array:
-    """Usual over present variance of the readings (b,) within blocks, at most one: what is seen while the cameras are disturbed
-    counts for less. scatter: (b, frames, m, 3) [m], nan where nothing is seen."""
-    variance = uniform_filter1d(np.nan_to_num(np.nanmean(scatter**2, axis=(1, 2, 3))), LOUD_BLOCKS, mode="nearest")
-    share = np.median(variance) / np.maximum(variance, 1e-30)
-    return np.where(share < LOUD, share, 1.0)
-
-
-def _passing(flag: NDArray[np.bool_], time_s: Array) -> NDArray[np.bool_]:
-    """Where a flag (n,) or (n, m) is up for a moment only: a ghost passes, a slip lasts."""
-    width = max(int(LASTING_S / float(np.median(np.diff(time_s)))), 1)
-    up = uniform_filter1d(flag.astype(float), width, axis=0, mode="nearest")
-    return flag & (up < 0.45)
-
-
-def _assembled(chain: Chain, body: NDArray[np.int64], labels: tuple[str, ...], residual: Array, weight: Array, angle: Array,
-               record: Array, time_s: Array) -> Blocks:
-    x, by_frame, by_marker, by_joint = jacobians(chain, body, angle)
-    _, _, joints = propagate(chain, body, angle)
-    b, m = weight.shape
-    root = np.sqrt(np.repeat(weight / BLOCK, 3, axis=1))[..., None]
-    basis, _ = np.linalg.qr(by_frame.reshape(b, 3 * m, -1) * root)
-    shared = np.zeros((b, m, 3, 3 * m))
-    for j in range(m):
-        shared[:, j, :, 3 * j : 3 * j + 3] = by_marker[:, j]
-    columns = np.concatenate([shared.reshape(b, 3 * m, -1), by_joint.reshape(b, 3 * m, -1)], axis=-1)
-    return Blocks(residual, weight, basis, columns, by_marker, x, np.stack([a for a, _ in joints], 1),
-                  np.stack([c for _, c in joints], 1), angle, record.astype(int), time_s, labels, body)
-
-
-def project(blocks: Blocks, columns: Array) -> Array:
-    """Columns (b, 3m, c), weighted, minus what each block's pose explains."""
-    root = np.sqrt(np.repeat(blocks.weight / BLOCK, 3, axis=1))[..., None]
-    c = columns * root
-    return c - blocks.pose_basis @ (np.swapaxes(blocks.pose_basis, 1, 2) @ c)
-
-
 def name_markers(angles: FingerAngles) -> MarkerNaming:
     """Name slips and hinges that are none in the flexion recordings of one finger, by forward selection."""
     blocks = blocks_of(angles)
     y = project(blocks, blocks.residual.reshape(len(blocks.residual), -1, 1))
     shared = project(blocks, blocks.chain_columns)
     sigma = _noise(y, blocks)
-    candidates: list[_Candidate] | None = None
+    candidates: list[Candidate] | None = None
     found: list[MarkerEffect] = []
     p_before = excess_before = refused = None
     for _ in range(MOST + 1):
@@ -193,7 +97,7 @@ def name_markers(angles: FingerAngles) -> MarkerNaming:
         if len(found) == MOST or (not found and p > SKIP_P):
             break
         if candidates is None:
-            candidates = _candidates(blocks)
+            candidates = candidates_of(blocks)
             moments = {id(c.columns): _moments(project(blocks, c.columns), shared, y) for c in candidates}
         known = {e.body for e in found if e.effect in HINGE}
         chain = _chain_part(shared, y)
@@ -256,102 +160,6 @@ def _noise(y: Array, blocks: Blocks) -> float:
 
 
 @dataclass(frozen=True)
-class _Candidate:
-    effect: str
-    body: int
-    label: str | None
-    columns: Array
-    step: bool
-    lasting: bool = True  # a step that lasts for the session, or until the end of the recording (it was put right after)
-
-
-def _candidates(blocks: Blocks) -> list[_Candidate]:
-    b, m = blocks.weight.shape
-    out = []
-    for j, label in enumerate(blocks.labels):
-        name = "palm_marker_slip" if blocks.body[j] == 0 else "marker_slip"
-        for frame in _frames(blocks, int(blocks.body[j]), j):
-            columns = np.zeros((b, m, 3, 3))
-            columns[:, j] = frame
-            flat = columns.reshape(b, 3 * m, 3)
-            out += [_Candidate(name, int(blocks.body[j]), label, flat, True, lasting) for lasting in BOTH]
-    for k in range(1, int(blocks.body.max()) + 1):
-        mine = np.flatnonzero(blocks.body == k)
-        arm = blocks.position[:, mine] - blocks.position[:, mine].mean(1, keepdims=True)
-        for frame in _frames(blocks, k, int(mine[0])):
-            turned = np.stack([np.cross(frame[:, None, :, i], arm) for i in range(3)], axis=-1)
-            columns = np.zeros((b, m, 3, 6))
-            columns[:, mine, :, :3] = frame[:, None]
-            columns[:, mine, :, 3:] = turned
-            flat = columns.reshape(b, 3 * m, 6)
-            out += [_Candidate("support_slip", k, None, flat, True, lasting) for lasting in BOTH]
-        out += [*_no_hinge(blocks, k), *_any_motion(blocks, k)]
-    return out
-
-
-def _frames(blocks: Blocks, body: int, marker: int) -> list[Array]:
-    """Frames (b, 3, 3) in which a slip may be constant: its segment's, or the palm's (a marker held back by a cable)."""
-    b = len(blocks.residual)
-    fixed = np.broadcast_to(np.eye(3), (b, 3, 3))
-    return [fixed] if body == 0 else [blocks.rotation[:, marker], fixed]
-
-
-def _no_hinge(blocks: Blocks, k: int) -> list[_Candidate]:
-    """Wobble and moving centre of joint k - 1, each with a few forms over its angle."""
-    b, m = blocks.weight.shape
-    low, high = np.quantile(blocks.angle[:, k - 1], [0.005, 0.995])
-    u = ((blocks.angle[:, k - 1] - low) / max(high - low, 1e-9))[:, None]
-    wave = [np.sin(2 * np.pi * u), np.cos(2 * np.pi * u)]
-    forms: list[list[Array]] = [[u**2], [u**2, u**3], wave, [u**2, u**3, *wave]]
-    moved = np.flatnonzero(blocks.body >= k)
-    axis, centre = blocks.axes[:, k - 1], blocks.centres[:, k - 1]
-    helper = np.eye(3)[np.argmin(np.abs(axis.mean(0)))]
-    first = np.cross(axis, helper)
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    second = np.cross(axis, first)
-    out = []
-    for form in forms:
-        for name in ("joint_wobble", "moving_centre"):
-            functions = form if name == "joint_wobble" or form is wave else [u, *form[: len(form)]]
-            columns = np.zeros((b, m, 3, 2 * len(functions)))
-            one = np.zeros((b, len(moved), 3, 2 * len(functions)))
-            for i, f in enumerate(functions):
-                for d, direction in enumerate((first, second)):
-                    if name == "joint_wobble":
-                        arm = blocks.position[:, moved] - centre[:, None]
-                        shift = np.cross(direction[:, None], arm) * f[:, None]
-                    else:
-                        shift = np.broadcast_to((direction * f)[:, None], (b, len(moved), 3))
-                    one[..., 2 * i + d] = shift
-            columns[:, moved] = one
-            out.append(_Candidate(name, k, None, columns.reshape(b, 3 * m, -1), False))
-    return out
-
-
-def _any_motion(blocks: Blocks, k: int) -> list[_Candidate]:
-    """Whatever a smooth function of joint k - 1's angle could be: any motion of what it carries as a rigid body, or of each
-    marker of its segment (skin, a loose support)."""
-    b, m = blocks.weight.shape
-    low, high = np.quantile(blocks.angle[:, k - 1], [0.005, 0.995])
-    u = (blocks.angle[:, k - 1] - low) / max(high - low, 1e-9)
-    forms = [u, u**2, u**3, np.sin(2 * np.pi * u), np.cos(2 * np.pi * u)]
-    moved, mine = np.flatnonzero(blocks.body >= k), np.flatnonzero(blocks.body == k)
-    rigid = np.zeros((b, m, 3, 6))
-    rigid[:, moved, :, :3] = np.eye(3)
-    arm = blocks.position[:, moved] - blocks.centres[:, k - 1][:, None]
-    rigid[:, moved, :, 3:] = np.stack([np.cross(np.eye(3)[i], arm) for i in range(3)], axis=-1)
-    own = np.zeros((b, m, 3, 3 * len(mine)))
-    for i, j in enumerate(mine):
-        own[:, j, :, 3 * i : 3 * i + 3] = blocks.rotation[:, j]
-    out = []
-    for basis in (rigid, own):
-        flat = basis.reshape(b, 3 * m, -1)
-        columns = np.concatenate([flat * f[:, None, None] for f in forms], axis=-1)
-        out.append(_Candidate(NO_HINGE, k, None, columns, False))
-    return out
-
-
-@dataclass(frozen=True)
 class _Moments:
     """Products per block of projected columns d: with themselves (b, c, c), with the shared ones (b, s, c), with y (b, c)."""
 
@@ -378,7 +186,7 @@ def _chain_part(shared: Array, y: Array) -> tuple[Array, Array]:
     return np.linalg.pinv(gram / np.outer(size, size), rcond=1e-9, hermitian=True) / np.outer(size, size), flat.T @ y.ravel()
 
 
-def _try(candidate: _Candidate, blocks: Blocks, moments: _Moments, chain: tuple[Array, Array], sigma: float) -> MarkerEffect:
+def _try(candidate: Candidate, blocks: Blocks, moments: _Moments, chain: tuple[Array, Array], sigma: float) -> MarkerEffect:
     """Gain of a candidate beyond poses and chain; a step at its best moment."""
     dd, sd, dy = moments.dd, moments.sd, moments.dy
     inverse, sy = chain

@@ -44,12 +44,14 @@ class Rival:
 @dataclass(frozen=True)
 class Named:
     """One finding of a balance. rivals: every candidate that was tried in its place (best first), the winner included.
-    share: of the explainable residual variance. probability: against all rivals and none."""
+    share: of the explainable residual variance. size: of what it adds beyond what declared coefficients could, over the noise of
+    one reading (root mean squares). probability: against all rivals and none."""
 
     term: Term
     amplitudes: dict[str, float]
     rivals: tuple[Rival, ...]
     share: float
+    size: float
     probability: float
 
     @property
@@ -334,6 +336,14 @@ def _findings(balance: Balance, effects: tuple[Any, ...], terms: tuple[Term, ...
         weights = np.exp(np.array([r.evidence for r in rivals] + [0.0]) - max(rivals[0].evidence, 0.0))
         mine = [r.name for r in rivals].index(term.effect.name)
         share = losses[which] / max(sum(losses), 1e-12) * min(explained / max(explained, 1e-12), 1.0)
-        found.append(Named(term, dict(fit.amplitudes[which]), tuple(rivals), float(share),
+        found.append(Named(term, dict(fit.amplitudes[which]), tuple(rivals), float(share), _size(balance, fit, which),
                            float(weights[mine] / weights.sum())))
     return tuple(sorted(found, key=lambda f: -f.share))
+
+
+def _size(balance: Balance, fit: Fit, which: int) -> float:
+    """Root mean square over the noise of what a term adds beyond what the declared columns could, all coefficients as they are."""
+    basis, _, w = balance.apart(())
+    added = balance.whiten((fit.prediction - balance.removed(fit, which)) * w, w)
+    added = added - basis @ (basis.T @ added)
+    return float(np.sqrt(added @ added / max(balance.train.sum(), 1)))

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from ..identify.likelihood import OUTLIER_LIMIT
 from .angles import FingerAngles
+from .displacement import NO_HINGE
 from .findings import Finding
-from .markers import ALPHA, HINGE, NO_HINGE, MarkerEffect, MarkerNaming
+from .markers import ALPHA, HINGE, MarkerEffect, MarkerNaming
 
 Array = NDArray[np.float64]
 

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
 from .findings import Finding
 from .interval import held_out, parameter_intervals, proven, sized, undisturbed
-from .name import ALPHA, Named, Naming
+from .name import ALPHA, Named, Naming, name_effects
 
 # How before and after were computed, said in the findings: no compiled file is involved until one is replayed.
 ENGINE = {"current": "inverse dynamics of the motor's balance, motion as recorded", "encoder": "encoder map, motion as recorded",
           "markers": "linkage polynomial, motion as recorded"}
 UNWRITTEN = {"native": False, "mjcf": None, "urdf": "not expressible"}
+SECOND_HEARINGS = 2
 SMALL = 0.07  # share of the explained mismatch
 EXPLAINED_LEAST = 0.7  # of the explainable mismatch: below, the names are not believed
 
@@ -58,6 +60,11 @@ class Station:
         another, and is left to the unexplained part."""
         return tuple(f for f in self.proven if f.share >= SMALL or f is self.proven[0])
 
+    @property
+    def weight(self) -> float:
+        """What the effects that stand add to the effort, over the noise (mean squares)."""
+        return sum(f.size**2 for f in self.kept) if self.believed else 0.0
+
     def line(self) -> str:
         """One line for a progress display."""
         place = " ".join(x for x in (self.finger, self.joint, self.signal) if x)
@@ -67,7 +74,26 @@ class Station:
         return f"{place}: {names} (p {self.naming.before.p:.2g} -> {self.naming.after.p:.2g})"
 
 
-def finding_of(station: Station, named: Named, share: float) -> tuple[float, Finding]:
+def judged(signal: str, finger: str | None, actuator: str | None, joint: str | None, states: tuple[Any, ...], effects: Iterable[Any],
+           typical: Mapping[str, float] | None = None) -> Station:
+    """The station of the balance of `states`, named among `effects`. Where a name does not stand, those that it displaced are heard
+    without it."""
+    left = tuple(effects)
+    station = Station(signal, finger, actuator, joint, name_effects(states, left, typical=typical))
+    for _ in range(SECOND_HEARINGS):
+        fallen = {f.term.effect.name for f in station.naming.found} - {f.term.effect.name for f in station.proven}
+        if not fallen:
+            break
+        left = tuple(e for e in left if e.name not in fallen)
+        other = Station(signal, finger, actuator, joint, name_effects(states, left, typical=typical))
+        if other.weight <= station.weight:
+            break
+        station = other
+    return station
+
+
+def finding_of(station: Station, named: Named, share: float, size: float) -> tuple[float, Finding]:
+    """The finding of one effect, with its size (over the noise of one reading) as its weight."""
     naming = station.naming
     which = naming.fit.terms.index(named.term)
     effect = named.term.effect
@@ -94,14 +120,8 @@ def finding_of(station: Station, named: Named, share: float) -> tuple[float, Fin
     members = named.members if effect.name in named.members else (effect.name, *named.members)
     recording = getattr(effect, "correction", None)
     model = None if recording else dict(UNWRITTEN)
-    return _weight(naming, share), Finding(effect.name, members, named.probability, alternatives, where,
+    return size, Finding(effect.name, members, named.probability, alternatives, where,
                            effect.statement(where, values), parameters, fit, model, recording)
-
-
-def _weight(naming: Naming, share: float) -> float:
-    """What an effect adds to the effort over the noise of one reading (root mean squares, training recordings)."""
-    added = max(naming.declared.rss - naming.fit.rss, 0.0) * share
-    return float(np.sqrt(added / max(naming.balance.train.sum(), 1)))
 
 
 def unexplained_of(station: Station, share: float) -> dict[str, Any]:

@@ -10,6 +10,8 @@ import numpy as np
 from .base import Amplitude, Array, DriveState, Effect, Shape
 from .mjcf import delay, motor_sensor
 
+FIRST_SEEN = 0.1  # of a filter's time constant: a rise of ten times what is noticed
+
 
 class CurrentChannelDelay(Effect):
     """measured(t) = current(t - delay) (form 0), or the current behind a first-order filter of that time constant (form 1)."""
@@ -39,6 +41,12 @@ class CurrentChannelDelay(Effect):
             return _filtered(columns, state.time_s, shape["delay"])
         then = state.time_s - shape["delay"]
         return np.stack([np.interp(then, state.time_s, column) for column in columns.T], axis=-1)
+
+    def lateness(self, shape: Mapping[str, float]) -> tuple[float, float]:
+        """How late [s] a sudden rise of the current is seen, at least and at most: behind a filter that depends on its height over the
+        noise; of a negative delay, on whether the current comes early or the position late."""
+        delay_s = shape["delay"]
+        return (FIRST_SEEN * delay_s, delay_s) if _filters(shape) else (delay_s, max(delay_s, 0.0))
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """Which channel comes first and by how much, or the filter's time constant."""

@@ -1,0 +1,101 @@
+"""Answers to commands: how late each drive's current and motion follow its setpoints, beside the session's other drives.
+
+A late drive answers late in both; a late current channel answers late beside a motion that does not. A healthy drive's motion
+begins when friction gives way, which differs from drive to drive by a sample or two; its current answers at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..effects.base import DriveState
+
+Array = NDArray[np.float64]
+
+LATE = 1.25  # sample intervals, from which an answer is late
+MOSTLY = 0.7  # share of the answers that must be late
+UNCLEAR = 0.3  # share of the lateness that the motion has too, from which it is no longer clear what is late
+LEAST_ANSWERS = 5
+UNLIKE = 0.4  # sample intervals by which the answers of healthy drives of one session differ
+USUAL_START = 2.0  # sample intervals after which a healthy drive is seen to move
+
+
+@dataclass(frozen=True)
+class Answers:
+    """current_s, motion_s: (e,) from each change of the setpoint to its answer. step_s: sample interval."""
+
+    current_s: Array
+    motion_s: Array
+    step_s: float
+
+
+@dataclass(frozen=True)
+class Lateness:
+    """What a drive's answers say. drive_s: (k,) by how much the drive answers late, empty where it does not. channel_s: by how
+    much its current alone is late, and doubt_s, the standard deviation of that; nan where there is nothing to compare with."""
+
+    drive_s: Array
+    channel_s: float
+    doubt_s: float
+
+
+def answers_of(states: Sequence[DriveState], currents: Sequence[Array]) -> Answers:
+    """Answers of one drive. currents: raw current (n,) of each state (its `effort` is masked at rest)."""
+    current = [x for s, c in zip(states, currents, strict=True) for x in _latencies(s, c)]
+    motion = [x for s in states for x in _latencies(s, s.position)]
+    step = float(np.median(np.concatenate([np.diff(s.time_s) for s in states])))
+    return Answers(_usual(np.array(current), step), _usual(np.array(motion), step), step)
+
+
+def lateness(answers: Mapping[str, Answers]) -> dict[str, Lateness]:
+    """Of each drive that answers often enough, beside the least late one of the session, or a usual one where it is alone."""
+    told = {a: x for a, x in answers.items() if len(x.current_s) >= LEAST_ANSWERS}
+    alone = len(told) == 1
+    first = min((float(np.mean(x.current_s)) for x in told.values()), default=0.0)
+    moved = {a: float(np.mean(x.motion_s)) for a, x in told.items() if len(x.motion_s) >= LEAST_ANSWERS}
+    out = {}
+    for actuator, x in told.items():
+        usual = min(first, x.step_s)  # a delay that all drives share is told beside the sample interval
+        late = x.current_s - usual
+        begins = USUAL_START * x.step_s if alone else min(moved.values(), default=np.nan)
+        behind = moved.get(actuator, np.nan) - begins  # nan: every drive repeats its setpoint as its motion
+        total = float(np.mean(x.current_s)) - (usual if alone else first)
+        drive = not behind <= max(x.step_s, 0.5 * total) and np.mean(late) > LATE * x.step_s and np.mean(late > x.step_s) > MOSTLY
+        channel = max(total - np.nan_to_num(behind, nan=total), 0.0) if drive else total
+        # Neither clearly the one nor the other: the motion's own scatter decides between the two.
+        torn = total > LATE * x.step_s and UNCLEAR * total < behind < (1 - UNCLEAR) * total
+        between = min(behind, total - behind) if torn else 0.0
+        unlike = (1.0 if alone else UNLIKE) * x.step_s
+        doubt = float(np.hypot(unlike + between, np.std(x.current_s) / np.sqrt(len(x.current_s))))
+        out[actuator] = Lateness(late if drive else np.zeros(0), channel, doubt)
+    return out
+
+
+def _latencies(state: DriveState, channel: Array) -> list[float]:
+    """Time from each setpoint change to the first two samples beyond three standard deviations, in its direction."""
+    if "setpoint" not in state.extra:
+        return []
+    setpoint, t = state.extra["setpoint"], state.time_s
+    out = []
+    for k in np.flatnonzero(np.diff(setpoint)) + 1:
+        before = channel[(t > t[k] - 0.2) & (t < t[k])]
+        if len(before) < 5:
+            continue
+        way = np.sign(setpoint[k] - setpoint[k - 1])
+        away = way * (channel[k : k + 60] - np.median(before)) > 3 * max(float(np.std(before)), 1e-9)
+        hit = np.flatnonzero(away[:-1] & away[1:])
+        if len(hit):
+            out.append(float(t[k + hit[0]] - t[k]))
+    return out
+
+
+def _usual(latency_s: Array, step_s: float) -> Array:
+    """The latencies (k,) without those that noise answered early or that a drive already in motion hid."""
+    if not len(latency_s):
+        return latency_s
+    apart = np.abs(latency_s - np.median(latency_s))
+    return latency_s[apart <= 3 * max(1.4826 * float(np.median(apart)), 0.5 * step_s)]

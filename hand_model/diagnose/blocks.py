@@ -1,0 +1,109 @@
+"""Blocks of frames of one finger's markers: residuals from the chain, what poses explain, what the chain could."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+
+from ..identify.chain import Chain, jacobians, propagate
+from ..identify.likelihood import OUTLIER_LIMIT
+from .angles import FARTHEST_M, FingerAngles
+
+Array = NDArray[np.float64]
+
+BLOCK = 8  # frames averaged into one row block
+LOUD_BLOCKS, LOUD = 5, 0.6  # blocks over which the noise is read, and the share of the usual variance from which it is louder
+LASTING_S = 2.0  # half of it is how long something must last that is no ghost
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Block means of all flexion recordings of one finger, in order of time.
+
+    residual: (b, m, 3) [m] observed minus chain, palm frame. weight: (b, m) frames behind a mean. pose_columns: (b, 3m, 6+k)
+    orthonormal basis of what poses explain. chain_columns: (b, 3m, s). rotation: (b, m, 3, 3) body to palm. position: (b, m, 3).
+    angle: (b, k). record, time_s: (b,). labels, body: of the markers.
+    """
+
+    residual: Array
+    weight: Array
+    pose_basis: Array
+    chain_columns: Array
+    rotation: Array
+    position: Array
+    axes: Array
+    centres: Array
+    angle: Array
+    record: NDArray[np.int64]
+    time_s: Array
+    labels: tuple[str, ...]
+    body: NDArray[np.int64]
+
+
+def blocks_of(angles: FingerAngles) -> Blocks:
+    """Residuals, Jacobians and projections in blocks of frames."""
+    labels, body = angles.records[0].data.labels, angles.records[0].data.body
+    chain = angles.chain
+    parts: list[tuple[Array, ...]] = []
+    for index, record in enumerate(angles.records):
+        observed = record.data.position_world
+        residual = record.pose.to_palm(observed) - propagate(chain, body, record.pose.angle_rad)[0]
+        size = np.linalg.norm(residual, axis=-1)
+        sound = np.isfinite(record.angle_rad).all(1)
+        far = ~(size < FARTHEST_M) | _passing(size > OUTLIER_LIMIT * angles.noise_m, record.mocap.time_s)
+        good = np.flatnonzero(sound | (~far.any(1) & ~_passing(~sound, record.mocap.time_s)))
+        count = len(good) // BLOCK
+        if count < 20:
+            continue
+        frames = good[: count * BLOCK].reshape(count, BLOCK)
+        frames = frames[(frames[:, -1] - frames[:, 0]) < 3 * BLOCK]
+        residual[far] = np.nan
+        residual = residual[frames.ravel()]
+        residual = residual.reshape(len(frames), BLOCK, len(labels), 3)
+        weight = np.isfinite(residual[..., 0]).sum(1).astype(float)
+        mean = np.nansum(residual, axis=1) / np.maximum(weight, 1)[..., None]
+        weight *= _calm(residual - mean[:, None])[:, None]
+        angle = record.pose.angle_rad[frames].mean(1)
+        parts.append((mean, weight, angle, np.full(len(frames), index), record.mocap.time_s[frames].mean(1)))
+    residual, weight, angle, record_index, time_s = (np.concatenate(p) for p in zip(*parts, strict=True))
+    return _assembled(chain, body, labels, residual, weight, angle, record_index, time_s)
+
+
+def _calm(scatter: Array) -> Array:
+    """Usual over present variance of the readings (b,) within blocks, at most one: what is seen while the cameras are disturbed
+    counts for less. scatter: (b, frames, m, 3) [m], nan where nothing is seen."""
+    variance = uniform_filter1d(np.nan_to_num(np.nanmean(scatter**2, axis=(1, 2, 3))), LOUD_BLOCKS, mode="nearest")
+    share = np.median(variance) / np.maximum(variance, 1e-30)
+    return np.where(share < LOUD, share, 1.0)
+
+
+def _passing(flag: NDArray[np.bool_], time_s: Array) -> NDArray[np.bool_]:
+    """Where a flag (n,) or (n, m) is up for a moment only: a ghost passes, a slip lasts."""
+    width = max(int(LASTING_S / float(np.median(np.diff(time_s)))), 1)
+    up = uniform_filter1d(flag.astype(float), width, axis=0, mode="nearest")
+    return flag & (up < 0.45)
+
+
+def _assembled(chain: Chain, body: NDArray[np.int64], labels: tuple[str, ...], residual: Array, weight: Array, angle: Array,
+               record: Array, time_s: Array) -> Blocks:
+    x, by_frame, by_marker, by_joint = jacobians(chain, body, angle)
+    _, _, joints = propagate(chain, body, angle)
+    b, m = weight.shape
+    root = np.sqrt(np.repeat(weight / BLOCK, 3, axis=1))[..., None]
+    basis, _ = np.linalg.qr(by_frame.reshape(b, 3 * m, -1) * root)
+    shared = np.zeros((b, m, 3, 3 * m))
+    for j in range(m):
+        shared[:, j, :, 3 * j : 3 * j + 3] = by_marker[:, j]
+    columns = np.concatenate([shared.reshape(b, 3 * m, -1), by_joint.reshape(b, 3 * m, -1)], axis=-1)
+    return Blocks(residual, weight, basis, columns, by_marker, x, np.stack([a for a, _ in joints], 1),
+                  np.stack([c for _, c in joints], 1), angle, record.astype(int), time_s, labels, body)
+
+
+def project(blocks: Blocks, columns: Array) -> Array:
+    """Columns (b, 3m, c), weighted, minus what each block's pose explains."""
+    root = np.sqrt(np.repeat(blocks.weight / BLOCK, 3, axis=1))[..., None]
+    c = columns * root
+    return c - blocks.pose_basis @ (np.swapaxes(blocks.pose_basis, 1, 2) @ c)

@@ -1,0 +1,115 @@
+"""What a finger's markers may show beside rigid segments on hinges, as columns of marker displacements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .blocks import Blocks
+
+Array = NDArray[np.float64]
+
+BOTH = (True, False)
+NO_HINGE = "no plain hinge"  # a joint whose markers leave the hinge in step with its angle, by none of the known ways
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """columns: (b, 3m, c) [m per unit]. step: it begins at some moment. lasting: a step that lasts for the session, or until the
+    end of the recording (it was put right after)."""
+
+    effect: str
+    body: int
+    label: str | None
+    columns: Array
+    step: bool
+    lasting: bool = True
+
+
+def candidates_of(blocks: Blocks) -> list[Candidate]:
+    """Slips of each marker and support, and each joint's ways of being no hinge."""
+    b, m = blocks.weight.shape
+    out = []
+    for j, label in enumerate(blocks.labels):
+        name = "palm_marker_slip" if blocks.body[j] == 0 else "marker_slip"
+        for frame in _frames(blocks, int(blocks.body[j]), j):
+            columns = np.zeros((b, m, 3, 3))
+            columns[:, j] = frame
+            flat = columns.reshape(b, 3 * m, 3)
+            out += [Candidate(name, int(blocks.body[j]), label, flat, True, lasting) for lasting in BOTH]
+    for k in range(1, int(blocks.body.max()) + 1):
+        mine = np.flatnonzero(blocks.body == k)
+        arm = blocks.position[:, mine] - blocks.position[:, mine].mean(1, keepdims=True)
+        for frame in _frames(blocks, k, int(mine[0])):
+            turned = np.stack([np.cross(frame[:, None, :, i], arm) for i in range(3)], axis=-1)
+            columns = np.zeros((b, m, 3, 6))
+            columns[:, mine, :, :3] = frame[:, None]
+            columns[:, mine, :, 3:] = turned
+            flat = columns.reshape(b, 3 * m, 6)
+            out += [Candidate("support_slip", k, None, flat, True, lasting) for lasting in BOTH]
+        out += [*_no_hinge(blocks, k), *_any_motion(blocks, k)]
+    return out
+
+
+def _frames(blocks: Blocks, body: int, marker: int) -> list[Array]:
+    """Frames (b, 3, 3) in which a slip may be constant: its segment's, or the palm's (a marker held back by a cable)."""
+    b = len(blocks.residual)
+    fixed = np.broadcast_to(np.eye(3), (b, 3, 3))
+    return [fixed] if body == 0 else [blocks.rotation[:, marker], fixed]
+
+
+def _no_hinge(blocks: Blocks, k: int) -> list[Candidate]:
+    """Wobble and moving centre of joint k - 1, each with a few forms over its angle."""
+    b, m = blocks.weight.shape
+    low, high = np.quantile(blocks.angle[:, k - 1], [0.005, 0.995])
+    u = ((blocks.angle[:, k - 1] - low) / max(high - low, 1e-9))[:, None]
+    wave = [np.sin(2 * np.pi * u), np.cos(2 * np.pi * u)]
+    forms: list[list[Array]] = [[u**2], [u**2, u**3], wave, [u**2, u**3, *wave]]
+    moved = np.flatnonzero(blocks.body >= k)
+    axis, centre = blocks.axes[:, k - 1], blocks.centres[:, k - 1]
+    helper = np.eye(3)[np.argmin(np.abs(axis.mean(0)))]
+    first = np.cross(axis, helper)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    second = np.cross(axis, first)
+    out = []
+    for form in forms:
+        for name in ("joint_wobble", "moving_centre"):
+            functions = form if name == "joint_wobble" or form is wave else [u, *form[: len(form)]]
+            columns = np.zeros((b, m, 3, 2 * len(functions)))
+            one = np.zeros((b, len(moved), 3, 2 * len(functions)))
+            for i, f in enumerate(functions):
+                for d, direction in enumerate((first, second)):
+                    if name == "joint_wobble":
+                        arm = blocks.position[:, moved] - centre[:, None]
+                        shift = np.cross(direction[:, None], arm) * f[:, None]
+                    else:
+                        shift = np.broadcast_to((direction * f)[:, None], (b, len(moved), 3))
+                    one[..., 2 * i + d] = shift
+            columns[:, moved] = one
+            out.append(Candidate(name, k, None, columns.reshape(b, 3 * m, -1), False))
+    return out
+
+
+def _any_motion(blocks: Blocks, k: int) -> list[Candidate]:
+    """Whatever a smooth function of joint k - 1's angle could be: any motion of what it carries as a rigid body, or of each
+    marker of its segment (skin, a loose support)."""
+    b, m = blocks.weight.shape
+    low, high = np.quantile(blocks.angle[:, k - 1], [0.005, 0.995])
+    u = (blocks.angle[:, k - 1] - low) / max(high - low, 1e-9)
+    forms = [u, u**2, u**3, np.sin(2 * np.pi * u), np.cos(2 * np.pi * u)]
+    moved, mine = np.flatnonzero(blocks.body >= k), np.flatnonzero(blocks.body == k)
+    rigid = np.zeros((b, m, 3, 6))
+    rigid[:, moved, :, :3] = np.eye(3)
+    arm = blocks.position[:, moved] - blocks.centres[:, k - 1][:, None]
+    rigid[:, moved, :, 3:] = np.stack([np.cross(np.eye(3)[i], arm) for i in range(3)], axis=-1)
+    own = np.zeros((b, m, 3, 3 * len(mine)))
+    for i, j in enumerate(mine):
+        own[:, j, :, 3 * i : 3 * i + 3] = blocks.rotation[:, j]
+    out = []
+    for basis in (rigid, own):
+        flat = basis.reshape(b, 3 * m, -1)
+        columns = np.concatenate([flat * f[:, None, None] for f in forms], axis=-1)
+        out.append(Candidate(NO_HINGE, k, None, columns, False))
+    return out
