@@ -14,7 +14,7 @@ from . import output_error
 from .balance import NAMES
 from .drive import CONTROLLERS
 from .moves import SETTLED, MoveData, shortened, without_rest
-from .output_error import COARSE_S, OutputErrorFit
+from .output_error import COARSE_S, ROUGH, OutputErrorFit
 from .replicates import lack_of_fit
 
 CLOSE = 1.15  # mean square of the residuals [noise variances] below which no other kind of friction is tried
@@ -69,7 +69,7 @@ def find_controller(
             near = jump if jump.cost < near.cost + EVIDENCE else near
         # bristles at rest let go under every tremor: what they hold there is not known
         whole = moves if near.values["presliding"] == 0 else [without_rest(m) for m in moves]
-        found = output_error.fit(whole, near.values, _names(near.controller, near.values), sigma, bounds, near.controller)
+        found = output_error.fit(whole, near.values, _names(near.controller, near.values), sigma, bounds, near.controller, ROUGH)
         if best is None or found.cost < best.cost:
             best = found
         if lack_of_fit(best) < enough:

@@ -288,10 +288,11 @@ class _Loop:
         # where the drive will be seen at the middle and at the end of the step
         self.middle, self.end = 0.5 * step_s - q["delay"], step_s - q["delay"]
         self.deadband, self.edge, self.gain = q["deadband"], q["edge"], q["position_gain"]
+        self.down, self.bottom = -self.slew, -self.top
 
     def narrow(self, k: int) -> None:
         """Keep the first k drives."""
-        for name in ("slew", "top", "middle", "end", "deadband", "edge", "gain"):
+        for name in ("slew", "top", "down", "bottom", "middle", "end", "deadband", "edge", "gain"):
             setattr(self, name, getattr(self, name)[:k])
 
     def step(self, error: Array, v: Array, wanted: Array) -> tuple[Array, Array]:
@@ -299,9 +300,9 @@ class _Loop:
         # a deadband narrower than the step's travel sets in within the step
         width = np.maximum(np.abs(self.step_s * v), self.edge)
         share = np.minimum(np.maximum((np.abs(error - self.middle * v) - self.deadband) / width + 0.5, 0.0), 1.0)
-        outside = np.minimum(np.maximum(self.gain * (error - self.end * v), -self.top), self.top) - wanted
-        outside = np.minimum(np.maximum(outside, -self.slew), self.slew)
-        inside = np.minimum(np.maximum(-wanted, -self.slew), self.slew)
+        outside = np.minimum(np.maximum(self.gain * (error - self.end * v), self.bottom), self.top) - wanted
+        outside = np.minimum(np.maximum(outside, self.down), self.slew)
+        inside = np.minimum(np.maximum(-wanted, self.down), self.slew)
         return share, inside + share * (outside - inside)
 
 

@@ -225,9 +225,9 @@ def _fit_output_error(
     best, evidence = find_controller(moves, _plant(plain), sigma, BOUNDS, LACK_OF_FIT), 0.0
     # a rise is tried where the regression, which knows no controller, leaves room for one
     if curved.excess_z > (ROOM if max(best.chi2) < 4.0 else CLAIM):
-        best, evidence = _with_rise(best, curved)
+        best, evidence = _with_rise(output_error.fit(best.moves, best.values, best.names, sigma, BOUNDS, best.controller, (FINE,), best.own), curved)
     if lack_of_fit(best) < LACK_OF_FIT:
-        best = output_error.reweighted(best, BOUNDS)
+        best = output_error.refined(best, BOUNDS)
         best = _with_other_shape(best) if evidence else best
     return best, evidence
 

@@ -22,9 +22,11 @@ Array = NDArray[np.float64]
 
 COARSE_S = 5e-3
 # steps [s], rounds, fall of the misfit that is worth another round, width [%] over which a deadband sets in: what sets in softly has no kinks
-COARSE, SOFT, FINE = (COARSE_S, 4, 5.0, 0.5), (COARSE_S, 4, 5.0, 0.1), (STEP_S, 8, 0.5, 0.02)
-ALIGN = (COARSE, (STEP_S, 4, 0.5, 0.02))  # where only the moves' own unknowns are sought
-STAGES = {"profile": (COARSE, FINE), "cascade": (COARSE, SOFT, FINE)}
+COARSE, FINE = (COARSE_S, 4, 5.0, 0.5), (STEP_S, 8, 0.5, 0.05)
+ALIGN = (COARSE, (STEP_S, 4, 0.5, 0.05))  # where only the moves' own unknowns are sought
+NEARLY = (STEP_S, 3, 5.0, 0.05)  # a fit that will be refined
+STAGES, ROUGH = (COARSE, FINE), (COARSE, NEARLY)
+DAMPINGS = ((-1, 0, 1), (-2, 2, 3, 4))  # of one step, powers of ten of the last one; the second four where the first three fail on a fresh Jacobian
 ABSOLUTE_REACH = {"preload": 20.0, "viscous": 0.1, "stiffness": 0.2, "coulomb": 10.0, "bristle": 0.01, "damping": 2.0, "rise": 0.02, "fall": 0.02, "deadband": 0.2, "delay": 0.002, "lead": 0.002, "lag": 0.002}
 REACH_S = 1.5 * TICK_S  # what the instant of a jump is known to, half a step at its end and one at its begin: a current that jumps within it says little
 # differences wide enough that the instants at which a drive sticks or a deadband sets in, held to one step, average out
@@ -33,9 +35,7 @@ STEP_SHARE, OWN_STEP = 2e-2, (1e-3, 1e-2, 1e-3, 0.5)
 # sums up its reference step by step has the velocity up to half a step behind. Without this the motion alone, which tells inertia less damping
 # times delay, lets the two run off together
 PRIOR = {"lead": (0.5 * TICK_S, 0.5 * TICK_S), "delay": (0.5 * TICK_S, TICK_S), "lag": (0.25 * TICK_S, 0.75 * TICK_S)}
-AGAIN = (STEP_S, 3, 0.5, 0.02)
 UNREST, MEMORY = 1.3, 0.1  # mean square [noise variances] and correlation from sample to sample above which residuals are weighed anew
-SEARCH = 1.0
 OWN_REACH = np.array([0.01, 0.3, 0.01, 10.0])  # of one step
 
 
@@ -137,7 +137,7 @@ def _linearise(
     owns = np.repeat(own[order], width, axis=0)
     for i, small in enumerate(own_step):
         owns[k + 1 + i :: width, i] += small
-    coarse_s = COARSE_S
+    coarse_s = step_s if controller == "cascade" else COARSE_S
     varied = run(_arrays(ordered, owns, width), values, coarse_s, controller)
     base = run(_arrays(ordered, own[order], 1), {n: np.full(len(data), v) for n, v in q.items()}, step_s, controller) if step_s < coarse_s else varied
     per = 1 if step_s < coarse_s else width
@@ -198,12 +198,12 @@ def fit(
 ) -> OutputErrorFit:
     """Fit the named parameters to the moves by damped Gauss-Newton; the others stay at `start_values`.
 
-    sigma: noise of position [%] and current [raw]. bounds: parameter -> (low, high). stages: STAGES of the controller unless given. own: (moves, 4) to start from.
+    sigma: noise of position [%] and current [raw]. bounds: parameter -> (low, high). stages: STAGES unless given. own: (moves, 4) to start from.
     memory: of the noise of position and current.
     """
     q, own = dict(start_values), np.array([m.own for m in data]) if own is None else own.copy()
     wanted = tuple(names)
-    for step_s, rounds, enough, edge in stages or STAGES[controller]:
+    for step_s, rounds, enough, edge in stages or STAGES:
         damping, share, fresh, q = 1e-3, 1.0, True, {**q, "edge": edge}
         # what is finer than the step would only make up for the step
         names = tuple(n for n in wanted if step_s < COARSE_S or n not in PRIOR)
@@ -219,7 +219,7 @@ def fit(
                     break
                 fresh = True
                 continue
-            moved = _step(data, q, names, own, linear[3], bounds, system, cost, damping, controller, step_s, memory)
+            moved = _step(data, q, names, own, linear[3], bounds, system, cost, damping, controller, step_s, memory, DAMPINGS if fresh else DAMPINGS[:1])
             if moved is None:
                 if not fresh:
                     fresh = True
@@ -238,18 +238,18 @@ def fit(
     return _finish(data, linear, q, names, sigma, own, cost, controller, bounds, memory, step_s)
 
 
-def reweighted(f: OutputErrorFit, bounds: Mapping[str, tuple[float, float]]) -> OutputErrorFit:
-    """The fit again, its noise as large and with the memory that the residuals show: a drive that is not quite alike twice moves by more than its
-    encoder's noise, and for longer. The fit itself where they show nothing of this."""
+def refined(f: OutputErrorFit, bounds: Mapping[str, tuple[float, float]]) -> OutputErrorFit:
+    """The fit to its end, its noise as large and with the memory that the residuals show: a drive that is not quite alike twice moves by more than its
+    encoder's noise, and for longer."""
     correlation = autocorrelation([e / f.sigma for e in f.residual])
     if max(f.chi2) < UNREST and correlation[:, 1].max() < MEMORY:
-        return f
+        return fit(f.moves, f.values, f.names, f.sigma, bounds, f.controller, (FINE,), f.own, f.memory)
     sigma = (f.sigma[0] * float(np.sqrt(max(f.chi2[0], 1.0))), f.sigma[1] * float(np.sqrt(max(f.chi2[1], 1.0))))
     memory = tuple(predictors(c) for c in correlation)
     # means of what has a memory are known less well
     wider = np.sqrt(np.maximum(1 + 2 * correlation[:, 1:].sum(axis=1), 1.0) * np.maximum(f.chi2, 1.0))
     moves = [dataclasses.replace(m, own_sd=m.own_sd * [1.0, wider[0], 1.0, wider[1]]) for m in f.moves]
-    return fit(moves, f.values, f.names, sigma, bounds, f.controller, (AGAIN,), f.own, memory)
+    return fit(moves, f.values, f.names, sigma, bounds, f.controller, (FINE,), f.own, memory)
 
 
 def _expected(normal: Array, gradient: Array, blocks: list[tuple[Array, Array, Array]]) -> float:
@@ -271,15 +271,16 @@ def _step(
     damping: float,
     controller: str,
     step_s: float,
-    memory: tuple[Predictors, ...] = (),
+    memory: tuple[Predictors, ...],
+    dampings: Sequence[tuple[int, ...]],
 ) -> tuple[dict[str, float], Array, float, float, list[Array]] | None:
-    """One Levenberg-Marquardt step, the best of three dampings, or of four more: new values, own unknowns, cost, damping and residuals;
+    """One Levenberg-Marquardt step, the best of the first dampings (powers of ten) that improve: new values, own unknowns, cost, damping and residuals;
     None where nothing improves."""
     normal, gradient, blocks = system
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-30))
     free = _free(gradient, np.array([q[n] for n in names]), _limits(names, bounds))
     system = (normal / np.outer(scale, scale))[np.ix_(free, free)]
-    for powers in ((-1, 0, 1), (-2, 2, 3, 4)):
+    for powers in dampings:
         candidates = []
         for strength in (tried := damping * 10.0 ** np.array(powers, float)):
             move = np.zeros(len(names))
@@ -336,7 +337,7 @@ def _finish(
     chi2 = squared / (n - 0.5 * (k + 3 * len(data)))
     left = _unresolved(normal, gradient, _limits(names, bounds), np.array([q[n] for n in names]))
     found = covariance(parts, normal - parts.sum(axis=0), scores, gradient, float(chi2.max()))
-    found = SEARCH**2 * found + np.outer(left, left)
+    found = found + np.outer(left, left)
     return OutputErrorFit(
         dict(q), tuple(names), found, sigma, residual, tuple(data), own, cost, (float(chi2[0]), float(chi2[1])), controller, memory
     )
