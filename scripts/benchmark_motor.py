@@ -20,6 +20,7 @@ import numpy as np
 
 from hand_model.errors import MissingDependencyError
 from hand_model.identify.motor import identify_motor
+from hand_model.identify.motor.moves import moves_from_rest
 from hand_model.identify.motor.predict import predict, reference
 from hand_model.identify.motor.recording import MotorTrial, actuator_trials, motor_trial
 from hand_model.session import read_session
@@ -70,10 +71,10 @@ def sequences(sysid, spec, fit, trials: list[MotorTrial], lead: float):
     return sysid.ModelSequences("motor", spec, [t.name for t in trials], starts, controls, sensors)
 
 
-def begin_values(fit) -> dict[str, float]:
+def begin_values(fit, trials: list[MotorTrial]) -> dict[str, float]:
     """Where both searches begin: the plant by regression, gain from how far off its setpoint the drive rests, critical damping."""
     plant = dict(zip(NAMES, map(float, fit.regression.values), strict=False))
-    m = fit.output_error.moves
+    m = [x for t in trials for x in moves_from_rest(t, (fit.sigma_position, fit.sigma_current), fit.scale.speed_full)]
     off, hold = np.array([[np.mean(x.target - x.position[-6:]), np.mean(x.current[-6:])] for x in m]).T
     gain = float(np.median(hold / np.where(np.abs(off) > 1e-3, off, np.nan)[()])) if len(m) else 20.0
     gain = gain if np.isfinite(gain) and gain > 0.5 else 20.0
@@ -85,7 +86,7 @@ def run_sysid(sysid, fit, trials: list[MotorTrial]) -> tuple[dict[str, float], f
     import mujoco
 
     spec = mujoco.MjSpec.from_string(MODEL)
-    start = begin_values(fit)
+    start = begin_values(fit, trials)
     bounds = {n: (-5.0, 5.0) if n == "preload" else (0.1, 5.0) for n in NAMES}  # in units of the start
     current = dict(start)
 
@@ -152,7 +153,7 @@ def main() -> None:
     same = {n: fit.values[n] for n in NAMES}
     result = {
         "trials": [t.name for t in training], "held_out": [t.name for t in held], "noise_raw": fit.sigma_current,
-        "start": begin_values(fit),
+        "start": begin_values(fit, training),
         "hand_model": {
             "cpu_s": ours, "held_out_current_rmse": float(np.sqrt(np.nanmean(error**2))),
             "held_out_current_rmse_in_sysids_model": held_out_current(fit, same, held), "parameters": same,
