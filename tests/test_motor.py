@@ -230,6 +230,11 @@ def _log(**columns: np.ndarray) -> Log:
     return Log(t, {**base, **columns}, Path("x.csv"))
 
 
+def _clipped(noise: float) -> np.ndarray:
+    """A drive's current that clips at 30 raw, the noise of a converter added after it."""
+    return np.clip(_log().columns["current"], -30, 30) + np.random.default_rng(3).normal(0, noise, 600)
+
+
 def _check(log: Log) -> None:
     scale = trial_scale([("log/x.csv", log)])
     check_trials([motor_trial("log/x.csv", log, scale)])
@@ -246,6 +251,7 @@ def test_good_log_passes() -> None:
         ({"position": np.full(600, 12000.0)}, "does not move"),
         ({"position": np.linspace(12000, 18000, 600)}, "no extension"),
         ({"current": np.clip(60 * np.sin(np.arange(600) * 0.018), -40, 40)}, "saturated"),
+        ({"current": _clipped(0.4)}, "saturated near"),
         ({"current": 20 + 29 * (1 - np.cos(np.arange(600) * 0.018))}, "command"),
         ({"current": 20 + 29 * (1 - np.cos(np.arange(600) * 0.018 + 0.05))}, "command"),  # a reference that the position follows
         ({"current": np.random.default_rng(2).normal(0, 5, 600)}, "no higher in flexion"),

@@ -185,6 +185,7 @@ def _costs(
     return costs, best, [e[:, best] for e in residual]
 
 
+@np.errstate(over="ignore", invalid="ignore")  # values that a search tries may let a drive run away
 def fit(
     data: Sequence[MoveData],
     start_values: Mapping[str, float],

@@ -14,6 +14,7 @@ from ...session import Log, Session, Trial
 Array = NDArray[np.float64]
 
 KINDS = ("excitation", "flexion")
+QUIET = 0.25  # of the noise elsewhere, below which a current at the top of its range is clipped
 
 
 @dataclass(frozen=True)
@@ -163,6 +164,30 @@ def _check_current(t: MotorTrial) -> None:
     command = _follows_command(t)
     if command:
         raise IdentificationError(f'{t.name}: column "current" {command}; it is a command, not a measurement, and is not fitted')
+    for side in (1, -1):
+        share, ceiling = _quiet_ceiling(side * u[moving])
+        if share > 0.05:
+            raise IdentificationError(
+                f'{t.name}: column "current" is saturated near {side * ceiling:.3g} in {100 * share:.0f} % of the samples in motion, where it hardly varies; '
+                "friction cannot be read from a clipped current"
+            )
+
+
+def _quiet_ceiling(u: Array) -> tuple[float, float]:
+    """Share of samples (n,) that lie at the top of their range with hardly any of the others' noise, and that top; 0 where none do.
+
+    A reading that clips loses its noise at the ceiling, whatever is added after it; noise within a band as wide as its own deviation keeps about half of it.
+    """
+    if len(u) < 50:
+        return 0.0, 0.0
+    ceiling, step = float(np.quantile(u, 0.99)), np.abs(np.diff(u))
+    noise = 1.05 * float(np.median(step))  # deviation of a Gaussian, of whose differences this is the median
+    near = np.abs(u - ceiling) < noise
+    pairs, free = near[1:] & near[:-1], ~near[1:] & ~near[:-1]
+    if pairs.sum() < 10 or free.sum() < 10 or ceiling < 0.5 * float(np.abs(u).max()):
+        return 0.0, ceiling
+    quiet = np.median(step[pairs]) < QUIET * np.median(step[free])
+    return (float(pairs.mean()) if quiet else 0.0), ceiling
 
 
 def _follows_command(t: MotorTrial) -> str | None:
