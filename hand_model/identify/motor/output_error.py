@@ -22,10 +22,11 @@ Array = NDArray[np.float64]
 
 COARSE_S = 5e-3
 # steps [s], rounds, fall of the misfit that is worth another round, width [%] over which a deadband sets in: what sets in softly has no kinks
-COARSE, FINE = (COARSE_S, 4, 5.0, 0.5), (STEP_S, 8, 0.5, 0.05)
+COARSE, FINE = (COARSE_S, 4, 5.0, 0.5), (STEP_S, 6, 1.0, 0.05)
 ALIGN = (COARSE, (STEP_S, 4, 0.5, 0.05))  # where only the moves' own unknowns are sought
 NEARLY = (STEP_S, 3, 5.0, 0.05)  # a fit that will be refined
 STAGES, ROUGH = (COARSE, FINE), (COARSE, NEARLY)
+RETRY = 10.0  # times what is worth another round: the fall of the misfit for which a failed step is tried with other dampings
 DAMPINGS = ((-1, 0, 1), (-2, 2, 3, 4))  # of one step, powers of ten of the last one; the second four where the first three fail on a fresh Jacobian
 ABSOLUTE_REACH = {"preload": 20.0, "viscous": 0.1, "stiffness": 0.2, "coulomb": 10.0, "bristle": 0.01, "damping": 2.0, "rise": 0.02, "fall": 0.02, "deadband": 0.2, "delay": 0.002, "lead": 0.002, "lag": 0.002}
 REACH_S = 1.5 * TICK_S  # what the instant of a jump is known to, half a step at its end and one at its begin: a current that jumps within it says little
@@ -220,11 +221,11 @@ def fit(
                     break
                 fresh = True
                 continue
-            moved = _step(data, q, names, own, linear[3], bounds, system, cost, damping, controller, step_s, memory, DAMPINGS if fresh else DAMPINGS[:1])
+            moved = _step(data, q, names, own, linear[3], bounds, system, cost, damping, controller, step_s, memory, DAMPINGS if fresh and expected > RETRY * enough else DAMPINGS[:1])
             if moved is None:
                 if not fresh:
                     fresh = True
-                elif share != 1.0 or step_s == COARSE_S:
+                elif share != 1.0 or step_s == COARSE_S or expected < RETRY * enough:
                     break
                 else:  # caught at a kink: differences over another width see past it
                     share, damping = 0.3, 1e-1
