@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ..effects import catalogue
+from .distinguishability import protocol_pairs
 from .findings import Finding, Findings
 from .interval import variance_ratio
 from .name import ALPHA, Named
@@ -90,8 +92,9 @@ def _protocol(stations: list[Station]) -> dict[str, Any]:
     states = drives[0].naming.balance.states
     speeds = {v for s in states if "speed" in s.extra for v in np.unique(s.extra["speed"]).tolist()}
     step = float(np.median(np.concatenate([np.diff(s.time_s) for s in states])))
-    return {"repeats": len(states), "rate_hz": round(1 / step, 1), "speeds": len(speeds), "isolable": [],
-            "not_isolable": [["asymmetric_friction", "spring_preload"]]}
+    told, alike = protocol_pairs(drives[0].naming.balance, catalogue("drive"))
+    return {"repeats": len(states), "rate_hz": round(1 / step, 1), "speeds": len(speeds), "isolable": told,
+            "not_isolable": [["asymmetric_friction", "spring_preload"], *alike]}
 
 
 EXPERIMENTS = {

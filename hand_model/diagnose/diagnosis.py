@@ -26,6 +26,7 @@ from .gravity import with_gravity
 from .improve import read_model, write_improved
 from .name import polish, scan
 from .page import write_page
+from .preload import preload_findings
 from .prove import Replay
 from .stamps import Stamps, stamps
 from .station import Station, judged
@@ -69,6 +70,10 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
         typical = typical_coefficients([fit for a, fit in alone.items() if a != actuator])
         stations.append(judged("current", _finger_of(session, actuator), actuator, None, states, effects, typical))
         tell(stations[-1].line())
+    odd = preload_findings(stations)
+    for _, finding in odd:
+        tell(finding.statement)
+    found += odd
     clipped = {s.actuator for s in stations if s.believed for f in s.kept if f.term.effect.clips}
     # a reading that clips says little of the load, on which a sag is judged
     found = [i for i in found if i[1].effect != "drive_sag" or i[1].where["actuator"] not in clipped]

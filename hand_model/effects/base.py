@@ -187,7 +187,7 @@ class Effect:
     def statement(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """The place and the effect's sentence; the name and the figures there are, where one that it needs is missing or not finite."""
         known = {key: float(v) for key, v in parameters.items() if isinstance(v, Real) and math.isfinite(v)}
-        of_motor = self.station in ("drive", "command")
+        of_motor = self.station in ("drive", "command", "motors")
         place = (of_motor and where.get("actuator")) or where.get("finger") or where.get("actuator")
         try:
             return f"{place}: {self.sentence(where, known)}."

@@ -1,0 +1,108 @@
+"""Distinguishability: which effects these recordings can tell apart, from the recordings alone.
+
+Of each effect what it would add is taken at every starting shape, beside what the declared columns explain. What of it the
+likeliest shape of another effect cannot mimic is the part of a log likelihood ratio that an effect of a given size leaves (the
+expected discrimination of Box & Hill 1967, for rivals that are linear in their amplitudes).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .balance import Balance, Fit, Term
+from .name import ALONG, CLASS_WIDTH
+
+Array = NDArray[np.float64]
+
+SIZE = 0.5  # of the noise: root mean square of what the planted effect adds beyond what declared coefficients could
+MOST_ROWS, MOST_SHAPES = 2500, 24  # of the balance, and of an effect's grid, that are looked at
+
+
+def distinguishability(balance: Balance, effects: Iterable[Any]) -> dict[tuple[str, str], float]:
+    """Pair of effects -> expected log likelihood ratio between them, the lower of the two ways round, where one of them adds SIZE.
+
+    Effects that belong to one recording (events) and those that nothing here shows beside the declared columns are left out.
+    """
+    basis, _, weight = balance.apart(())
+    rows = np.flatnonzero(weight > 0)
+    rows = rows[:: max(1, len(rows) // MOST_ROWS)]
+    fit = balance.fit()
+    spans = {}
+    for effect in effects:
+        if any(s.name == "trial" for s in effect.shapes(balance.states)):
+            continue
+        shapes = effect.grid(balance.states)
+        shapes = shapes[:: max(1, len(shapes) // MOST_SHAPES)]
+        parts = [_span(balance, effect, shape, fit, basis, weight)[rows] for shape in shapes]
+        parts = [np.linalg.qr(p)[0] for p in parts if p.shape[1]]
+        if parts:
+            spans[effect.name] = parts
+    count = balance.train.sum() * SIZE**2 / (2 * balance.inflation)
+    products = _products(spans)
+    return {(a, b): float(count * min(1 - _mimicked(products[a, b]), 1 - _mimicked(_turned(products[a, b]))))
+            for a, b in combinations(spans, 2)}
+
+
+def protocol_pairs(balance: Balance, effects: Sequence[Any]) -> tuple[list[list[Any]], list[list[str]]]:
+    """Of the findings' protocol: each effect with the nearest of those that can be told from it (two names and the log likelihood
+    ratio), and the pairs that cannot be told apart."""
+    pairs = distinguishability(balance, effects)
+    told: dict[str, list[Any]] = {}
+    for (a, b), value in sorted(pairs.items(), key=lambda item: item[1]):
+        if value >= CLASS_WIDTH:
+            for name in (a, b):
+                told.setdefault(name, [a, b, round(value, 1)])
+    nearest = sorted({tuple(entry) for entry in told.values()}, key=lambda entry: entry[2])
+    return [list(entry) for entry in nearest], [[a, b] for (a, b), value in pairs.items() if value < CLASS_WIDTH]
+
+
+def _span(balance: Balance, effect: Any, shape: dict[str, float], fit: Fit, basis: Array, weight: Array) -> Array:
+    """What an effect may add (n, j), weighted, whitened and beside the declared columns; no columns where that is nothing."""
+    added = _added(balance, Term(effect, shape), fit) * weight[:, None]
+    added = balance.whiten(added, weight)
+    length = np.linalg.norm(added, axis=0)
+    left = added - basis @ (basis.T @ added)
+    return left[:, np.linalg.norm(left, axis=0) > np.maximum(ALONG, 1e-3) * length]
+
+
+def _added(balance: Balance, term: Term, fit: Fit) -> Array:
+    """Columns (n, j) of an effect; of one that changes the declared columns, shifts or clips, the change of the declared prediction."""
+    effect, shape = term.effect, term.shape
+    if effect.clips:
+        return (effect.clip(fit.prediction, shape) - fit.prediction)[:, None]
+    if effect.replaces is None and not effect.warps:
+        return balance.columns(effect, shape)
+    values = np.array(list(fit.declared.values()))
+
+    def changed(state: Any) -> Array:
+        columns = effect.declared(replace(state), shape) if effect.replaces is not None else state.declared
+        columns = effect.warp(state, columns, shape) if effect.warps else columns
+        return ((columns - state.declared) @ values)[:, None]
+
+    return np.concatenate([balance.gather(changed), balance.columns(effect, shape)], axis=1)
+
+
+def _products(spans: dict[str, list[Array]]) -> dict[tuple[str, str], list[list[Array]]]:
+    """Products of the orthonormal bases of every shape of one effect with those of every shape of another."""
+    stacked = {name: np.concatenate(parts, axis=1) for name, parts in spans.items()}
+    edges = {name: np.cumsum([p.shape[1] for p in parts])[:-1] for name, parts in spans.items()}
+    out = {}
+    for a, b in combinations(spans, 2):
+        gram = stacked[a].T @ stacked[b]
+        out[a, b] = [np.split(row, edges[b], axis=1) for row in np.split(gram, edges[a], axis=0)]
+    return out
+
+
+def _turned(products: list[list[Array]]) -> list[list[Array]]:
+    return [[block.T for block in column] for column in zip(*products, strict=True)]
+
+
+def _mimicked(products: list[list[Array]]) -> float:
+    """Share of an effect's variance, at the median of its shapes, that the other's best shape reproduces."""
+    return float(np.median([max(float(np.mean(np.sum(block**2, axis=1))) for block in row) for row in products]))

@@ -1,0 +1,72 @@
+"""Preload: a drive whose declared preload is unlike those of the hand's other drives has lopsided friction, or another preload.
+
+From current alone the two are the same (the declared model takes up either), so the name is a class, and only what other drives
+of the same hand are like speaks for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..effects import effect
+from .findings import Finding
+from .station import Station
+
+SPREAD = 0.2  # mean absolute deviation of the logarithm of a drive's preload within one hand
+ODD_P = 0.03  # of two drives that differ as much by chance; beyond, one of them is odd
+LOST = 0.2  # of the other's preload: less, or the wrong sign, and there is none
+CLASS = ("asymmetric_friction", "spring_preload")
+
+
+def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]:
+    """Drives of which nothing else is missing and whose preload the others' do not let expect, with what that adds over the noise.
+
+    The other drives' median is the reference, of those of which nothing is missing either.
+    """
+    sound = [s for s in stations if s.signal == "current" and not s.missing and "preload" in s.naming.fit.declared]
+    preload = {id(s): float(s.naming.fit.declared["preload"]) for s in sound}
+    out = []
+    for station in sound:
+        others = [preload[id(s)] for s in sound if s is not station]
+        usual = float(np.median(others)) if others else 0.0
+        # Of two that differ the larger is odd, unless one has lost its preload altogether: springs do not push.
+        if usual <= 0 or (len(others) == 1 and usual < LOST * preload[id(station)]):
+            continue
+        own, error = preload[id(station)], _standard_error(station)
+        p = max(_by_chance(own, error, other) for other in others)  # unlike every other
+        if p < ODD_P and (len(others) > 1 or own > usual or own < LOST * usual):
+            out.append(_finding(station, own - usual, error, usual, p))
+    return out
+
+
+def _by_chance(own: float, error: float, usual: float) -> float:
+    """Probability of two healthy preloads so far apart (logarithms by Laplace), at the nearer end of the standard error."""
+    if usual <= 0:
+        return 0.0
+    nearer = own + np.sign(usual - own) * min(2 * error, abs(usual - own))
+    x = abs(np.log(max(nearer, 1e-3 * usual) / usual))
+    return float((1 + x / (2 * SPREAD)) * np.exp(-x / SPREAD))
+
+
+def _standard_error(station: Station) -> float:
+    """Of the preload [raw], from the declared balance."""
+    balance = station.naming.balance
+    matrix = balance.design(())[0] * (balance.weight * balance.train)[:, None]
+    at = balance.names.index("preload")
+    return float(np.sqrt(np.linalg.pinv(matrix.T @ matrix)[at, at] * balance.inflation))
+
+
+def _finding(station: Station, half_difference: float, error: float, usual: float, p: float) -> tuple[float, Finding]:
+    doubt = 2 * float(np.hypot(error, SPREAD * np.sqrt(2) * usual))
+    unit = station.naming.balance.states[0].effort_unit
+    parameters = {"half_difference": {"value": half_difference, "unit": unit, "ci95": [half_difference - doubt, half_difference + doubt]}}
+    where: dict[str, Any] = {"finger": station.finger, "joint": None, "actuator": station.actuator, "signal": "current", "marker": None,
+                             "trials": [s.trial for s in station.naming.balance.states], "region": None, "share_of_mismatch": 1.0}
+    text = effect(CLASS[0]).statement(where, {"half_difference": half_difference})
+    fit = {"metric": "current_rmse", "unit": unit, "before": None, "after": None, "noise_floor": station.naming.balance.sigma,
+           "ci95_reduction": None, "held_out": [], "engine": "comparison of the hand's motors"}
+    model = {"native": True, "mjcf": f"joint[@name='{station.actuator}']/@springref", "urdf": "kept in hand.json"}
+    return abs(half_difference) / station.naming.balance.sigma, Finding(CLASS[0], CLASS, 1 - p, (), where, text, parameters, fit, model)

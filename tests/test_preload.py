@@ -1,0 +1,38 @@
+"""Preload: what only a comparison of a hand's motors tells."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from test_diagnose import drive
+
+from hand_model.diagnose.preload import preload_findings
+from hand_model.diagnose.station import judged
+from hand_model.effects import effect
+
+
+def hand(*half_difference: float):
+    """Stations of as many motors as given, each with that much more current flexing than extending [raw]."""
+    return [judged("current", f"finger_{i}", f"motor_{i}", None, drive(11 + i, lambda s, half=half: np.full(len(s.time_s), half)), [effect("torque_ripple")])
+            for i, half in enumerate(half_difference)]
+
+
+def test_motors_alike_are_not_accused() -> None:
+    assert not preload_findings(hand(0.0, 2.0))
+    assert not preload_findings(hand(0.0))
+
+
+@pytest.mark.parametrize("half", [25.0, -12.0])
+def test_the_lopsided_one_is_named_in_a_class_with_another_preload(half: float) -> None:
+    found = preload_findings(hand(0.0, half, 0.5))
+    assert [f.where["finger"] for _, f in found] == ["finger_1"]
+    finding = found[0][1]
+    assert finding.effect == "asymmetric_friction" and "spring_preload" in finding.members
+    low, high = finding.parameters["half_difference"]["ci95"]
+    assert low < half < high
+    assert "the same" in finding.statement
+
+
+def test_of_two_that_differ_the_heavier_is_odd_unless_one_has_lost_its_preload() -> None:
+    assert [f.where["finger"] for _, f in preload_findings(hand(25.0, 0.0))] == ["finger_0"]
+    assert [f.where["finger"] for _, f in preload_findings(hand(-12.0, 0.0))] == ["finger_0"]
