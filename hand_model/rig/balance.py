@@ -21,6 +21,7 @@ from .states import choose_cutoff, differentiate, fill_gaps, low_pass, uniform_t
 Array = NDArray[np.float64]
 MAX_RATE_HZ = 250.0  # faster recordings are thinned to this: joints move below 50 Hz
 STATE_CUTOFF = 3.0  # of the states, in cut-offs of the balance
+MOST_ENDS = 0.05  # of a recording are left out at most at each end
 MAX_SAMPLES = 4000  # per trial: residuals are correlated over far longer than this spacing
 
 
@@ -48,7 +49,7 @@ class Rows:
     """The balance of one independent joint in one trial.
 
     Full-rate grid (n,): time_s, states, extra channels (never filtered: an effect reads them as they are), full_columns
-    (n, P), carried (P,) bool and load_known (n,): of what the joint carries besides its own drive and friction. Filtered and thinned (m,): effort, columns (m, P), moving (bool).
+    (n, P), carried (P,) bool and load_known (n,): of what the joint carries besides its own drive and friction. Filtered and thinned (m,): effort, columns (m, P), moving (bool): what the fit uses, neither at rest nor at the ends.
     effort: recorded, less what the trial's own bodies add to the declared ones. states: position, velocity, acceleration (n, joints) of the whole rig; rest_speeds (joints,); jacobian: joint -> (n,),
     what hangs on this joint by couplings, itself included; declared: the columns' names.
     """
@@ -133,9 +134,10 @@ def _back_emf(model: Any, name: str) -> float:
 
 
 def trial_rows(
-    rig: RigModel, trial: RigTrial, columns: tuple[Column, ...], cutoff_hz: float | None = None
+    rig: RigModel, trial: RigTrial, columns: tuple[Column, ...], cutoff_hz: float | None = None, ends: bool = False
 ) -> tuple[Rows, ...]:
-    """The balance of every independent joint whose effort is known (or whose drive is absent or open) in one trial."""
+    """The balance of every independent joint whose effort is known (or whose drive is absent or open) in one trial; ends:
+    count the samples at its ends as well, where the filter knows one side only."""
     missing = [j for j in rig.joints if j not in trial.position]
     if missing:
         return ()
@@ -168,6 +170,8 @@ def trial_rows(
     own = _own_bodies(rig, trial, model, q, v, a)
     step = max(1, int(np.ceil(len(grid) / MAX_SAMPLES)), int(rate / (6 * cutoff)))
     external = np.array([c.kind in ("inertial", "spring", "stiffness") for c in columns])
+    away = np.minimum(grid - grid[0], grid[-1] - grid)
+    settled = away >= (0.0 if ends else min(1.0 / cutoff, MOST_ENDS * (grid[-1] - grid[0])))
     rows = []
     for joint in rig.independent:
         jacobian = _jacobian(rig, joint, q)
@@ -179,7 +183,7 @@ def trial_rows(
         rows.append(
             Rows(trial.name, joint, trial.validate, grid, q[:, i], v[:, i], a[:, i],
                  low_pass(y, rate, cutoff)[::step], low_pass(x, rate, cutoff)[::step],
-                 (np.abs(v[:, i]) > rest[i])[::step], float(rest[i]), cutoff, rate,
+                 (settled & (np.abs(v[:, i]) > rest[i]))[::step], float(rest[i]), cutoff, rate,
                  {"effort": y, **channels}, x, external, y - effort[joint], step, (q, v, a), rest, jacobian, columns)
         )  # fmt: skip
     return tuple(rows)

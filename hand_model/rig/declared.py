@@ -109,7 +109,8 @@ def _choose_cutoff(rig: RigModel, columns: tuple[Column, ...], refused: set[tupl
     the residual than to the effort: there is nothing of the motion in it; None where none can be tried."""
     sample, most, shares, last = _sample(rig), 0.0, {}, None
     for cutoff in CUTOFFS:
-        rows = [r for t in sample for r in trial_rows(rig, t, columns, cutoff) if (r.trial, r.joint) not in refused]
+        # What a low cut-off spoils at the ends counts against it.
+        rows = [r for t in sample for r in trial_rows(rig, t, columns, cutoff, ends=True) if (r.trial, r.joint) not in refused]
         if not rows or cutoff > 0.3 * min(r.rate_hz for r in rows):
             continue
         seen = float(np.mean([r.moving.mean() for r in rows]))
