@@ -123,7 +123,8 @@ def _linearise(
     """Whitened residuals (2n,) at steps of step_s [s], shared (2n, k) and own (2n, 4) Jacobian of every move; weights (n, 2).
 
     The Jacobian of a profile generator is that of the coarse simulation: a derivative that is off by a few percent changes the way to
-    the optimum, not where the residuals have no part of it left. A deadband needs the fine one.
+    the optimum, not where the residuals have no part of it left. Where a deadband sets in needs the fine one: with the coarse, cascades end far enough
+    from the optimum to miss their intervals.
     """
     k = len(names)
     width = k + 1 + len(OWN_STEP)
