@@ -198,7 +198,9 @@ def _prove(bench: Bench, fit: DeclaredFit, stories: Sequence[tuple[Step, Term]],
         many = settled(bench, fit, [*kept, term])
         proof = bench.proof(term.candidate.joint, (fit, *few), (fit, *many))
         reason = None
-        if not _holds(proof, pose(fit, term.candidate.joint)):
+        if proof["before"] <= proof["noise_floor"]:
+            reason = "without it the error is within the sensors' noise already"
+        elif not _holds(proof, pose(fit, term.candidate.joint)):
             reason = "error on validation trials does not fall"
         elif bench.mujoco and not _moves_better(bench, (fit, *few), (fit, *many)):
             reason = "the motion of the training trials, simulated from the commands, gets no better"
