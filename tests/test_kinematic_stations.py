@@ -139,3 +139,26 @@ def test_exchanged_labels_of_a_symmetrical_cluster_are_put_right() -> None:
     untouched, none = repair_labels(ChainData(truth, np.array([0, 0, 0, 1, 1, 1]), tuple("abcdef")))
     assert none == ()
     np.testing.assert_array_equal(untouched.position_world, truth)
+
+
+def test_the_current_of_whiles_in_which_the_finger_has_left_its_drive_is_not_judged() -> None:
+    from types import SimpleNamespace
+
+    from hand_model.diagnose.decoupled import without_excursions
+    from hand_model.effects.base import DriveState
+
+    t = np.arange(0, 40, 0.01)
+    x = 50 - 50 * np.cos(2 * np.pi * 0.15 * t * (1 + 0.01 * t))
+
+    def state(time_s: np.ndarray, **extra) -> DriveState:
+        one = np.ones((len(time_s), 1))
+        return DriveState("trial", "index", time_s, np.interp(time_s, t, x), one[:, 0], one[:, 0], one[:, 0], one, extra=extra)
+
+    late_s, lifted = 3.0, (t > 20.0) & (t < 20.5)
+    angle = np.deg2rad(0.8 * x)[:, None]
+    angles = SimpleNamespace(records=[SimpleNamespace(trial=SimpleNamespace(name="trial"), mocap=SimpleNamespace(time_s=t + late_s), angle_rad=angle)])
+    ahead = DriveState(**{**vars(state(t)), "time_s": t + late_s, "extra": {"ahead": lifted.astype(float)}})
+    judged, = without_excursions((state(t),), (ahead,), angles)
+    free = np.isnan(judged.effort)
+    assert free[lifted].all() and not free[(t < 19.5) | (t > 21.0)].any()
+    assert np.isfinite(without_excursions((state(t),), (state(t),), angles)[0].effort).all()

@@ -43,7 +43,7 @@ class SpringDecoupling(Effect):
     def region(self, states: tuple[DriveState, ...], shape: Mapping[str, float]) -> dict[str, Any] | None:
         """The whiles [s] by trial, or from the open end to where it follows again."""
         if shape["form"] == 0.0:
-            return {"time": {s.trial: _spans(s) for s in states if _spans(s)}, "unit": "s"}
+            return {"time": {s.trial: spans(s) for s in states if spans(s)}, "unit": "s"}
         low, _ = position_range(states)
         return {"position": [low, shape["below"]], "unit": states[0].position_unit}
 
@@ -61,7 +61,7 @@ class SpringDecoupling(Effect):
         return f"the finger leaves its actuator and runs ahead of it, {longest}from {begin:.1f} to {end:.1f} s of {trial}"
 
 
-def _spans(state: DriveState) -> list[list[float]]:
+def spans(state: DriveState) -> list[list[float]]:
     """[begin, end] [s of the trial] of every while in which the finger is ahead."""
     here = state.extra.get("ahead", np.zeros(len(state.time_s))) > 0
     edges = np.flatnonzero(np.diff(np.r_[False, here, False].astype(int)))

@@ -1,0 +1,37 @@
+"""Whiles in which a finger has left its drive: what the motor's current shows then is no property of the drive."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..effects.base import DriveState
+from ..effects.spring_decoupling import spans
+from ..identify.clock import align
+from .angles import FingerAngles
+
+BESIDE = 0.4  # of an excursion's length, on either side: it is seen from where it stands out
+
+
+def without_excursions(states: Sequence[DriveState], ahead: Sequence[DriveState], angles: FingerAngles) -> tuple[DriveState, ...]:
+    """A drive's states without the current of whiles in which the finger was ahead of it: it carried no spring then.
+
+    ahead: states of the encoder's balance, with excursions. angles: of the finger; by them the clocks are aligned.
+    """
+    found = {s.trial: s for s in ahead if np.any(s.extra.get("ahead", np.zeros(1)) > 0)}
+    records = {r.trial.name: r for r in angles.records}
+    out = []
+    for state in states:
+        if state.trial in found and state.trial in records:
+            record, flexed = records[state.trial], records[state.trial].angle_rad[:, 0]
+            good = np.isfinite(flexed)
+            clock = align(record.mocap.time_s[good], flexed[good], state.time_s, state.position, state.trial)
+            free = np.zeros(len(state.time_s), bool)
+            for begin, end in spans(found[state.trial]):
+                a, b = clock.log_time(np.array([begin, end]))
+                free |= np.abs(state.time_s - 0.5 * (a + b)) <= (0.5 + BESIDE) * (b - a)
+            state = replace(state, effort=np.where(free, np.nan, state.effort))
+        out.append(state)
+    return tuple(out)
