@@ -19,9 +19,10 @@ import numpy as np
 
 from hand_model.rig import diagnose_rig, load_rig, replay_rig
 from hand_model.rig.declared import fit_declared
-from hand_model.rig.swing import INDEX, Task, fit_together, typical, vector
+from hand_model.rig.swing import INDEX, vector
 from hand_model.rig.swing_build import build_swing, windows_s
 from hand_model.rig.swing_compete import fit_stages, free_declared
+from hand_model.rig.swing_fit import Task, fit_together, typical
 from hand_model.rig.swing_patch import write_swing
 from hand_model.session import read_session
 

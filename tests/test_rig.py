@@ -19,7 +19,8 @@ from hand_model.rig.mjcf import read_effects, write_effects
 from hand_model.rig.physical import physical
 from hand_model.rig.solve import solve_bounded
 from hand_model.rig.states import local_states
-from hand_model.rig.swing import Lane, Swing, Task, errors, fit_together, simulate, vector
+from hand_model.rig.swing import Lane, Swing, errors, simulate, vector
+from hand_model.rig.swing_fit import Task, fit_together
 from hand_model.session import read_session
 
 REAL = Path(__file__).resolve().parents[2] / "shared" / "real"

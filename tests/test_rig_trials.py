@@ -21,9 +21,10 @@ from hand_model.rig.overrides import apply_overrides, compile_model
 from hand_model.rig.proof import Bench
 from hand_model.rig.replay import can_simulate
 from hand_model.rig.supply import supply_channel, supply_deviation
-from hand_model.rig.swing import INDEX, Task, fit_together, simulate, vector
+from hand_model.rig.swing import INDEX, simulate, vector
 from hand_model.rig.swing_build import build_swing, can_swing
 from hand_model.rig.swing_compete import all_free, compete_swing, fit_stages
+from hand_model.rig.swing_fit import Task, fit_together
 from hand_model.rig.swing_interval import intervals
 from hand_model.rig.swing_patch import write_swing
 from hand_model.session import read_session

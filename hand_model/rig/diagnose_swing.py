@@ -15,9 +15,10 @@ from .findings import Finding
 from .model import RigModel, load_rig
 from .replay import RigResiduals, replay_rig
 from .states import fill_gaps, noise_std
-from .swing import INDEX, PARAMETERS, STEP_S, Fitted, Swing, Task, parameter_units, vector
+from .swing import INDEX, PARAMETERS, STEP_S, Swing, parameter_units, vector
 from .swing_build import build_swing, search_step_s, thinned, windows_s
 from .swing_compete import LEAST_GAIN, Round, Variant, all_free, compete_swing, fit_stages, free_declared
+from .swing_fit import Fitted, Task
 from .swing_interval import intervals
 from .swing_patch import write_swing
 from .words import shares, statement

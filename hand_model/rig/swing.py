@@ -1,16 +1,14 @@
-"""One joint simulated many times at once: trials x parameter sets in the lanes of one vector, and its output-error fit.
+"""One joint simulated many times at once: trials x parameter sets in the lanes of one vector.
 
 Semi-implicit Euler with implicit damping and the friction impulse clipped to what stops the joint within a step
-(as in MuJoCo's and BAM's discrete dry friction). Output error after Ljung (1999, ch. 7): the recorded drive in, the
-simulated position out, nothing filtered.
+(as in MuJoCo's and BAM's discrete dry friction).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -263,152 +261,3 @@ def _drive(swing: Swing, theta: Array, lanes: Array, has: Mapping[str, bool], st
         u = u * (1.0 + share * supply[:, lanes])
     u = u * gain
     return u * (1.0 - sag * np.abs(u)) if has["sag"] else u
-
-
-@dataclass(frozen=True)
-class Task:
-    """One fit among many that run together. free: names; start: all parameters; stretches: which may be fitted."""
-
-    free: tuple[str, ...]
-    start: Array
-    stretches: tuple[int, ...]
-
-
-@dataclass(frozen=True)
-class Fitted:
-    """A task's result: theta (len(PARAMETERS),), its mean squared error on its stretches, evaluations used, parameters free."""
-
-    theta: Array
-    cost: float
-    evaluations: int
-    free: int
-
-
-LOW = {"inertia": 1e-9, "stribeck_speed": 1e-3, "stribeck_exponent": 0.3, "asymmetry": -np.inf, "damping_asymmetry": -np.inf, "offset": -np.inf,
-       "lateral": -np.inf, "stiffness": -np.inf, "supply": 0.0, "delay": 0.0, "load_speed": 0.0}  # fmt: skip
-
-
-def typical(swing: Swing) -> Array:
-    """A natural size of every parameter: the unit in which steps are taken and differences made."""
-    i = swing.initial
-    weight = max(abs(swing.sine), abs(swing.cosine), i.get("coulomb", 0.0), 1e-12)
-    speed = 3.0 * max(np.ptp(lane.position) for lane in swing.lanes)
-    dry = max(i.get("coulomb", 0.0), 1e-4 * weight)
-    wet = max(i.get("damping", 0.0), 0.1 * dry / speed)
-    share = dry / weight
-    size = {"inertia": i["inertia"], "gain": i.get("gain", 1.0), "back_emf": i.get("back_emf", 1.0), "damping": wet,
-            "coulomb": dry, "static_excess": dry, "stribeck_speed": 0.1 * speed, "stribeck_exponent": 0.5, "motor_squared": share / weight,
-            "external_squared": share / weight, "load_speed": wet / weight, "asymmetry": dry, "drag": wet / speed,
-            "damping_asymmetry": wet, "offset": dry, "lateral": dry, "stiffness": dry,
-            "sag": 0.1 / weight, "supply": 0.5, "delay": 0.01}  # fmt: skip
-    size = {k: v or 1.0 for k, v in size.items()} | {
-        k: share for k in PARAMETERS if k.startswith("load_") and k not in size
-    }
-    return vector(size)
-
-
-def fit_together(swing: Swing, tasks: Sequence[Task], iterations: int = 14) -> list[Fitted]:
-    """Levenberg-Marquardt on all tasks at once: every Jacobian column of every task is a lane of one simulation."""
-    unit = typical(swing)
-    low = np.array([LOW.get(name, 0.0) for name in PARAMETERS])
-    theta = [t.start.copy() for t in tasks]
-    damping = np.full(len(tasks), 1e-2)
-    cost = np.full(len(tasks), np.inf)
-    count = np.zeros(len(tasks), int)
-    active = np.ones(len(tasks), bool)
-    jacobians: list = [None] * len(tasks)
-    for _ in range(iterations):
-        todo = [k for k in range(len(tasks)) if active[k]]
-        if not todo:
-            break
-        for k, (r, jac) in zip(todo, _jacobians(swing, [(tasks[k], theta[k]) for k in todo], unit, low), strict=True):
-            cost[k] = float(r @ r)
-            jacobians[k] = (r, jac)
-            count[k] += len(tasks[k].free) + 1
-        trials = {k: [_moved(tasks[k], theta[k], *jacobians[k], damping[k] * f, unit, low) for f in (0.1, 1.0, 10.0, 100.0)]
-                  for k in todo}  # fmt: skip
-        values = _costs(swing, [(tasks[k], t) for k in todo for t in trials[k]])
-        for n, k in enumerate(todo):
-            mine = values[4 * n : 4 * n + 4]
-            count[k] += 4
-            best = int(np.argmin(mine))
-            if mine[best] < cost[k]:
-                active[k] = mine[best] < cost[k] * (1 - 1e-4) or damping[k] < 1e-6
-                theta[k], cost[k] = trials[k][best], mine[best]
-                damping[k] = np.clip(damping[k] * (0.1, 1.0, 10.0, 100.0)[best], 1e-7, 1e7)
-            else:
-                damping[k] *= 300.0
-                active[k] = damping[k] < 1e6
-    size = [sum(swing.lanes[i].used.sum() for i in t.stretches) for t in tasks]
-    return [Fitted(th, c / max(s, 1), int(n), len(t.free)) for t, th, c, s, n in zip(tasks, theta, cost, size, count, strict=True)]
-
-
-def _moved(task: Task, theta: Array, r: Array, jac: Array, damping: float, unit: Array, low: Array) -> Array:
-    """Parameters after a damped step; those that it would push through a bound are held there and the step redone."""
-    free = np.array([INDEX[n] for n in task.free])
-    gram, slope = jac.T @ jac, jac.T @ r
-    gram = gram + damping * np.diag(np.diag(gram) + 1e-9 * np.trace(gram) / len(free) + 1e-12)
-    room = (low[free] - theta[free]) / unit[free]
-    held = np.zeros(len(free), bool)
-    step = np.zeros(len(free))
-    for _ in range(len(free)):
-        step = np.where(held, room, 0.0)
-        loose = ~held
-        right = -slope[loose] - gram[np.ix_(loose, held)] @ step[held]
-        step[loose] = np.linalg.solve(gram[np.ix_(loose, loose)], right) if loose.any() else 0.0
-        beyond = loose & (step < room - 1e-12)
-        if not beyond.any():
-            break
-        held |= beyond
-    out = theta.copy()
-    out[free] = np.maximum(theta[free] + np.clip(step, -5, 5) * unit[free], low[free])
-    out[INDEX["supply"]] = min(out[INDEX["supply"]], 1.0)  # a drive passes on all of its supply at most
-    return out
-
-
-def _difference(name: str) -> float:
-    """Step of a finite difference in units: phase is sensitive to inertia, and stiction makes small steps blind."""
-    return 1e-4 if name == "inertia" else 3e-3
-
-
-def _runs(pairs: Sequence[tuple[Task, Array]]) -> tuple[Array, Array]:
-    theta = np.concatenate([np.repeat(t[None], len(task.stretches), 0) for task, t in pairs])
-    return theta, np.concatenate([np.array(task.stretches) for task, _ in pairs])
-
-
-def _costs(swing: Swing, pairs: Sequence[tuple[Task, Array]]) -> Array:
-    theta, lanes = _runs(pairs)
-    square = np.sum(errors(swing, theta, lanes) ** 2, 0)
-    edges = np.cumsum([0] + [len(task.stretches) for task, _ in pairs])
-    return np.array([square[a:b].sum() for a, b in pairwise(edges)])
-
-
-def jacobian(swing: Swing, task: Task, theta: Array) -> tuple[Array, Array]:
-    """Residuals (n,) of a task at theta, stretch after stretch, and their slopes (n, free) in units of `typical`."""
-    low = np.array([LOW.get(name, 0.0) for name in PARAMETERS])
-    return _jacobians(swing, [(task, theta)], typical(swing), low)[0]
-
-
-def _jacobians(swing: Swing, pairs: Sequence[tuple[Task, Array]], unit: Array, low: Array) -> list[tuple[Array, Array]]:
-    """Residuals (n,) and Jacobian (n, free) in units of `unit`, forward differences."""
-    varied = []
-    for task, theta in pairs:
-        varied.append((task, theta))
-        for name in task.free:
-            i = INDEX[name]
-            moved = theta.copy()
-            moved[i] += _difference(name) * unit[i]
-            varied.append((task, moved))
-    theta, lanes = _runs(varied)
-    residual = errors(swing, theta, lanes)
-    out, at = [], 0
-    for task, _ in pairs:
-        n = len(task.stretches)
-        r = residual[::3, at : at + n].T.ravel() * np.sqrt(3.0)
-        columns = []
-        for j, name in enumerate(task.free):
-            b = at + n * (j + 1)
-            columns.append((residual[::3, b : b + n].T.ravel() * np.sqrt(3.0) - r) / _difference(name))
-        out.append((r, np.stack(columns, 1)))
-        at += n * (len(task.free) + 1)
-    return out

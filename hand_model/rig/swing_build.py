@@ -53,7 +53,7 @@ def thinned(swing: Swing) -> Swing:
             lanes.append(lane)
         seen[lane.trial] += 1
     few = len(lanes) - sum(lane.validate for lane in lanes) < LEAST_STRETCHES
-    return swing if few else replace(swing, lanes=tuple(lanes))
+    return swing if few or every == 1 else replace(swing, lanes=tuple(lanes))
 
 
 def can_swing(rig: RigModel) -> bool:

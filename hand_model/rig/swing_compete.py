@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 
 from ..background import Background
 from .evidence import ONE_STANDARD_ERROR, weigh
-from .swing import DECLARED, INDEX, LOW_SPEED, Fitted, Swing, Task, errors, fit_together, vector
+from .swing import DECLARED, INDEX, LOW_SPEED, Swing, errors, vector
+from .swing_fit import Fitted, Task, fit_together
 
 Array = NDArray[np.float64]
 FOLDS, SHORTLIST, ALIKE = 4, 6, 3
 LEAST_GAIN, MOST_TERMS = 0.025, 5
 BETTER = 1.01  # an exchange of variants has to pay
-FEW_RUNS = 1500
+FEW_RUNS = 500
 PARTS = 4  # a recording's error is resampled in so many parts
 
 

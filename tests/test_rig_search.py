@@ -1,0 +1,83 @@
+"""What a rig's search may rest on: noise that is no mismatch, friction that turns round over a distance, long recordings."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hand_model.effects.path import jenkins
+from hand_model.rig import diagnose_rig, load_rig
+from hand_model.rig.diagnose import trusted_fit
+from hand_model.rig.swing import Lane, Swing
+from hand_model.rig.swing_build import ENOUGH_STEPS, thinned
+from hand_model.session import read_session
+
+ARM = """<mujoco><compiler angle="radian"/><option timestep="0.001" integrator="implicitfast" gravity="0 0 -9.81"/>
+<worldbody><body name="arm"><joint name="hinge" axis="0 -1 0" damping="0.02" frictionloss="0.05"/>
+<inertial pos="0 0 -0.2" mass="0.5" diaginertia="0.002 0.002 0.0002"/></body></worldbody>
+<actuator><motor name="motor" joint="hinge"/></actuator></mujoco>
+"""
+HEAD = """format = "hand-session/1"
+[hand]
+name = "bench"
+[rig]
+model = "rig.xml"
+[signals]
+position = "joint:hinge:position"
+torque = "actuator:motor:force"
+"""
+
+
+def bench(folder: Path, by_load: float, noise: float) -> Path:
+    """Six recordings of two sines each, the last two held out; by_load: friction per load, which turns round over 0.1 rad;
+    noise [N m] of the torque."""
+    random, text = np.random.default_rng(4), HEAD
+    (folder / "log").mkdir(parents=True)
+    (folder / "rig.xml").write_text(ARM)
+    t = np.arange(0, 12, 0.004)
+    for k in range(6):
+        rate, size = 2 * np.pi * random.uniform([0.2, 0.6], [0.45, 1.2]), random.uniform([0.5, 0.15], [0.9, 0.3])
+        phase = np.outer(rate, t) + random.uniform(0, 6, 2)[:, None]
+        q, v, a = size @ np.sin(phase), (size * rate) @ np.cos(phase), -(size * rate**2) @ np.sin(phase)
+        load = (0.6 * 0.04 + 0.002) * a + 0.6 * 0.2 * 9.81 * np.sin(q)
+        torque = load + 0.03 * v + 0.08 * np.sign(v) + by_load * np.abs(load) * jenkins(q, 0.1)
+        table = np.stack([t, np.round(q / 4e-4) * 4e-4, torque + noise * random.standard_normal(len(t))], 1)
+        np.savetxt(folder / f"log/{k}.csv", table, delimiter=",", header="time,position,torque", comments="", fmt="%.8g")
+        text += f'[[trial]]\nkind = "motion"\nlog = "log/{k}.csv"\n' + ('purpose = "validate"\n' if k > 3 else "")
+    (folder / "session.toml").write_text(text)
+    return folder
+
+
+def test_friction_by_load_that_turns_round_over_a_distance(tmp_path: Path) -> None:
+    """Load-dependent friction is named first, with its size and the distance within 10 %, and leaves little of the mismatch."""
+    found = diagnose_rig(read_session(bench(tmp_path / "s", 0.3, 0.01)))
+    first = found.findings[0]
+    assert first.effect == "load_dependent_friction"
+    assert [first.parameters[n]["value"] for n in ("per_load", "reach")] == pytest.approx([0.3, 0.1], rel=0.1)
+    assert found.lack_of_fit["one_effect"] < 0.2
+
+
+def test_a_noisy_torque_is_no_mismatch(tmp_path: Path) -> None:
+    """Ten percent of noise on a torque that the declared model explains: consistent, and the friction is the planted one."""
+    session = read_session(bench(tmp_path / "s", 0.0, 0.08))
+    assert diagnose_rig(session).verdict == "consistent"
+    fit = trusted_fit(load_rig(session))[0]
+    friction = [t for c, t in zip(fit.columns, fit.theta, strict=True) if c.kind in ("damping", "frictionloss")]
+    assert friction == pytest.approx([0.03, 0.08], rel=0.1)
+
+
+def test_a_long_swing_is_searched_on_some_of_its_stretches() -> None:
+    """No more training steps than enough, of every trial alike, all that validate; a short one as it is."""
+    size = 500
+    blank = Lane("", False, np.zeros(size), 1.0, np.zeros(size), (0.0, 0.0), np.zeros(size), np.ones(size))
+    lanes = [replace(blank, trial=name, validate=name == "c") for name in "abc" for _ in range(100)]
+    swing = Swing(tuple(lanes), 1.0, 0.0, {"inertia": 1.0}, False)
+    some = thinned(swing)
+    count = {name: sum(lane.trial == name for lane in some.lanes) for name in "abc"}
+    assert count["a"] == count["b"] == 25 and count["c"] == 100
+    assert len(some.train()) * size <= ENOUGH_STEPS
+    short = replace(swing, lanes=tuple(lanes[::10]))
+    assert thinned(short) is short
