@@ -21,7 +21,7 @@ from .swing import STEP_S, Lane, Swing
 DRIVEN_PERIODS, FREE_PERIODS = (1.3,), (2.5, 10.0)
 DRIVEN_STEP_S, STEPS_A_PERIOD = 4e-3, 200
 LEAST_STRETCHES = 4  # some to fit, some to leave out
-ENOUGH_STEPS = 25_000  # simulated at once: with more, effects are chosen on some of the stretches and fitted to all
+ENOUGH_STEPS = 12_500  # simulated at once: with more, effects are chosen on some of the stretches and fitted to all
 
 
 def free_period_s(rig: RigModel) -> float:
