@@ -75,7 +75,7 @@ def row(motor, fit: MotorFit, seconds: float, noise: float, planted: dict[str, f
     truth = {n: getattr(motor, n) for n in NAMES} | planted
     sd = np.sqrt(np.diag(fit.regression.covariance))
     return {
-        "controller": motor.controller.kind, "method": fit.method, "cpu_s": seconds, "stribeck": fit.stribeck, "noise_true": noise,
+        "controller": motor.controller.kind, "method": fit.method, "cpu_s": seconds, "stribeck": bool(fit.stribeck), "noise_true": noise,
         "noise": fit.sigma_current, "misfit": None if fit.output_error is None else list(fit.output_error.chi2),
         "parameters": {n: [truth[n], e.value, *(e.ci95 or (None, None))] for n, e in found.items()},
         "regression_z": {n: float((v - getattr(motor, n)) / s) for n, v, s in zip(NAMES, fit.regression.values, sd, strict=True)},
