@@ -265,7 +265,7 @@ def _with_other_shape(best: OutputErrorFit) -> OutputErrorFit:
 
 def _claims(curved: Regression) -> bool:
     """Whether the regression alone claims a Stribeck rise."""
-    return curved.excess_z > CLAIM and curved.values[2] > 0
+    return bool(curved.excess_z > CLAIM and curved.values[2] > 0)
 
 
 def _plant(r: Regression) -> dict[str, float]:
