@@ -5,7 +5,8 @@ Everything here is generic in what the effort is (current, torque, an angle) and
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -26,6 +27,7 @@ Array = NDArray[np.float64]
 # What physics allows of a declared coefficient, by its column's name.
 DECLARED_LOW = {"inertia": 0.0, "viscous": 0.0, "coulomb": 0.0, "spring": 0.0}
 MOST_KEPT = 3e8  # bytes of columns that one balance keeps
+MOST_LAST = 24  # columns of single terms that it remembers
 UNSETTLED = 1e-3  # weight left to a start or stop where steady motion alone is asked
 DISCRETE = ("side", "trial", "form", "end")  # shapes that choose among few cases: no continuous parameter is spent on them
 
@@ -49,6 +51,14 @@ class Fit:
     prediction: Array
     rss: float
     size: int
+
+
+def _key(shape: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
+    return tuple(sorted((k, float(v)) for k, v in shape.items()))
+
+
+def _keys(terms: tuple[Term, ...]) -> tuple[Any, ...]:
+    return tuple((t.effect, _key(t.shape)) for t in terms)
 
 
 class Balance:
@@ -78,6 +88,8 @@ class Balance:
         self.wander: Wander | None = None
         self._grids: dict[Any, Grid] = {}
         self._kept: dict[Any, GridColumns] = {}
+        self._warped: tuple[Any, ...] = ()
+        self._last: OrderedDict[Any, Array] = OrderedDict()
         self._apart: Any = None
 
     def wandering(self, wander: Wander | None) -> Balance:
@@ -113,14 +125,24 @@ class Balance:
         return np.concatenate([label[m] for label, m in zip(out, self.masks, strict=True)])
 
     def columns(self, effect: Any, shape: Mapping[str, float], warps: tuple[Term, ...] = ()) -> Array:
-        """An effect's columns (n, j), shifted by those of `warps`, unweighted."""
+        """An effect's columns (n, j), shifted by those of `warps`, unweighted. To be read only: the last ones are kept."""
         def one(state: DriveState) -> Array:
             columns = effect.columns(state, shape)
             for term in warps:
                 columns = term.effect.warp(state, columns, term.shape)
             return columns
 
-        return self.gather(one)
+        return self._remembered((effect, _key(shape), _keys(warps)), one)
+
+    def _remembered(self, key: Any, value: Callable[[DriveState], Array]) -> Array:
+        """What `gather` makes of `value`; while one term's shape is optimised the other terms' columns stay."""
+        if key in self._last:
+            self._last.move_to_end(key)
+        else:
+            self._last[key] = self.gather(value)
+            if len(self._last) > MOST_LAST:
+                self._last.popitem(last=False)
+        return self._last[key]
 
     def grid(self, effect: Any) -> Grid:
         """Starting shapes of an effect on these recordings."""
@@ -131,7 +153,9 @@ class Balance:
     def grid_columns(self, grid: Grid, weight: Array, warps: tuple[Term, ...] = ()) -> GridColumns:
         """The columns of every shape of a grid, weighted by `weight` (n,) and whitened; kept under the balance's own weight, for
         each step of a search asks again."""
-        plain = not warps and np.array_equal(weight, self.weight * self.train)
+        plain = np.array_equal(weight, self.weight * self.train)
+        if plain and self._warped != _keys(warps):
+            self._kept, self._warped = {}, _keys(warps)
         if plain and grid.effect in self._kept:
             return self._kept[grid.effect]
         out = stacked([self.whiten(self.columns(grid.effect, shape, warps) * weight[:, None], weight) for shape in grid.shapes])
@@ -152,7 +176,8 @@ class Balance:
                 columns = term.effect.warp(state, columns, term.shape)
             return columns
 
-        parts = [self.gather(declared)]
+        changing = tuple(t for t in terms if t.effect.replaces is not None)
+        parts = [self._remembered(("declared", _keys(changing), _keys(warps)), declared)]
         low = [DECLARED_LOW.get(name, -np.inf) for name in self.names]
         high = [np.inf] * len(self.names)
         for term in terms:
@@ -161,8 +186,9 @@ class Balance:
             high += [a[3] for a in term.effect.amplitudes()]
         return np.concatenate(parts, axis=1), np.array(low), np.array(high)
 
-    def fit(self, terms: tuple[Term, ...] = ()) -> Fit:
-        """Amplitudes and declared coefficients by bounded weighted least squares on the training samples."""
+    def fit(self, terms: tuple[Term, ...] = (), held: bool = True) -> Fit:
+        """Amplitudes and declared coefficients by bounded weighted least squares on the training samples. held: also what belongs
+        to validation recordings alone, which training does not see."""
         matrix, low, high = self.design(terms)
         weight = self.weights(terms)
         w = weight * self.train
@@ -172,7 +198,8 @@ class Balance:
         for _ in range(4 if clips else 1):
             v = w * inside
             coefficients = bounded_least_squares(self.whiten(matrix * v[:, None], v), self.whiten(self.effort * v, v), low, high)
-            coefficients = self._own_nuisances(matrix, coefficients, w, low)
+            if held:
+                coefficients = self._own_nuisances(matrix, coefficients, w, low)
             prediction = raw = matrix @ coefficients
             for term in clips:
                 prediction = term.effect.clip(prediction, term.shape)
@@ -229,7 +256,7 @@ class Balance:
 
     def vagueness(self, weight: Array) -> float:
         """What wider errors cost, on the scale of a sum of squares: a density that says less is lower where it is right."""
-        return 2 * self.inflation * float(np.sum(np.log(self.weight / weight)[self.train]))
+        return 0.0 if weight is self.weight else 2 * self.inflation * float(np.sum(np.log(self.weight / weight)[self.train]))
 
     def unanswered(self, terms: tuple[Term, ...]) -> float:
         """What the answers to commands hold against `terms`, on the scale of a sum of squares: "late" in `extra`, by how much [s] the

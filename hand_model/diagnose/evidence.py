@@ -91,4 +91,4 @@ def _occam(balance: Balance, fit: Fit, which: int, shape: Shape, scale: float) -
 def _moved(balance: Balance, fit: Fit, which: int, name: str, value: float) -> Fit:
     terms = list(fit.terms)
     terms[which] = Term(terms[which].effect, {**terms[which].shape, name: value})
-    return balance.fit(tuple(terms))
+    return balance.fit(tuple(terms), held=False)

@@ -237,11 +237,11 @@ def polish(balance: Balance, fit: Fit, which: int) -> Fit:
     span = np.array([s.high - s.low for s in shapes])
     start = np.array([term.shape[s.name] for s in shapes])
 
-    def at(u: Array) -> Fit:
+    def at(u: Array, held: bool = False) -> Fit:
         values = {s.name: float(np.clip(v, s.low, s.high)) for s, v in zip(shapes, start + u * span, strict=True)}
         terms = list(fit.terms)
         terms[which] = Term(term.effect, {**term.shape, **values})
-        return balance.fit(tuple(terms))
+        return balance.fit(tuple(terms), held)
 
     step = [np.zeros(len(shapes))]
     for i, s in enumerate(shapes):
@@ -252,7 +252,7 @@ def polish(balance: Balance, fit: Fit, which: int) -> Fit:
     result = minimize(lambda u: at(u).rss, np.zeros(len(shapes)), method="Nelder-Mead",
                       options={"initial_simplex": np.array(step), "maxfev": 30 + 25 * len(shapes), "fatol": 0.02,
                                "xatol": 1e-4})
-    best = at(result.x)
+    best = at(result.x, held=True)
     return best if best.rss < fit.rss else fit
 
 
