@@ -267,3 +267,21 @@ def test_a_recording_without_the_pose_of_the_hand_bears_no_weight_out() -> None:
     posed = replace(plain, extra={**plain.extra, "pose_seen": np.ones(len(plain.time_s))})
     assert not effect("gravity_load").told_by(plain) and effect("gravity_load").told_by(posed)
     assert effect("stribeck_friction").told_by(plain)
+
+
+def test_a_delay_is_the_one_that_answers_to_commands_tell_where_they_tell_it_well() -> None:
+    delay, s = effect("current_channel_delay"), state()
+    read = {"form": {"value": 0.0}, "delay": {"value": 0.05}}
+
+    def told(late_s: float, doubt_s: float) -> tuple[DriveState, ...]:
+        return (DriveState(**{**vars(s), "extra": {**s.extra, "late": np.array([late_s, doubt_s])}}),)
+
+    entry = delay.further(told(0.062, 0.005), read)["delay"]
+    assert entry["value"] == 0.062 and entry["ci95"][0] < 0.055 and entry["ci95"][1] > 0.069
+    assert delay.further((s,), read) == {}  # no commands
+    assert delay.further(told(0.062, 0.03), read) == {}  # told to more than a sample interval
+    assert delay.further(told(0.062, 0.005), {**read, "form": {"value": 1.0}}) == {}  # a filter
+    assert delay.lateness({"form": 0.0, "delay": 0.05}) == (0.05, 0.05)
+    assert delay.lateness({"form": 0.0, "delay": -0.05}) == (-0.05, 0.0)
+    low, high = delay.lateness({"form": 1.0, "delay": 0.05})
+    assert 0 < low < high == 0.05

@@ -48,6 +48,16 @@ class CurrentChannelDelay(Effect):
         delay_s = shape["delay"]
         return (FIRST_SEEN * delay_s, delay_s) if _filters(shape) else (delay_s, max(delay_s, 0.0))
 
+    def further(self, states: tuple[DriveState, ...], parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+        """The delay by the answers to commands, where they tell it to a sample interval ("late" in `extra`): what a motion shows of it
+        is its starts, whose estimate is smoothed."""
+        late = states[0].extra.get("late")
+        step = float(np.median(np.concatenate([np.diff(s.time_s) for s in states])))
+        if late is None or late[1] > step or parameters["form"]["value"] > 0.5 or parameters["delay"]["value"] <= 0:
+            return {}
+        low, high = (float(late[0] + sign * 1.96 * late[1]) for sign in (-1, 1))
+        return {"delay": {"value": float(late[0]), "unit": "s", "ci95": [low, high]}}
+
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """Which channel comes first and by how much, or the filter's time constant."""
         delay_ms = 1e3 * parameters["delay"]
