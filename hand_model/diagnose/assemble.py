@@ -16,6 +16,7 @@ from .name import ALPHA, Named
 from .station import Station, channel_of, finding_of, unexplained_of, unrepeated_of
 
 UNLIKE_OTHERS = 2.0  # times the wander of the calmest finger
+HARMONICS, SAME_PERIOD = 4, 0.02
 UNREST = 0.3  # of the noise: wander that every machine is granted
 
 
@@ -36,7 +37,7 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
         rejected += [{"effect": name, "where": str(station.finger), "reason": _reason(value)}
                      for name, value in station.naming.rejected[:4]]
     unexplained += [unrepeated_of(s) for s in stations if _wanders(s, stations)]
-    ranked = _one_clock(ranked)
+    ranked = _without_shadows(_one_clock(ranked))
     ranked.sort(key=lambda item: -item[0])
     found = tuple(f for _, f in ranked)
     verdict = "mismatch" if found else "unexplained" if unexplained else "consistent"
@@ -68,6 +69,20 @@ def _one_clock(ranked: list[tuple[float, Finding]]) -> list[tuple[float, Finding
         trials = sorted({t for _, f in drifts for t in f.where["trials"]})
         drifts = [(weight, replace(first, where={**first.where, "finger": None, "actuator": None, "trials": trials}))]
     return [i for i in ranked if i[1].effect != "clock_drift"] + drifts
+
+
+def _without_shadows(ranked: list[tuple[float, Finding]]) -> list[tuple[float, Finding]]:
+    """Without ripples of the current at a period of the same motor's encoder error or a harmonic of it: a position that errs by a
+    percent there errs by many percent in speed, and putting it right leaves part of that."""
+    wrong = {(f.where["actuator"], f.parameters["period"]["value"]) for _, f in ranked if f.effect == "encoder_periodic_error"}
+
+    def shadow(finding: Finding) -> bool:
+        if finding.effect != "torque_ripple":
+            return False
+        order = [period / finding.parameters["period"]["value"] for actuator, period in wrong if actuator == finding.where["actuator"]]
+        return any(0.5 < n < HARMONICS + 0.5 and abs(n / round(n) - 1) < SAME_PERIOD for n in order)
+
+    return [item for item in ranked if not shadow(item[1])]
 
 
 def _merged(found: tuple[Named, ...]) -> list[tuple[Named, float, float]]:

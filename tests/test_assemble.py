@@ -1,0 +1,25 @@
+"""Findings of several stations beside each other."""
+
+from __future__ import annotations
+
+import pytest
+
+from hand_model.diagnose.assemble import _without_shadows
+from hand_model.diagnose.findings import Finding
+
+
+def periodic(effect: str, actuator: str, period: float) -> tuple[float, Finding]:
+    where = {"finger": actuator, "actuator": actuator, "joint": None, "signal": "current", "marker": None, "trials": []}
+    return 1.0, Finding(effect, (effect,), 1.0, (), where, "", {"period": {"value": period, "unit": "%"}}, {}, None)
+
+
+@pytest.mark.parametrize(("period", "motor", "stays"), [(10.8, "index", False), (3.62, "index", False), (8.1, "index", True),
+                                                        (3.62, "ring", True), (21.6, "index", True)])
+def test_a_ripple_at_a_harmonic_of_the_same_encoders_error_is_its_shadow(period: float, motor: str, stays: bool) -> None:
+    error, ripple = periodic("encoder_periodic_error", "index", 10.79), periodic("torque_ripple", motor, period)
+    assert _without_shadows([error, ripple]) == ([error, ripple] if stays else [error])
+
+
+def test_without_an_encoder_error_every_ripple_stays() -> None:
+    ripples = [periodic("torque_ripple", "index", 5.0), periodic("torque_ripple", "index", 10.0)]
+    assert _without_shadows(ripples) == ripples
