@@ -162,3 +162,9 @@ def test_the_current_of_whiles_in_which_the_finger_has_left_its_drive_is_not_jud
     free = np.isnan(judged.effort)
     assert free[lifted].all() and not free[(t < 19.5) | (t > 21.0)].any()
     assert np.isfinite(without_excursions((state(t),), (state(t),), angles)[0].effort).all()
+
+
+def test_a_drifting_clock_lifts_no_finger() -> None:
+    for drift in (1.5e-3, -3e-3):
+        states = joint(9, drift=drift)
+        assert not any(np.any(s.extra["ahead"] > 0) for s in states)

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..effects import effect
 from ..effects.base import DriveState
-from .balance import Balance
+from .balance import Balance, Term
 from .motion import local_quadratic
 
 Array = NDArray[np.float64]
@@ -24,14 +25,15 @@ SMOOTH_S = 0.06  # bandwidth of its course
 def with_excursions(states: Sequence[DriveState]) -> tuple[DriveState, ...]:
     """The states with "ahead" in `extra`: (n,) [effort unit] the course of every excursion, zero elsewhere.
 
-    The residual of the declared map, minus its median over replicates (same place and direction in other strokes), is
+    The residual of the declared map and a drifting clock, minus its median over replicates (same place and direction in other strokes), is
     searched for windows whose mean stands out by a likelihood ratio; each must have ended before LONGEST_S.
     """
     states = tuple(states)
     if not states:
         return states
     balance = Balance(states, everything=True)
-    residual = _beside_replicates(balance, balance.effort - balance.fit().prediction)
+    drifting = balance.fit((Term(effect("clock_drift"), {}),))  # a clock at another rate lifts the finger where it is fast
+    residual = _beside_replicates(balance, balance.effort - drifting.prediction)
     out, start = [], 0
     for state, mask in zip(states, balance.masks, strict=True):
         mine = residual[start : start + mask.sum()]

@@ -20,7 +20,7 @@ from .motion import local_quadratic
 Array = NDArray[np.float64]
 
 SMOOTH_S = 0.1  # the palm turns slowly
-TURNED = 0.05  # spread of gravity's direction below which nothing can be learned from it: three degrees
+TURNED = 0.12  # spread of gravity's direction below which a weight is as good as a function of position: seven degrees
 
 
 def with_gravity(session: Session, fingers: Mapping[str, FingerAngles], states: tuple[DriveState, ...]) -> tuple[DriveState, ...]:
