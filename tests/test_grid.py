@@ -80,3 +80,22 @@ def test_without_a_delay_weights_stay_and_wider_errors_cost() -> None:
     assert balance.weights(()) is balance.weight
     assert balance.vagueness(balance.weight) == 0.0
     assert balance.vagueness(0.5 * balance.weight) == pytest.approx(2 * np.log(2) * balance.inflation * balance.train.sum())
+
+
+def test_a_candidate_that_is_always_dropped_again_ends_the_search(monkeypatch) -> None:
+    from hand_model.diagnose import name
+
+    balance = Balance(drive(7, planted("detent_load", {"form": 0.0, "centre": 50.0, "width": 6.0}, [12.0]), trials=3))
+    kind = effect("torque_ripple")
+    offered = balance.fit((Term(kind, {"period": 9.0}),))
+    tried: list[str] = []
+
+    def rank(*_arguments):
+        tried.append(kind.name)
+        assert len(tried) < 10
+        return [name.Rival(kind.name, 50.0, offered)]
+
+    monkeypatch.setattr(name, "rank", rank)
+    monkeypatch.setattr(name, "settle", lambda *_arguments: ((), balance.fit()))
+    fit, brought = name._search(balance, (kind,), None)
+    assert fit.terms == () and brought == {kind.name: 50.0}

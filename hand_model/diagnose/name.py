@@ -121,16 +121,28 @@ def _name(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str], 
 def _search(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str], None] | None) -> tuple[Fit, dict[str, float]]:
     """The fit to which no effect adds evidence, and what every candidate brought at its best moment."""
     fit, brought = balance.fit(), {}
+    been, refused = {_names(fit)}, set[str]()
     while len(fit.terms) < MOST_TERMS:
         ranked = rank(balance, effects, fit.terms, fit)
         for rival in ranked:
             brought[rival.name] = max(brought.get(rival.name, -np.inf), rival.evidence)
-        if not ranked or ranked[0].evidence < EVIDENCE_LEAST:
+        best = next((r for r in ranked if r.evidence >= EVIDENCE_LEAST and r.name not in refused), None)
+        if best is None:
             break
-        _, fit = settle(balance, effects, ranked[0].fit.terms)
+        _, settled = settle(balance, effects, best.fit.terms)
+        if _names(settled) in been:  # it went again beside the others: round and round from here
+            refused.add(best.name)
+            fit = min(fit, settled, key=lambda f: f.rss) if _names(settled) == _names(fit) else fit
+            continue
+        fit = settled
+        been.add(_names(fit))
         if progress is not None:
             progress(f"{balance.states[0].drive}: {', '.join(t.effect.name for t in fit.terms)}")
     return fit, brought
+
+
+def _names(fit: Fit) -> tuple[str, ...]:
+    return tuple(sorted(t.effect.name for t in fit.terms))
 
 
 def _unrepeated(balance: Balance, fit: Fit) -> Wander | None:

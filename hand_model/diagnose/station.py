@@ -15,7 +15,7 @@ from .name import ALPHA, Named, Naming, name_effects
 ENGINE = {"current": "inverse dynamics of the motor's balance, motion as recorded", "encoder": "encoder map, motion as recorded",
           "markers": "linkage polynomial, motion as recorded"}
 UNWRITTEN = {"native": False, "mjcf": None, "urdf": "not expressible"}
-SECOND_HEARINGS = 2
+SECOND_HEARINGS, DISPLACING = 2, 0.1  # and the share of what was explained from which a fallen name has displaced others
 SMALL = 0.07  # share of the explained mismatch
 EXPLAINED_LEAST = 0.7  # of the explainable mismatch: below, the names are not believed
 
@@ -82,7 +82,7 @@ def judged(signal: str, finger: str | None, actuator: str | None, joint: str | N
     station = Station(signal, finger, actuator, joint, name_effects(states, left, typical=typical))
     for _ in range(SECOND_HEARINGS):
         fallen = {f.term.effect.name for f in station.naming.found} - {f.term.effect.name for f in station.proven}
-        if not fallen:
+        if sum(f.share for f in station.naming.found if f.term.effect.name in fallen) < DISPLACING:
             break
         left = tuple(e for e in left if e.name not in fallen)
         other = Station(signal, finger, actuator, joint, name_effects(states, left, typical=typical))
