@@ -17,6 +17,7 @@ from .station import Station, channel_of, finding_of, unexplained_of, unrepeated
 
 UNLIKE_OTHERS = 2.0  # times the wander of the calmest finger
 HARMONICS, SAME_PERIOD = 4, 0.02
+SHADOW = 0.12  # of an encoder error's size: less, in the current of the same motor, may be what is left of it
 UNREST = 0.3  # of the noise: wander that every machine is granted
 
 
@@ -72,17 +73,19 @@ def _one_clock(ranked: list[tuple[float, Finding]]) -> list[tuple[float, Finding
 
 
 def _without_shadows(ranked: list[tuple[float, Finding]]) -> list[tuple[float, Finding]]:
-    """Without ripples of the current at a period of the same motor's encoder error or a harmonic of it: a position that errs by a
-    percent there errs by many percent in speed, and putting it right leaves part of that."""
-    wrong = {(f.where["actuator"], f.parameters["period"]["value"]) for _, f in ranked if f.effect == "encoder_periodic_error"}
+    """Without what a motor's encoder error leaves in its current after it was put right: a position that errs by a percent errs by
+    many percent in speed. Small effects there, and ripples at the error's period or a harmonic of it, are no evidence."""
+    wrong = {f.where["actuator"]: (weight, f.parameters["period"]["value"]) for weight, f in ranked if f.effect == "encoder_periodic_error"}
 
-    def shadow(finding: Finding) -> bool:
-        if finding.effect != "torque_ripple":
+    def shadow(weight: float, finding: Finding) -> bool:
+        if finding.where["actuator"] not in wrong or finding.where["signal"] != "current":
             return False
-        order = [period / finding.parameters["period"]["value"] for actuator, period in wrong if actuator == finding.where["actuator"]]
-        return any(0.5 < n < HARMONICS + 0.5 and abs(n / round(n) - 1) < SAME_PERIOD for n in order)
+        error, period = wrong[finding.where["actuator"]]
+        order = period / finding.parameters["period"]["value"] if finding.effect == "torque_ripple" else np.nan
+        harmonic = 0.5 < order < HARMONICS + 0.5 and abs(order / round(order) - 1) < SAME_PERIOD
+        return harmonic or weight < SHADOW * error
 
-    return [item for item in ranked if not shadow(item[1])]
+    return [item for item in ranked if not shadow(*item)]
 
 
 def _merged(found: tuple[Named, ...]) -> list[tuple[Named, float, float]]:
