@@ -17,7 +17,7 @@ from .station import Station, channel_of, finding_of, unexplained_of, unrepeated
 
 UNLIKE_OTHERS = 2.0  # times the wander of the calmest finger
 HARMONICS, SAME_PERIOD = 4, 0.02
-SHADOW = 0.12  # of an encoder error's size: less, in the current of the same motor, may be what is left of it
+SHADOW = 0.2  # of an encoder error's size: less, in the current of the same motor, may be what is left of it
 UNREST = 0.3  # of the noise: wander that every machine is granted
 
 
