@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects.base import DriveState
+from ..effects.base import DriveState, sample_interval
 
 Array = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ class Answers:
 @dataclass(frozen=True)
 class Lateness:
     """What a drive's answers say. drive_s: (k,) by how much the drive answers late, empty where it does not. channel_s: by how
-    much its current alone is late, and doubt_s, the standard deviation of that; nan where there is nothing to compare with."""
+    much its current alone is late, and doubt_s, the standard deviation of that."""
 
     drive_s: Array
     channel_s: float
@@ -47,7 +47,7 @@ def answers_of(states: Sequence[DriveState], currents: Sequence[Array]) -> Answe
     """Answers of one drive. currents: raw current (n,) of each state (its `effort` is masked at rest)."""
     current = [x for s, c in zip(states, currents, strict=True) for x in _latencies(s, c)]
     motion = [x for s in states for x in _latencies(s, s.position)]
-    step = float(np.median(np.concatenate([np.diff(s.time_s) for s in states])))
+    step = sample_interval(states)
     return Answers(_usual(np.array(current), step), _usual(np.array(motion), step), step)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..effects import catalogue
+from ..effects.base import sample_interval
 from .distinguishability import protocol_pairs
 from .findings import Finding, Findings
 from .interval import variance_ratio
@@ -109,7 +110,7 @@ def _protocol(stations: list[Station]) -> dict[str, Any]:
         return {}
     states = drives[0].naming.balance.states
     speeds = {v for s in states if "speed" in s.extra for v in np.unique(s.extra["speed"]).tolist()}
-    step = float(np.median(np.concatenate([np.diff(s.time_s) for s in states])))
+    step = sample_interval(states)
     told, alike = protocol_pairs(drives[0].naming.balance, catalogue("drive"))
     return {"repeats": len(states), "rate_hz": round(1 / step, 1), "speeds": len(speeds), "isolable": told,
             "not_isolable": [["asymmetric_friction", "spring_preload"], *alike]}

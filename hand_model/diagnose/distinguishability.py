@@ -8,7 +8,6 @@ expected discrimination of Box & Hill 1967, for rivals that are linear in their 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from itertools import combinations
 from typing import Any
 
@@ -16,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .balance import Balance, Fit, Term
-from .name import ALONG, CLASS_WIDTH
+from .name import CLASS_WIDTH
 
 Array = NDArray[np.float64]
 
 SIZE = 0.5  # of the noise: root mean square of what the planted effect adds beyond what declared coefficients could
+TOLD = 1e-3  # of a column's length: less left beside the declared columns, and these recordings do not show it
 MOST_ROWS, MOST_SHAPES = 2500, 24  # of the balance, and of an effect's grid, that are looked at
 
 
@@ -68,7 +68,7 @@ def _span(balance: Balance, effect: Any, shape: dict[str, float], fit: Fit, basi
     added = balance.whiten(added, weight)
     length = np.linalg.norm(added, axis=0)
     left = added - basis @ (basis.T @ added)
-    return left[:, np.linalg.norm(left, axis=0) > np.maximum(ALONG, 1e-3) * length]
+    return left[:, np.linalg.norm(left, axis=0) > TOLD * length]
 
 
 def _added(balance: Balance, term: Term, fit: Fit) -> Array:
@@ -81,7 +81,7 @@ def _added(balance: Balance, term: Term, fit: Fit) -> Array:
     values = np.array(list(fit.declared.values()))
 
     def changed(state: Any) -> Array:
-        columns = effect.declared(replace(state), shape) if effect.replaces is not None else state.declared
+        columns = effect.declared(state, shape) if effect.replaces is not None else state.declared
         columns = effect.warp(state, columns, shape) if effect.warps else columns
         return ((columns - state.declared) @ values)[:, None]
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from ..effects.base import sample_interval
 from .balance import DISCRETE, Balance, Fit, Term
 from .evidence import evidence, gain, rough_evidence, scale_of
 from .grid import Grid
@@ -179,7 +180,7 @@ def _resolved(balance: Balance, term: Term) -> bool:
     """Whether a delay exceeds three quarters of a sample interval; true of anything else."""
     if "delay" not in term.shape:
         return True
-    step = float(np.median(np.concatenate([np.diff(s.time_s) for s in balance.states])))
+    step = sample_interval(balance.states)
     return abs(term.shape["delay"]) > 0.75 * step
 
 

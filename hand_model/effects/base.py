@@ -13,7 +13,7 @@ The same interface serves three balances, told apart by `station`:
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from numbers import Real
 from typing import Any, ClassVar, Protocol, runtime_checkable
@@ -222,6 +222,11 @@ class Effect:
 def figure(value: float) -> str:
     """A number for a sentence: three significant digits, whole from a hundred on."""
     return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
+
+
+def sample_interval(states: Sequence[DriveState]) -> float:
+    """Median time [s] between neighbouring samples of all states."""
+    return float(np.median(np.concatenate([np.diff(s.time_s) for s in states])))
 
 
 def position_range(states: tuple[DriveState, ...]) -> tuple[float, float]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .base import Amplitude, Array, DriveState, Effect, Shape
+from .base import Amplitude, Array, DriveState, Effect, Shape, sample_interval
 from .mjcf import delay, motor_sensor
 
 FIRST_SEEN = 0.1  # of a filter's time constant: a rise of ten times what is noticed
@@ -21,7 +21,7 @@ class CurrentChannelDelay(Effect):
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """Delay of the effort behind the position, up to eight samples either way."""
-        step = float(np.median(np.concatenate([np.diff(s.time_s) for s in states])))
+        step = sample_interval(states)
         return (Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),
                 Shape("delay", "s", -8 * step, 8 * step, tuple(step * k for k in (-6, -4, -2.5, -1.5, -0.75, 0.75, 1.5, 2.5, 4, 6))))
 
@@ -52,7 +52,7 @@ class CurrentChannelDelay(Effect):
         """The delay by the answers to commands, where they tell it to a sample interval ("late" in `extra`): what a motion shows of it
         is its starts, whose estimate is smoothed."""
         late = states[0].extra.get("late")
-        step = float(np.median(np.concatenate([np.diff(s.time_s) for s in states])))
+        step = sample_interval(states)
         if late is None or late[1] > step or parameters["form"]["value"] > 0.5 or parameters["delay"]["value"] <= 0:
             return {}
         low, high = (float(late[0] + sign * 1.96 * late[1]) for sign in (-1, 1))

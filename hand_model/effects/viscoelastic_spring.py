@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .base import Amplitude, Array, DriveState, Effect, Shape, figure
+from .base import Amplitude, Array, DriveState, Effect, Shape, figure, sample_interval
 from .law import Law, Moment
 from .path import lowpass
 
@@ -20,7 +20,7 @@ class ViscoelasticSpring(Effect):
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """Relaxation time between five samples and the length of the longest trial."""
-        step = float(np.median(np.concatenate([np.diff(s.time_s) for s in states])))
+        step = sample_interval(states)
         longest = max(float(s.time_s[-1] - s.time_s[0]) for s in states)
         low, high = 5 * step, max(longest, 20 * step)
         return (Shape("relaxation_time", "s", low, high, tuple(np.geomspace(1.5 * low, 0.7 * high, 9))),)
