@@ -165,7 +165,7 @@ def test_jump_of_the_current_is_where_the_reference_jumps() -> None:
     """Between two steps, however coarse: just before the command the current is what held the drive, a tick later it has jumped, half of it between."""
     jump = {"presliding": 0.0, "rise": 1e-4, "fall": 1e-4, "damping": 0.6, "lead": 0.0}
     q = {k: np.array([v]) for k, v in {**PARAMETERS, **jump}.items()}
-    _, u = run(_moves(start_s=0.0513), q, 5e-3).sample(slice(0, 1), np.array([0.0507, 0.0513, 0.0519]))
+    _, u = run(_moves(start_s=0.0513), q, 5e-3).sample([np.array([0.0507, 0.0513, 0.0519])])
     assert abs(u[0, 0]) < 1.0 and u[2, 0] == pytest.approx(0.6 * 115.0, rel=0.05)
     assert u[1, 0] == pytest.approx(0.5 * u[2, 0], rel=0.15)
 

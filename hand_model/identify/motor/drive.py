@@ -16,14 +16,16 @@ Integrated by the implicit midpoint rule, linear within a step.
 
 from __future__ import annotations
 
+import copy
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .friction import Bristles, Stick
+from .grid import NEVER, Grid, grid, rows
 
 Array = NDArray[np.float64]
 
@@ -40,7 +42,7 @@ STRIBECK = ("static_ratio", "stribeck_speed", "stribeck_exponent")
 class Moves:
     """Moves from rest, one per entry (B,): start_s of the command after the move's own zero [s], origin and target [%],
     speed [share of full], limit [raw], position [%] and current hold [raw] at rest, duration_s [s], velocity [%/s] of a drive that
-    creeps within its deadband; by falling duration for `simulate`."""
+    creeps within its deadband; when it may be simulated in long steps [s]: from when on it cruises, until when, and from when on it rests."""
 
     start_s: Array
     origin: Array
@@ -51,8 +53,11 @@ class Moves:
     hold: Array
     duration_s: Array
     velocity: Array | float = 0.0
+    cruise_s: Array | float = NEVER
+    stop_s: Array | float = NEVER
+    rest_s: Array | float = NEVER
 
-    def some(self, columns: slice) -> Moves:
+    def some(self, columns: NDArray[np.int64]) -> Moves:
         """The moves of these columns."""
         every = (getattr(self, f.name) + np.zeros(len(self.target)) for f in dataclasses.fields(self))
         return Moves(*(x[columns] for x in every))
@@ -76,6 +81,13 @@ class _Trapezoid:
         self.rise, self.fall = self.top / self.up, self.top / self.down
         self.flat = np.maximum(distance / self.top - 0.5 * (self.rise + self.fall), 0.0)
 
+    def some(self, columns: NDArray[np.int64]) -> _Trapezoid:
+        """Those of these columns."""
+        found = copy.copy(self)
+        for name, x in vars(self).items():
+            setattr(found, name, x[columns])
+        return found
+
     def way(self, t: Array) -> Array:
         """Way [%] at times (n, B) [s] after the command."""
         a = _within(t, self.rise)
@@ -95,38 +107,41 @@ def _within(t: Array, duration: Array) -> Array:
 
 @dataclass(frozen=True)
 class Run:
-    """Simulated moves. time_s (n,) [s], from EARLY_S before their zero; position (n, B) [%]; feedback (n, B) [raw]: the current without what a reference that is known
-    beforehand adds, and unlimited; moves and q (each (B,)) that were simulated. Rows after a move's duration are not filled."""
+    """Simulated moves. grid: times of the steps, from EARLY_S before the moves' zero; position (n, B) [%]; feedback (n, B) [raw]: the current without what a reference
+    that is known beforehand adds, and unlimited; moves and q (each (B,)), column (B,): where each move stands among these columns. Rows after a move's duration are not filled."""
 
-    time_s: Array
+    grid: Grid
     position: Array
     feedback: Array
     moves: Moves
     q: Mapping[str, Array]
     controller: str
+    column: NDArray[np.int64]
 
-    def sample(self, columns: slice, at_s: Array) -> tuple[Array, Array]:
-        """Position [%] and, `lead` later, current [raw], (k, columns), of moves at times (k,) [s]; where the reference's speed jumps, the mean over a
-        controller's tick, as nobody knows where in a tick a sample falls."""
-        at_s = at_s + EARLY_S
-        q = {n: self.q[n][columns] for n in ("gain", "damping", "speed_full", "rise", "fall", "lag", "lead") if n in self.q}
-        lead = q.get("lead", 0.0) + np.zeros(self.position[:1, columns].shape[1])
-        position = _interpolated(self.position[:, columns], at_s[:, None] / self.time_s[1])
-        current = _interpolated(self.feedback[:, columns], (at_s[:, None] + lead) / self.time_s[1])
-        moves = self.moves.some(columns)
+    def sample(self, at_s: Sequence[Array], width: int = 1) -> tuple[Array, Array]:
+        """Position [%] and, `lead` later, current [raw], (N, width), at times at_s (each (k,)) [s] of every `width` neighbouring moves, one after the other; where the
+        reference's speed jumps, the mean over a controller's tick, as nobody knows where in a tick a sample falls."""
+        column = np.repeat(self.column.reshape(-1, width), [len(t) for t in at_s], axis=0)
+        t = np.concatenate(at_s)[:, None] + EARLY_S
+        position = self._interpolated(self.position, t, column)
+        t = t + self.q["lead"][column] if "lead" in self.q else t
+        current = self._interpolated(self.feedback, t, column)
+        moves = self.moves
         if self.controller == "profile":
-            t, sign, shape = at_s[:, None] + lead - moves.start_s, np.sign(moves.target - moves.origin), _Trapezoid(moves, q)
-            ahead, behind = (shape.way(t - q["lag"] + way * TICK_S) for way in (0.5, -0.5))
-            current += q["gain"] * (moves.origin + sign * shape.way(t)) + q["damping"] / TICK_S * sign * (ahead - behind)
-        return position, np.clip(current, -moves.limit, moves.limit)
+            t, shape, sign = t - moves.start_s[column], _Trapezoid(moves, self.q).some(column), np.sign(moves.target - moves.origin)[column]
+            behind = t - self.q["lag"][column]
+            jumped = (shape.way(behind + 0.5 * TICK_S) - shape.way(behind - 0.5 * TICK_S)) / TICK_S
+            current += self.q["gain"][column] * (moves.origin[column] + sign * shape.way(t)) + self.q["damping"][column] * sign * jumped
+        limit = moves.limit[column]
+        return position, np.minimum(np.maximum(current, -limit), limit)
 
-
-def _interpolated(y: Array, x: Array) -> Array:
-    """Columns of y (n, B) at steps x (k, B or 1), linearly."""
-    x = np.clip(x, 0.0, len(y) - 1.001)
-    i, column = x.astype(int), np.arange(y.shape[1])
-    share = x - i
-    return y[i, column] * (1 - share) + y[i + 1, column] * share
+    def _interpolated(self, y: Array, t: Array, column: NDArray[np.int64]) -> Array:
+        """y (n, B) at times t (N, width or 1) [s] of columns (N, width), linearly."""
+        x = np.minimum(np.maximum(self.grid.index(t, column), 0.0), len(y) - 1.001)
+        i = x.astype(int)
+        share, flat, below = x - i, i * y.shape[1] + column, y.shape[1]
+        y = y.ravel()
+        return y[flat] * (1 - share) + y[flat + below] * share
 
 
 def run(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, controller: str = "profile") -> Run:
@@ -136,57 +151,77 @@ def run(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, controller
     friction is that of sliding. Friction without presliding in any set sticks hard.
     """
     beyond = BEYOND_S + max(0.0, float(np.max(q.get("lead", 0.0))))
-    moves = dataclasses.replace(
-        moves, start_s=moves.start_s + EARLY_S, position=moves.position - EARLY_S * moves.velocity, duration_s=moves.duration_s + EARLY_S + beyond
-    )
-    n = int(np.ceil(moves.duration_s.max() / step_s)) + 2
-    time_s = np.arange(n) * step_s
+    # an object stops a drive anywhere
+    calm = np.full((3, len(moves.target)), NEVER) if "contact_stiffness" in q else np.stack([x + EARLY_S + np.zeros(len(moves.target)) for x in (moves.cruise_s, moves.stop_s, moves.rest_s)])
+    ends_s, steps = rows(calm, moves.duration_s + EARLY_S + beyond, step_s)
+    order = np.argsort(-steps, kind="stable")
+    column = np.empty(len(order), int)
+    column[order] = np.arange(len(order))
+    moves, q, steps = moves.some(order), {n: x[order] for n, x in q.items()}, steps[order]
+    moves = dataclasses.replace(moves, start_s=moves.start_s + EARLY_S, position=moves.position - EARLY_S * moves.velocity)
+    times = grid(ends_s[:, order], int(steps[0]) + 1, step_s)
     kind = _Cascade if controller == "cascade" else _Profile
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # values that a search tries may let a drive run away
-        steer = kind(moves, q, step_s, time_s)
-        position, feedback = _run(moves, q, steer, step_s, n, np.inf)
-        simulated = (np.arange(n)[:, None] - 2) * step_s <= moves.duration_s
+        steer = kind(moves, q, times)
+        position, feedback = _run(moves, q, steer, times, steps, np.inf)
+        simulated = np.arange(len(position))[:, None] < steps
         if np.any(np.isfinite(moves.limit)) and np.any(simulated & (np.abs(steer.at + feedback) > moves.limit)):
-            steer = kind(moves, q, step_s, time_s)
-            position, feedback = _run(moves, q, steer, step_s, n, moves.limit)
-        return Run(time_s, position, steer.at + feedback if controller == "cascade" else feedback, moves, q, controller)
+            steer = kind(moves, q, times)
+            position, feedback = _run(moves, q, steer, times, steps, moves.limit)
+        return Run(times, position, steer.at + feedback if controller == "cascade" else feedback, moves, q, controller, column)
 
 
 def simulate(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, controller: str = "profile") -> tuple[Array, Array, Array]:
-    """Time (n,) [s], position (n, B) [%] and current (n, B) [raw] of `run`, at its steps."""
+    """Time (n,) [s], position (n, B) [%] and current (n, B) [raw] of `run`, at its short steps."""
     found = run(moves, {**q, "lead": np.zeros(len(moves.target))}, step_s, controller)
-    time_s = found.time_s[: -round(EARLY_S / step_s)]
-    return time_s, *found.sample(slice(None), time_s)
+    time_s = np.arange(int(np.ceil(np.max(moves.duration_s) / step_s)) + 2) * step_s
+    position, current = found.sample([time_s] * len(moves.target))
+    return time_s, *(x.reshape(len(moves.target), -1).T for x in (position, current))
 
 
-def _run(moves: Moves, q: Mapping[str, Array], steer: _Profile | _Cascade, step_s: float, n: int, limit: Array | float) -> tuple[Array, Array]:
-    """Position [%] and what it adds to the current that is asked for [raw], (n, B), of drives that follow what `steer` says, with no more current than the limit [raw]."""
-    active = np.searchsorted(-moves.duration_s, -((np.arange(n) - 2) * step_s), side="right").tolist()
+def _run(
+    moves: Moves, q: Mapping[str, Array], steer: _Profile | _Cascade, times: Grid, rows_of: NDArray[np.int64], limit: Array | float
+) -> tuple[Array, Array]:
+    """Position [%] and what it adds to the current that is asked for [raw], (n, B), of drives that follow what `steer` says, with no more current than the limit [raw].
+
+    rows_of (B,): the rows that each takes, falling.
+    """
+    n = len(times.at_s)
+    active = np.searchsorted(-rows_of, -np.arange(n), side="left").tolist()
+    steps = times.steps()
+    changes = [True, *np.any(steps[1:] != steps[:-1], axis=1).tolist()]
     position, velocity, acceleration = np.zeros((3, n, len(moves.target)))
-    half = 0.5 * step_s
     p, v = moves.position.copy(), np.zeros(len(moves.target)) + moves.velocity
     a = np.zeros(len(p))
-    friction = (Stick if not np.any(q["presliding"]) else Bristles)(q, step_s)
+    friction = (Stick if not np.any(q["presliding"]) else Bristles)(q)
     friction.begin(np.clip(steer.first(p, v), -limit, limit) - q["stiffness"] * p - q["preload"], v)
     late = np.minimum(q["delay"], 0.8 * q["inertia"] / np.maximum(q["damping"], 1e-9))
-    mass, sprung = q["inertia"] / half, q["stiffness"] + q["gain"]
     gain, keep, late_push = q["gain"], q["damping"] - q["gain"] * late, q["damping"] * late
-    moving, preload, limit, late_move = mass - late_push / half, q["preload"], limit + np.zeros(len(p)), late_push / half
-    closed = gain * (half - late) + q["damping"] * (1.0 - late / half)
-    inner = mass + q["viscous"] + half * q["stiffness"] + closed
+    sprung, preload, limit = q["stiffness"] + gain, q["preload"], limit + np.zeros(len(p))
     every = gain, keep, late_push
-    contact = _Contact(q, half) if "contact_stiffness" in q else None
+    contact = _Contact(q) if "contact_stiffness" in q else None
     bounded = bool(np.isfinite(limit).any())
+    h = late_move = moving = closed = inner = steps[0]
     for i in range(n):
         k = active[i]
         if k == 0:
             break
         if k < len(p):
-            p, v, a, gain, late_move, moving, sprung, preload, limit, closed, inner = (
-                x[:k] for x in (p, v, a, gain, late_move, moving, sprung, preload, limit, closed, inner)
+            p, v, a, h, gain, late_move, moving, sprung, preload, limit, closed, inner = (
+                x[:k] for x in (p, v, a, h, gain, late_move, moving, sprung, preload, limit, closed, inner)
             )
             friction.narrow(k)
             steer.narrow(k)
+        if changes[i]:
+            h = steps[i, :k]
+            half = 0.5 * h
+            mass, late_move = q["inertia"][:k] / half, late_push[:k] / half
+            moving, closed = mass - late_move, gain * (half - late[:k]) + q["damping"][:k] * (1.0 - late[:k] / half)
+            inner = mass + q["viscous"][:k] + half * q["stiffness"][:k] + closed
+            friction.pace(h)
+            steer.pace(h)
+            if contact is not None:
+                contact.pace(h)
         push = steer.push(i, p, v)
         position[i, :k], velocity[i, :k], acceleration[i, :k] = p, v, a
         total = push - preload + moving * v - sprung * p
@@ -203,8 +238,8 @@ def _run(moves: Moves, q: Mapping[str, Array], steer: _Profile | _Cascade, step_
                 middle = np.where(over, friction.velocity(own + np.sign(u_middle) * limit, resisting - closed, v), middle)
         fresh, middle = friction.advance(v, middle)
         steer.advance(middle)
-        p = p + step_s * middle
-        a = (fresh - v) / step_s
+        p = p + h * middle
+        a = (fresh - v) / h
         v = fresh
     gain, keep, late_push = every
     return position, late_push * acceleration - gain * position - keep * velocity
@@ -213,8 +248,8 @@ def _run(moves: Moves, q: Mapping[str, Array], steer: _Profile | _Cascade, step_
 class _Profile:
     """What a trapezoidal profile adds to the current: gain r + damping r', at the steps (at) and between them."""
 
-    def __init__(self, moves: Moves, q: Mapping[str, Array], step_s: float, time_s: Array) -> None:
-        t, sign = time_s[:, None] - moves.start_s, np.sign(moves.target - moves.origin)
+    def __init__(self, moves: Moves, q: Mapping[str, Array], times: Grid) -> None:
+        t, sign = times.at_s - moves.start_s, np.sign(moves.target - moves.origin)
         shape = _Trapezoid(moves, q)
         r = moves.origin + sign * shape.way(t)
         t -= q["lag"]
@@ -222,7 +257,7 @@ class _Profile:
         self.at = q["gain"] * r + q["damping"] * sign * shape.speed(t)
         # the mean over a step is exact where the velocity jumps within it
         self.between = np.empty_like(r)
-        self.between[:-1] = q["gain"] * 0.5 * (r[1:] + r[:-1]) + q["damping"] * sign * np.diff(way, axis=0) / step_s
+        self.between[:-1] = q["gain"] * 0.5 * (r[1:] + r[:-1]) + q["damping"] * sign * np.diff(way, axis=0) / np.diff(times.at_s, axis=0)
         self.between[-1] = self.at[-1]
         self.hold = q["gain"] * r[0], q["gain"]
 
@@ -232,6 +267,9 @@ class _Profile:
 
     def narrow(self, k: int) -> None:
         """Nothing: the drives that are left say how many they are."""
+
+    def pace(self, step_s: Array) -> None:
+        """Nothing: the reference is known beforehand."""
 
     def push(self, i: int, p: Array, v: Array) -> Array:
         """Its part of the current (k,) [raw] in the middle of step i."""
@@ -244,11 +282,11 @@ class _Profile:
 class _Cascade:
     """What a position loop round a speed loop adds to the current, at the steps (at); r goes with the drive within the deadband."""
 
-    def __init__(self, moves: Moves, q: Mapping[str, Array], step_s: float, time_s: Array) -> None:
-        self.step_s, self.time_s, self.last_start = step_s, time_s, float(moves.start_s.max())
-        self.at, self.hold = np.zeros((len(time_s), len(moves.target))), moves.hold
+    def __init__(self, moves: Moves, q: Mapping[str, Array], times: Grid) -> None:
+        self.at_s, self.starting = times.at_s, (times.at_s.min(axis=1) < moves.start_s.max()).tolist()
+        self.at, self.hold = np.zeros(times.at_s.shape), moves.hold
         self.gain, self.damping, self.half_gain, self.half_damping = q["gain"], q["damping"], 0.5 * q["gain"], 0.5 * q["damping"]
-        self.start_s, self.target, self.origin, self.loop = moves.start_s, moves.target, moves.origin, _Loop(q, step_s, moves.speed)
+        self.start_s, self.target, self.origin, self.loop = moves.start_s, moves.target, moves.origin, _Loop(q, moves.speed)
 
     def first(self, p: Array, v: Array) -> Array:
         """Current (B,) [raw] before the move: what held the drive."""
@@ -257,22 +295,27 @@ class _Cascade:
 
     def narrow(self, k: int) -> None:
         """Keep the first k drives."""
-        for name in ("gain", "damping", "half_gain", "half_damping", "start_s", "target", "origin", "r", "w"):
+        for name in ("gain", "damping", "half_gain", "half_damping", "start_s", "target", "origin", "r", "w", "step_s", "half"):
             setattr(self, name, getattr(self, name)[:k])
         self.loop.narrow(k)
+
+    def pace(self, step_s: Array) -> None:
+        """The steps (k,) [s] from here on."""
+        self.step_s, self.half = step_s, 0.5 * step_s
+        self.loop.pace(step_s)
 
     def push(self, i: int, p: Array, v: Array) -> Array:
         """Its part of the current (k,) [raw] in the middle of step i."""
         r, w = self.r, self.w
         share, change = self.loop.step(self.target - p, v, w)
-        if self.time_s[i] < self.last_start:
+        if self.starting[i]:
             # the share of this step that lies behind the command, so that its instant counts within a step too
-            since = np.minimum(np.maximum((self.time_s[i] + self.step_s - self.start_s) / self.step_s, 0.0), 1.0)
+            since = np.minimum(np.maximum((self.at_s[i, : len(p)] + self.step_s - self.start_s) / self.step_s, 0.0), 1.0)
             old_share, old_change = self.loop.step(self.origin - p, v, w)
             share, change = since * share + (1 - since) * old_share, since * change + (1 - since) * old_change
         self.w = w + change
         both = w + self.w
-        self.share, self.r_next = share, r + (0.5 * self.step_s) * both
+        self.share, self.r_next = share, r + self.half * both
         self.at[i, : len(p)] = self.gain * r + self.damping * w
         return self.half_gain * (r + self.r_next) + self.half_damping * both
 
@@ -285,16 +328,20 @@ class _Cascade:
 class _Loop:
     """The position loop of cascades: the wanted speed, within a slew rate, of a position error."""
 
-    def __init__(self, q: Mapping[str, Array], step_s: float, speed: Array) -> None:
-        self.step_s, self.slew, self.top = step_s, step_s * q["speed_full"] / np.maximum(q["rise"], 1e-4), q["speed_full"] * speed
+    def __init__(self, q: Mapping[str, Array], speed: Array) -> None:
+        self.slope, self.top, self.delay = q["speed_full"] / np.maximum(q["rise"], 1e-4), q["speed_full"] * speed, q["delay"]
+        self.deadband, self.edge, self.gain, self.bottom = q["deadband"], q["edge"], q["position_gain"], -self.top
+
+    def pace(self, step_s: Array) -> None:
+        """The steps (k,) [s] from here on."""
+        k = len(step_s)
+        self.step_s, self.slew = step_s, step_s * self.slope[:k]
         # where the drive will be seen at the middle and at the end of the step
-        self.middle, self.end = 0.5 * step_s - q["delay"], step_s - q["delay"]
-        self.deadband, self.edge, self.gain = q["deadband"], q["edge"], q["position_gain"]
-        self.down, self.bottom = -self.slew, -self.top
+        self.middle, self.end, self.down = 0.5 * step_s - self.delay[:k], step_s - self.delay[:k], -self.slew
 
     def narrow(self, k: int) -> None:
         """Keep the first k drives."""
-        for name in ("slew", "top", "down", "bottom", "middle", "end", "deadband", "edge", "gain"):
+        for name in ("step_s", "slew", "top", "down", "bottom", "middle", "end", "deadband", "edge", "gain"):
             setattr(self, name, getattr(self, name)[:k])
 
     def step(self, error: Array, v: Array, wanted: Array) -> tuple[Array, Array]:
@@ -311,8 +358,12 @@ class _Loop:
 class _Contact:
     """An object: a one-sided spring with damping."""
 
-    def __init__(self, q: Mapping[str, Array], half: float) -> None:
-        self.stiffness, self.at, self.reach = q["contact_stiffness"], q["contact_at"], half + q["contact_damping"]
+    def __init__(self, q: Mapping[str, Array]) -> None:
+        self.stiffness, self.at, self.damping = q["contact_stiffness"], q["contact_at"], q["contact_damping"]
+
+    def pace(self, step_s: Array) -> None:
+        """The steps (k,) [s] from here on."""
+        self.reach = 0.5 * step_s + self.damping[: len(step_s)]
 
     def load(self, p: Array) -> tuple[Array, Array]:
         """Load (k,) [raw] at positions (k,) [%], and what it resists velocity with [raw s/%]."""
@@ -329,7 +380,9 @@ def cascade_step(
     error [%]: setpoint less position; speed: share of full; velocity [%/s] of the drive.
     """
     one = {k: np.atleast_1d(np.asarray(q[k], float)) for k in ("deadband", "edge", "position_gain", "speed_full", "rise", "delay")}
-    share, change = (float(x[0]) for x in _Loop(one, step_s, np.atleast_1d(speed)).step(*map(np.atleast_1d, (error, velocity, wanted))))
+    loop = _Loop(one, np.atleast_1d(speed))
+    loop.pace(np.atleast_1d(step_s))
+    share, change = (float(x[0]) for x in loop.step(*map(np.atleast_1d, (error, velocity, wanted))))
     w = wanted + change
     # within the deadband the integral holds: the reference goes with the drive
     return share * (reference + 0.5 * step_s * (wanted + w)) + (1 - share) * (reference + step_s * velocity), w

@@ -13,8 +13,11 @@ Array = NDArray[np.float64]
 class Stick:
     """Coulomb friction that truly sticks; set-valued at rest, solved implicitly (Moreau's sweeping process; Acary & Brogliato 2008)."""
 
-    def __init__(self, q: Mapping[str, Array], step_s: float) -> None:
+    def __init__(self, q: Mapping[str, Array]) -> None:
         self.rise = Rise(q)
+
+    def pace(self, step_s: Array) -> None:
+        """Nothing: what stops stops within a step, however long."""
 
     def begin(self, load: Array, v: Array) -> None:
         """Nothing: what holds a drive at rest follows from its balance."""
@@ -43,11 +46,14 @@ class Stick:
 class Bristles:
     """LuGre's friction (equations in `drive`), linear within a step."""
 
-    def __init__(self, q: Mapping[str, Array], step_s: float) -> None:
-        self.rise, self.step_s = Rise(q), step_s
+    def __init__(self, q: Mapping[str, Array]) -> None:
+        self.rise, self.bristle = Rise(q), q["bristle"]
         distance = np.maximum(q["presliding"], 1e-4)
-        self.reach, self.least, self.per = 0.5 * step_s + q["bristle"], 1e-6 * distance, -1.0 / distance
-        self.step_per = step_s * self.per
+        self.least, self.per = 1e-6 * distance, -1.0 / distance
+
+    def pace(self, step_s: Array) -> None:
+        """The steps (k,) [s] from here on."""
+        self.step_s, self.reach, self.step_per = step_s, 0.5 * step_s + self.bristle[: len(step_s)], step_s * self.per
 
     def begin(self, load: Array, v: Array) -> None:
         """Friction of drives in balance with a load (B,) [raw], or sliding at v (B,) [%/s]."""
@@ -57,7 +63,8 @@ class Bristles:
     def narrow(self, k: int) -> None:
         """Keep the first k drives."""
         self.rise.narrow(k)
-        self.f, self.reach, self.least, self.per, self.step_per = self.f[:k], self.reach[:k], self.least[:k], self.per[:k], self.step_per[:k]
+        for name in ("f", "step_s", "reach", "least", "per", "step_per"):
+            setattr(self, name, getattr(self, name)[:k])
 
     def velocity(self, total: Array, inner: Array, v: Array) -> Array:
         """Velocity (k,) [%/s] in the middle of a step, of all other efforts [raw] and what resists velocity [raw s/%]."""

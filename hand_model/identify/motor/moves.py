@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .grid import NEVER
 from .recording import MotorTrial
 
 Array = NDArray[np.float64]
@@ -16,6 +17,7 @@ Array = NDArray[np.float64]
 SETTLED = 0.6  # [%]: movement allowed over the samples before a move that starts from rest
 SURE = 0.05  # share of what one logged speed is known to, below which no level of speeds is known
 AFTER_S = 0.05  # after which a move that is settled counts as over
+STARTS_S, STOPS_S, RESTS_S = 0.15, 0.3, 0.15  # after a drive has left its place, before it is back at rest, and after that: where it may be sudden
 BEFORE = 12  # samples at rest that a move looks back to
 
 
@@ -40,6 +42,11 @@ class MoveData:
     own_sd: Array
     velocity: float = 0.0
     logged: float = 1.0
+
+    @property
+    def calm_s(self) -> tuple[float, float, float]:
+        """When the drive was seen to cruise, from and until, and from when on to rest [s]: where nothing sudden happens."""
+        return _calm(self)
 
 
 def moves_from_rest(trial: MotorTrial, sigma: tuple[float, float], speed_full: float) -> tuple[MoveData, ...]:
@@ -111,6 +118,17 @@ def without_rest(m: MoveData) -> MoveData:
     """The move until AFTER_S after it is within SETTLED of where it ends."""
     far = np.flatnonzero(np.abs(m.position - m.position[-3:].mean()) > SETTLED)
     return shortened(m, float(m.time_s[far[-1]]) + AFTER_S) if len(far) else m
+
+
+def _calm(m: MoveData) -> tuple[float, float, float]:
+    t, p = m.time_s, m.position
+    end = float(p[-3:].mean())
+    gone, far = np.flatnonzero(np.abs(p - p[0]) > SETTLED), np.flatnonzero(np.abs(p - end) > SETTLED)
+    if len(gone) == 0 or len(far) == 0:
+        return NEVER, NEVER, NEVER
+    stopped = float(t[far[-1]])
+    rests = len(p) > far[-1] + 4
+    return float(max(t[gone[0]], m.own[0])) + STARTS_S, (stopped - STOPS_S if rests else NEVER), (stopped + RESTS_S if rests else NEVER)
 
 
 def _rest(t: Array, p: Array, sigma: float) -> tuple[float, float, float] | None:

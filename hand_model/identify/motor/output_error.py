@@ -21,11 +21,13 @@ from .moves import MoveData, speed_levels
 Array = NDArray[np.float64]
 
 COARSE_S = 5e-3
-# steps [s], rounds, fall of the misfit that is worth another round, width [%] over which a deadband sets in: what sets in softly has no kinks
-COARSE, FINE = (COARSE_S, 4, 5.0, 0.5), (STEP_S, 6, 1.0, 0.05)
-ALIGN = (COARSE, (STEP_S, 4, 0.5, 0.05))  # where only the moves' own unknowns are sought
-NEARLY = (STEP_S, 3, 5.0, 0.05)  # a fit that will be refined
+# steps [s], rounds, fall of the misfit that is worth another round, width [%] over which a deadband sets in: what sets in softly has no kinks; share of the
+# usual widths of differences: wide ones see past kinks, narrow ones find the way along narrow valleys
+COARSE, FINE = (COARSE_S, 4, 5.0, 0.5, 1.0), (STEP_S, 8, 0.5, 0.05, 0.25)
+ALIGN = (COARSE, (STEP_S, 4, 0.5, 0.05, 1.0))  # where only the moves' own unknowns are sought
+NEARLY = (STEP_S, 3, 5.0, 0.05, 1.0)  # a fit that will be refined
 STAGES, ROUGH = (COARSE, FINE), (COARSE, NEARLY)
+OTHER = 0.3
 RETRY = 10.0  # times what is worth another round: the fall of the misfit for which a failed step is tried with other dampings
 DAMPINGS = ((-1, 0, 1), (-2, 2, 3, 4))  # of one step, powers of ten of the last one; the second four where the first three fail on a fresh Jacobian
 ABSOLUTE_REACH = {"preload": 20.0, "viscous": 0.1, "stiffness": 0.2, "coulomb": 10.0, "bristle": 0.01, "damping": 2.0, "rise": 0.02, "fall": 0.02, "deadband": 0.2, "delay": 0.002, "lead": 0.002, "lag": 0.002}
@@ -64,51 +66,55 @@ class OutputErrorFit:
         return speed_levels(self.moves, self.own)
 
 
-def _arrays(data: Sequence[MoveData], own: Array, repeat: int) -> Moves:
+def _arrays(data: Sequence[MoveData], own: Array, repeat: int, calm: bool = True) -> Moves:
     def tile(x: Sequence[float]) -> Array:
         return np.repeat(np.asarray(x, float), repeat)
 
     return Moves(
         own[:, 0], tile([m.origin for m in data]), tile([m.target for m in data]), own[:, 2],
         tile([m.limit for m in data]), own[:, 1], own[:, 3], tile([m.time_s[-1] for m in data]),
-        tile([m.velocity for m in data]),
+        tile([m.velocity for m in data]), *((tile(x) for x in zip(*(m.calm_s for m in data), strict=True)) if calm else ()),
     )  # fmt: skip
 
 
 def simulate_moves(data: Sequence[MoveData], q: Mapping[str, float], own: Array, controller: str, step_s: float = STEP_S) -> list[Array]:
     """Simulated position [%] and current [raw], (n, 2) per move."""
-    return [y for y, _ in _simulated(data, q, own, (1.0, 1.0), controller, step_s)]
+    return _split(_one(_single(data, q, own, controller, step_s, False), data, (1.0, 1.0))[0], data)
 
 
 def whitened(
     data: Sequence[MoveData], q: Mapping[str, float], own: Array, sigma: tuple[float, float], controller: str, step_s: float = STEP_S
 ) -> list[Array]:
     """Recorded less simulated position and current in units of what they are known to, (n, 2) per move."""
-    simulated = _simulated(data, q, own, sigma, controller, step_s)
-    return [(np.stack([m.position, m.current], axis=1) - y) * weight for m, (y, weight) in zip(data, simulated, strict=True)]
+    y, weight = _one(_single(data, q, own, controller, step_s, False), data, sigma)
+    return _split((_recorded(data) - y) * weight, data)
 
 
-def _simulated(
-    data: Sequence[MoveData], q: Mapping[str, float], own: Array, sigma: tuple[float, float], controller: str, step_s: float
-) -> list[tuple[Array, Array]]:
-    order = np.argsort([-m.time_s[-1] for m in data], kind="stable")
-    full = {k: np.full(len(data), v) for k, v in q.items()}
-    found = run(_arrays([data[i] for i in order], own[order], 1), full, step_s, controller)
-    out: list = [None] * len(data)
-    for column, i in enumerate(order):
-        out[i] = _one(found, column, data[i].time_s, sigma)
-    return out
+def _single(data: Sequence[MoveData], q: Mapping[str, float], own: Array, controller: str, step_s: float, calm: bool = True) -> Run:
+    """The moves simulated; calm: in long steps while the recorded drive cruised or rested, which is where the simulated one does only if it is near."""
+    return run(_arrays(data, own, 1, calm), {k: np.full(len(data), v) for k, v in q.items()}, step_s, controller)
 
 
-def _one(found: Run, column: int, at_s: Array, sigma: tuple[float, float]) -> tuple[Array, Array]:
-    """Position and current (n, 2) of one simulated move, and the inverse standard deviations to which they are known, (n, 2).
+def _recorded(data: Sequence[MoveData]) -> Array:
+    """Position and current (N, 2) of all moves, one after the other."""
+    return np.stack([np.concatenate([m.position for m in data]), np.concatenate([m.current for m in data])], axis=1)
+
+
+def _split(rows: Array, data: Sequence[MoveData]) -> list[Array]:
+    """Rows (N, ...) of all moves by move."""
+    return np.split(rows, np.cumsum([len(m.time_s) for m in data])[:-1])
+
+
+def _one(found: Run, data: Sequence[MoveData], sigma: tuple[float, float], width: int = 1) -> tuple[Array, Array]:
+    """Position and current (N, 2) of simulated moves, the first of every `width`, and the inverse standard deviations to which they are known, (N, 2).
 
     The current's holds half its change from REACH_S before to REACH_S after the sample: what the controller's steps leave open.
     """
-    n, c = len(at_s), slice(column, column + 1)
-    p, u = (y[:, 0] for y in found.sample(c, np.concatenate([at_s, at_s - REACH_S, at_s + REACH_S])))
-    change = 0.5 * (u[2 * n :] - u[n : 2 * n])
-    return np.c_[p[:n], u[:n]], np.c_[np.full(n, 1 / sigma[0]), 1 / np.hypot(sigma[1], change)]
+    found = dataclasses.replace(found, column=found.column[::width])
+    times = [m.time_s for m in data]
+    p, u = (y[:, 0] for y in found.sample(times))
+    before, after = (found.sample([t + x for t in times])[1][:, 0] for x in (-REACH_S, REACH_S))
+    return np.c_[p, u], np.c_[np.full(len(p), 1 / sigma[0]), 1 / np.hypot(sigma[1], 0.5 * (after - before))]
 
 
 def _steps(values: Mapping[str, float], names: Sequence[str]) -> Array:
@@ -126,37 +132,41 @@ def _linearise(
     the optimum, not where the residuals have no part of it left. Where a deadband sets in needs the fine one: with the coarse, cascades end far enough
     from the optimum to miss their intervals.
     """
-    k = len(names)
-    width = k + 1 + len(OWN_STEP)
-    steps, own_step = width_share * _steps(q, names), width_share * np.array(OWN_STEP)
-    order = np.argsort([-m.time_s[-1] for m in data], kind="stable")
-    ordered = [data[i] for i in order]
+    apart = [n for n in names if n != "speed_full"]
+    width = len(apart) + 1 + len(OWN_STEP)
+    steps = width_share * np.append(_steps(q, apart), OWN_STEP)
     values = {n: np.full(width, v) for n, v in q.items()}
-    for i, n in enumerate(names):
+    for i, n in enumerate(apart):
         values[n] = values[n].copy()
         values[n][1 + i] += steps[i]
     values = {n: np.tile(v, len(data)) for n, v in values.items()}
-    owns = np.repeat(own[order], width, axis=0)
-    for i, small in enumerate(own_step):
-        owns[k + 1 + i :: width, i] += small
+    owns = np.repeat(own, width, axis=0)
+    for i in range(own.shape[1]):
+        owns[len(apart) + 1 + i :: width, i] += steps[len(apart) + i]
     coarse_s = step_s if controller == "cascade" else COARSE_S
-    varied = run(_arrays(ordered, owns, width), values, coarse_s, controller)
-    base = run(_arrays(ordered, own[order], 1), {n: np.full(len(data), v) for n, v in q.items()}, step_s, controller) if step_s < coarse_s else varied
-    per = 1 if step_s < coarse_s else width
-    out_r: list = [None] * len(data)
-    out_g: list = [None] * len(data)
-    out_l: list = [None] * len(data)
-    out_w: list = [None] * len(data)
-    for column, i in enumerate(order):
-        m = data[i]
-        y, weight = _one(base, column * per, m.time_s, sigma)
-        out_r[i] = ((np.stack([m.position, m.current], axis=1) - y) * weight).T.ravel()
-        y = np.stack(varied.sample(slice(column * width, (column + 1) * width), m.time_s), axis=1) * weight[:, :, None]  # (n, 2, width)
-        with np.errstate(invalid="ignore"):  # drives that ran away
-            derivative = (y[:, :, 1:] - y[:, :, :1]) / np.append(steps, own_step)
-        derivative = np.nan_to_num(derivative.transpose(1, 0, 2).reshape(-1, width - 1), posinf=0.0, neginf=0.0)
-        out_g[i], out_l[i], out_w[i] = derivative[:, :k], derivative[:, k:], weight
-    return [freed(e, memory) for e in out_r], [freed(e, memory) for e in out_g], [freed(e, memory) for e in out_l], out_w
+    varied = run(_arrays(data, owns, width), values, coarse_s, controller)
+    y, weight = _one(_single(data, q, own, controller, step_s), data, sigma) if step_s < coarse_s else _one(varied, data, sigma, width)
+    residual = _split((_recorded(data) - y) * weight, data)
+    with np.errstate(over="ignore", invalid="ignore"):  # drives that ran away
+        varied_y = varied.sample([m.time_s for m in data], width)
+        derivative = np.stack([(x[:, 1:] - x[:, :1]) * w[:, None] for x, w in zip(varied_y, weight.T, strict=True)], axis=1) / steps
+    derivative = np.nan_to_num(derivative, posinf=0.0, neginf=0.0)  # (N, 2, width - 1)
+    both = [freed(d.transpose(1, 0, 2).reshape(-1, width - 1), memory) for d in _split(derivative, data)]
+    shared = [_with_speed(d, x, q, names, apart) for d, x in zip(both, own, strict=True)]
+    return [freed(e.T.ravel(), memory) for e in residual], shared, [d[:, len(apart) :] for d in both], _split(weight, data)
+
+
+def _with_speed(derivative: Array, own: Array, q: Mapping[str, float], names: Sequence[str], apart: Sequence[str]) -> Array:
+    """Derivatives (2n, k) by `names`, of a move's (2n, k') by those `apart` from the full speed and by its own unknowns (4,).
+
+    A move's top speed is full speed times its own share, its slew full speed over the time to reach it. All moves' own shares make up for full speed but for
+    what is known of them: differences of their own for both, wide as they are, would hide this way of going wrong.
+    """
+    if "speed_full" not in names:
+        return derivative[:, : len(apart)]
+    by = dict(zip(apart, derivative.T, strict=False))
+    speed = (own[2] * derivative[:, len(apart) + 2] - sum(q[n] * by[n] for n in ("rise", "fall") if n in by)) / q["speed_full"]
+    return np.column_stack([speed if n == "speed_full" else by[n] for n in names])
 
 
 def _misfit(residual: list[Array], data: Sequence[MoveData], own: Array, q: Mapping[str, float]) -> float:
@@ -172,16 +182,11 @@ def _costs(
 ) -> tuple[Array, int, list[Array]]:
     """Misfit of several candidates (their shared values and own unknowns) at fixed weights, in one batch of simulations; the best, its residuals."""
     width = len(qs)
-    order = np.argsort([-m.time_s[-1] for m in data], kind="stable")
     values = {n: np.tile([q[n] for q in qs], len(data)) for n in qs[0]}
-    own = np.stack(owns, axis=1)[order].reshape(len(data) * width, -1)
-    found = run(_arrays([data[i] for i in order], own, width), values, step_s, controller)
-    residual: list = [None] * len(data)
-    for column, i in enumerate(order):
-        m = data[i]
-        y = np.stack(found.sample(slice(column * width, (column + 1) * width), m.time_s), axis=1)
-        error = ((np.stack([m.position, m.current], axis=1)[:, :, None] - y) * weights[i][:, :, None]).transpose(1, 0, 2).reshape(-1, width)
-        residual[i] = freed(error, memory)
+    found = run(_arrays(data, np.stack(owns, axis=1).reshape(len(data) * width, -1), width), values, step_s, controller)
+    y = found.sample([m.time_s for m in data], width)
+    error = np.stack([(r[:, None] - x) * w[:, None] for r, x, w in zip(_recorded(data).T, y, np.concatenate(weights).T, strict=True)], axis=1)
+    residual = [freed(e.transpose(1, 0, 2).reshape(-1, width), memory) for e in _split(error, data)]
     costs = np.array([_misfit([e[:, j] for e in residual], data, owns[j], qs[j]) for j in range(width)])
     best = int(np.argmin(costs))
     return costs, best, [e[:, best] for e in residual]
@@ -195,7 +200,7 @@ def fit(
     sigma: tuple[float, float],
     bounds: Mapping[str, tuple[float, float]],
     controller: str = "profile",
-    stages: Sequence[tuple[float, int, float, float]] = (),
+    stages: Sequence[tuple[float, int, float, float, float]] = (),
     own: Array | None = None,
     memory: tuple[Predictors, ...] = (),
 ) -> OutputErrorFit:
@@ -206,8 +211,8 @@ def fit(
     """
     q, own = dict(start_values), np.array([m.own for m in data]) if own is None else own.copy()
     wanted = tuple(names)
-    for step_s, rounds, enough, edge in stages or STAGES:
-        damping, share, fresh, q = 1e-3, 1.0, True, {**q, "edge": edge}
+    for step_s, rounds, enough, edge, usual in stages or STAGES:
+        damping, share, fresh, q = 1e-3, usual, True, {**q, "edge": edge}
         # what is finer than the step would only make up for the step
         names = tuple(n for n in wanted if step_s < COARSE_S or n not in PRIOR)
         for _ in range(rounds):
@@ -226,10 +231,10 @@ def fit(
             if moved is None:
                 if not fresh:
                     fresh = True
-                elif share != 1.0 or step_s == COARSE_S or expected < RETRY * enough:
+                elif share != usual or step_s == COARSE_S or expected < RETRY * enough:
                     break
                 else:  # caught at a kink: differences over another width see past it
-                    share, damping = 0.3, 1e-1
+                    share, damping = OTHER * usual, 1e-1
                 continue
             fell = cost - moved[2]
             q, own, cost, damping, residual = moved
