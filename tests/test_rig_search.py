@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,8 @@ import pytest
 from hand_model.effects.path import jenkins
 from hand_model.rig import diagnose_rig, load_rig
 from hand_model.rig.diagnose import trusted_fit
+from hand_model.rig.diagnose_swing import _standing
+from hand_model.rig.evidence import weigh
 from hand_model.rig.swing import Lane, Swing
 from hand_model.rig.swing_build import ENOUGH_STEPS, thinned
 from hand_model.session import read_session
@@ -67,6 +70,41 @@ def test_a_noisy_torque_is_no_mismatch(tmp_path: Path) -> None:
     fit = trusted_fit(load_rig(session))[0]
     friction = [t for c, t in zip(fit.columns, fit.theta, strict=True) if c.kind in ("damping", "frictionloss")]
     assert friction == pytest.approx([0.03, 0.08], rel=0.1)
+
+
+def test_the_best_of_many_rivals_is_held_to_the_best_of_chance() -> None:
+    """Of rivals that gain nothing one in twenty rounds names one, be they independent or all the same; a real gain that
+    one of many alike has is as sure as alone."""
+    random, blocks = np.random.default_rng(0), 30
+    none, group = np.full(blocks, 10.0), np.arange(blocks)
+    for alike in (False, True):
+        hits = 0
+        for _ in range(200):
+            noise = random.standard_normal((1 if alike else 15, blocks))
+            hits += weigh(none, none - np.repeat(noise, 15 if alike else 1, 0), [1] * 15, group) is not None
+        assert hits < 25
+    gain = 0.6 + random.standard_normal((1, blocks))
+    alone = weigh(none, none - gain, [1], group)
+    among = weigh(none, none - np.repeat(gain, 15, 0), [1] * 15, group)
+    assert alone is not None and among is not None and among.probability == alone.probability
+
+
+def test_effects_that_help_only_together_stand_together() -> None:
+    """An effect that makes the held-out error worse before a later one comes stands where all are worse without it; one
+    that they do without is withdrawn, and one that helps last comes last."""
+    error = {"": 10.0, "a": 5.0, "ab": 6.0, "abc": 1.0, "ac": 4.9}
+    helpers = {"": 10.0, "a": 5.0, "ab": 6.0, "abc": 1.0, "ac": 2.0}
+    useless = {"": 10.0, "a": 5.0, "ab": 6.0, "abc": 2.0, "ac": 2.0}
+    for table, order, gone in ((error, "abc", []), (helpers, "acb", []), (useless, "ac", ["b"])):
+
+        def chain(some: list, table: dict = table) -> list[SimpleNamespace]:
+            keys = ["".join(v.key for v, _ in some[:k]) for k in range(len(some) + 1)]
+            return [SimpleNamespace(error=table[key]) for key in keys]
+
+        kept, links, rejected = _standing([(SimpleNamespace(key=k), None) for k in "abc"], chain)
+        assert "".join(v.key for v, _ in kept) == order
+        assert [r["effect"] for r in rejected] == gone
+        assert links[-1].error == min(table.values())
 
 
 def test_a_long_swing_is_searched_on_some_of_its_stretches() -> None:

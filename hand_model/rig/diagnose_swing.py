@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ from .words import shares, statement
 
 RESAMPLES = 500
 NOT_BORNE_OUT = "error on validation trials does not fall"
+Taken = tuple[Variant, Round]
 
 
 def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Callable[[str], None]) -> tuple:
@@ -35,24 +37,24 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
     declared = fit_stages(stages, [Task(free, vector(stages[0].initial), ())], 15)[0]
     floor, held = _resolution(rig), bool(rig.select(True))  # without validation recordings the training ones measure
     taken, rounds = compete_swing(stages, declared, floor)
-    kept, rejected = list(zip(taken, rounds, strict=True)), []
-    say(f"{rig.name}: {', '.join(v.key for v, _ in kept) or 'nothing'}")
-    # Last, at the step of the replay; a free swing over whole recordings, for its phase is known well enough by now.
-    last_stages = [(STEP_S, windows[-1], 8)] if stages[0].driven else [(step, np.inf, 12), (STEP_S, np.inf, 3)]
+    say(f"{rig.name}: {', '.join(v.key for v in taken) or 'nothing'}")
+    # Last, at the step of the replay; a free swing over whole recordings, for its phase is known well enough by now. What
+    # a coarse step there does to the period (4e-4 of it at most, with a hundred steps in each) the last steps take back.
+    last_stages = [(STEP_S, windows[-1], 8)] if stages[0].driven else [(2 * step, np.inf, 12), (STEP_S, np.inf, 3)]
     fine = [(build_swing(rig, fit, step_s, window_s), most) for step_s, window_s, most in last_stages]
     known: dict[tuple[str, ...], Link] = {}
-    while True:
-        chain = _chain(rig, session, held, fine, declared.theta, kept, known)
-        figures = [c.replay.figure("position_rmse", held) for c in chain]
-        worse = next((k for k in range(len(kept)) if not figures[k + 1] < (1.0 - LEAST_GAIN) * figures[k]), None)
-        if worse is None:
-            break
-        rejected.append({"effect": kept.pop(worse)[0].key, "reason": NOT_BORNE_OUT})
+
+    def chain_of(some: Sequence[Taken]) -> list[Link]:
+        return _chain(rig, session, held, fine, declared.theta, some, known)
+
+    kept, chain, rejected = _standing(list(zip(taken, rounds, strict=True)), chain_of)
+    figures = [c.error for c in chain]
     found = []
     ends = intervals(build_swing(rig, fit, STEP_S, windows[-1]), chain[-1].free, chain[-1].fit.theta)
     for k, (variant, round_) in enumerate(kept):
-        proof = {"metric": "position_rmse", "unit": rig.unit(rig.joints[0]), "before": figures[k], "after": figures[k + 1],
-                 "noise_floor": floor, "ci95_reduction": _fall(chain[k].replay, chain[k + 1].replay, held),
+        before, after = _sides(kept, chain, k, chain_of)
+        proof = {"metric": "position_rmse", "unit": rig.unit(rig.joints[0]), "before": before.error, "after": after.error,
+                 "noise_floor": floor, "ci95_reduction": _fall(before.replay, after.replay, held),
                  "held_out": [t.name for t in rig.select(held)], "engine": "mujoco"}  # fmt: skip
         found.append(_swing_finding(rig, variant, round_, ends, chain[-1], proof))
     means = [c.replay.figure("position_mae", held) for c in (chain[0], chain[-1])]
@@ -66,16 +68,55 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
 
 @dataclass(frozen=True)
 class Link:
-    """The declared model with the first so many effects: free parameters, their fit, the file, and its replay."""
+    """The declared model with the first so many effects: free parameters, their fit, the file, its replay, and the held-out
+    error of that."""
 
     free: tuple[str, ...]
     fit: Fitted
     xml: bytes
     replay: RigResiduals
+    error: float
+
+
+def _standing(
+    kept: list[Taken], chain_of: Callable[[Sequence[Taken]], list[Link]]
+) -> tuple[list[Taken], list[Link], list[dict[str, Any]]]:
+    """Effects that stand, the chain of models with them, and those withdrawn: an effect falls when all that stand predict the
+    recordings held out no worse without it. One that has to wait for a later one before it helps comes after it, where
+    the others do without it so far."""
+    needed: set[str] = set()
+    rejected: list[dict[str, Any]] = []
+    chain = chain_of(kept)
+    while True:
+        falls = _falls(chain)
+        worse = next((k for k, fell in enumerate(falls) if not fell and kept[k][0].key not in needed), None)
+        if worse is None:
+            return kept, chain, rejected
+        others = [*kept[:worse], *kept[worse + 1 :]]
+        without, key = chain_of(others), kept[worse][0].key
+        if not chain[-1].error < (1.0 - LEAST_GAIN) * without[-1].error:
+            rejected.append({"effect": key, "reason": NOT_BORNE_OUT})
+            kept, chain = others, without
+            continue
+        needed.add(key)
+        if all(_falls(without)):
+            kept, chain = [*others, kept[worse]], [*without, chain[-1]]
+
+
+def _sides(kept: Sequence[Taken], chain: Sequence[Link], k: int, chain_of: Callable[[Sequence[Taken]], list[Link]]) -> tuple[Link, Link]:
+    """What an effect is held to: the chain before and after it; of one that helps the later ones, all without and with it."""
+    if _falls(chain)[k]:
+        return chain[k], chain[k + 1]
+    return chain_of([*kept[:k], *kept[k + 1 :]])[-1], chain[-1]
+
+
+def _falls(chain: Sequence[Link]) -> list[bool]:
+    """Whether each effect of a chain lowers the held-out error by enough where it comes in."""
+    return [b.error < (1.0 - LEAST_GAIN) * a.error for a, b in pairwise(chain)]
 
 
 def _chain(rig: RigModel, session: Session, held: bool, stages: Sequence[tuple[Swing, int]], declared: np.ndarray,
-           kept: Sequence[tuple[Variant, Round]], known: dict[tuple[str, ...], Link]) -> list[Link]:  # fmt: skip
+           kept: Sequence[Taken], known: dict[tuple[str, ...], Link]) -> list[Link]:  # fmt: skip
     """The declared model, with the first effect, with the first two, ...: fitted in one batch, written and replayed; stages:
     each with its most iterations; known holds those that were before, by the effects in them."""
     swing = stages[0][0]
@@ -90,7 +131,7 @@ def _chain(rig: RigModel, session: Session, held: bool, stages: Sequence[tuple[S
     files = [write_swing(rig, swing, f.theta) for f in fits]
     replays = Background(_replayed, [(session, x, held) for x in files]).results()
     for k, names, f, x, r in zip(new, free, fits, files, replays, strict=True):
-        known[keys[k]] = Link(names, f, x, r)
+        known[keys[k]] = Link(names, f, x, r, r.figure("position_rmse", held))
     return [known[key] for key in keys]
 
 

@@ -3,7 +3,9 @@
 Cluster bootstrap (Davison & Hinkley 1997, sec. 3.8): whole recordings are drawn where there are enough of them, since
 blocks of one recording share what is peculiar to it; else blocks. A tie goes to the simpler rival within one standard
 error of the best (Breiman et al. 1984). That anything is there at all is asked first, of
-the best of so many rivals (Bonferroni; a protected comparison, Fisher 1935).
+the best of so many rivals: the largest studentised gain against its own distribution where none of them gains anything
+(White 2000, a reality check; Hansen 2005), so that rivals that say the same count once (a protected comparison, Fisher
+1935).
 """
 
 from __future__ import annotations
@@ -46,16 +48,29 @@ def multiplicities(group: Array, count: int = RESAMPLES, seed: int = 0) -> Array
     return np.stack([np.bincount(row, minlength=total) for row in drawn]).astype(float)[:, unit]
 
 
+def reality_check(resampled: Array, gain: Array) -> float:
+    """Probability that the best gain of several rivals is no chance: gain (rivals,), resampled (rivals, draws) [its unit]."""
+    spread = np.std(resampled, 1)
+    alive = spread > 1e-12 * np.max(np.abs(gain), initial=0.0)
+    if not alive.any():
+        return 0.0
+    spread, gain, resampled = spread[alive], gain[alive], resampled[alive]
+    chance = np.max((resampled - gain[:, None]) / spread[:, None], 0)
+    return float(np.mean(chance < np.max(gain / spread)))
+
+
 def weigh(none: Array, errors: Array, sizes: Sequence[int], group: Array,
           least: float = BEYOND_DOUBT) -> Verdict | None:  # fmt: skip
     """Compare rivals (errors (rivals, blocks), sizes: parameters) with each other and with "nothing" (none (blocks,)); None
-    where none of them beats nothing with probability `least`, the number of rivals allowed for."""
+    where none of them beats nothing with probability `least`, the choice among them allowed for."""
     draws = multiplicities(group)
     resampled, base, total = errors @ draws.T, draws @ none, errors.sum(1)
     against = np.mean(resampled < base, 1)
-    if 1.0 - len(errors) * (1.0 - against.max(initial=0.0)) < least:  # of many rivals some win by chance
+    if reality_check(base - resampled, none.sum() - total) < least:  # of many rivals some win by chance
         return None
     sure = [k for k in range(len(errors)) if against[k] >= least]
+    if not sure:
+        return None
     best = min(sure, key=lambda k: total[k])
     close = [k for k in sure if np.mean(resampled[best] < resampled[k]) < BEYOND_DOUBT]
     close.sort(key=lambda k: total[k])
