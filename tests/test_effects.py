@@ -128,7 +128,7 @@ def named() -> list:
     """Every effect with parameters for each of its forms and sides, amplitudes of either sign where physics allows it."""
     s, out = state(), []
     posed = DriveState(s.trial, s.drive, s.time_s, s.position, s.velocity, s.acceleration, s.effort, s.declared,
-                       declared_names=s.declared_names, extra={**s.extra, "gravity_along": s.time_s, "moved": s.time_s})
+                       declared_names=s.declared_names, extra={**s.extra, "gravity_along": s.time_s, "moving": np.ones(len(s.time_s))})
     for e in catalogue():
         if e.name in READ_ELSEWHERE:
             out.append(pytest.param(e, READ_ELSEWHERE[e.name], id=e.name))

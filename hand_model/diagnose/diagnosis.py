@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from ..background import Background
 from ..effects import catalogue
 from ..effects.base import DriveState
-from ..errors import HandModelError, IdentificationError
+from ..errors import HandModelError
 from ..hand import Hand
-from ..session import Finger, Session, read_session
+from ..session import Session, read_session
 from .angles import FingerAngles
 from .assemble import assemble
 from .balance import Balance
@@ -23,6 +24,7 @@ from .decoupled import without_excursions
 from .drive import drive_states, drive_trials, echoes_command, is_measured
 from .evidence import typical_coefficients
 from .findings import Finding, Findings
+from .finger import finger_readings
 from .gravity import with_gravity
 from .improve import read_model, write_improved
 from .name import polish, scan
@@ -49,13 +51,22 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
     notes: list[str] = []
     found: list[tuple[float, Finding]] = []
     fingers: dict[str, FingerAngles] = {}
+    stations: list[Station] = []
     unexplained: list[dict[str, Any]] = []
     distrusted = _distrusted(session)
     unexplained += [_false_stamps(session, a, s) for a, s in distrusted.items()]
     echoing = {a: trials for a, trials in drive_trials(session).items() if echoes_command([t.log() for t in trials])}
     found += [refused(a, _finger_of(session, a), tuple(t.name for t in trials), "position") for a, trials in echoing.items()]
     unread = (*distrusted, *echoing)
-    stations = _kinematic_stations(session, tell, notes, found, fingers, unexplained, unread)
+    for reading in finger_readings(session, unread):
+        for line in reading.lines:
+            tell(line)
+        stations += reading.stations
+        found += reading.found
+        unexplained += reading.unexplained
+        notes += reading.notes
+        if reading.angles is not None:
+            fingers[reading.finger] = reading.angles
     drives = {a: with_gravity(session, fingers, states)
               for a, states in drive_states(session, _encoder_corrections(stations)).items() if a not in unread}
     for station in (s for s in stations if s.believed and s.actuator in drives):
@@ -69,11 +80,14 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
     for _, finding in found:
         tell(finding.statement)
     allowed, alone = _delays_apart(drives), {a: Balance(states).fit() for a, states in drives.items()}
+    calls = []
     for actuator, states in drives.items():
         effects = [e for e in catalogue("drive") if not e.warps or allowed[actuator]]
         typical = typical_coefficients([fit for a, fit in alone.items() if a != actuator])
-        stations.append(judged("current", _finger_of(session, actuator), actuator, None, states, effects, typical))
-        tell(stations[-1].line())
+        calls.append(("current", _finger_of(session, actuator), actuator, None, states, effects, typical))
+    for station in Background(judged, calls).results():
+        stations.append(station)
+        tell(station.line())
     odd = preload_findings(stations)
     for _, finding in odd:
         tell(finding.statement)
@@ -196,59 +210,3 @@ def _once(found: list[tuple[float, Finding]]) -> list[tuple[float, Finding]]:
 
 def _finger_of(session: Session, actuator: str) -> str | None:
     return next((f.name for f in session.fingers if f.actuator == actuator), None)
-
-
-def _kinematic_stations(session: Session, tell: Callable[[str], None], notes: list[str],
-                        marker_findings: list[tuple[float, Finding]], fingers: dict[str, FingerAngles],
-                        unexplained: list[dict[str, Any]], unread: tuple[str, ...]) -> list[Station]:
-    if session.palm is None:
-        return []
-    from ..identify.identification import palm_shape
-    from .angles import ranges_of_counts
-
-    if not session.select("flexion") or not any(t.mocap_path for t in session.select("flexion")):
-        return []
-    try:
-        shape = palm_shape(session)
-    except IdentificationError as error:
-        notes.append(str(error))
-        return []
-    counts = {a: c for a, c in ranges_of_counts(session).items() if a not in unread}
-    out: list[Station] = []
-    for finger in session.fingers:
-        try:
-            out += _finger_stations(session, finger, shape, counts, tell, marker_findings, fingers, unexplained)
-        except IdentificationError as error:
-            notes.append(str(error))
-    return out
-
-
-def _finger_stations(session: Session, finger: Finger, shape: Any, counts: dict[str, tuple[float, float]],
-                     tell: Callable[[str], None], marker_findings: list[tuple[float, Finding]],
-                     fingers: dict[str, FingerAngles], unexplained: list[dict[str, Any]]) -> list[Station]:
-    from .angles import encoder_states, expected_angles, finger_angles, linkage_states
-    from .markers import corrected_angles, name_markers
-    from .slips import marker_findings as findings_of
-    from .slips import steps
-    from .slips import unexplained as unexplained_of
-
-    angles = fingers[finger.name] = finger_angles(session, finger, shape)
-    markers = name_markers(angles)
-    found = findings_of(angles, markers)
-    marker_findings += found
-    unexplained += unexplained_of(angles, markers)
-    tell(f"{finger.name} markers: {', '.join(f.effect for _, f in found) or 'consistent'} "
-         f"(p {markers.p_before:.2g} -> {markers.p_after:.2g})")
-    angles, moments = corrected_angles(angles, markers), steps(angles, markers)
-    out: list[Station] = []
-    states = encoder_states(angles, *counts[finger.actuator], moments) if finger.actuator in counts else ()
-    if states:
-        out.append(judged("encoder", finger.name, finger.actuator, finger.segments[0].name, states, catalogue("encoder")))
-        tell(out[-1].line())
-    for joint in range(1, len(finger.segments)):
-        expected = expected_angles(out[0].naming) if out and joint == 1 else {}
-        states = linkage_states(angles, joint, moments, expected)
-        if states:
-            out.append(judged("markers", finger.name, finger.actuator, finger.segments[joint].name, states, catalogue("linkage")))
-            tell(out[-1].line())
-    return out

@@ -61,34 +61,32 @@ def _frames(blocks: Blocks, body: int, marker: int) -> list[Array]:
 
 
 def _no_hinge(blocks: Blocks, k: int) -> list[Candidate]:
-    """Wobble and moving centre of joint k - 1, each with a few forms over its angle."""
+    """Wobble and moving centre of joint k - 1, each with a few forms over its angle. The other axis of a wobble meets the hinge
+    where the centre is taken to be, or passes anywhere: then what it carries is shifted in step with the tilt."""
     b, m = blocks.weight.shape
     low, high = np.quantile(blocks.angle[:, k - 1], [0.005, 0.995])
     u = ((blocks.angle[:, k - 1] - low) / max(high - low, 1e-9))[:, None]
     wave = [np.sin(2 * np.pi * u), np.cos(2 * np.pi * u)]
     forms: list[list[Array]] = [[u**2], [u**2, u**3], wave, [u**2, u**3, *wave]]
     moved = np.flatnonzero(blocks.body >= k)
-    axis, centre = blocks.axes[:, k - 1], blocks.centres[:, k - 1]
+    axis = blocks.axes[:, k - 1]
     helper = np.eye(3)[np.argmin(np.abs(axis.mean(0)))]
     first = np.cross(axis, helper)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
-    second = np.cross(axis, first)
+    across = (first, np.cross(axis, first))
+    arm = blocks.position[:, moved] - blocks.centres[:, k - 1][:, None]
+    shifts = [np.broadcast_to(d[:, None], arm.shape) for d in across]
+    tilts = [np.cross(d[:, None], arm) for d in across]
+
+    def candidate(name: str, functions: list[Array], ways: list[Array]) -> Candidate:
+        columns = np.zeros((b, m, 3, len(functions) * len(ways)))
+        columns[:, moved] = np.stack([f[:, :, None] * way for f in functions for way in ways], axis=-1)
+        return Candidate(name, k, None, columns.reshape(b, 3 * m, -1), False)
+
     out = []
     for form in forms:
-        for name in ("joint_wobble", "moving_centre"):
-            functions = form if name == "joint_wobble" or form is wave else [u, *form[: len(form)]]
-            columns = np.zeros((b, m, 3, 2 * len(functions)))
-            one = np.zeros((b, len(moved), 3, 2 * len(functions)))
-            for i, f in enumerate(functions):
-                for d, direction in enumerate((first, second)):
-                    if name == "joint_wobble":
-                        arm = blocks.position[:, moved] - centre[:, None]
-                        shift = np.cross(direction[:, None], arm) * f[:, None]
-                    else:
-                        shift = np.broadcast_to((direction * f)[:, None], (b, len(moved), 3))
-                    one[..., 2 * i + d] = shift
-            columns[:, moved] = one
-            out.append(Candidate(name, k, None, columns.reshape(b, 3 * m, -1), False))
+        out += [candidate("joint_wobble", form, tilts), candidate("joint_wobble", form, [*tilts, *shifts]),
+                candidate("moving_centre", form if form is wave else [u, *form], shifts)]
     return out
 
 

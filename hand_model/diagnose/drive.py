@@ -63,7 +63,7 @@ def _prepare(
     actuator: str, entries: list[tuple[Trial, Log]], correct: Callable[[Array], Array] | None = None
 ) -> list[DriveState]:
     low, high = count_range([log for _, log in entries])
-    history: list[tuple[float, float]] = []  # of each earlier trial: time in motion, rest until the next one [s]
+    history: list[tuple[float, float]] = []  # of all bouts before a trial: time in motion, rest until the next one [s]
     end = None
     first = min(float(log.time_s[0]) for _, log in entries)
     states = []
@@ -78,10 +78,10 @@ def _prepare(
                  if name in log.columns and np.isfinite(log.columns[name][seen]).all()}
         extra["elapsed"] = time_s - first
         if end is not None:
-            history[-1] = (history[-1][0], max(float(time_s[0]) - end, 0.0))
+            history[-1] = (history[-1][0], history[-1][1] + max(float(time_s[0]) - end, 0.0))
         extra["history"] = np.array(history).reshape(-1, 2)
-        extra["moved"] = np.cumsum(np.diff(time_s, prepend=time_s[0]) * motion.moving)
-        history.append((float(extra["moved"][-1]), 0.0))
+        extra["moving"] = motion.moving.astype(float)
+        history += bouts(time_s, motion.moving)
         end = float(time_s[-1])
         extra["trial_index"] = np.full(len(time_s), float(index))
         extra["validation_index"] = np.full(len(time_s), float(sum(t.validate for t, _ in entries[:index])))
@@ -95,6 +95,15 @@ def _prepare(
                                  effort, declared, extra=extra, validate=trial.validate,
                                  declared_names=("inertia", "viscous", "coulomb", "spring", "preload")))
     return states
+
+
+def bouts(time_s: Array, moving: NDArray[np.bool_]) -> list[tuple[float, float]]:
+    """Time in motion and at rest after it [s] of each bout of a recording, in order; a rest before the first counts as a bout of
+    no motion. time_s, moving: (n,)."""
+    step = np.diff(time_s, prepend=time_s[0])
+    begin = np.unique(np.r_[0, np.flatnonzero(np.diff(moving.astype(int)) > 0) + 1])
+    return [(float(step[a:b][moving[a:b]].sum()), float(step[a:b][~moving[a:b]].sum()))
+            for a, b in zip(begin, np.r_[begin[1:], len(time_s)], strict=True)]
 
 
 def is_measured(states: tuple[DriveState, ...]) -> bool:

@@ -10,6 +10,8 @@ import numpy as np
 from .base import Array, DriveState
 from .path import strokes
 
+LEAST_SLOPE = 0.1  # of the mean: flatter, what follows as good as stands
+
 
 def driven(state: DriveState, change: Callable[[Array], Array]) -> Array:
     """Declared columns (n, k) with the powers of the driver taken of `change(driver)`, driver in the state's position unit.
@@ -53,6 +55,17 @@ def soft_play(path: Array, gap: float, softness: float) -> Array:
     """Play with give at its ends: the mean of plays of (1 - softness), one and (1 + softness) times the gap."""
     gaps = (gap,) if softness <= 0 else ((1 - softness) * gap, gap, (1 + softness) * gap)
     return np.mean([play(path, g) for g in gaps], axis=0)
+
+
+def path_behind(state: DriveState) -> tuple[Array, Array]:
+    """The path of what follows (n,) by its map, scaled to the driver's unit at the map's mean slope, and how fast it goes with the
+    driver (n,), one on the average."""
+    order = np.argsort(state.position, kind="stable")
+    slope = np.maximum(state.slope, LEAST_SLOPE * mean_slope((state,))) / mean_slope((state,))
+    x, rate = state.position[order], slope[order]
+    path = np.empty(len(x))
+    path[order] = x[0] + np.r_[0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(x))]
+    return path, slope
 
 
 def mean_slope(states: tuple[DriveState, ...]) -> float:

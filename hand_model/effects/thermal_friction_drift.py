@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -24,10 +25,10 @@ class ThermalFrictionDrift(Effect):
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """Warm-up time between 5 s and four times the session, cooling time at rest, form."""
         total = max(max(float(s.elapsed_s[-1]) for s in states), 10.0)
-        forms = (0.0, 1.0) if all("moved" in s.extra for s in states) else (0.0,)
+        forms = (0.0, 1.0) if all("moving" in s.extra for s in states) else (0.0,)
         return (Shape("form", "1", 0.0, 1.0, forms),
                 Shape("warm_up_time", "s", 5.0, 4 * total, tuple(np.geomspace(max(5.0, 0.04 * total), 2 * total, 7))),
-                Shape("cooling_time", "s", 20.0, 40 * total, (60.0, 120.0, 400.0)))
+                Shape("cooling_time", "s", 2.0, 40 * total, (5.0, 25.0, 60.0, 120.0, 400.0)))
 
     def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
         """Nothing cools in form 0."""
@@ -44,10 +45,7 @@ class ThermalFrictionDrift(Effect):
             return (state.direction * state.extra["temperature"])[:, None]
         if shape["form"] < 0.5:
             return (state.direction * np.exp(-state.elapsed_s / shape["warm_up_time"]))[:, None]
-        cold = 1.0
-        for moved, rest in state.extra["history"]:
-            cold = 1 - (1 - cold * np.exp(-moved / shape["warm_up_time"])) * np.exp(-rest / shape["cooling_time"])
-        return (state.direction * cold * np.exp(-state.extra["moved"] / shape["warm_up_time"]))[:, None]
+        return (state.direction * _cold(state, shape["warm_up_time"], shape["cooling_time"]))[:, None]
 
     def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
                    declared: Mapping[str, float]) -> dict[str, float]:
@@ -67,10 +65,7 @@ class ThermalFrictionDrift(Effect):
         """Share of the excess that is left when a recording begins."""
         if parameters.get("form", 0.0) < 0.5:
             return {"cold": math.exp(-float(state.elapsed_s[0]) / parameters["warm_up_time"])}
-        cold = 1.0
-        for moved, rest in state.extra["history"]:
-            cold = 1 - (1 - cold * math.exp(-moved / parameters["warm_up_time"])) * math.exp(-rest / parameters["cooling_time"])
-        return {"cold": cold}
+        return {"cold": _before(state, parameters["warm_up_time"], parameters["cooling_time"])}
 
     def log_prior(self, parameters: Mapping[str, float]) -> float:
         """Warming seldom takes more than the warm friction off."""
@@ -84,9 +79,36 @@ class ThermalFrictionDrift(Effect):
         def load(now: Moment) -> float:
             if parameters.get("form", 0.0) < 0.5 or abs(now.velocity) > MOVING:
                 cold[0] *= math.exp(-now.step_s / parameters["warm_up_time"])
+            else:
+                cold[0] = _rested(cold[0], now.step_s, parameters["cooling_time"])
             return parameters["cold_excess"] * now.direction * cold[0]
 
         return load
+
+
+def _rested(cold: float, rest_s: float, cooling_time_s: float) -> float:
+    return 1 - (1 - cold) * math.exp(-rest_s / cooling_time_s)
+
+
+def _before(state: DriveState, warm_up_s: float, cooling_s: float) -> float:
+    """Share of the change that is still to come when a recording begins."""
+    cold = 1.0
+    for moved, rest in state.extra["history"]:
+        cold = _rested(cold * math.exp(-moved / warm_up_s), rest, cooling_s)
+    return cold
+
+
+def _cold(state: DriveState, warm_up_s: float, cooling_s: float) -> Array:
+    """Share (n,) of the change that is still to come."""
+    moving = state.extra["moving"] > 0
+    step = np.diff(state.time_s, prepend=state.time_s[0])
+    edges = np.r_[0, np.flatnonzero(np.diff(moving)) + 1, len(moving)]
+    out, cold = np.empty(len(moving)), _before(state, warm_up_s, cooling_s)
+    for a, b in itertools.pairwise(edges):
+        span = np.cumsum(step[a:b])
+        out[a:b] = cold * np.exp(-span / warm_up_s) if moving[a] else 1 - (1 - cold) * np.exp(-span / cooling_s)
+        cold = out[b - 1]
+    return out
 
 
 EFFECT = ThermalFrictionDrift()

@@ -1,0 +1,80 @@
+"""What the cameras say of each finger: markers on rigid segments first, then encoder against segment, then segment against segment."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from ..background import Background
+from ..effects import catalogue
+from ..errors import IdentificationError
+from ..session import Finger, Session
+from .angles import FingerAngles, encoder_states, expected_angles, finger_angles, linkage_states, ranges_of_counts
+from .findings import Finding
+from .markers import corrected_angles, name_markers
+from .slips import marker_findings, steps
+from .slips import unexplained as unexplained_of
+from .station import Station, judged
+
+
+@dataclass(frozen=True)
+class FingerReading:
+    """One finger seen by the cameras. stations: encoder and linkages, in this order. found: of its markers, each with its weight.
+    angles: None where nothing could be read, and notes say why. lines: for a progress display."""
+
+    finger: str
+    angles: FingerAngles | None = None
+    stations: tuple[Station, ...] = ()
+    found: tuple[tuple[float, Finding], ...] = ()
+    unexplained: tuple[dict[str, Any], ...] = ()
+    notes: tuple[str, ...] = ()
+    lines: tuple[str, ...] = ()
+
+
+def finger_readings(session: Session, unread: tuple[str, ...] = ()) -> Iterator[FingerReading]:
+    """Every finger of a session with flexion trials before cameras, each as soon as it is judged; two at a time.
+
+    unread: actuators whose counts are not believed.
+    """
+    from ..identify.identification import palm_shape
+
+    if session.palm is None or not any(t.mocap_path for t in session.select("flexion")):
+        return
+    try:
+        shape = palm_shape(session)
+    except IdentificationError as error:
+        yield FingerReading("palm", notes=(str(error),))
+        return
+    counts = {a: c for a, c in ranges_of_counts(session).items() if a not in unread}
+    yield from Background(_reading, [(session, finger, shape, counts) for finger in session.fingers]).results()
+
+
+def _reading(session: Session, finger: Finger, shape: Any, counts: dict[str, tuple[float, float]]) -> FingerReading:
+    try:
+        seen = finger_angles(session, finger, shape)
+    except IdentificationError as error:
+        return FingerReading(finger.name, notes=(str(error),))
+    try:
+        return _judged(finger, seen, counts)
+    except IdentificationError as error:
+        return FingerReading(finger.name, seen, notes=(str(error),))
+
+
+def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, float]]) -> FingerReading:
+    markers = name_markers(seen)
+    found = tuple(marker_findings(seen, markers))
+    names = ", ".join(f.effect for _, f in found) or "consistent"
+    lines = [f"{finger.name} markers: {names} (p {markers.p_before:.2g} -> {markers.p_after:.2g})"]
+    angles, moments = corrected_angles(seen, markers), steps(seen, markers)
+    stations: list[Station] = []
+    states = encoder_states(angles, *counts[finger.actuator], moments) if finger.actuator in counts else ()
+    if states:
+        stations.append(judged("encoder", finger.name, finger.actuator, finger.segments[0].name, states, catalogue("encoder")))
+    for joint in range(1, len(finger.segments)):
+        expected = expected_angles(stations[0].naming) if stations and joint == 1 else {}
+        states = linkage_states(angles, joint, moments, expected)
+        if states:
+            stations.append(judged("markers", finger.name, finger.actuator, finger.segments[joint].name, states, catalogue("linkage")))
+    lines += [s.line() for s in stations]
+    return FingerReading(finger.name, seen, tuple(stations), found, tuple(unexplained_of(seen, markers)), (), tuple(lines))
