@@ -50,13 +50,9 @@ def multiplicities(group: Array, count: int = RESAMPLES, seed: int = 0) -> Array
 
 def reality_check(resampled: Array, gain: Array) -> float:
     """Probability that the best gain of several rivals is no chance: gain (rivals,), resampled (rivals, draws) [its unit]."""
-    spread = np.std(resampled, 1)
-    alive = spread > 1e-12 * np.max(np.abs(gain), initial=0.0)
-    if not alive.any():
-        return 0.0
-    spread, gain, resampled = spread[alive], gain[alive], resampled[alive]
-    chance = np.max((resampled - gain[:, None]) / spread[:, None], 0)
-    return float(np.mean(chance < np.max(gain / spread)))
+    spread = np.maximum(np.std(resampled, 1), 1e-9 * np.max(np.abs(gain), initial=0.0) + 1e-300)
+    chance = np.max((resampled - gain[:, None]) / spread[:, None], 0, initial=-np.inf)
+    return float(np.mean(chance < np.max(gain / spread, initial=-np.inf)))
 
 
 def weigh(none: Array, errors: Array, sizes: Sequence[int], group: Array,
