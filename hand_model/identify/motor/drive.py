@@ -186,13 +186,12 @@ def _run(
 
     rows_of (B,): the rows that each takes, falling.
     """
-    n = len(times.at_s)
+    n = len(times.at)
     active = np.searchsorted(-rows_of, -np.arange(n), side="left").tolist()
     steps = times.steps()
     changes = [True, *np.any(steps[1:] != steps[:-1], axis=1).tolist()]
-    position, velocity, acceleration = np.zeros((3, n, len(moves.target)))
+    position, velocity = np.zeros((2, n, len(moves.target)))
     p, v = moves.position.copy(), np.zeros(len(moves.target)) + moves.velocity
-    a = np.zeros(len(p))
     friction = (Stick if not np.any(q["presliding"]) else Bristles)(q)
     friction.begin(np.clip(steer.first(p, v), -limit, limit) - q["stiffness"] * p - q["preload"], v)
     late = np.minimum(q["delay"], 0.8 * q["inertia"] / np.maximum(q["damping"], 1e-9))
@@ -207,8 +206,8 @@ def _run(
         if k == 0:
             break
         if k < len(p):
-            p, v, a, h, gain, late_move, moving, sprung, preload, limit, closed, inner = (
-                x[:k] for x in (p, v, a, h, gain, late_move, moving, sprung, preload, limit, closed, inner)
+            p, v, h, gain, late_move, moving, sprung, preload, limit, closed, inner = (
+                x[:k] for x in (p, v, h, gain, late_move, moving, sprung, preload, limit, closed, inner)
             )
             friction.narrow(k)
             steer.narrow(k)
@@ -223,7 +222,7 @@ def _run(
             if contact is not None:
                 contact.pace(h)
         push = steer.push(i, p, v)
-        position[i, :k], velocity[i, :k], acceleration[i, :k] = p, v, a
+        position[i, :k], velocity[i, :k] = p, v
         total = push - preload + moving * v - sprung * p
         resisting = inner
         if contact is not None:
@@ -239,14 +238,15 @@ def _run(
         fresh, middle = friction.advance(v, middle)
         steer.advance(middle)
         p = p + h * middle
-        a = (fresh - v) / h
         v = fresh
     gain, keep, late_push = every
-    return position, late_push * acceleration - gain * position - keep * velocity
+    feedback = -gain * position - keep * velocity
+    feedback[1:] += late_push * np.diff(velocity, axis=0) / steps[:-1]
+    return position, feedback
 
 
 class _Profile:
-    """What a trapezoidal profile adds to the current: gain r + damping r', at the steps (at) and between them."""
+    """What a trapezoidal profile adds to the current: gain r + damping r', the mean over each step (at)."""
 
     def __init__(self, moves: Moves, q: Mapping[str, Array], times: Grid) -> None:
         t, sign = times.at_s - moves.start_s, np.sign(moves.target - moves.origin)
@@ -254,11 +254,9 @@ class _Profile:
         r = moves.origin + sign * shape.way(t)
         t -= q["lag"]
         way = shape.way(t)
-        self.at = q["gain"] * r + q["damping"] * sign * shape.speed(t)
         # the mean over a step is exact where the velocity jumps within it
-        self.between = np.empty_like(r)
-        self.between[:-1] = q["gain"] * 0.5 * (r[1:] + r[:-1]) + q["damping"] * sign * np.diff(way, axis=0) / np.diff(times.at_s, axis=0)
-        self.between[-1] = self.at[-1]
+        self.at = q["gain"] * r
+        self.at[:-1] = 0.5 * (self.at[1:] + self.at[:-1]) + q["damping"] * sign * np.diff(way, axis=0) / times.steps()[:-1]
         self.hold = q["gain"] * r[0], q["gain"]
 
     def first(self, p: Array, v: Array) -> Array:
@@ -273,7 +271,7 @@ class _Profile:
 
     def push(self, i: int, p: Array, v: Array) -> Array:
         """Its part of the current (k,) [raw] in the middle of step i."""
-        return self.between[i, : len(p)]
+        return self.at[i, : len(p)]
 
     def advance(self, middle: Array) -> None:
         """Nothing: the profile does not see the drive."""
@@ -283,8 +281,8 @@ class _Cascade:
     """What a position loop round a speed loop adds to the current, at the steps (at); r goes with the drive within the deadband."""
 
     def __init__(self, moves: Moves, q: Mapping[str, Array], times: Grid) -> None:
-        self.at_s, self.starting = times.at_s, (times.at_s.min(axis=1) < moves.start_s.max()).tolist()
-        self.at, self.hold = np.zeros(times.at_s.shape), moves.hold
+        self.at_s, self.at, self.hold = times.at_s, np.zeros(times.at.shape), moves.hold
+        self.starting = (self.at_s.min(axis=1) < moves.start_s.max()).tolist()
         self.gain, self.damping, self.half_gain, self.half_damping = q["gain"], q["damping"], 0.5 * q["gain"], 0.5 * q["damping"]
         self.start_s, self.target, self.origin, self.loop = moves.start_s, moves.target, moves.origin, _Loop(q, moves.speed)
 

@@ -15,6 +15,7 @@ from ...session import Session
 from . import output_error
 from .balance import NAMES
 from .controller import find_controller
+from .creep import begins, creeping
 from .drive import STRIBECK
 from .moves import BEFORE, MoveData, moves_from_rest
 from .output_error import FINE, OutputErrorFit
@@ -227,7 +228,8 @@ def _fit_output_error(
     if curved.excess_z > (ROOM if max(best.chi2) < 4.0 else CLAIM):
         best, evidence = _with_rise(output_error.fit(best.moves, best.values, best.names, sigma, BOUNDS, best.controller, (FINE,), best.own), curved)
     if lack_of_fit(best) < LACK_OF_FIT:
-        best = output_error.refined(best, BOUNDS)
+        states = begins(moves, best.values, best.own, best.controller)
+        best = output_error.refined(dataclasses.replace(best, moves=creeping(best.moves, states)), BOUNDS)
         best = _with_other_shape(best) if evidence else best
     return best, evidence
 

@@ -17,11 +17,16 @@ NEVER = 1e9  # [s]: the end of a stretch that has none
 @dataclass(frozen=True)
 class Grid:
     """Steps of B simulated moves. step_s [s]: a short one. ends_s (3, B) [s]: of the stretch in short steps at the start, of the long steps after it, of the
-    short ones at the stop; long ones follow. at_s (n, B) [s]: times of all steps."""
+    short ones at the stop; long ones follow. at (n, B): times of all steps, in short ones."""
 
     step_s: float
     ends_s: Array
-    at_s: Array
+    at: Array
+
+    @property
+    def at_s(self) -> Array:
+        """Times (n, B) [s] of all steps."""
+        return self.at * self.step_s
 
     def index(self, t: Array, columns: NDArray[np.int64]) -> Array:
         """Row, with its fraction, of times t (..., C) [s] of these columns (C,)."""
@@ -31,7 +36,7 @@ class Grid:
 
     def steps(self) -> Array:
         """Length (n, B) [s] of the step that begins in each row."""
-        return np.diff(self.at_s, axis=0, append=self.at_s[-1:] + self.step_s)
+        return np.diff(self.at, axis=0, append=self.at[-1:] + 1.0) * self.step_s
 
 
 def _index(t: Array, ends_s: Array, step_s: float) -> Array:
@@ -65,11 +70,11 @@ def grid(ends_s: Array, n: int, step_s: float) -> Grid:
     """The grid of n rows with these ends (3, B) [s] of its stretches, as `rows` found them."""
     i = np.arange(n)[:, None]
     if ends_s[0].min() >= NEVER:
-        return Grid(step_s, ends_s, np.broadcast_to(i * step_s, (n, ends_s.shape[1])))
+        return Grid(step_s, ends_s, np.broadcast_to(1.0 * i, (n, ends_s.shape[1])))
     long, (a, b, c) = _long(step_s), ends_s / step_s
     first, second, third = a, (b - a) / long, c - b  # rows of each stretch
     after = np.maximum(i - first, 0.0)
     at = np.minimum(i, first) + long * np.minimum(after, second)
     after = np.maximum(after - second, 0.0)
     at = at + np.minimum(after, third) + long * np.maximum(after - third, 0.0)
-    return Grid(step_s, ends_s, at * step_s)
+    return Grid(step_s, ends_s, np.round(at))

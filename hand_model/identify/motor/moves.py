@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,7 @@ class MoveData:
     Known only so well, and estimated with the fit: own = when the command took effect (within one sample of the log) [s], where
     the drive rested [%], the speed [share of full] (logged in whole raw units), and the current that held it at rest [raw].
     own_sd: (4,) standard deviations. velocity [%/s]: of a drive that creeps before the command; 0 at rest. logged: the speed as it is logged.
+    seen: velocity before the command as the encoder tells it, and its deviation [%/s].
     """
 
     trial: str
@@ -42,8 +44,9 @@ class MoveData:
     own_sd: Array
     velocity: float = 0.0
     logged: float = 1.0
+    seen: tuple[float, float] = (0.0, np.inf)
 
-    @property
+    @cached_property
     def calm_s(self) -> tuple[float, float, float]:
         """When the drive was seen to cruise, from and until, and from when on to rest [s]: where nothing sudden happens."""
         return _calm(self)
@@ -77,7 +80,7 @@ def moves_from_rest(trial: MotorTrial, sigma: tuple[float, float], speed_full: f
             MoveData(
                 trial.name, int(i), t[k] - t[i], p[k], trial.current[k], float(trial.setpoint[i]), float(trial.setpoint[i + 1]),
                 limit, np.array([0.5 * gap, rest[0], speed, held.mean()]),
-                np.array([max(gap / np.sqrt(12), 5e-3), rest[1], speed_sd, sigma[1] / np.sqrt(len(held))]), rest[2], speed,
+                np.array([max(gap / np.sqrt(12), 5e-3), rest[1], speed_sd, sigma[1] / np.sqrt(len(held))]), rest[2], speed, rest[3],
             )
         )  # fmt: skip
     return tuple(found)
@@ -131,8 +134,8 @@ def _calm(m: MoveData) -> tuple[float, float, float]:
     return float(max(t[gone[0]], m.own[0])) + STARTS_S, (stopped - STOPS_S if rests else NEVER), (stopped + RESTS_S if rests else NEVER)
 
 
-def _rest(t: Array, p: Array, sigma: float) -> tuple[float, float, float] | None:
-    """Position [%] at the last of samples before a command, its deviation [%], and the velocity [%/s] of a steady creep.
+def _rest(t: Array, p: Array, sigma: float) -> tuple[float, float, float, tuple[float, float]] | None:
+    """Position [%] at the last of samples before a command, its deviation [%], the velocity [%/s] of a steady creep, and the slope with its deviation.
 
     0 where none is told from rest; None where the drive is not settled.
     """
@@ -144,4 +147,4 @@ def _rest(t: Array, p: Array, sigma: float) -> tuple[float, float, float] | None
     creeps = abs(slope) > 4 * slope_sd
     if np.sqrt(np.mean((p - p.mean() - slope * x) ** 2)) > 2 * sigma:
         return None
-    return float(p.mean() + slope * x[-1]), 2 * sigma / np.sqrt(n), slope if creeps else 0.0
+    return float(p.mean() + slope * x[-1]), 2 * sigma / np.sqrt(n), slope if creeps else 0.0, (slope, slope_sd)

@@ -77,9 +77,11 @@ def _arrays(data: Sequence[MoveData], own: Array, repeat: int, calm: bool = True
     )  # fmt: skip
 
 
-def simulate_moves(data: Sequence[MoveData], q: Mapping[str, float], own: Array, controller: str, step_s: float = STEP_S) -> list[Array]:
-    """Simulated position [%] and current [raw], (n, 2) per move."""
-    return _split(_one(_single(data, q, own, controller, step_s, False), data, (1.0, 1.0))[0], data)
+def simulate_moves(
+    data: Sequence[MoveData], q: Mapping[str, float], own: Array, controller: str, step_s: float = STEP_S, calm: bool = False
+) -> list[Array]:
+    """Simulated position [%] and current [raw], (n, 2) per move; calm: in long steps while the recorded drive cruised or rested."""
+    return _split(_one(_single(data, q, own, controller, step_s, calm), data, (1.0, 1.0))[0], data)
 
 
 def whitened(

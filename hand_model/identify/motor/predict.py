@@ -13,6 +13,7 @@ from ...errors import IdentificationError
 from ...session import Log
 from . import output_error
 from .balance import NAMES, balance
+from .creep import begins, continued, end_state
 from .drive import Moves, profile
 from .fit import MotorFit
 from .moves import MoveData, levelled, moves_from_rest
@@ -81,8 +82,8 @@ def predict(fit: MotorFit, log: Log, name: str = "log", align: bool = True) -> P
         k = slice(m.index + 1, m.index + 1 + len(m.time_s))
         position[k], current[k], predicted[k] = y[:, 0], y[:, 1], True
         phase[k] = _phases(m, x, y[:, 0])
-        creep = float((y[-1, 0] - y[-4, 0]) / (m.time_s[-1] - m.time_s[-4]))
-        last = (y[-1, 0], y[-1, 1], k.stop, creep if abs(creep) > 1e-3 else 0.0)
+        position_end, current_end, creep = end_state(m.time_s, y)
+        last = (position_end, current_end, k.stop, creep)
     return Prediction(trial.time_s, position, current, trial.position, trial.current, phase, predicted)
 
 
@@ -95,7 +96,11 @@ def known_moves(fit: MotorFit, trial: MotorTrial) -> tuple[MoveData, ...]:
 def _align(fit: MotorFit, data: tuple[MoveData, ...]) -> Array:
     """Own unknowns of every move from its position alone (the current weighs nothing)."""
     blind = (fit.sigma_position, 1e3 * fit.sigma_current)
-    found = output_error.fit(data, fit.simulated, (), blind, {}, fit.output_error.controller, output_error.ALIGN)
+    controller = fit.output_error.controller
+    found = output_error.fit(data, fit.simulated, (), blind, {}, controller, output_error.ALIGN)
+    states = begins(data, fit.simulated, found.own, controller)
+    if any(states):
+        found = output_error.fit(continued(data, states), fit.simulated, (), blind, {}, controller, output_error.ALIGN[1:], found.own)
     return found.own
 
 
