@@ -18,7 +18,8 @@ Array = NDArray[np.float64]
 SETTLED = 0.6  # [%]: movement allowed over the samples before a move that starts from rest
 SURE = 0.05  # share of what one logged speed is known to, below which no level of speeds is known
 AFTER_S = 0.05  # after which a move that is settled counts as over
-STARTS_S, STOPS_S, RESTS_S = 0.15, 0.3, 0.15  # after a drive has left its place, before it is back at rest, and after that: where it may be sudden
+AWAY = 0.02  # share of a move by which a drive has left a place, well beyond the noise of an encoder
+STARTS_S, STOPS_S, RESTS_S = 0.15, 0.3, 0.2  # after a drive has left its place, before it is back at rest, and after that: where it may be sudden
 BEFORE = 12  # samples at rest that a move looks back to
 
 
@@ -126,7 +127,8 @@ def without_rest(m: MoveData) -> MoveData:
 def _calm(m: MoveData) -> tuple[float, float, float]:
     t, p = m.time_s, m.position
     end = float(p[-3:].mean())
-    gone, far = np.flatnonzero(np.abs(p - p[0]) > SETTLED), np.flatnonzero(np.abs(p - end) > SETTLED)
+    away = max(SETTLED, AWAY * abs(end - float(p[0])))
+    gone, far = np.flatnonzero(np.abs(p - p[0]) > away), np.flatnonzero(np.abs(p - end) > away)
     if len(gone) == 0 or len(far) == 0:
         return NEVER, NEVER, NEVER
     stopped = float(t[far[-1]])
