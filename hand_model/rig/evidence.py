@@ -3,9 +3,8 @@
 Cluster bootstrap (Davison & Hinkley 1997, sec. 3.8): whole recordings are drawn where there are enough of them, since
 blocks of one recording share what is peculiar to it; else blocks. A tie goes to the simpler rival within one standard
 error of the best (Breiman et al. 1984). That anything is there at all is asked first, of
-the best of so many rivals: the largest studentised gain against its own distribution where none of them gains anything
-(White 2000, a reality check; Hansen 2005), so that rivals that say the same count once (a protected comparison, Fisher
-1935).
+the best of so many rivals: the largest of their gains against its own distribution with signs turned at random (Westfall
+& Young 1993; Romano & Wolf 2005), so that rivals that say the same count once (a protected comparison, Fisher 1935).
 """
 
 from __future__ import annotations
@@ -37,22 +36,29 @@ class Verdict:
     gain: float
 
 
+def units(group: Array) -> Array:
+    """What is drawn together (blocks,): recordings where there are enough, else every block alone."""
+    names, unit = np.unique(group, return_inverse=True)
+    return unit if len(names) >= ENOUGH else np.arange(len(group))
+
+
 def multiplicities(group: Array, count: int = RESAMPLES, seed: int = 0) -> Array:
     """How often each block is drawn (count, blocks); group (blocks,): recording of each block."""
-    random = np.random.default_rng(seed)
-    names, unit = np.unique(group, return_inverse=True)
-    if len(names) < ENOUGH:
-        unit = np.arange(len(group))
+    unit = units(group)
     total = int(unit.max()) + 1
-    drawn = random.integers(0, total, (count, total))
+    drawn = np.random.default_rng(seed).integers(0, total, (count, total))
     return np.stack([np.bincount(row, minlength=total) for row in drawn]).astype(float)[:, unit]
 
 
-def reality_check(resampled: Array, gain: Array) -> float:
-    """Probability that the best gain of several rivals is no chance: gain (rivals,), resampled (rivals, draws) [its unit]."""
-    spread = np.maximum(np.std(resampled, 1), 1e-9 * np.max(np.abs(gain), initial=0.0) + 1e-300)
-    chance = np.max((resampled - gain[:, None]) / spread[:, None], 0, initial=-np.inf)
-    return float(np.mean(chance < np.max(gain / spread, initial=-np.inf)))
+def beyond_chance(gains: Array, flips: int = RESAMPLES, seed: int = 0) -> float:
+    """Probability that the best of several rivals' gains (rivals, units) is no chance: had none of them anything to gain, a
+    unit's gain might as well have had the other sign, of all rivals at once; the largest self-normalised sum is held to
+    its distribution under such flips."""
+    size = np.sqrt(np.sum(gains**2, 1)) + 1e-300
+    signs = np.random.default_rng(seed).choice([-1.0, 1.0], (flips, gains.shape[1]))
+    best = np.max(gains.sum(1) / size, initial=-np.inf)
+    by_chance = np.max(signs @ gains.T / size, 1, initial=-np.inf)
+    return float(np.mean(by_chance < best - 1e-9))
 
 
 def weigh(none: Array, errors: Array, sizes: Sequence[int], group: Array,
@@ -62,7 +68,10 @@ def weigh(none: Array, errors: Array, sizes: Sequence[int], group: Array,
     draws = multiplicities(group)
     resampled, base, total = errors @ draws.T, draws @ none, errors.sum(1)
     against = np.mean(resampled < base, 1)
-    if reality_check(base - resampled, none.sum() - total) < least:  # of many rivals some win by chance
+    unit = units(group)
+    mine, theirs = np.bincount(unit, none), np.stack([np.bincount(unit, e) for e in errors])
+    # Relative, or the loudest recording would speak for all. Of many rivals some win by chance.
+    if beyond_chance((mine - theirs) / (mine + theirs + 1e-300)) < least:
         return None
     sure = [k for k in range(len(errors)) if against[k] >= least]
     if not sure:
