@@ -216,6 +216,17 @@ def check_log(session: Session, trial: Trial, log: Log) -> list[str]:
     return notes
 
 
+def missing_direction(values: Array) -> str:
+    """"flexion" or "extension", where a channel (n,) that increases with flexion never goes that way by a tenth of its range; "" where it goes both ways."""
+    values = values[np.isfinite(values)]
+    if len(values) < 2:
+        return ""
+    way = 0.1 * float(np.ptp(values))
+    if float(np.max(values - np.minimum.accumulate(values))) <= way:
+        return "flexion"
+    return "extension" if float(np.max(np.maximum.accumulate(values) - values)) <= way else ""
+
+
 def moves(values: Array) -> bool:
     """Whether a channel (n,) moves, rather than flicker by noise or by its last digit.
 
@@ -250,6 +261,11 @@ def _check_durations(mocap: Mocap, log: Log) -> None:
     """Refuse a pair of recordings whose lengths no two clocks explain (a `time` in milliseconds, say)."""
     lengths_s = [float(t[-1] - t[0]) for t in (mocap.time_s, log.time_s)]
     if min(lengths_s) * 20.0 < max(lengths_s):
+        if missing := missing_direction(log.column("position")):
+            raise SessionError(
+                f"{log.path}: the log holds no {missing} (in {lengths_s[1]:.3g} s, of the {lengths_s[0]:.3g} s in {mocap.path.name}); "
+                "motion in both directions is needed"
+            )
         raise SessionError(
             f"{log.path}: the log lasts {lengths_s[1]:.3g} s and {mocap.path.name} {lengths_s[0]:.3g} s; "
             "recordings of one motion are needed, `time` in seconds"

@@ -114,8 +114,6 @@ def motor_trial(name: str, log: Log, scale: Scale) -> MotorTrial:
 
 def check_trials(trials: Sequence[MotorTrial]) -> None:
     """Raise IdentificationError where the current is constant, saturated, a command or no drive's, or the motion goes one way only."""
-    for t in trials:
-        _check_current(t)
     v = [_coarse_velocity(t) for t in trials]
     fastest = max(float(np.quantile(np.abs(x), 0.98)) for x in v)
     share = [sum(float(np.mean(sign * x > 0.25 * fastest)) for x in v) for sign in (1, -1)]
@@ -124,8 +122,8 @@ def check_trials(trials: Sequence[MotorTrial]) -> None:
         raise IdentificationError(
             f"{', '.join(t.name for t in trials)}: the log holds no {way}; motion in both directions separates friction from spring"
         )
-
-
+    for t in trials:
+        _check_current(t)
     flexing, extending = (np.concatenate([t.current[sign * x > 0.25 * fastest] for t, x in zip(trials, v, strict=True)]) for sign in (1, -1))
     friction = flexing.mean() - extending.mean()
     if friction < 5 * np.sqrt(flexing.var() / len(flexing) + extending.var() / len(extending)):
