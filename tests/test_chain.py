@@ -126,6 +126,17 @@ def test_exchanged_labels_are_put_right(pair):
     assert [(set(s.labels), s.start, s.stop) for s in swaps] == [({data.labels[i] for i in pair}, 400, 519)]
 
 
+def test_labels_that_return_behind_a_gap_are_not_held_to_be_exchanged_for_good() -> None:
+    _, data, _ = recording(5)
+    pair, y = [3, 4], data.position_world.copy()
+    y[400:430, pair] = y[400:430, pair[::-1]]
+    y[415:445, pair] = np.nan  # neither is seen while they return
+    y[900:, pair[0]] += [2e-3, 1e-3, 0.0]  # and a slip keeps the cluster out of shape from here on
+    repaired, swaps = repair_labels(replace(data, position_world=y))
+    assert all(s.stop < 445 for s in swaps)
+    np.testing.assert_array_equal(repaired.position_world[445:], y[445:])
+
+
 def test_sound_labels_are_left_alone():
     _, data, _ = recording(10, noise_m=4e-4)
     repaired, swaps = repair_labels(data)

@@ -44,14 +44,16 @@ def repair_labels(data: ChainData) -> tuple[ChainData, tuple[Swap, ...]]:
     """Undo exchanged labels: where a cluster loses its shape, markers are followed from the last sound frame.
 
     A permutation is applied only where it brings every marker nearer to its track than the labels do, by more than half of
-    the smallest distance between two markers. Two labels that jump to each other's places from one frame to the next are
+    the smallest distance between two markers, and leaves the clusters no more out of shape: a marker that slipped keeps its
+    cluster broken for as long as the recording lasts, and tracks may be lost meanwhile. Two labels that jump to each other's places from one frame to the next are
     exchanged until they jump back, whether or not the cluster's shape shows it (a nearly symmetrical one does not).
     """
     spacing = _spacing(data)
-    order = _jumped(data, spacing)
+    shape = _Shape.of(data)
+    order = _jumped(data, spacing, shape)
     y = np.take_along_axis(data.position_world, order[..., None], axis=1)
     data = replace(data, position_world=y)
-    broken = _broken(data)
+    broken = shape.broken(y)
     if not broken.any() or broken.all():
         return data, _swaps(order, data.labels)
     fixed = y.copy()
@@ -61,6 +63,8 @@ def repair_labels(data: ChainData) -> tuple[ChainData, tuple[Swap, ...]]:
         last = _last_seen(fixed, run[0] - 1 if forward else run[1] + 1, forward)
         for f in frames:
             permutation = _follow(y[f], last, spacing)
+            if shape.worse(y[f, permutation], y[f]):
+                permutation = np.arange(len(permutation))
             order[f] = order[f, permutation]
             fixed[f] = y[f, permutation]
             seen = np.isfinite(fixed[f, :, 0])
@@ -70,8 +74,9 @@ def repair_labels(data: ChainData) -> tuple[ChainData, tuple[Swap, ...]]:
     return repaired, _swaps(order, data.labels)
 
 
-def _jumped(data: ChainData, spacing: float) -> NDArray[np.int64]:
-    """(n, m) column that each label has in truth, by pairs of labels that jump to each other's last places and back."""
+def _jumped(data: ChainData, spacing: float, shape: _Shape) -> NDArray[np.int64]:
+    """(n, m) column that each label has in truth, by pairs of labels that jump to each other's last places and back, or until
+    the clusters' shape says that they are back (they may return behind a gap)."""
     y = data.position_world
     n, m = y.shape[:2]
     order = np.tile(np.arange(m), (n, 1))
@@ -86,22 +91,57 @@ def _jumped(data: ChainData, spacing: float) -> NDArray[np.int64]:
             with np.errstate(invalid="ignore"):
                 jumps = (cross < 0.4 * stay) & (stay > 0.7 * spacing) & recent[:, a] & recent[:, b]
             exchanged = np.concatenate([[False], np.cumsum(jumps) % 2 == 1])
+            for start, stop in _runs(exchanged):
+                exchanged[start + shape.until(y[start : stop + 1], a, b) : stop + 1] = False
             order[np.ix_(exchanged, [a, b])] = order[np.ix_(exchanged, [b, a])]
     return order
 
 
-def _broken(data: ChainData) -> NDArray[np.bool_]:
-    """Frames in which a distance within a cluster is off its usual value by more than its noise allows."""
-    broken = np.zeros(len(data.position_world), bool)
-    for k in range(data.n_joints + 1):
-        columns = np.flatnonzero(data.body == k)
-        for i, a in enumerate(columns):
-            for b in columns[i + 1 :]:
-                distance = np.linalg.norm(data.position_world[:, a] - data.position_world[:, b], axis=1)
-                off = np.abs(distance - np.nanmedian(distance))
-                with np.errstate(invalid="ignore"):
-                    broken |= off > 10 * np.nanmedian(off) + 1e-4
-    return broken
+@dataclass(frozen=True)
+class _Shape:
+    """Pairs of markers of one segment (p, 2), their usual distance and how far it is usually off (p,) [m]."""
+
+    pairs: NDArray[np.int64]
+    usual: Array
+    noise: Array
+
+    @classmethod
+    def of(cls, data: ChainData) -> _Shape:
+        first, second = np.triu_indices(len(data.body), 1)
+        pairs = np.stack([first, second], axis=1)[data.body[first] == data.body[second]]
+        distance = _distances(data.position_world, pairs)
+        usual = np.nanmedian(distance, axis=0)
+        return cls(pairs, usual, np.nanmedian(np.abs(distance - usual), axis=0))
+
+    def broken(self, position: Array) -> NDArray[np.bool_]:
+        """Frames (n,) of positions (n, m, 3) in which a distance is off by more than its noise allows."""
+        with np.errstate(invalid="ignore"):
+            return (np.abs(_distances(position, self.pairs) - self.usual) > 10 * self.noise + 1e-4).any(axis=1)
+
+    def until(self, position: Array, a: int, b: int) -> int:
+        """How many of the frames of positions (n, m, 3) have columns a and b exchanged, given that the first has: as many as
+        are in better shape so; all of them where the shape does not tell."""
+        other = position.copy()
+        other[:, [a, b]] = other[:, [b, a]]
+        left = np.nancumsum(self._off(position) - self._off(other))
+        best = int(np.argmax(left))
+        return len(position) if left[best] - left[-1] < self._tolerance else best + 1
+
+    def worse(self, one: Array, other: Array) -> bool:
+        """Whether markers (m, 3) are farther out of shape than others, by more than noise allows."""
+        off = self._off(np.stack([one, other]))
+        return bool(off[0] > off[1] + self._tolerance)
+
+    @property
+    def _tolerance(self) -> float:
+        return float(np.nansum(10 * self.noise + 1e-4))
+
+    def _off(self, position: Array) -> Array:
+        return np.nansum(np.abs(_distances(position, self.pairs) - self.usual), axis=1)
+
+
+def _distances(position: Array, pairs: NDArray[np.int64]) -> Array:
+    return np.linalg.norm(position[:, pairs[:, 0]] - position[:, pairs[:, 1]], axis=-1)
 
 
 def _spacing(data: ChainData) -> float:
