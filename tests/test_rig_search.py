@@ -89,6 +89,14 @@ def test_the_best_of_many_rivals_is_held_to_the_best_of_chance() -> None:
     assert alone is not None and among is not None and among.probability == alone.probability
 
 
+def test_the_loudest_block_does_not_speak_for_all() -> None:
+    """What every block says counts, however loud one is; what that one says alone does not."""
+    group, loud = np.arange(20), np.where(np.arange(20) == 3, 1e4, 1.0)
+    assert weigh(loud, np.array([0.5 * loud]), [1], group) is not None
+    alone = np.where(np.arange(20) == 3, 0.5, 1.0 + 0.01 * (-1.0) ** np.arange(20)) * loud
+    assert weigh(loud, np.array([alone]), [1], group) is None
+
+
 def test_effects_that_help_only_together_stand_together() -> None:
     """An effect that makes the held-out error worse before a later one comes stands where all are worse without it; one
     that they do without is withdrawn, and one that helps last comes last."""
