@@ -83,7 +83,8 @@ def predict(fit: MotorFit, log: Log, name: str = "log", align: bool = True) -> P
         position[k], current[k], predicted[k] = y[:, 0], y[:, 1], True
         phase[k] = _phases(m, x, y[:, 0])
         position_end, current_end, creep = end_state(m.time_s, y)
-        last = (position_end, current_end, k.stop, creep)
+        # a reference that ends lets nothing creep: what is left of a motion then is the end of its settling, held by bristles that are not all bent
+        last = (position_end, current_end, k.stop, creep if controller == "cascade" else 0.0)
     return Prediction(trial.time_s, position, current, trial.position, trial.current, phase, predicted)
 
 
