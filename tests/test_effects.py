@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hand_model.effects import catalogue, effect
-from hand_model.effects.base import DriveState
+from hand_model.effects.base import DriveState, Effect
 from hand_model.effects.path import dahl, jenkins, lowpass, strokes, travelled
 from hand_model.errors import DescriptionError
 
@@ -124,16 +124,33 @@ READ_ELSEWHERE = {"asymmetric_friction": {"half_difference": -9.0},
                   "joint_wobble": {"amplitude": 0.04}, "moving_centre": {"travel": 0.008}}  # no balance has their parameters
 
 
+RATIOS = {"rate_minus_one", "side", "trial", "form", "ratio", "static_ratio", "load_coefficient", "since", "until", "passing", "exponent", "lead", "end"}
+
+
+def posed() -> DriveState:
+    s = state()
+    extra = {**s.extra, "gravity_along": s.time_s, "moving": np.ones(len(s.time_s))}
+    return DriveState(s.trial, s.drive, s.time_s, s.position, s.velocity, s.acceleration, s.effort, s.declared,
+                      declared_names=s.declared_names, extra=extra)
+
+
+@pytest.mark.parametrize("one", [e for e in catalogue() if isinstance(e, Effect)], ids=lambda e: e.name)
+def test_every_parameter_has_its_unit(one) -> None:
+    for point in one.grid((posed(),)):
+        amplitude = {n: 1e-3 for n, *_ in one.amplitudes()}
+        own = {s.name: s.unit for s in one.shapes((posed(),))} | {n: u for n, u, *_ in one.amplitudes()} | dict(one.units(point))
+        bare = {n for n in one.parameters(point, amplitude, DECLARED) if own.get(n, "1") == "1"}
+        assert bare <= RATIOS
+
+
 def named() -> list:
     """Every effect with parameters for each of its forms and sides, amplitudes of either sign where physics allows it."""
-    s, out = state(), []
-    posed = DriveState(s.trial, s.drive, s.time_s, s.position, s.velocity, s.acceleration, s.effort, s.declared,
-                       declared_names=s.declared_names, extra={**s.extra, "gravity_along": s.time_s, "moving": np.ones(len(s.time_s))})
+    out = []
     for e in catalogue():
         if e.name in READ_ELSEWHERE:
             out.append(pytest.param(e, READ_ELSEWHERE[e.name], id=e.name))
             continue
-        points = {(p.get("form"), p.get("side")): p for p in e.grid((posed,))}
+        points = {(p.get("form"), p.get("side")): p for p in e.grid((posed(),))}
         for (key, point), sign in itertools.product(points.items(), (1.0, -1.0)):
             amplitude = {n: max(low, sign * 3e-3 * (i + 1)) for i, (n, _, low, _) in enumerate(e.amplitudes())}
             out.append(pytest.param(e, e.parameters(point, amplitude, DECLARED), id=f"{e.name}-{key}-{sign:+.0f}"))

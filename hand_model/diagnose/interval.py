@@ -91,11 +91,10 @@ def _one(term: Term, which: int, name: str, values: Any) -> float:
 
 
 def _units(term: Term, balance: Balance) -> dict[str, str]:
-    units = {s.name: s.unit for s in term.effect.shapes(balance.states)}
     state = balance.states[0]
-    for name, unit, _, _ in term.effect.amplitudes():
-        units[name] = unit.replace("effort", state.effort_unit).replace("position", state.position_unit)
-    return {**getattr(term.effect, "units", {}), **units}
+    derived = {name: unit for name, unit, _, _ in term.effect.amplitudes()} | dict(term.effect.units(term.shape))
+    return {s.name: s.unit for s in term.effect.shapes(balance.states)} | {
+        name: unit.replace("effort", state.effort_unit).replace("position", state.position_unit) for name, unit in derived.items()}
 
 
 def _vector(fit: Fit) -> tuple[Array, Any]:

@@ -30,6 +30,7 @@ CLASS_WIDTH = 3.0  # log evidence within which two effects are one class: 20 to 
 MOST_TERMS = 5
 MOST_SEARCHES = 3  # each with noise that knows what did not repeat beside the effects of the one before
 ALONG = 1e-6  # of a column's length: less left beside the design, and it says nothing of its own
+SMALL = 0.07  # share of the explained mismatch: less beside a larger effect may be no more than its form being another
 GROWN = 1.3  # change of that noise, from which another search is worth its time
 
 
@@ -333,16 +334,20 @@ def _swap(balance: Balance, effects: tuple[Any, ...], fit: Fit) -> Fit | None:
 
 
 def _findings(balance: Balance, effects: tuple[Any, ...], terms: tuple[Term, ...], fit: Fit, declared: Fit) -> tuple[Named, ...]:
-    """Each term with its rivals (every candidate in its place), its share and its probability; largest share first."""
+    """Each term with its rivals (every candidate in its place, small terms aside that may stand for one of them), its share and
+    its probability; largest share first."""
     found = []
     explained = max(declared.rss - fit.rss, 1e-12)
     losses = [max(balance.fit(tuple(t for i, t in enumerate(terms) if i != which)).rss - fit.rss, 0.0)
               for which in range(len(terms))]
+    large = [loss >= SMALL * sum(losses) for loss in losses]
     for which, term in enumerate(terms):
-        rest = tuple(t for i, t in enumerate(terms) if i != which)
-        without = balance.fit(rest)
+        others = [i for i in range(len(terms)) if i != which and (large[i] or not large[which])]
+        rest = tuple(terms[i] for i in others)
+        without, beside = balance.fit(rest), fit if len(others) == len(terms) - 1 else balance.fit((*rest, term))
+        place = which if beside is fit else len(rest)
         ranked = rank(balance, effects, rest, without, refine=3)
-        own = evidence(balance, fit, without, which, scale_of(balance, fit))
+        own = evidence(balance, beside, without, place, scale_of(balance, beside))
         rivals = [r for r in ranked if r.name != term.effect.name]
         rivals.append(Rival(term.effect.name, max([own, *[r.evidence for r in ranked if r.name == term.effect.name]]), fit))
         rivals.sort(key=lambda r: -r.evidence)

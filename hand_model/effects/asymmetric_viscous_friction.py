@@ -31,6 +31,10 @@ class AsymmetricViscousFriction(Effect):
         return {"viscous_flexion": viscous + half, "viscous_extension": viscous - half,
                 "ratio": (viscous + half) / (viscous - half) if viscous != half else np.inf}
 
+    def units(self, shape: Mapping[str, float]) -> Mapping[str, str]:
+        """Effort over velocity."""
+        return dict.fromkeys(("viscous_flexion", "viscous_extension"), "effort s/position")
+
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """How much each way."""
         flexion, extension = figure(parameters["viscous_flexion"]), figure(parameters["viscous_extension"])

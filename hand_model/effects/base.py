@@ -172,6 +172,10 @@ class Effect:
         """Parameters by their textbook names, from shapes, amplitudes and declared coefficients."""
         return {**shape, **amplitude}
 
+    def units(self, shape: Mapping[str, float]) -> Mapping[str, str]:
+        """Units of what `parameters` makes of shapes and amplitudes, with "effort" and "position" for those of the state."""
+        return {}
+
     def log_prior(self, parameters: Mapping[str, float]) -> float:
         """Log density of the parameters over that of ordinary ones: negative where machines rarely are like that."""
         return 0.0

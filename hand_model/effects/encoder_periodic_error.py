@@ -39,6 +39,10 @@ class EncoderPeriodicError(Effect):
         return {"amplitude": float(np.hypot(amplitude["sine"], amplitude["cosine"])), "period": shape["period"],
                 "phase": float(np.arctan2(amplitude["cosine"], amplitude["sine"]))}
 
+    def units(self, shape: Mapping[str, float]) -> Mapping[str, str]:
+        """Amplitude as the effort, phase as an angle."""
+        return {"amplitude": "effort", "phase": "rad"}
+
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """Error in degrees of the segment, and its period."""
         segment, error, period = where.get("joint") or "proximal", parameters["amplitude"], parameters["period"]

@@ -45,6 +45,10 @@ class EndStopContact(Effect):
         """Side, where the stop begins, and its stiffness."""
         return {"side": shape["side"], "begin": _begin(shape), **amplitude}
 
+    def units(self, shape: Mapping[str, float]) -> Mapping[str, str]:
+        """Where it begins, as a position."""
+        return {"begin": "position"}
+
     def region(self, states: tuple[DriveState, ...], shape: Mapping[str, float]) -> dict[str, Any] | None:
         """From where the stop begins to the end of the range."""
         ends = sorted((_begin(shape), shape["end"]))

@@ -52,6 +52,10 @@ class NonlinearSpring(Effect):
             return {"form": 1.0, "knee": shape["knee"], "stiffness_beyond": amplitude["cubic_stiffness"]}
         return {"form": 0.0, **amplitude}
 
+    def units(self, shape: Mapping[str, float]) -> Mapping[str, str]:
+        """Of the stiffness beyond a knee."""
+        return {"stiffness_beyond": "effort/position"}
+
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """Where it is stiffer or softer, and by how much."""
         if parameters["form"] > 0.5:

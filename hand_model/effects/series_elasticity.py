@@ -35,6 +35,10 @@ class SeriesElasticity(Effect):
         """Minus the load, (n, 1), times the map's slope where the give is at the driver's end."""
         return -(state.extra["load"] * (state.slope if shape["form"] == 0.0 else 1.0))[:, None]
 
+    def units(self, shape: Mapping[str, float]) -> Mapping[str, str]:
+        """Of what yields: the driver's or the follower's position."""
+        return {"compliance": "position/raw" if shape["form"] == 0.0 else "effort/raw"}
+
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """How far the segment stays back, at which end."""
         give, end = figure(100 * parameters["compliance"]), "% of the encoder's range" if parameters["form"] == 0.0 else "deg"

@@ -34,6 +34,10 @@ class SpringDecoupling(Effect):
         """Share of the seen excursion (form 0), or angle per position that the finger stays behind (form 1)."""
         return (("lead", "1", 0.0, np.inf),)
 
+    def units(self, shape: Mapping[str, float]) -> Mapping[str, str]:
+        """Of how far it stays behind for each unit of position."""
+        return {"lead": "effort/position"} if shape["form"] > 0.5 else {}
+
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """The excursions, or max(0, below - x), (n, 1)."""
         if shape["form"] == 0.0:
