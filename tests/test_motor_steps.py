@@ -11,7 +11,6 @@ from hand_model.identify.motor.creep import begins, continued, creeping, end_sta
 from hand_model.identify.motor.grid import LONG_S, NEVER, grid, rows
 from hand_model.identify.motor.moves import MoveData
 from hand_model.identify.motor.output_error import _linearise, simulate_moves
-from hand_model.session.check import missing_direction
 
 VALUES = {
     "inertia": 0.0125, "viscous": 0.145, "coulomb": 34.0, "stiffness": 0.23, "preload": 9.0, "presliding": 0.0, "bristle": 0.0, "static_ratio": 1.0, "stribeck_speed": 20.0,
@@ -87,10 +86,3 @@ def test_state_at_the_end_of_a_move() -> None:
     t = np.arange(10) * 0.01
     assert end_state(t, np.c_[50 + 2 * t, 3 * np.ones(10)]) == (pytest.approx(50.18), 3.0, pytest.approx(2.0))
     assert end_state(t, np.c_[50 + 0 * t, 3 * np.ones(10)])[2] == 0.0
-
-
-def test_a_direction_that_is_missing() -> None:
-    rng, up = np.random.default_rng(0), np.linspace(0, 100, 200)
-    assert missing_direction(up + rng.normal(size=200)) == "extension"
-    assert missing_direction(-up) == "flexion"
-    assert missing_direction(np.r_[up, up[::-1]]) == "" and missing_direction(np.array([np.nan, 1.0])) == ""

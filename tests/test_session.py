@@ -22,7 +22,7 @@ from session_writers import (
 
 from hand_model.errors import SessionError
 from hand_model.session import check_session, read_log, read_mocap, read_session
-from hand_model.session.check import flatness, moves
+from hand_model.session.check import flatness, missing_direction, moves
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 
@@ -471,6 +471,13 @@ def test_recordings_refused(case, root):
     message = refusal(lambda: check_session(read_session(root)))
     for word in words:
         assert any(part in message for part in word.split("|")), (word, message)
+
+
+def test_a_direction_that_is_missing():
+    rng, up = np.random.default_rng(0), np.linspace(0, 100, 200)
+    assert missing_direction(up + rng.normal(size=200)) == "extension"
+    assert missing_direction(-up) == "flexion"
+    assert missing_direction(np.r_[up, up[::-1]]) == "" and missing_direction(np.array([np.nan, 1.0])) == ""
 
 
 def test_flatness_of_known_triangles():
