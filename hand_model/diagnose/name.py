@@ -7,7 +7,7 @@ recording.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -107,9 +107,16 @@ def _name(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str], 
     wander = estimate_wander(balance, balance.fit().prediction)
     for _ in range(MOST_SEARCHES):
         balance = balance.wandering(wander)
-        fit, brought = _search(balance, effects, progress)
+        fit, brought, ranked = _search(balance, effects, progress)
         wander = _unrepeated(balance, fit)
         if _alike(wander, balance.wander):
+            break
+    for rival, calmer in _calming(balance, fit, ranked):
+        other = balance.wandering(calmer)
+        further, more, _ = _search(other, effects, progress)
+        if rival.name in _names(further):
+            balance, fit, brought = other.wandering(_unrepeated(other, further)), further, more
+            fit = refit(balance, balance.fit(fit.terms))
             break
     declared = balance.fit()
     before = lack_of_fit(balance, declared.prediction, len(balance.names), ALPHA)
@@ -120,9 +127,23 @@ def _name(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str], 
     return Naming(balance, declared, fit, estimate_wander(balance, fit.prediction), before, after, found, rejected)
 
 
-def _search(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str], None] | None) -> tuple[Fit, dict[str, float]]:
-    """The fit to which no effect adds evidence, and what every candidate brought at its best moment."""
-    fit, brought = balance.fit(), {}
+def _calming(balance: Balance, fit: Fit, ranked: Iterable[Rival]) -> Iterator[tuple[Rival, Wander | None]]:
+    """The refused candidates that would be taken if what does not repeat were estimated beside each of them, and that estimate: a
+    slow change of the machine looks like chance as long as nobody holds its law against it."""
+    if balance.wander is None:
+        return
+    chance = _likelihood(balance, fit, balance.wander)
+    for rival in ranked:
+        calmer = estimate_wander(balance, rival.fit.prediction)
+        brought = _likelihood(balance, rival.fit, calmer) - chance
+        if rival.evidence - gain(balance, rival.fit, fit) + brought >= EVIDENCE_LEAST:
+            yield rival, calmer
+
+
+def _search(balance: Balance, effects: tuple[Any, ...],
+            progress: Callable[[str], None] | None) -> tuple[Fit, dict[str, float], list[Rival]]:
+    """The fit to which no effect adds evidence, what every candidate brought at its best moment, and the last ones refused."""
+    fit, brought, ranked = balance.fit(), {}, list[Rival]()
     been, refused = {_names(fit)}, set[str]()
     while len(fit.terms) < MOST_TERMS:
         ranked = rank(balance, effects, fit.terms, fit)
@@ -140,7 +161,7 @@ def _search(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str]
         been.add(_names(fit))
         if progress is not None:
             progress(f"{balance.states[0].drive}: {', '.join(t.effect.name for t in fit.terms)}")
-    return fit, brought
+    return fit, brought, ranked
 
 
 def _names(fit: Fit) -> tuple[str, ...]:
