@@ -32,6 +32,8 @@ NOT_FOR_RIGS = frozenset(
 PERIODIC = frozenset({"torque_ripple"})  # between two periods of a grid there is nothing to descend from
 SMOOTH = ("nonlinear_spring",)  # its knee belongs to fingers with a return spring; a joint has stops and detents
 LONGEST_DELAY_S = 0.03
+# Samples. A drive that holds its torque from one control step to the next acts half a step late: less than a sample of a log.
+DELAYS = (0.125, 0.25, 0.5, 1, 2, 3, 5, 8)
 BY_LEVEL = "a level for each that trials declare"
 REACHES = tuple(np.geomspace(0.004, 0.5, 8))  # of the range, over which friction turns round
 PLACED = frozenset({"reach", "period", "centre"})  # what has one of these can be there twice: two springs, two tight spots
@@ -134,7 +136,7 @@ def _own(rig: RigModel, fit: DeclaredFit, joint: str, rows: list[Rows]) -> list[
     load = {r.trial: np.abs(r.load(fit.theta)) for r in fit.rows if r.joint == joint}
     expected = {r.trial: np.abs(r.expected(fit.theta)) for r in fit.rows if r.joint == joint}
     sample = max(float(np.median(np.diff(t.time_s))) for t in rig.trials)
-    late = sorted({round(d, 6) for d in [k * sample for k in (0.5, 1, 2, 3, 5, 8)] + [k * LONGEST_DELAY_S / 6 for k in range(1, 7)]})
+    late = sorted({round(d, 6) for d in [k * sample for k in DELAYS] + [k * LONGEST_DELAY_S / 6 for k in range(1, 7)]})
     delays = tuple({"delay": sign * d} for d in late if d <= max(8 * sample, LONGEST_DELAY_S) for sign in (-1.0, 1.0))
     own = [
         Candidate("load_dependent_friction", "low speed", joint, (("per_load", "1", 0.0, np.inf),), knees,

@@ -47,12 +47,14 @@ class Score:
 
 @dataclass(frozen=True)
 class Step:
-    """One round of the competition: the winner's probability against none, rivals with theirs, share of variance."""
+    """One round of the competition: the winner's probability against none, rivals with theirs, share of variance; equals:
+    effects not told from the best; close: which of the rivals these are."""
 
     probability: float
     rivals: tuple[tuple[str, float], ...]
     gain: float
     equals: tuple[str, ...] = ()
+    close: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -280,8 +282,15 @@ def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ..
         found = judge(none, scores, problem.group, max(declared, none.sum()))
         if found is None:
             break
-        terms = (*terms, refined(problem, terms, scores[found[0]].term, parts))
-        steps.append(found[1])
+        # Between the points of a grid a rival may be better than on them: those not told apart meet again at their best.
+        last = [refined(problem, terms, scores[k].term, parts) for k in dict.fromkeys((found[0], *found[1].close))]
+        won, step = last[0], found[1]
+        if len(last) > 1:
+            errors = [Score(t, held_out(problem, (*terms, t), normal(problem, (*terms, t)))) for t in last]
+            again = judge(none, errors, problem.group, max(declared, none.sum()))
+            won, step = (last[again[0]], again[1]) if again is not None else (won, step)
+        terms = (*terms, won)
+        steps.append(step)
     return terms, tuple(steps), tuple(scores)
 
 
@@ -295,7 +304,7 @@ def judge(none: Array, scores: Sequence[Score], group: Array, whole: float) -> t
         return None
     rivals = tuple((scores[i].term.candidate.key, float(said.wins[i])) for i in np.argsort(-said.wins) if said.wins[i] > 0.005)
     equals = tuple(dict.fromkeys(scores[k].term.candidate.effect for k in said.close))
-    return said.chosen, Step(said.probability, rivals, said.gain, equals)
+    return said.chosen, Step(said.probability, rivals, said.gain, equals, said.close)
 
 
 def _size(term: Term) -> int:
