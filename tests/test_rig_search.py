@@ -11,6 +11,8 @@ import pytest
 
 from hand_model.effects.path import jenkins
 from hand_model.rig import diagnose_rig, load_rig
+from hand_model.rig.candidates import candidates
+from hand_model.rig.compete import compete, pose
 from hand_model.rig.diagnose import trusted_fit
 from hand_model.rig.diagnose_swing import _standing
 from hand_model.rig.evidence import weigh
@@ -34,19 +36,21 @@ torque = "actuator:motor:force"
 """
 
 
-def bench(folder: Path, by_load: float, noise: float) -> Path:
+def bench(folder: Path, by_load: float, noise: float, late: float = 0.0, last: float = 1.0) -> Path:
     """Six recordings of two sines each, the last two held out; by_load: friction per load, which turns round over 0.1 rad;
-    noise [N m] of the torque."""
+    noise [N m] of the torque, which acts late [s] after it is recorded; last: times as fast the fourth of them."""
     random, text = np.random.default_rng(4), HEAD
     (folder / "log").mkdir(parents=True)
     (folder / "rig.xml").write_text(ARM)
     t = np.arange(0, 12, 0.004)
     for k in range(6):
         rate, size = 2 * np.pi * random.uniform([0.2, 0.6], [0.45, 1.2]), random.uniform([0.5, 0.15], [0.9, 0.3])
+        rate = rate * (last if k == 3 else 1.0)
         phase = np.outer(rate, t) + random.uniform(0, 6, 2)[:, None]
         q, v, a = size @ np.sin(phase), (size * rate) @ np.cos(phase), -(size * rate**2) @ np.sin(phase)
         load = (0.6 * 0.04 + 0.002) * a + 0.6 * 0.2 * 9.81 * np.sin(q)
         torque = load + 0.03 * v + 0.08 * np.sign(v) + by_load * np.abs(load) * jenkins(q, 0.1)
+        torque = np.interp(t + late, t, torque)
         table = np.stack([t, np.round(q / 4e-4) * 4e-4, torque + noise * random.standard_normal(len(t))], 1)
         np.savetxt(folder / f"log/{k}.csv", table, delimiter=",", header="time,position,torque", comments="", fmt="%.8g")
         text += f'[[trial]]\nkind = "motion"\nlog = "log/{k}.csv"\n' + ('purpose = "validate"\n' if k > 3 else "")
@@ -70,6 +74,16 @@ def test_a_noisy_torque_is_no_mismatch(tmp_path: Path) -> None:
     fit = trusted_fit(load_rig(session))[0]
     friction = [t for c, t in zip(fit.columns, fit.theta, strict=True) if c.kind in ("damping", "frictionloss")]
     assert friction == pytest.approx([0.03, 0.08], rel=0.1)
+
+
+def test_a_torque_that_acts_a_fraction_of_a_sample_late_is_a_delay_and_no_spring(tmp_path: Path) -> None:
+    """Loudest in one fast recording: the delay wins, as long as it is; without it nothing does."""
+    for late in (0.0, 0.0015):
+        rig = load_rig(read_session(bench(tmp_path / str(late), 0.0, 0.002, late, 3.0)))
+        fit = trusted_fit(rig)[0]
+        terms = compete(pose(fit), candidates(rig, fit, "hinge"))[0]
+        assert [t.candidate.effect for t in terms] == ["current_channel_delay"] * (late > 0)
+        assert not late or terms[0].shape["delay"] == pytest.approx(-late, rel=0.1)
 
 
 def test_the_best_of_many_rivals_is_held_to_the_best_of_chance() -> None:
