@@ -68,7 +68,7 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
         if reading.angles is not None:
             fingers[reading.finger] = reading.angles
     drives = {a: with_gravity(session, fingers, states)
-              for a, states in drive_states(session, _encoder_corrections(stations)).items() if a not in unread}
+              for a, states in drive_states(session, _encoder_corrections(stations), unread).items()}
     for station in (s for s in stations if s.believed and s.actuator in drives):
         if any(f.term.effect.name == "spring_decoupling" and f.term.shape["form"] == 0.0 for f in station.kept):
             drives[station.actuator] = without_excursions(drives[station.actuator], station.naming.balance.states, fingers[station.finger])
@@ -171,7 +171,7 @@ def _periodic(period: float, sine: float, cosine: float, further: Callable[[Any]
 
 def _delays_apart(drives: dict[str, tuple[DriveState, ...]]) -> dict[str, bool]:
     """Whether each drive's current may be delayed: a delay that all drives of a session share is how the log is read. Answers to
-    commands tell a late current better than the balance does."""
+    commands tell a late or an early current better than the balance does, and must bear it out."""
     best: dict[str, float] = {}
     for actuator, states in drives.items():
         balance = Balance(tuple(replace(s, extra={k: v for k, v in s.extra.items() if k != "late"}) for s in states))
@@ -182,9 +182,17 @@ def _delays_apart(drives: dict[str, tuple[DriveState, ...]]) -> dict[str, bool]:
     # a lone drive cannot tell how the log is read from what its own channel does: twice as much is asked of it
     common, least = (min(best.values(), key=abs), 0.75) if len(best) > 1 else (0.0, 2.0)
     late = {a: s[0].extra["late"] for a, s in drives.items() if "late" in s[0].extra}
-    apart = {a: value - common for a, value in best.items()}
-    return {a: x < -least * step[a] or (float(np.sum(late[a])) > least * step[a] if a in late else x > least * step[a])
-            for a, x in apart.items()}
+
+    def borne_out(actuator: str) -> bool:
+        x, bound = best[actuator] - common, least * step[actuator]
+        if actuator not in late:
+            return abs(x) > bound
+        if x >= -bound:
+            return float(late[actuator][0]) > bound
+        others = [float(np.sum(value)) for a, value in late.items() if a != actuator]
+        return not others or max(others) - late[actuator][0] > bound  # who is early answers before the others
+
+    return {a: borne_out(a) for a in best}
 
 
 def _command(session: Session, drives: dict[str, tuple[DriveState, ...]]) -> dict[str, CommandFacts]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -45,18 +45,18 @@ def count_range(logs: list[Log]) -> tuple[float, float]:
     return low, max(high, low + 1e-9)
 
 
-def drive_states(
-    session: Session, corrections: Mapping[str, Callable[[Array], Array]] | None = None
-) -> dict[str, tuple[DriveState, ...]]:
+def drive_states(session: Session, corrections: Mapping[str, Callable[[Array], Array]] | None = None,
+                 unread: Collection[str] = ()) -> dict[str, tuple[DriveState, ...]]:
     """DriveStates of every actuator, [%] of its range and raw current; with the bristle length of its friction.
 
-    corrections: actuator -> function that takes its position [%] to what it should have read.
+    corrections: actuator -> function that takes its position [%] to what it should have read. unread: actuators to leave out. A
+    current that measures nothing says nothing of friction either: other drives are not compared with it.
     """
-    raw = {a: [(t, t.log()) for t in trials] for a, trials in drive_trials(session).items()}
+    raw = {a: [(t, t.log()) for t in trials] for a, trials in drive_trials(session).items() if a not in unread}
     prepared = {a: _prepare(a, entries, (corrections or {}).get(a)) for a, entries in raw.items()}
-    prepared = {a: states for a, states in prepared.items() if states}
-    give, granted = gives(prepared)
-    return {a: tuple(with_coulomb(s, give[a], granted) for s in states) for a, states in prepared.items()}
+    prepared = {a: tuple(states) for a, states in prepared.items() if states}
+    give, granted = gives({a: states for a, states in prepared.items() if is_measured(states)})
+    return {a: tuple(with_coulomb(s, give.get(a, granted), granted) for s in states) for a, states in prepared.items()}
 
 
 def _prepare(

@@ -1,8 +1,8 @@
 """Log evidence of one more term in a balance: what it gains, less what its freedom could gain by chance.
 
-Amplitudes carry a prior as wide as the data find likely (empirical Bayes; George & Foster 2000), shapes are uniform
-within the bounds that the effect declares (Laplace's method; Kass & Raftery 1995). Sums of squares count divided by
-the correlation time of the noise.
+Amplitudes, and shapes that are sizes, carry a prior as wide as the data find likely (empirical Bayes; George & Foster 2000);
+other shapes are uniform within the bounds that the effect declares (Laplace's method; Kass & Raftery 1995). Sums of squares
+count divided by the correlation time of the noise.
 """
 
 from __future__ import annotations
@@ -40,11 +40,12 @@ def evidence(balance: Balance, fit: Fit, reference: Fit, which: int = -1, scale:
     other motors are like) a model pays for coefficients unlike theirs.
     """
     brought = gain(balance, fit, reference, scale)
-    count = int(np.any(balance.columns(fit.terms[which].effect, fit.terms[which].shape)[balance.train] != 0, axis=0).sum())
+    term = fit.terms[which]
+    shapes = [shape for shape in term.effect.shapes(balance.states) if shape.name in term.shape]
+    count = int(np.any(balance.columns(term.effect, term.shape)[balance.train] != 0, axis=0).sum()) + sum(s.size for s in shapes)
     if count and brought > 0:
         brought -= 0.5 * count * (1 + np.log(max(2 * brought / count, 1.0)))
-    term = fit.terms[which]
-    volume = sum(_occam(balance, fit, which, shape, scale) for shape in term.effect.shapes(balance.states) if shape.name in term.shape)
+    volume = sum(_occam(balance, fit, which, shape, scale) for shape in shapes if not shape.size)
     return float(brought - volume + oddity(balance, reference) - oddity(balance, fit))
 
 

@@ -29,6 +29,7 @@ EVIDENCE_LEAST = 6.0  # log evidence an effect must bring: e^6 against "none", a
 CLASS_WIDTH = 3.0  # log evidence within which two effects are one class: 20 to 1
 MOST_TERMS = 5
 MOST_SEARCHES = 3  # each with noise that knows what did not repeat beside the effects of the one before
+REFUTED = 3.0  # standard deviations by which a delay may miss what answers to commands say
 ALONG = 1e-6  # of a column's length: less left beside the design, and it says nothing of its own
 SMALL = 0.07  # share of the explained mismatch: less beside a larger effect may be no more than its form being another
 GROWN = 1.3  # change of that noise, from which another search is worth its time
@@ -55,6 +56,11 @@ class Named:
     share: float
     size: float
     probability: float
+
+    @property
+    def evidence(self) -> float:
+        """Log evidence of the effect in its own place."""
+        return next(r.evidence for r in self.rivals if r.name == self.term.effect.name)
 
     @property
     def members(self) -> tuple[str, ...]:
@@ -199,11 +205,12 @@ def _likelihood(balance: Balance, fit: Fit, wander: Wander | None) -> float:
 
 
 def _resolved(balance: Balance, term: Term) -> bool:
-    """Whether a delay exceeds three quarters of a sample interval; true of anything else."""
+    """Whether a delay exceeds three quarters of a sample interval and answers to commands do not refute it; true of anything else."""
     if "delay" not in term.shape:
         return True
     step = sample_interval(balance.states)
-    return abs(term.shape["delay"]) > 0.75 * step
+    refuted = balance.unanswered((term,)) > REFUTED**2 * balance.inflation
+    return abs(term.shape["delay"]) > 0.75 * step and not refuted
 
 
 def rank(balance: Balance, effects: Iterable[Any], terms: tuple[Term, ...], fit: Fit, refine: int = 6) -> list[Rival]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -126,12 +127,17 @@ def _proof(naming: MarkerNaming) -> dict[str, Any]:
 
 def _swaps(angles: FingerAngles) -> list[tuple[float, Finding]]:
     found: dict[frozenset[str], list[tuple[str, float, float]]] = {}
+    flickers: Counter[frozenset[str]] = Counter()
     for record in angles.records:
         time_s = record.mocap.time_s
         for swap in record.swaps:
             if swap.stop - swap.start + 1 >= SWAP_FRAMES:
                 found.setdefault(frozenset(swap.labels), []).append(
                     (record.trial.name, float(time_s[swap.start]), float(time_s[swap.stop])))
+            else:
+                flickers[frozenset(swap.labels)] += 1
+    # Labels that come and go all the time are a marker's noise that reaches its neighbour.
+    found = {labels: spans for labels, spans in found.items() if len(spans) > flickers[labels]}
     if not found:
         return []
     # Pieces of one exchange, interrupted by gaps, are one finding: the labels exchanged for the longest time.

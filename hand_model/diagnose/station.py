@@ -9,13 +9,14 @@ import numpy as np
 
 from .findings import Finding
 from .interval import held_out, parameter_intervals, proven, sized, undisturbed
-from .name import ALPHA, SMALL, Named, Naming, name_effects
+from .name import ALPHA, EVIDENCE_LEAST, SMALL, Named, Naming, name_effects
 
 # How before and after were computed, said in the findings: no compiled file is involved until one is replayed.
 ENGINE = {"current": "inverse dynamics of the motor's balance, motion as recorded", "encoder": "encoder map, motion as recorded",
           "markers": "linkage polynomial, motion as recorded"}
 UNWRITTEN = {"native": False, "mjcf": None, "urdf": "not expressible"}
 SECOND_HEARINGS, DISPLACING = 2, 0.1  # and the share of what was explained from which a fallen name has displaced others
+CHANNELS = 20  # of a session: what no test of one sees must stand against as many chances
 EXPLAINED_LEAST = 0.7  # of the explainable mismatch: below, the names are not believed
 
 
@@ -26,7 +27,9 @@ class Station:
         self.signal, self.finger, self.actuator, self.joint, self.naming = signal, finger, actuator, joint, naming
         places = {id(f): naming.fit.terms.index(f.term) for f in naming.found}
         self.reading = undisturbed(naming)
-        stand = [which for which in places.values() if proven(naming, which) and sized(self.reading, which)]
+        least = EVIDENCE_LEAST + (np.log(CHANNELS) if naming.before.p >= ALPHA else 0.0)
+        stand = [places[id(f)] for f in naming.found
+                 if f.evidence >= least and proven(naming, places[id(f)]) and sized(self.reading, places[id(f)])]
         self.parameters = {which: parameter_intervals(self.reading, which) for which in stand}
         self.proven = tuple(f for f in naming.found if places[id(f)] in stand)
 

@@ -24,7 +24,7 @@ class Backlash(Effect):
         half gap); forms 2 and 3: the same at what follows, that wide where its map has its mean slope."""
         low, high = position_range(states)
         span = high - low
-        return (Shape("gap", states[0].position_unit, 1e-4 * span, 0.15 * span, tuple(span * np.geomspace(0.002, 0.1, 8))),
+        return (Shape("gap", states[0].position_unit, 1e-4 * span, 0.15 * span, tuple(span * np.geomspace(0.002, 0.1, 8)), True),
                 Shape("form", "1", HARD, SOFT_BEHIND, (HARD, SOFT, HARD_BEHIND, SOFT_BEHIND)))
 
     def amplitudes(self) -> tuple[Amplitude, ...]:

@@ -78,13 +78,15 @@ class DriveState:
 
 @dataclass(frozen=True)
 class Shape:
-    """A nonlinear parameter of an effect: its unit, bounds, and the starting values that a multi-start fit tries."""
+    """A nonlinear parameter of an effect: its unit, bounds, and the starting values that a multi-start fit tries. size: it says how
+    much of the effect there is, as an amplitude does."""
 
     name: str
     unit: str
     low: float
     high: float
     starts: tuple[float, ...]
+    size: bool = False
 
 
 @runtime_checkable

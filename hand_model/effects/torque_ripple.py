@@ -18,11 +18,13 @@ class TorqueRipple(Effect):
     repeats = True  # further harmonics
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """Period from four times the sample spacing at slow speed to half the range, dense in wavenumber."""
+        """Period from a fiftieth of the range to a third of it, dense in wavenumber: what does not come three times is seen to repeat
+        by nobody. Where the position is that of a joint, to half of it: such a load is tied to the joint's own turn."""
         low, high = position_range(states)
         span = high - low
-        periods = span / np.arange(2.0, 40.01, 0.25)
-        return (Shape("period", states[0].position_unit, 0.02 * span, 0.55 * span, tuple(periods)),)
+        fewest = 3.0 if states[0].position_unit == "%" else 1.8
+        periods = span / np.arange(np.ceil(fewest), 40.01, 0.25)
+        return (Shape("period", states[0].position_unit, 0.02 * span, span / fewest, tuple(periods)),)
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Sine and cosine parts."""
