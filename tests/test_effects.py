@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hand_model.diagnose.drive import bouts
 from hand_model.effects import catalogue, effect
 from hand_model.effects.base import DriveState, Effect
 from hand_model.effects.path import dahl, jenkins, lowpass, strokes, travelled
@@ -302,3 +303,20 @@ def test_a_delay_is_the_one_that_answers_to_commands_tell_where_they_tell_it_wel
     assert delay.lateness({"form": 0.0, "delay": -0.05}) == (-0.05, 0.0)
     low, high = delay.lateness({"form": 1.0, "delay": 0.05})
     assert 0 < low < high == 0.05
+
+
+def test_a_drive_warms_in_motion_and_cools_at_every_rest() -> None:
+    time_s = np.arange(0, 60, 0.02)
+    moving = (time_s % 10 > 2) & (time_s > 4)
+    warm_s, cool_s, want, cold = 12.0, 30.0, [], 1.0
+    for now, step in zip(moving, np.diff(time_s, prepend=0.0), strict=True):
+        cold = cold * np.exp(-step / warm_s) if now else 1 - (1 - cold) * np.exp(-step / cool_s)
+        want.append(cold)
+    half = len(time_s) // 2
+    earlier = np.array(bouts(time_s[:half], moving[:half]))
+    assert earlier.sum() == pytest.approx(time_s[half - 1])
+    earlier[-1, 1] += 0.02  # until the second half begins
+    late = DriveState("b", "drive", time_s[half:], 0 * time_s[half:], np.ones(len(time_s) - half), 0 * time_s[half:], 0 * time_s[half:],
+                      np.zeros((len(time_s) - half, 0)), extra={"history": earlier, "moving": moving[half:].astype(float)})
+    column = effect("thermal_friction_drift").columns(late, {"form": 1.0, "warm_up_time": warm_s, "cooling_time": cool_s})[:, 0]
+    np.testing.assert_allclose(column, want[half:], atol=1e-3)

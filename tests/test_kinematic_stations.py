@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from hand_model.diagnose.excursions import with_excursions
 from hand_model.diagnose.name import name_effects
+from hand_model.diagnose.slips import _swaps
 from hand_model.effects import catalogue, effect
 from hand_model.effects.base import DriveState
 from hand_model.effects.driven import driven, play, soft_play
 from hand_model.identify.chain import ChainData
-from hand_model.identify.repair import repair_labels
+from hand_model.identify.repair import Swap, repair_labels
 
 MAP = np.array([0.0, 62.0, 30.0, -12.0])  # deg over the share of the driver's range
 
@@ -80,6 +82,20 @@ def test_healthy_joints_are_consistent(station: str) -> None:
 
 
 @pytest.mark.parametrize(("station", "name"), [("encoder", "drive_backlash"), ("linkage", "linkage_backlash")])
+def test_lost_motion_at_what_follows_is_lost_motion_too(station: str, name: str) -> None:
+    gap_deg = 2.4
+
+    def lag(t, x, v):
+        angle = np.polynomial.Polynomial(MAP)(x / 100)
+        return play(angle, gap_deg) - angle
+
+    found = named(joint(3, add=lag), station)
+    assert set(found) == {name}
+    slope = (np.polynomial.Polynomial(MAP)(1.0) - np.polynomial.Polynomial(MAP)(0.0)) / 100
+    assert found[name]["gap"] * slope == pytest.approx(gap_deg, rel=0.1)
+
+
+@pytest.mark.parametrize(("station", "name"), [("encoder", "drive_backlash"), ("linkage", "linkage_backlash")])
 def test_lost_motion_is_named_with_its_full_width(station: str, name: str) -> None:
     found = named(joint(1, move=lambda x: play(x, 1.5)), station)
     assert list(found) == [name]
@@ -139,6 +155,19 @@ def test_exchanged_labels_of_a_symmetrical_cluster_are_put_right() -> None:
     untouched, none = repair_labels(ChainData(truth, np.array([0, 0, 0, 1, 1, 1]), tuple("abcdef")))
     assert none == ()
     np.testing.assert_array_equal(untouched.position_world, truth)
+
+
+def test_labels_that_flicker_are_no_exchange() -> None:
+    def record(swaps):
+        data = SimpleNamespace(labels=("a", "b", "c"))
+        return SimpleNamespace(mocap=SimpleNamespace(time_s=np.arange(500) / 100), swaps=swaps, trial=SimpleNamespace(name="t"), data=data)
+
+    segment = SimpleNamespace(name="distal", markers=("a", "b", "c"))
+    finger = SimpleNamespace(name="index", segments=(segment,))
+    lasting = Swap(("a", "b"), 100, 140)
+    flicker = tuple(Swap(("a", "b"), f, f + 1) for f in range(200, 300, 5))
+    for swaps, count in (((lasting,), 1), ((lasting, *flicker), 0)):
+        assert len(_swaps(SimpleNamespace(records=(record(swaps),), finger=finger, noise_m=1e-4))) == count
 
 
 def test_the_current_of_whiles_in_which_the_finger_has_left_its_drive_is_not_judged() -> None:
