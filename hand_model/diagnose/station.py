@@ -53,8 +53,10 @@ class Station:
 
     @property
     def believed(self) -> bool:
-        """Whether the names stand: the final model passes the test, or takes most of the mismatch away."""
-        return bool(self.proven) and (self.naming.after.p >= ALPHA or self.explained >= EXPLAINED_LEAST)
+        """Whether the names stand: the final model passes the test, or takes most of the mismatch away. Names that take nothing of a
+        plain mismatch away do not, however little is left to see."""
+        idle = self.naming.before.p < ALPHA and self.explained < SMALL
+        return bool(self.proven) and not idle and (self.naming.after.p >= ALPHA or self.explained >= EXPLAINED_LEAST)
 
     @property
     def kept(self) -> tuple[Named, ...]:
