@@ -7,7 +7,7 @@ recording.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -117,13 +117,14 @@ def _name(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str], 
         wander = _unrepeated(balance, fit)
         if _alike(wander, balance.wander):
             break
-    for rival, calmer in _calming(balance, fit, ranked):
+    calmed = _calmed(balance, fit, ranked)
+    if calmed is not None:
+        rival, calmer = calmed
         other = balance.wandering(calmer)
-        further, more, _ = _search(other, effects, progress)
+        further, more, _ = _search(other, effects, progress, rival.fit.terms)
         if rival.name in _names(further):
-            balance, fit, brought = other.wandering(_unrepeated(other, further)), further, more
-            fit = refit(balance, balance.fit(fit.terms))
-            break
+            balance, brought = other.wandering(_unrepeated(other, further)), {**brought, **more}
+            fit = refit(balance, balance.fit(further.terms))
     declared = balance.fit()
     before = lack_of_fit(balance, declared.prediction, len(balance.names), ALPHA)
     after = lack_of_fit(balance, fit.prediction, len(balance.names) + fit.size, ALPHA) if fit.terms else before
@@ -133,23 +134,26 @@ def _name(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str], 
     return Naming(balance, declared, fit, estimate_wander(balance, fit.prediction), before, after, found, rejected)
 
 
-def _calming(balance: Balance, fit: Fit, ranked: Iterable[Rival]) -> Iterator[tuple[Rival, Wander | None]]:
-    """The refused candidates that would be taken if what does not repeat were estimated beside each of them, and that estimate: a
-    slow change of the machine looks like chance as long as nobody holds its law against it."""
+def _calmed(balance: Balance, fit: Fit, ranked: Iterable[Rival]) -> tuple[Rival, Wander | None] | None:
+    """The refused candidate that would be taken if what does not repeat were estimated beside it, and that estimate: a slow change
+    of the machine looks like chance as long as nobody holds its law against it. The likeliest one; None where there is none."""
     if balance.wander is None:
-        return
+        return None
     chance = _likelihood(balance, fit, balance.wander)
+    best, most = None, EVIDENCE_LEAST
     for rival in ranked:
         calmer = estimate_wander(balance, rival.fit.prediction)
-        brought = _likelihood(balance, rival.fit, calmer) - chance
-        if rival.evidence - gain(balance, rival.fit, fit) + brought >= EVIDENCE_LEAST:
-            yield rival, calmer
+        brought = rival.evidence - gain(balance, rival.fit, fit) + _likelihood(balance, rival.fit, calmer) - chance
+        if brought >= most:
+            best, most = (rival, calmer), brought
+    return best
 
 
-def _search(balance: Balance, effects: tuple[Any, ...],
-            progress: Callable[[str], None] | None) -> tuple[Fit, dict[str, float], list[Rival]]:
-    """The fit to which no effect adds evidence, what every candidate brought at its best moment, and the last ones refused."""
-    fit, brought, ranked = balance.fit(), {}, list[Rival]()
+def _search(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str], None] | None,
+            start: tuple[Term, ...] = ()) -> tuple[Fit, dict[str, float], list[Rival]]:
+    """The fit to which no effect adds evidence, what every candidate brought at its best moment, and the last ones refused. start:
+    terms to begin with."""
+    fit, brought, ranked = settle(balance, effects, start)[1] if start else balance.fit(), {}, list[Rival]()
     been, refused = {_names(fit)}, set[str]()
     while len(fit.terms) < MOST_TERMS:
         ranked = rank(balance, effects, fit.terms, fit)
