@@ -45,8 +45,9 @@ def repair_labels(data: ChainData) -> tuple[ChainData, tuple[Swap, ...]]:
 
     A permutation is applied only where it brings every marker nearer to its track than the labels do, by more than half of
     the smallest distance between two markers, and leaves the clusters no more out of shape: a marker that slipped keeps its
-    cluster broken for as long as the recording lasts, and tracks may be lost meanwhile. Two labels that jump to each other's places from one frame to the next are
-    exchanged until they jump back, whether or not the cluster's shape shows it (a nearly symmetrical one does not).
+    cluster broken for as long as the recording lasts, and tracks may be lost meanwhile. Two labels that jump to each other's
+    places from one frame to the next are exchanged until they jump back or the cluster's shape says that they are back,
+    whether or not the shape shows the exchange (a nearly symmetrical one does not).
     """
     spacing = _spacing(data)
     shape = _Shape.of(data)
@@ -63,8 +64,9 @@ def repair_labels(data: ChainData) -> tuple[ChainData, tuple[Swap, ...]]:
         last = _last_seen(fixed, run[0] - 1 if forward else run[1] + 1, forward)
         for f in frames:
             permutation = _follow(y[f], last, spacing)
-            if shape.worse(y[f, permutation], y[f]):
-                permutation = np.arange(len(permutation))
+            stay = np.arange(len(permutation))
+            if (permutation != stay).any() and shape.worse(y[f, permutation], y[f]):
+                permutation = stay
             order[f] = order[f, permutation]
             fixed[f] = y[f, permutation]
             seen = np.isfinite(fixed[f, :, 0])
