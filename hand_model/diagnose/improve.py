@@ -13,7 +13,7 @@ from numpy.polynomial import Polynomial
 from ..effects import effect
 from ..hand import Coupling, Effect, EncoderMap, Estimate, Finger, Hand, Motor, load_hand
 from .findings import Finding
-from .prove import Replay, proved
+from .prove import Replay, errors_along, proved, untouched
 
 MOTOR = {"inertia": ("inertia", "raw s^2/%"), "viscous": ("viscous", "raw s/%"), "coulomb": ("coulomb", "raw"),
          "spring": ("stiffness", "raw/%"), "preload": ("preload", "raw")}
@@ -128,12 +128,13 @@ def write_improved(hand: Hand, findings: Sequence[Finding], stations: Sequence[A
         return tuple(findings), ()
     compile(before, output / "model_before")
     compile(after, output / "model")
+    named = [(f, next((s for s in stations if _of(f, s)), None)) for f in findings]
+    errors = errors_along([(s, untouched(f, s)) for f, s in named if f.correction is None], output / "model_before", output / "model")
     out, replays = [], []
-    for finding in findings:
+    for finding, station in named:
         if finding.correction is None:
             finding = replace(finding, model=written(output / "model_before", finding))
-            station = next((s for s in stations if _of(finding, s)), None)
-            fit, replay = proved(finding, station, output / "model_before", output / "model")
+            fit, replay = proved(finding, station, errors)
             finding = replace(finding, fit=fit)
             replays += [] if replay is None else [replace(replay, finding=finding)]
         out.append(finding)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,12 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..background import Background
 from ..effects import effect
 from ..effects.base import DriveState
 from ..effects.path import strokes
 from .findings import Finding
 
 Array = NDArray[np.float64]
+Place = tuple[str, str | None, str | None, str | None]  # signal, finger, joint, actuator of a station
+Errors = Mapping[tuple[Place, str], tuple[Array | None, Array | None]]  # before and after, by station and recording
 
 INVERSE = "mujoco: mj_inverse of the compiled motor along the recorded motion"
 FORWARD = "mujoco: the compiled finger simulated, its driver on the recorded path"
@@ -38,24 +41,41 @@ class Replay:
     trials: tuple[str, ...]
 
 
-def proved(finding: Finding, station: Any, before: Path, after: Path) -> tuple[dict[str, Any], Replay | None]:
-    """`fit` of a finding from the folders `before` and `after`, and their replay; as it was, saying why, where they cannot be
-    replayed.
+def untouched(finding: Finding, station: Any) -> tuple[DriveState, ...]:
+    """The recordings on which a finding is proved by replay; none where it cannot be replayed. station: where it was named, or None."""
+    kind = effect(finding.effect)
+    if station is None or not kind.of_the_hand or kind.unwritten:
+        return ()
+    return kept_out(tuple(s for s in station.naming.balance.states if kind.told_by(s)))
+
+
+def errors_along(wanted: Sequence[tuple[Any, Sequence[DriveState]]], before: Path, after: Path) -> Errors:
+    """Recorded minus replayed (n,) by station and recording, of the folders `before` and `after`; two replays at a time.
+
+    wanted: stations and recordings, each of which is replayed once, however many effects are named there.
+    """
+    once = {(_place(station), s.trial): (station, s) for station, states in wanted for s in states}
+    calls = [(_place(station), folder, fit.declared, state) for station, state in once.values()
+             for folder, fit in ((before, station.reading.declared), (after, station.reading.fit))]
+    errors = list(Background(_error, calls).results())
+    return {key: (errors[2 * i], errors[2 * i + 1]) for i, key in enumerate(once)}
+
+
+def proved(finding: Finding, station: Any, errors: Errors) -> tuple[dict[str, Any], Replay | None]:
+    """`fit` of a finding from the errors of the compiled files along its recordings, and their replay; as it was, saying why, where they
+    cannot be replayed.
 
     station: where it was named, None for what was read from events.
     """
-    kind = effect(finding.effect)
-    if station is None or not kind.of_the_hand or kind.unwritten:
+    kind, states = effect(finding.effect), untouched(finding, station)
+    if not states:
         return {**finding.fit, "note": kind.unwritten or "read from events, not from a balance"}, None
-    states = kept_out(tuple(s for s in station.naming.balance.states if kind.told_by(s)))
-    replay = _currents if station.signal == "current" else _angles
-    errors = [replay(station, finding, folder, fit, states)
-              for folder, fit in ((before, station.reading.declared), (after, station.reading.fit))]
-    if errors[0] is None or errors[1] is None:
+    pairs = [errors[_place(station), s.trial] for s in states]
+    if any(e is None for pair in pairs for e in pair):
         return {**finding.fit, "note": "no compiled file has its motor or its joint"}, None
     every = bool(kind.warps or kind.replaces)
     used = [_used(s, every) for s in states]
-    r0, r1 = ([e[u] for e, u in zip(error, used, strict=True)] for error in errors)
+    r0, r1 = ([pair[k][u] for pair, u in zip(pairs, used, strict=True)] for k in (0, 1))
     blocks = [_blocks(s)[u] for s, u in zip(states, used, strict=True)]
     granted = np.concatenate([s.extra.get("sigma", np.zeros(len(s.time_s)))[u] for s, u in zip(states, used, strict=True)])
     floor = float(np.hypot(station.naming.balance.sigma, np.sqrt(np.mean(granted**2))))
@@ -66,29 +86,27 @@ def proved(finding: Finding, station: Any, before: Path, after: Path) -> tuple[d
                        station.naming.balance.sigma, tuple(s.trial for s in states))
 
 
-def _currents(station: Any, finding: Finding, folder: Path, fit: Any, states: Sequence[DriveState]) -> list[Array] | None:
-    """Current recorded minus what the compiled motor needs (n,) [raw], per recording."""
-    from .inverse import current_along, read_motor
-
-    motor = read_motor(folder, station.actuator)
-    return None if motor is None else [s.effort - current_along(motor, s) for s in states]
+def _place(station: Any) -> Place:
+    return station.signal, station.finger, station.joint, station.actuator
 
 
-def _angles(station: Any, finding: Finding, folder: Path, fit: Any, states: Sequence[DriveState]) -> list[Array] | None:
-    """Angle recorded minus that of the compiled joint (n,) [deg], per recording; less what belongs to the recording itself, its
-    clock's offset and steps of slipped markers."""
+def _error(place: Place, folder: Path, declared: Mapping[str, float], state: DriveState) -> Array | None:
+    """Recorded minus replayed (n,): current [raw] of the compiled motor, or angle [deg] of the compiled joint less what belongs to the recording
+    itself, its clock's offset and steps of slipped markers. None where no file has the motor or the joint."""
+    signal, finger, joint, actuator = place
+    if signal == "current":
+        from .inverse import current_along, read_motor
+
+        motor = read_motor(folder, str(actuator))
+        return None if motor is None else state.effort - current_along(motor, state)
     from .forward import follower_along
 
-    out = []
-    where = {"finger": station.finger, "joint": station.joint, "actuator": station.actuator}
-    for state in states:
-        moved = follower_along(folder, state, where, "encoder" if station.signal == "encoder" else "linkage")
-        if moved is None:
-            return None
-        own = [i for i, name in enumerate(state.declared_names) if not name.startswith("power_")]
-        nuisance = state.declared[:, own] @ np.array([fit.declared[state.declared_names[i]] for i in own])
-        out.append(state.effort - nuisance - np.rad2deg(moved))
-    return out
+    where = {"finger": finger, "joint": joint, "actuator": actuator}
+    moved = follower_along(folder, state, where, "encoder" if signal == "encoder" else "linkage")
+    if moved is None:
+        return None
+    own = [i for i, name in enumerate(state.declared_names) if not name.startswith("power_")]
+    return state.effort - state.declared[:, own] @ np.array([declared[state.declared_names[i]] for i in own]) - np.rad2deg(moved)
 
 
 def kept_out(states: Sequence[DriveState]) -> tuple[DriveState, ...]:
