@@ -29,7 +29,8 @@ class DriveNow:
     [raw].
 
     direction: of the motion, or of the push while sticking. transmitted: load behind the gearbox [raw]. gravity_palm:
-    unit vector of gravity in the palm frame. bristle: deflection [%] of the friction's bristles.
+    unit vector of gravity in the palm frame. bristle: deflection [%] of the friction's bristles. level: what friction slides at, as of
+    the step before [raw].
     """
 
     time_s: float = 0.0
@@ -43,6 +44,7 @@ class DriveNow:
     slip: bool = True
     gravity_palm: Sequence[float] = (0.0, 0.0, -1.0)
     bristle: float = 0.0
+    level: float = 0.0
 
 
 Term = Callable[[DriveNow], float]
@@ -55,8 +57,7 @@ class DriveTerms:
     load: [raw] against flexion whatever the direction. friction: [raw] added to the Coulomb level, opposing motion.
     advance: called once per step, after the motion. speed_factor: share of the commanded speed that the drive reaches.
     sense: position [%] that the encoder tells the controller. current_limit: the drive's own clip [raw].
-    replace_coulomb: a bristle carries the Coulomb
-    friction instead.
+    replace_coulomb: a bristle, one of the loads, carries the friction instead.
     """
 
     load: tuple[Term, ...] = ()
@@ -140,7 +141,7 @@ def simulate(
     n = round(program.duration_s / step_s) + 1
     time_s = np.arange(n) * step_s
     target, speed, limit = (column.tolist() for column in commands(program, time_s, terms.command_delay_s))
-    now = DriveNow(position=start_percent)
+    now = DriveNow(position=start_percent, level=motor.coulomb)
     if motor.give:  # at rest the bristles carry the preload, as a hard stick would
         now.bristle = -motor.give * min(0.9, motor.preload / motor.coulomb)
     control = _controller(motor.controller, now, step_s)
@@ -194,10 +195,12 @@ def _step(
     drive -= load
     direction = (1.0 if v > 0 else -1.0) if v != 0.0 else (1.0 if drive > 0 else -1.0)
     now.direction = direction
-    level = 0.0 if terms.replace_coulomb else motor.coulomb
+    level = motor.coulomb
     for term in terms.friction:
         level += term(now)
-    level = max(0.0, level)
+    now.level = level = max(0.0, level)
+    if terms.replace_coulomb:
+        level = 0.0
     if motor.give and level > 0.0:
         new, friction = _bristles(motor, now, drive, level, step_s)
     elif v == 0.0 and abs(drive) <= level:

@@ -86,7 +86,7 @@ def quadratic(draw: Draw) -> Influence:
 
 @effect("presliding_friction", "drive", "current", ("dahl", "lugre"))
 def presliding(draw: Draw) -> Influence:
-    """The Coulomb friction is carried by a bristle that gives way over a small distance before it slides."""
+    """Friction is carried by a bristle that gives way over a small distance before it slides, at whatever level that is by then."""
     give = max(0.05, draw.size("give_percent", 0.4, 0.9))
     if draw.motor.give:  # a drive that gives anyway gives more
         give = draw.note("give_percent", draw.motor.give * (1.0 + 2.0 * give))
@@ -101,7 +101,7 @@ def presliding(draw: Draw) -> Influence:
     def load(now: DriveNow) -> float:
         v = now.velocity
         bristle[1] = v * (1.0 - math.copysign(bristle[0] / give, bristle[0] * v))
-        return level * bristle[0] / give + damping * bristle[1]
+        return now.level * bristle[0] / give + damping * bristle[1]
 
     def advance(now: DriveNow, step_s: float) -> None:
         bristle[0] = max(-give, min(give, bristle[0] + bristle[1] * step_s))
