@@ -180,7 +180,7 @@ def fit_motor(trials: Sequence[MotorTrial], scale: Scale, actuator: str = "motor
     sigma_u = max(float(np.median([white_noise(t.current, t.time_s) for t in trials])), 0.3)
     sigma_u = max(sigma_u, rest_noise(trials, (sigma_p, sigma_u), scale.speed_full))
     plain, curved = fit_regressions(trials, sigma_p, sigma_u)
-    published, alike, smear = fit_published(trials), fit_published(trials, both_sides=True), smear_share(trials)
+    published, alike = fit_published(trials), fit_published(trials, both_sides=True)
     moves = [m for t in trials for m in moves_from_rest(t, (sigma_p, sigma_u), scale.speed_full)]
     best, evidence = None, 0.0
     if len(moves) >= 4:
@@ -215,7 +215,7 @@ def fit_motor(trials: Sequence[MotorTrial], scale: Scale, actuator: str = "motor
     )  # fmt: skip
     return MotorFit(
         motor, scale, values, names, covariance, "output error" if accepted else "regression", float(sigma_p), float(sigma_u),
-        plain, published, alike, smear, best, stribeck, evidence,
+        plain, published, alike, smear_share(published, alike), best, stribeck, evidence,
     )  # fmt: skip
 
 

@@ -104,13 +104,13 @@ def fit_published(trials: Sequence[MotorTrial], both_sides: bool = False) -> tup
     return tuple(found)
 
 
-def smear_share(trials: Sequence[MotorTrial]) -> float:
+def smear_share(published: Sequence[PublishedFit], alike: Sequence[PublishedFit]) -> float:
     """Share (0..1) of the reciprocal term's gain in explained variance that is smear: gone, or no rise towards
-    zero speed, once both sides are filtered alike."""
+    zero speed, once both sides are filtered alike. Both as `fit_published` finds them."""
     gain = []
-    for alike in (False, True):
-        fits = {f.model: f for f in fit_published(trials, alike)}
+    for found in (published, alike):
+        fits = {f.model: f for f in found}
         gained = fits["SMD+Fc"].rmse_raw ** 2 - fits["SMD+Frec+Fc"].rmse_raw ** 2
         # a friction that falls towards zero speed is no Stribeck friction but what is left of the stops
-        gain.append(gained if not alike or fits["SMD+Frec+Fc"].parameters["reciprocal"] > 0 else 0.0)
+        gain.append(gained if found is published or fits["SMD+Frec+Fc"].parameters["reciprocal"] > 0 else 0.0)
     return float(np.clip(1 - gain[1] / gain[0], 0.0, 1.0)) if gain[0] > 0 else 0.0

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import IdentificationError
+from .modulating import Modulating
 from .recording import MotorTrial
 
 Array = NDArray[np.float64]
@@ -62,23 +63,18 @@ class Stroke:
 
 @dataclass(frozen=True)
 class _Projected:
-    """A stroke on its splines: onto (k, n) from n grid points, to be whitened by white (k, k); fixed (k, 2) acceleration and velocity, whitened;
+    """A stroke on its splines (k of them, n grid points); fixed (k, 2) acceleration and velocity, whitened;
     position, current (interpolated between samples; held_current: from those inside only) and speed (n,) on the grid; noise (3, 3) expected in the
     products of acceleration, velocity and position."""
 
     stroke: Stroke
-    white: Array
-    onto: Array
+    splines: Modulating
     fixed: Array
     position: Array
     current: Array
     held_current: Array
     speed: Array
     noise: Array
-
-    def project(self, y: Array) -> Array:
-        """Columns y (n, ...) on the splines, whitened (k, ...)."""
-        return self.white @ (self.onto @ y)
 
 
 def fit_regressions(trials: Sequence[MotorTrial], sigma_position: float, sigma_current: float) -> tuple[Regression, Regression]:
@@ -182,37 +178,28 @@ def _projected(trials: Sequence[MotorTrial], moved: Sequence[Sequence[Stroke]], 
 
 
 def _project(t: MotorTrial, s: Stroke, sigma: float, spacing: float, step: float, rng: np.random.Generator) -> _Projected:
-    from scipy.interpolate import BSpline, make_interp_spline
+    from scipy.interpolate import make_interp_spline
 
     k = np.arange(max(s.samples.start - 3, 0), min(s.samples.stop + 3, len(t.time_s)))
     k = k[(t.time_s[k] > s.begin_s + 1e-4) & (t.time_s[k] < s.end_s - 1e-4)]
     at = np.r_[s.begin_s, t.time_s[k], s.end_s]
-    knots = np.linspace(s.begin_s, s.end_s, int((s.end_s - s.begin_s) / spacing) + 1)
-    knots = np.r_[[s.begin_s] * 3, knots, [s.end_s] * 3]
-    grid = np.linspace(s.begin_s, s.end_s, int((s.end_s - s.begin_s) / step) + 2)
-    weight = np.full(len(grid), grid[1] - grid[0])
-    weight[[0, -1]] *= 0.5
-    spline = BSpline(knots, np.eye(len(knots) - 4)[:, 1:-1], 3)
-    value, first, second = spline(grid), spline(grid, 1), spline(grid, 2)
-    onto = np.ascontiguousarray((value * weight[:, None]).T)
-    white = np.linalg.inv(np.linalg.cholesky(onto @ value))
+    splines = Modulating(s.begin_s, s.end_s, spacing, step)
+    grid = splines.grid
     share = (grid - s.begin_s) / (s.end_s - s.begin_s)
-    position = make_interp_spline(at, np.r_[s.begin, t.position[k], s.end], k=3)(grid)
-    # less its chord the position vanishes at both ends, and with it what integration by parts leaves there
-    bent = position - position[0] - (position[-1] - position[0]) * share
     noise = sigma * rng.normal(size=(len(at), 2))
     noise[[0, -1]] *= 0.5  # means of a rest
-    shaken = make_interp_spline(at, noise, k=3)(grid)
-    curved = shaken - shaken[0] - (shaken[-1] - shaken[0]) * share[:, None]
-    chord = (position[-1] - position[0]) / (s.end_s - s.begin_s)
-    heavy = weight[:, None] * np.c_[bent, curved, shaken]
-    accelerated, moved, placed = white @ (second.T @ heavy), white @ -(first.T @ heavy), white @ (value.T @ heavy)
-    velocity = moved[:, 0] + chord * (white @ onto.sum(axis=1))
-    speed = np.abs(chord + first @ (white.T @ placed[:, 0]))
-    seen = np.stack([accelerated[:, 1:3], moved[:, 3:], placed[:, 3:]])
+    smooth = make_interp_spline(at, np.c_[np.r_[s.begin, t.position[k], s.end], noise], k=3)(grid)
+    # less its chord the position vanishes at both ends, and with it what integration by parts leaves there
+    bent = smooth - smooth[0] - (smooth[-1] - smooth[0]) * share[:, None]
+    position, chord = smooth[:, 0], (smooth[-1, 0] - smooth[0, 0]) / (s.end_s - s.begin_s)
+    accelerated = splines.products(bent, 2)
+    moved, placed = -splines.products(np.c_[bent[:, 0], smooth[:, 1:]], 1), splines.products(np.c_[bent[:, 0], np.ones(len(grid)), smooth[:, 1:]])
+    velocity = moved[:, 0] + chord * placed[:, 1]
+    speed = np.abs(chord + splines.slope(placed[:, 0]))
+    seen = np.stack([accelerated[:, 1:], moved[:, 1:], placed[:, 2:]])
     current, held = np.interp(grid, t.time_s, t.current), np.interp(grid, t.time_s[k], t.current[k])
     noise = np.einsum("ikr,jkr->ij", seen, seen) / 2
-    return _Projected(s, white, onto, np.c_[accelerated[:, 0], velocity], position, current, held, speed, noise)
+    return _Projected(s, splines, np.c_[accelerated[:, 0], velocity], position, current, held, speed, noise)
 
 
 def _rows(q: _Projected, give: float, shapes: Sequence[tuple[float, float]] = ()) -> tuple[Array, Array]:
@@ -224,7 +211,7 @@ def _rows(q: _Projected, give: float, shapes: Sequence[tuple[float, float]] = ()
     else:
         friction, held, hold = q.stroke.sign * (1 - left), left, q.stroke.hold
     rises = [friction * np.exp(-((q.speed / speed) ** exponent)) for speed, exponent in shapes]
-    x = q.project(np.column_stack([friction, q.position - held * q.stroke.rest, 1 - held, *rises, q.current - held * hold]))
+    x = q.splines.products(np.column_stack([friction, q.position - held * q.stroke.rest, 1 - held, *rises, q.current - held * hold]))
     return np.c_[q.fixed, x[:, :-1]], x[:, -1]
 
 
