@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from .base import Amplitude, Array, DriveState, Effect, Shape, figure, position_range
+from .base import Array, DriveState, Shape, figure, position_range
 from .mjcf import free_name, motor_joint, section
+from .sinusoid import Sinusoid
 
 
-class TorqueRipple(Effect):
+class TorqueRipple(Sinusoid):
     """F = A sin(2 pi x / P + phase)."""
 
     name = "torque_ripple"
-    repeats = True  # further harmonics
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """Period from a fiftieth of the range to a third of it, dense in wavenumber: what does not come three times is seen to repeat
@@ -26,28 +26,13 @@ class TorqueRipple(Effect):
         periods = span / np.arange(np.ceil(fewest), 40.01, 0.25)
         return (Shape("period", states[0].position_unit, 0.02 * span, span / fewest, tuple(periods)),)
 
-    def amplitudes(self) -> tuple[Amplitude, ...]:
-        """Sine and cosine parts."""
-        return (("sine", "effort", -np.inf, np.inf), ("cosine", "effort", -np.inf, np.inf))
-
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """sin and cos of the position's phase, (n, 2)."""
-        phase = 2 * np.pi * state.position / shape["period"]
+        """sin and cos of the position's phase, (n, 2), where they can be seen."""
         # Faster than the state estimate sees, inertia takes the ripple up: nothing is claimed there.
         blur = 2 * np.pi * np.abs(state.velocity) / shape["period"] * state.extra.get("bandwidth_s", 0.0)
         # Where motion starts or stops a slow phase resembles anything that friction does while it turns over.
-        seen = np.exp(-0.5 * blur**2) * state.extra.get("steady", np.ones(len(phase)))
-        return np.stack([np.sin(phase), np.cos(phase)], axis=-1) * seen[:, None]
-
-    def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
-                   declared: Mapping[str, float]) -> dict[str, float]:
-        """Amplitude, period and phase [rad]."""
-        return {"amplitude": float(np.hypot(amplitude["sine"], amplitude["cosine"])), "period": shape["period"],
-                "phase": float(np.arctan2(amplitude["cosine"], amplitude["sine"]))}
-
-    def units(self, shape: Mapping[str, float]) -> Mapping[str, str]:
-        """Amplitude as the effort, phase as an angle."""
-        return {"amplitude": "effort", "phase": "rad"}
+        seen = np.exp(-0.5 * blur**2) * state.extra.get("steady", np.ones(len(blur)))
+        return super().columns(state, shape) * seen[:, None]
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """Swing and period."""
