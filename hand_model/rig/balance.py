@@ -49,7 +49,7 @@ class Rows:
     """The balance of one independent joint in one trial.
 
     Full-rate grid (n,): time_s, states, extra channels (never filtered: an effect reads them as they are), full_columns
-    (n, P), carried (P,) bool and load_known (n,): of what the joint carries besides its own drive and friction. Filtered and thinned (m,): effort, columns (m, P), moving (bool): what the fit uses, neither at rest nor at the ends.
+    (n, P), still_columns (n, P): the same without acceleration, carried (P,) bool and load_known (n,): of what the joint carries besides its own drive and friction. Filtered and thinned (m,): effort, columns (m, P), moving (bool): what the fit uses, neither at rest nor at the ends.
     effort: recorded, less what the trial's own bodies add to the declared ones. states: position, velocity, acceleration (n, joints) of the whole rig; rest_speeds (joints,); jacobian: joint -> (n,),
     what hangs on this joint by couplings, itself included; declared: the columns' names.
     """
@@ -76,6 +76,7 @@ class Rows:
     rest_speeds: Array = ()
     jacobian: Mapping[str, Array] = field(default_factory=dict)
     declared: tuple[Column, ...] = ()
+    still_columns: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def filtered_effort(self) -> Array:
@@ -89,6 +90,10 @@ class Rows:
     def load(self, theta: Array) -> Array:
         """Load (n,) that the joint transmits at declared parameters theta (P,)."""
         return self.full_columns @ (theta * self.carried) - self.load_known
+
+    def bias(self, theta: Array) -> Array:
+        """Load (n,) without what the joints' acceleration asks for: weight, centrifugal and Coriolis forces, springs."""
+        return self.still_columns @ (theta * self.carried) - self.load_known
 
     def expected(self, theta: Array) -> Array:
         """Effort (n,) of the joint's own drive that the declared parameters theta (P,) ask for at this motion."""
@@ -167,6 +172,7 @@ def trial_rows(
     grid, channels = grid[::thin], {k: c[::thin] for k, c in channels.items()}
     rate = rate / thin
     values = _column_values(rig, trial, model, columns, q, v, a, sign)
+    still = _column_values(rig, trial, model, columns, q, v, np.zeros_like(a), sign)
     own = _own_bodies(rig, trial, model, q, v, a)
     step = max(1, int(np.ceil(len(grid) / MAX_SAMPLES)), int(rate / (6 * cutoff)))
     external = np.array([c.kind in ("inertial", "spring", "stiffness") for c in columns])
@@ -179,12 +185,12 @@ def trial_rows(
             continue
         i = rig.joints.index(joint)
         y = sum((effort[j] - own[:, rig.joints.index(j)]) * w for j, w in jacobian.items())
-        x = sum(values[:, rig.joints.index(j)] * w[:, None] for j, w in jacobian.items())
+        x, x_still = (sum(c[:, rig.joints.index(j)] * w[:, None] for j, w in jacobian.items()) for c in (values, still))
         rows.append(
             Rows(trial.name, joint, trial.validate, grid, q[:, i], v[:, i], a[:, i],
                  low_pass(y, rate, cutoff)[::step], low_pass(x, rate, cutoff)[::step],
                  (settled & (np.abs(v[:, i]) > rest[i]))[::step], float(rest[i]), cutoff, rate,
-                 {"effort": y, **channels}, x, external, y - effort[joint], step, (q, v, a), rest, jacobian, columns)
+                 {"effort": y, **channels}, x, external, y - effort[joint], step, (q, v, a), rest, jacobian, columns, x_still)
         )  # fmt: skip
     return tuple(rows)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..effects import DriveState, catalogue, effect
 from .balance import Rows
 from .declared import DeclaredFit
-from .laws import TURNING
+from .laws import GEAR, GEAR_LOW, LINE, TURNING
 from .model import RigModel
 
 Array = NDArray[np.float64]
@@ -34,6 +34,7 @@ SMOOTH = ("nonlinear_spring",)  # its knee belongs to fingers with a return spri
 LONGEST_DELAY_S = 0.03
 # Samples. A drive that holds its torque from one control step to the next acts half a step late: less than a sample of a log.
 DELAYS = (0.125, 0.25, 0.5, 1, 2, 3, 5, 8)
+UNDECLARED = "no spring is declared"
 BY_LEVEL = "a level for each that trials declare"
 REACHES = tuple(np.geomspace(0.004, 0.5, 8))  # of the range, over which friction turns round
 PLACED = frozenset({"reach", "period", "centre"})  # what has one of these can be there twice: two springs, two tight spots
@@ -64,6 +65,17 @@ class Candidate:
         return f"{self.effect}{'/' + self.variant if self.variant else ''}@{self.joint}"
 
 
+def beside(rows: Sequence[Rows], acting: Sequence[tuple[Candidate, Mapping[str, float], Array]]) -> dict[tuple[str, str], Array]:
+    """Effort (n,) at full rate, of every (trial, joint), of effects with shape and amplitudes (j,); delays are left out."""
+    out: dict[tuple[str, str], Array] = {}
+    for row in rows:
+        for candidate, shape, amplitude in acting:
+            if candidate.joint == row.joint:
+                values = candidate.columns(row, shape).reshape(len(row.time_s), -1) @ amplitude
+                out[row.trial, row.joint] = out.get((row.trial, row.joint), 0.0) + values
+    return out
+
+
 def direction(row: Rows) -> Array:
     """Friction's direction (n,) in [-1, 1]: the sign of velocity, linear where it drowns in noise."""
     return np.clip(row.velocity / row.rest_speed, -1.0, 1.0)
@@ -89,6 +101,8 @@ def candidates(rig: RigModel, fit: DeclaredFit, joint: str) -> tuple[Candidate, 
     states = {r.trial: drive_state(rig, r, fit.theta) for r in fit.rows if r.joint == joint}
     train = tuple(states[r.trial] for r in rows)
     found = [_from_catalogue(e, joint, train, states) for e in catalogue("drive") if _usable(e)]
+    if not any(c.kind == "stiffness" and c.name == joint for c in fit.columns):
+        found = [_with_line(c) if c.effect in SMOOTH else c for c in found]
     found += [*_own(rig, fit, joint, rows), *_turning_round(rig, fit, joint, train, states)]
     return tuple(c for c in found if c.grid)
 
@@ -105,6 +119,12 @@ def _from_catalogue(
         grid = grid[:: int(np.ceil(len(grid) / 16))]
     return Candidate(found.name, "", joint, tuple(found.amplitudes()), grid,
                      lambda row, shape: np.asarray(found.columns(states[row.trial], shape), float), bool(found.warps))  # fmt: skip
+
+
+def _with_line(bend: Candidate) -> Candidate:
+    """A spring's bend with the line that it bends from: no spring at all is declared."""
+    return replace(bend, variant=UNDECLARED, amplitudes=((LINE, "effort/position", -np.inf, np.inf), *bend.amplitudes),
+                   columns=lambda r, s: np.column_stack([r.position, bend.columns(r, s)]))  # fmt: skip
 
 
 def _turning_round(
@@ -127,26 +147,42 @@ def _turning_round(
     return found
 
 
-def _own(rig: RigModel, fit: DeclaredFit, joint: str, rows: list[Rows]) -> list[Candidate]:
-    """Offset, load-dependent friction of several kinds, delay between the channels."""
-    free = (-np.inf, np.inf)
-    drive = rig.drive(joint)
+def _by_load(fit: DeclaredFit, joint: str, rows: list[Rows], driven: bool) -> list[Candidate]:
+    """Friction by what the joint carries, by what its drive puts in, or by both sides of a gear at once: the mean of the
+    drive's effort and of the bias that it works against (Duclusaud et al. 2024, model M3)."""
+    mine = [r for r in fit.rows if r.joint == joint]
+    load = {r.trial: np.abs(r.load(fit.theta)) for r in mine}
     speeds = np.concatenate([np.abs(r.velocity) for r in rows])
     knees = tuple({"stribeck_speed": float(s)} for s in np.geomspace(*np.percentile(speeds[speeds > 0], [10, 90]), 6))
-    load = {r.trial: np.abs(r.load(fit.theta)) for r in fit.rows if r.joint == joint}
-    expected = {r.trial: np.abs(r.expected(fit.theta)) for r in fit.rows if r.joint == joint}
+
+    def friction(variant: str, amplitude: str, by: Mapping[str, Array]) -> Candidate:
+        return Candidate("load_dependent_friction", variant, joint, ((amplitude, "1", 0.0, np.inf),), ({},),
+                         lambda r, s: (direction(r) * by[r.trial])[:, None])  # fmt: skip
+
+    def at_low_speed(variant: str, by: Mapping[str, Array]) -> Candidate:
+        return Candidate("load_dependent_friction", variant, joint, (("per_load", "1", 0.0, np.inf),), knees,
+                         lambda r, s: (direction(r) * by[r.trial] * np.exp(-((r.velocity / s["stribeck_speed"]) ** 2)))[:, None])  # fmt: skip
+
+    found = [at_low_speed("low speed", load),
+             Candidate("load_dependent_friction", "with speed", joint, (("per_load_speed", "s", 0.0, np.inf),), ({},),
+                       lambda r, s: (r.velocity * load[r.trial])[:, None])]  # fmt: skip
+    if driven:
+        expected = {r.trial: fit.expected(r) for r in mine}
+        gear = {r.trial: 0.5 * np.abs(expected[r.trial] + r.bias(fit.theta)) for r in mine}
+        found += [friction("motor side", "per_effort", {t: np.abs(e) for t, e in expected.items()}),
+                  friction(GEAR, "per_load", gear), at_low_speed(GEAR_LOW, gear)]  # fmt: skip
+    return found
+
+
+def _own(rig: RigModel, fit: DeclaredFit, joint: str, rows: list[Rows]) -> list[Candidate]:
+    """Friction by load of several kinds, offset, delay between the channels."""
+    free = (-np.inf, np.inf)
+    drive = rig.drive(joint)
     sample = max(float(np.median(np.diff(t.time_s))) for t in rig.trials)
     late = sorted({round(d, 6) for d in [k * sample for k in DELAYS] + [k * LONGEST_DELAY_S / 6 for k in range(1, 7)]})
     delays = tuple({"delay": sign * d} for d in late if d <= max(8 * sample, LONGEST_DELAY_S) for sign in (-1.0, 1.0))
-    own = [
-        Candidate("load_dependent_friction", "low speed", joint, (("per_load", "1", 0.0, np.inf),), knees,
-                  lambda r, s: (direction(r) * load[r.trial] * np.exp(-((r.velocity / s["stribeck_speed"]) ** 2)))[:, None]),
-        Candidate("load_dependent_friction", "with speed", joint, (("per_load_speed", "s", 0.0, np.inf),), ({},),
-                  lambda r, s: (r.velocity * load[r.trial])[:, None]),
-    ]  # fmt: skip
+    own = _by_load(fit, joint, rows, drive is not None)
     if drive is not None:
-        own.append(Candidate("load_dependent_friction", "motor side", joint, (("per_effort", "1", 0.0, np.inf),), ({},),
-                             lambda r, s: (direction(r) * expected[r.trial])[:, None]))  # fmt: skip
         measured = drive.kind == "force"
         if not measured:  # a drive can act later than told, not earlier
             delays = tuple(d for d in delays if d["delay"] < 0)

@@ -7,7 +7,7 @@ the best is the share of resampled sets of blocks in which it is (Efron's bootst
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -27,6 +27,8 @@ FOLDS = 6
 FEW = 4  # recordings from which on whole ones are left out
 LEAST_SHARE = 0.05  # of the held-out residual variance: less is not worth a name
 MOST_TERMS = 4
+MOST_WEIGHINGS = 8
+LEAST_SCALE = 1e-3  # of what the declared model leaves
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,9 @@ class Term:
 
     candidate: Candidate
     shape: Mapping[str, float]
+
+
+Settle = Callable[[tuple[Term, ...]], tuple[tuple[Term, ...], Sequence[Candidate]]]
 
 
 @dataclass(frozen=True)
@@ -161,8 +166,32 @@ def training_error(problem: Problem, terms: Sequence[Term], parts: tuple) -> flo
     return float(parts[2].sum() - 2 * moment @ theta + theta @ gram @ theta)
 
 
+def rescaled(problem: Problem, terms: Sequence[Term]) -> Problem:
+    """The problem with every joint weighed by what declared parameters and terms leave there, not by what the declared ones
+    alone leave: weights and parameters in turn (Gautier & Poignet 2001). Beside a large effect that is not yet known the
+    recordings would say less than what was declared, and other joints would have to make up for it."""
+    box, sums = limits(problem, terms), []
+    for row in problem.rows:
+        x, y = design(row, terms)[row.moving], row.effort[row.moving]
+        sums.append((row.joint, x.T @ x, x.T @ y, float(y @ y), len(y)))
+    scale = dict(problem.fit.scale)
+    for _ in range(MOST_WEIGHINGS):
+        gram, moment = (sum(s[k] / scale[s[0]] ** 2 for s in sums) for k in (1, 2))
+        theta = solve_bounded(gram, moment, *box)
+        left: dict[str, list[float]] = {}
+        for joint, g, m, square, count in sums:
+            left.setdefault(joint, []).append(max(square - 2 * m @ theta + theta @ g @ theta, 0.0) / count)
+        last, scale = scale, dict(scale)
+        for joint, squares in left.items():
+            scale[joint] = max(float(np.sqrt(np.median(squares))), LEAST_SCALE * problem.fit.scale[joint])
+        if all(abs(scale[j] - last[j]) < 0.01 * last[j] for j in left):
+            break
+    return replace(problem, fit=replace(problem.fit, scale=scale))
+
+
 def solution(problem: Problem, terms: Sequence[Term]) -> Array:
-    """All parameters (P + J,) on all training blocks; bodies are such as can exist."""
+    """All parameters (P + J,) on all training blocks, every joint weighed by what it leaves; bodies are such as can exist."""
+    problem = rescaled(problem, terms)
     gram, moment, _, _ = normal(problem, terms)
     sums, box, fit = (gram.sum(0), moment.sum(0)), limits(problem, terms), problem.fit
     theta = solve_bounded(*sums, *box)
@@ -171,6 +200,7 @@ def solution(problem: Problem, terms: Sequence[Term]) -> Array:
 
 def resampled(problem: Problem, terms: Sequence[Term], draws: int = 200) -> Array:
     """All parameters (draws, P + J) on resampled sets of training blocks (block bootstrap, Kuensch 1989)."""
+    problem = rescaled(problem, terms)
     gram, moment, _, _ = normal(problem, terms)
     box = limits(problem, terms)
     pick = np.random.default_rng(0).integers(0, len(gram), (draws, len(gram)))
@@ -263,18 +293,19 @@ def _descended(train: Callable[[Mapping[str, float]], float], shapes: Sequence[M
 
 
 def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ...] = (),
-            most: int = MOST_TERMS) -> tuple[tuple[Term, ...], tuple[Step, ...], tuple[Score, ...]]:  # fmt: skip
+            most: int = MOST_TERMS, settle: Settle | None = None) -> tuple[tuple[Term, ...], tuple[Step, ...], tuple[Score, ...]]:  # fmt: skip
     """Forward selection: the candidate that lowers the held-out error most, while it does so beyond doubt.
 
-    begin: terms that stand already. Returns all terms, the rounds, and the scores of the last round.
+    begin: terms that stand already; settle: terms and rivals again, at the loads of a fit with these terms. Returns all terms, the rounds, and the scores of the last round.
     """
-    _CACHE.clear()
     terms = begin
     steps: list[Step] = []
     scores: list[Score] = []
-    # Of what is left, where whole recordings were left out; within one and the same recording small terms always pay.
-    declared = 0.0 if left_out_whole(problem) else held_out(problem, (), normal(problem, ())).sum()
     while len(terms) < most:
+        _CACHE.clear()
+        problem = rescaled(problem, terms)
+        # Of what is left, where whole recordings were left out; within one and the same recording small terms always pay.
+        declared = 0.0 if left_out_whole(problem) else held_out(problem, (), normal(problem, ())).sum()
         parts = normal(problem, terms)
         none = held_out(problem, terms, parts)
         taken = {t.candidate.key for t in terms}
@@ -290,6 +321,8 @@ def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ..
             again = judge(none, errors, problem.group, max(declared, none.sum()))
             won, step = (last[again[0]], again[1]) if again is not None else (won, step)
         terms = (*terms, won)
+        if settle is not None:
+            terms, rivals = settle(terms)
         steps.append(step)
     return terms, tuple(steps), tuple(scores)
 

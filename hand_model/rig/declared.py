@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -37,10 +37,15 @@ class DeclaredFit:
     quality: dict[tuple[str, str], float]
     bodies: Array = field(default_factory=lambda: np.zeros((0, 10)))  # declared inertial parameters, in columns' order
     anchored: bool = False  # no effort is recorded anywhere: only ratios show, and the declared masses are the scale
+    beside: Mapping[tuple[str, str], Array] = field(default_factory=dict)  # (trial, joint) -> effort (n,) of effects at full rate
 
     def residual(self, row: Rows) -> Array:
         """Effort that the declared model leaves (m,), on the thinned grid."""
         return row.effort - row.columns @ self.theta
+
+    def expected(self, row: Rows) -> Array:
+        """Effort (n,) that the joint's own drive has to give, effects beside the declared parameters included."""
+        return row.expected(self.theta) + self.beside.get((row.trial, row.joint), 0.0)
 
 
 def bounds(columns: Sequence[Column]) -> tuple[Array, Array]:

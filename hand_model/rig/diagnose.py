@@ -36,6 +36,7 @@ from .joint_search import as_term, offsets_first, search_joints
 from .model import RigModel, load_rig
 from .noise import effort_noise
 from .proof import Bench
+from .settled import settled
 from .states import fill_gaps
 from .swing_build import can_swing
 from .transmission import angle_residual
@@ -181,7 +182,7 @@ def _diagnose_balance(rig: RigModel, fit: DeclaredFit, say: Callable[[str], None
         found.append(finding)
     later, kept = _prove(bench, fit, stories, kept, rejected)
     found += later
-    one, two, every = ((fit, *settled(bench, fit, _first(kept, k))) for k in (1, 2, len(kept)))
+    one, two, every = ((fit, *_settled(bench, fit, _first(kept, k))) for k in (1, 2, len(kept)))
     lack = {"metric": "effort_rmse", "unit": "share of the declared model's", "before": 1.0,
             "after": bench.ratio(plain, every), "one_effect": bench.ratio(plain, one),
             "two_effects": bench.ratio(plain, two), "engine": bench.engine,
@@ -193,9 +194,9 @@ def _prove(bench: Bench, fit: DeclaredFit, stories: Sequence[tuple[Step, Term]],
            rejected: list[dict[str, Any]]) -> tuple[list[Finding], list[Term]]:  # fmt: skip
     """Findings that hold on the validation recordings, one after the other beside `kept`; the rest goes to rejected."""
     kept, found = list(kept), []
-    few = settled(bench, fit, kept)
+    few = _settled(bench, fit, kept)
     for step, term in stories:
-        many = settled(bench, fit, [*kept, term])
+        many = _settled(bench, fit, [*kept, term])
         proof = bench.proof(term.candidate.joint, (fit, *few), (fit, *many))
         reason = None
         if proof["before"] <= proof["noise_floor"]:
@@ -235,16 +236,9 @@ def _moves_better(bench: Bench, before: tuple, after: tuple) -> bool:
     return ratio < 1.0
 
 
-def settled(bench: Bench, fit: DeclaredFit, terms: Sequence[Term]) -> tuple[list[Term], Array]:
-    """Terms and solution (P + J,) whose loads are those of the solution's own declared parameters (two passes)."""
-    terms, problem = list(terms), pose(fit)
-    theta = solution(problem, terms)
-    for _ in range(2 if bench.mujoco and any(t.candidate.effect == "load_dependent_friction" for t in terms) else 0):
-        at = replace(fit, theta=theta[: len(fit.columns)])
-        known = {j: {c.key: c for c in candidates(bench.rig, at, j)} for j in {t.candidate.joint for t in terms}}
-        terms = [replace(t, candidate=known[t.candidate.joint][t.candidate.key]) for t in terms]
-        theta = solution(problem, terms)
-    return terms, theta
+def _settled(bench: Bench, fit: DeclaredFit, terms: Sequence[Term]) -> tuple[list[Term], Array]:
+    """Terms and solution, at its own loads where there are any (angles of couplings have none)."""
+    return settled(bench.rig, fit, terms)[:2] if bench.mujoco else (list(terms), solution(pose(fit), terms))
 
 
 def _first(terms: Sequence[Term], count: int) -> list[Term]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..errors import DescriptionError
 from .balance import Column, Rows, declared_columns, trial_rows
-from .candidates import Candidate, candidates
+from .candidates import Candidate, beside, candidates
 from .declared import DeclaredFit
 from .mjcf import read_effects
 from .model import RigModel, RigTrial
@@ -24,6 +24,7 @@ from .overrides import compile_model
 from .states import later
 
 Array = NDArray[np.float64]
+PASSES = 4  # what one changes of the load, friction changes by a fraction of
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ def effort_residuals(
         rows = tuple(r for t in rig.trials for r in trial_rows(rig, t, columns, cutoff))
     rows = tuple(r for r in rows if keep is None or (r.trial, r.joint) in keep)
     fit = DeclaredFit(columns, theta, {}, _recolumned(rows, columns), 0.0, {})
-    terms = [(_rebuilt(rig, fit, r), r) for r in records if "effect" in r]
+    terms = _acting(rig, fit, [r for r in records if "effect" in r])
     trials = {t.name: t for t in rig.trials}
     by_trial = {t: [r for r in rows if r.trial == t] for t in dict.fromkeys(r.trial for r in rows)}
     out = []
@@ -68,13 +69,12 @@ def effort_residuals(
         own = joint_efforts(rig, trials[name], mine[0])
         for row in mine:
             expected = row.filtered(sum(own[:, rig.joints.index(j)] * w for j, w in row.jacobian.items()))
-            for candidate, record in terms:
+            for candidate, shape, amplitude in terms:
                 if candidate.joint == row.joint:
-                    amplitude = np.array([record["amplitude"][a[0]] for a in candidate.amplitudes])
-                    expected = expected + row.filtered(candidate.columns(row, record["shape"])) @ amplitude
-            for candidate, record in terms:
+                    expected = expected + row.filtered(candidate.columns(row, shape)) @ amplitude
+            for candidate, shape, _ in terms:
                 if candidate.joint == row.joint and candidate.delays:
-                    expected = later(row.time_s[:: row.step], expected, record["shape"]["delay"])
+                    expected = later(row.time_s[:: row.step], expected, shape["delay"])
             out.append(EffortResidual(name, row.joint, row.validate, (row.effort - expected)[row.moving], row, expected))
     return tuple(out)
 
@@ -134,8 +134,21 @@ def _recolumned(rows: Sequence[Rows], columns: Sequence[Column]) -> tuple[Rows, 
         pick = [at.get(c.label, -1) for c in columns]
         blank = np.concatenate([row.full_columns, np.zeros((len(row.full_columns), 1))], 1)
         carried = np.append(row.carried, False)
-        out.append(replace(row, full_columns=blank[:, pick], carried=carried[pick], declared=tuple(columns)))
+        still = np.concatenate([row.still_columns, np.zeros((len(row.still_columns), 1))], 1)
+        out.append(replace(row, full_columns=blank[:, pick], still_columns=still[:, pick], carried=carried[pick], declared=tuple(columns)))
     return tuple(out)
+
+
+def _acting(rig: RigModel, fit: DeclaredFit, records: Sequence[Mapping[str, Any]]) -> list[tuple[Candidate, Mapping, Array]]:
+    """Candidates that the file's records name, with shapes and amplitudes, at the loads of the file's parameters and, by
+    turns, of the effects themselves."""
+    turns = PASSES if any(r["effect"] == "load_dependent_friction" for r in records) else 1
+    acting: list[tuple[Candidate, Mapping, Array]] = []
+    for _ in range(turns):
+        at = replace(fit, beside=beside(fit.rows, acting))
+        found = [(_rebuilt(rig, at, r), r) for r in records]
+        acting = [(c, r["shape"], np.array([r["amplitude"][a[0]] for a in c.amplitudes])) for c, r in found]
+    return acting
 
 
 def _rebuilt(rig: RigModel, fit: DeclaredFit, record: Mapping[str, Any]) -> Candidate:

@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..background import Background
-from .candidates import candidates
+from .candidates import Candidate, candidates
 from .compete import Step, Term, compete, pose
 from .declared import DeclaredFit
 from .model import RigModel
+from .settled import settled
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,12 @@ def _offset_first(rig: RigModel, fit: DeclaredFit, joint: str) -> Won | None:
 
 def _search(rig: RigModel, fit: DeclaredFit, joint: str, begin: Won | None) -> tuple[list[Won], list[str]]:
     stands = () if begin is None else (as_term(rig, fit, begin),)
-    taken, steps, scores = compete(pose(fit, joint), candidates(rig, fit, joint), stands)
+
+    def settle(terms: tuple[Term, ...]) -> tuple[tuple[Term, ...], Sequence[Candidate]]:
+        same, _, at = settled(rig, fit, terms)
+        return tuple(same), candidates(rig, at, joint)
+
+    taken, steps, scores = compete(pose(fit, joint), candidates(rig, fit, joint), stands, settle=settle)
     won = [Won(s, joint, t.candidate.key, t.shape) for s, t in zip(steps, taken[len(stands) :], strict=True)]
     stand = {t.candidate.key for t in taken}
     return won, [s.term.candidate.key for s in scores if s.term.candidate.key not in stand]

@@ -13,19 +13,23 @@ from ..effects import DriveState, effect
 
 # Effects that depend on the present state alone; of those, the frictions.
 FRICTION = frozenset({"stribeck_friction", "position_dependent_friction"})
+GEAR = "both sides of the gear"  # variant of friction by load
+GEAR_LOW = "both sides of the gear, low speed"
 TURNING = "turning round over a distance"  # variant of friction by load
+LINE = "linear_stiffness"  # of a spring where none is declared
 OF_STATE = FRICTION | {"nonlinear_spring", "end_stop_contact", "detent_load", "torque_ripple"}
 
 
 @dataclass(frozen=True)
 class Now:
     """One instant of a joint. position [rad or m], velocity [per s]; load: what the joint carries [N m or N]; drive: what
-    its own drive puts in."""
+    its own drive puts in; bias: the load without what acceleration asks for."""
 
     position: float
     velocity: float
     load: float
     drive: float
+    bias: float = 0.0
 
 
 # (effort against the motion that the drive must give besides, bound of further dry friction), both [N m or N].
@@ -56,13 +60,13 @@ def _of_state(record: Mapping[str, Any]) -> Law:
     """The catalogue's own columns at one sample; friction as the bound that it is while the joint moves forwards."""
     named, shape = effect(record["effect"]), record.get("shape", {})
     size = np.array([record["amplitude"][a[0]] for a in named.amplitudes()])
-    one, friction = np.ones(1), record["effect"] in FRICTION
+    one, friction, line = np.ones(1), record["effect"] in FRICTION, record["amplitude"].get(LINE, 0.0)
 
     def act(now: Now) -> tuple[float, float]:
         state = DriveState("", "", 0 * one, now.position * one, now.velocity * one, 0 * one, np.nan * one, one[:, None],
                            declared_names=("coulomb",))  # fmt: skip
         value = float((named.columns(state, shape) @ size)[0])
-        return (0.0, value) if friction else (value, 0.0)
+        return (0.0, value) if friction else (value + line * now.position, 0.0)
 
     return act
 
@@ -70,11 +74,18 @@ def _of_state(record: Mapping[str, Any]) -> Law:
 def _by_load(variant: str, shape: Mapping[str, float], size: float) -> Law:
     if variant == "with speed":
         return lambda n: (size * n.velocity * abs(n.load), 0.0)
-    if variant == "low speed":
-        return lambda n: (0.0, size * abs(n.load) * math.exp(-((n.velocity / shape["stribeck_speed"]) ** 2)))
+    if variant in ("low speed", GEAR_LOW):
+        side = _gear if variant == GEAR_LOW else lambda n: abs(n.load)
+        return lambda n: (0.0, size * side(n) * math.exp(-((n.velocity / shape["stribeck_speed"]) ** 2)))
+    if variant == GEAR:
+        return lambda n: (0.0, size * _gear(n))
     if variant == "motor side":
         return lambda n: (0.0, size * abs(n.drive))
     return lambda n: (0.0, size * abs(n.load))
+
+
+def _gear(now: Now) -> float:
+    return 0.5 * abs(now.drive + now.bias)
 
 
 class _Stop:

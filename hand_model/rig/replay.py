@@ -117,7 +117,8 @@ class EffectStepper:
         for joint, act in self.laws:
             drive = float(data.qfrc_actuator[joint])
             load = drive + float(data.qfrc_passive[joint] + data.qfrc_constraint[joint])
-            effort, friction = act(Now(float(data.qpos[joint]), float(data.qvel[joint]), load, drive))
+            bias = float(data.qfrc_bias[joint] - data.qfrc_spring[joint])
+            effort, friction = act(Now(float(data.qpos[joint]), float(data.qvel[joint]), load, drive, bias))
             data.qfrc_passive[joint] -= effort
             bound[joint] = bound.get(joint, self.coulomb[joint]) + friction
         for joint, value in bound.items():
