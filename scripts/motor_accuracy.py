@@ -25,7 +25,7 @@ import numpy as np
 from hand_model.compile.motor import write_motors
 from hand_model.hand import EncoderMap, Finger, Hand, Joint
 from hand_model.identify.motor.balance import NAMES
-from hand_model.identify.motor.drive import cascade_step
+from hand_model.identify.motor.cascade import cascade_step
 from hand_model.identify.motor.fit import MotorFit, fit_motor
 from hand_model.identify.motor.predict import aligned_moves, predict, reference
 from hand_model.identify.motor.recording import MotorTrial, motor_trial, trial_scale

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from hand_model.identify.motor.creep import begins, continued, creeping, end_state
-from hand_model.identify.motor.grid import LONG_S, NEVER, grid, rows
+from hand_model.identify.motor.drive import Moves, run
+from hand_model.identify.motor.grid import NEVER, grid, rows
 from hand_model.identify.motor.moves import MoveData
 from hand_model.identify.motor.output_error import _linearise, simulate_moves
 
@@ -38,7 +39,7 @@ def test_grid_counts_its_own_steps() -> None:
         assert np.allclose(found.index(found.at_s[:, [c]], np.array([c]))[:, 0], i)
         assert found.at_s[n[c] - 1, c] >= duration[c]
         within = found.steps()[:, c][(found.at_s[:, c] > calm[0, c] + 0.02) & (found.at_s[:, c] < min(calm[1, c], 2.0) - 0.02)]
-        assert np.allclose(within, LONG_S) if c < 2 else len(within) == 0
+        assert np.allclose(within, 4 * step) if c < 2 else len(within) == 0
     assert n[2] == 1002 and n[1] < n[0] < 700
 
 
@@ -86,3 +87,18 @@ def test_state_at_the_end_of_a_move() -> None:
     t = np.arange(10) * 0.01
     assert end_state(t, np.c_[50 + 2 * t, 3 * np.ones(10)]) == (pytest.approx(50.18), 3.0, pytest.approx(2.0))
     assert end_state(t, np.c_[50 + 0 * t, 3 * np.ones(10)])[2] == 0.0
+
+
+@pytest.mark.parametrize("controller", ["cascade", "profile"])
+def test_neighbours_that_share_their_steps_move_as_they_do_alone(controller: str) -> None:
+    """Two moves, three sets of parameters each, at once: each as it is by itself."""
+    each = {n: np.full(6, v) for n, v in VALUES.items()} | {"coulomb": np.array([34.0, 30.0, 38.0] * 2)}
+    zero, one = np.zeros(6), np.ones(6)
+    target, end_s = np.repeat([90.0, 60.0], 3), np.repeat([1.6, 1.2], 3)
+    moves = Moves(0.006 * one, zero, target, one, np.inf * one, zero, zero, end_s, zero, 0.3 * one, 0.5 * one, 1.1 * one)
+    times = [np.arange(1, 70) * 0.015] * 2
+    together = run(moves, each, 2e-3, controller, 3).sample(times, 3)
+    for k in range(6):
+        alone = run(moves.some(np.array([k])), {n: v[k : k + 1] for n, v in each.items()}, 2e-3, controller).sample(times[:1])
+        of_move = slice(69 * (k // 3), 69 * (k // 3 + 1))
+        assert all(np.allclose(x[of_move, k % 3], y[:, 0], atol=1e-9) for x, y in zip(together, alone, strict=True))

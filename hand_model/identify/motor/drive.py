@@ -18,12 +18,14 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-from collections.abc import Mapping, Sequence
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .cascade import Cascade
 from .friction import Bristles, Stick
 from .grid import NEVER, Grid, grid, rows
 
@@ -137,15 +139,15 @@ class Run:
 
     def _interpolated(self, y: Array, t: Array, column: NDArray[np.int64]) -> Array:
         """y (n, B) at times t (N, width or 1) [s] of columns (N, width), linearly."""
-        x = np.minimum(np.maximum(self.grid.index(t, column), 0.0), len(y) - 1.001)
+        x = np.minimum(np.maximum(self.grid.index(t, column[:, :1]), 0.0), len(y) - 1.001)
         i = x.astype(int)
         share, flat, below = x - i, i * y.shape[1] + column, y.shape[1]
         y = y.ravel()
         return y[flat] * (1 - share) + y[flat + below] * share
 
 
-def run(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, controller: str = "profile") -> Run:
-    """Simulate B moves under B parameter sets (each (B,)).
+def run(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, controller: str = "profile", width: int = 1) -> Run:
+    """Simulate B moves under B parameter sets (each (B,)); every `width` neighbours are one move, in the same steps.
 
     Every move starts at rest in balance, so its friction there is what the controller pushes less the spring; where it creeps,
     friction is that of sliding. Friction without presliding in any set sticks hard.
@@ -159,16 +161,16 @@ def run(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, controller
     column[order] = np.arange(len(order))
     moves, q, steps = moves.some(order), {n: x[order] for n, x in q.items()}, steps[order]
     moves = dataclasses.replace(moves, start_s=moves.start_s + EARLY_S, position=moves.position - EARLY_S * moves.velocity)
-    times = grid(ends_s[:, order], int(steps[0]) + 1, step_s)
-    kind = _Cascade if controller == "cascade" else _Profile
+    times = grid(ends_s[:, order], int(steps[0]) + 1, step_s, width)
+    kind = Cascade if controller == "cascade" else _Profile
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # values that a search tries may let a drive run away
         steer = kind(moves, q, times)
         position, feedback = _run(moves, q, steer, times, steps, np.inf)
         simulated = np.arange(len(position))[:, None] < steps
-        if np.any(np.isfinite(moves.limit)) and np.any(simulated & (np.abs(steer.at + feedback) > moves.limit)):
+        if np.any(np.isfinite(moves.limit)) and np.any(simulated & (np.abs(steer.asked(position) + feedback) > moves.limit)):
             steer = kind(moves, q, times)
             position, feedback = _run(moves, q, steer, times, steps, moves.limit)
-        return Run(times, position, steer.at + feedback if controller == "cascade" else feedback, moves, q, controller, column)
+        return Run(times, position, steer.asked(position) + feedback if controller == "cascade" else feedback, moves, q, controller, column)
 
 
 def simulate(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, controller: str = "profile") -> tuple[Array, Array, Array]:
@@ -180,69 +182,69 @@ def simulate(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, contr
 
 
 def _run(
-    moves: Moves, q: Mapping[str, Array], steer: _Profile | _Cascade, times: Grid, rows_of: NDArray[np.int64], limit: Array | float
+    moves: Moves, q: Mapping[str, Array], steer: _Profile | Cascade, times: Grid, rows_of: NDArray[np.int64], limit: Array | float
 ) -> tuple[Array, Array]:
     """Position [%] and what it adds to the current that is asked for [raw], (n, B), of drives that follow what `steer` says, with no more current than the limit [raw].
 
     rows_of (B,): the rows that each takes, falling.
     """
-    n = len(times.at)
-    active = np.searchsorted(-rows_of, -np.arange(n), side="left").tolist()
-    steps = times.steps()
-    changes = [True, *np.any(steps[1:] != steps[:-1], axis=1).tolist()]
-    position, velocity = np.zeros((2, n, len(moves.target)))
-    p, v = moves.position.copy(), np.zeros(len(moves.target)) + moves.velocity
+    width, steps = len(moves.target), times.steps()
+    position, velocity = np.zeros((2, len(times.at) + 1, width))
+    position[0], velocity[0] = moves.position, moves.velocity
     friction = (Stick if not np.any(q["presliding"]) else Bristles)(q)
-    friction.begin(np.clip(steer.first(p, v), -limit, limit) - q["stiffness"] * p - q["preload"], v)
+    friction.begin(np.clip(steer.begin(position[0], velocity[0]), -limit, limit) - q["stiffness"] * position[0] - q["preload"], velocity[0])
     late = np.minimum(q["delay"], 0.8 * q["inertia"] / np.maximum(q["damping"], 1e-9))
-    gain, keep, late_push = q["gain"], q["damping"] - q["gain"] * late, q["damping"] * late
-    sprung, preload, limit = q["stiffness"] + gain, q["preload"], limit + np.zeros(len(p))
-    every = gain, keep, late_push
+    late_push, sprung = q["damping"] * late, q["stiffness"] + steer.stiffness
     contact = _Contact(q) if "contact_stiffness" in q else None
-    bounded = bool(np.isfinite(limit).any())
-    h = late_move = moving = closed = inner = steps[0]
-    for i in range(n):
-        k = active[i]
-        if k == 0:
-            break
-        if k < len(p):
-            p, v, h, gain, late_move, moving, sprung, preload, limit, closed, inner = (
-                x[:k] for x in (p, v, h, gain, late_move, moving, sprung, preload, limit, closed, inner)
-            )
-            friction.narrow(k)
-            steer.narrow(k)
-        if changes[i]:
-            h = steps[i, :k]
-            half = 0.5 * h
-            mass, late_move = q["inertia"][:k] / half, late_push[:k] / half
-            moving, closed = mass - late_move, gain * (half - late[:k]) + q["damping"][:k] * (1.0 - late[:k] / half)
-            inner = mass + q["viscous"][:k] + half * q["stiffness"][:k] + closed
-            friction.pace(h)
-            steer.pace(h)
+    ceiling = _Ceiling(q, late, limit) if np.isfinite(limit).any() else None
+    for first, last, k in _stretches(steps, rows_of):
+        h, own_sprung = times.each(steps[first])[:k], sprung[:k]
+        half = 0.5 * h
+        mass = q["inertia"][:k] / half
+        closed = q["gain"][:k] * (half - late[:k]) + q["damping"][:k] * (1.0 - late[:k] / half)
+        moving = mass - late_push[:k] / half
+        inner = 0.5 * (mass + q["viscous"][:k] + half * q["stiffness"][:k] + closed)
+        total, work = np.empty((2, k))
+        for part in (friction, steer, *(x for x in (contact, ceiling) if x is not None)):
+            part.pace(first, last, h)
+        p, v = position[first, :k], velocity[first, :k]
+        for i, to, fresh in zip(range(first, last), position[first + 1 : last + 1, :k], velocity[first + 1 : last + 1, :k], strict=True):
+            np.multiply(moving, v, out=total)
+            np.multiply(own_sprung, p, out=work)
+            np.subtract(total, work, out=total)
+            np.add(total, steer.push(i, p, v), out=total)
+            resisting = inner
             if contact is not None:
-                contact.pace(h)
-        push = steer.push(i, p, v)
-        position[i, :k], velocity[i, :k] = p, v
-        total = push - preload + moving * v - sprung * p
-        resisting = inner
-        if contact is not None:
-            pressed, stiffer = contact.load(p)
-            total, resisting = total - pressed, inner + stiffer
-        middle = friction.velocity(total, resisting, v)
-        if bounded:
-            own = total - (push - gain * p - late_move * v)  # what is left without the controller
-            u_middle = total - own - closed * middle
-            over = np.abs(u_middle) > limit
-            if over.any():
-                middle = np.where(over, friction.velocity(own + np.sign(u_middle) * limit, resisting - closed, v), middle)
-        fresh, middle = friction.advance(v, middle)
-        steer.advance(middle)
-        p = p + h * middle
-        v = fresh
-    gain, keep, late_push = every
-    feedback = -gain * position - keep * velocity
-    feedback[1:] += late_push * np.diff(velocity, axis=0) / steps[:-1]
+                pressed, stiffer = contact.load(p)
+                total, resisting = total - pressed, inner + 0.5 * stiffer
+            both = friction.velocities(total, resisting, v)
+            if ceiling is not None:
+                both = ceiling.kept(both, total, resisting, p, v, 0.0 if contact is None else pressed, friction)
+            friction.advance(v, both, fresh)
+            np.multiply(half, both, out=work)
+            steer.advance(work)
+            np.add(p, work, out=to)
+            p, v = to, fresh
+    position, velocity = position[:-1], velocity[:-1]
+    feedback, rate = -q["gain"] * position, np.diff(velocity, axis=0)
+    np.divide(rate.reshape(*steps[1:].shape, -1), steps[:-1, :, None], out=rate.reshape(*steps[1:].shape, -1))
+    rate *= late_push
+    feedback[1:] += rate
+    velocity *= q["damping"] - q["gain"] * late
+    feedback -= velocity
     return position, feedback
+
+
+def _stretches(steps: Array, rows_of: NDArray[np.int64]) -> Iterator[tuple[int, int, int]]:
+    """First row, the row after the last, and how many drives are simulated, of stretches in which no drive changes its step or ends.
+
+    steps (n, ...) [s] that begin in each row; rows_of (B,): the rows that each takes, falling.
+    """
+    ends = np.minimum(rows_of, len(steps))
+    change = np.flatnonzero(np.any(steps[1:] != steps[:-1], axis=1)) + 1
+    cuts = np.unique(np.concatenate([[0], change, ends]))
+    for first, last in itertools.pairwise(cuts[cuts <= ends[0]].tolist()):
+        yield first, last, int(np.count_nonzero(ends > first))
 
 
 class _Profile:
@@ -256,101 +258,51 @@ class _Profile:
         way = shape.way(t)
         # the mean over a step is exact where the velocity jumps within it
         self.at = q["gain"] * r
-        self.at[:-1] = 0.5 * (self.at[1:] + self.at[:-1]) + q["damping"] * sign * np.diff(way, axis=0) / times.steps()[:-1]
-        self.hold = q["gain"] * r[0], q["gain"]
+        self.at[:-1] = 0.5 * (self.at[1:] + self.at[:-1]) + q["damping"] * sign * np.diff(way, axis=0) / times.each(times.steps()[:-1])
+        self.given, self.hold, self.stiffness = self.at - q["preload"], q["gain"] * r[0], q["gain"]
 
-    def first(self, p: Array, v: Array) -> Array:
+    def begin(self, p: Array, v: Array) -> Array:
         """Current (B,) [raw] before the move, at rest at positions (B,) [%]."""
-        return self.hold[0] - self.hold[1] * p
+        return self.hold - self.stiffness * p
 
-    def narrow(self, k: int) -> None:
-        """Nothing: the drives that are left say how many they are."""
-
-    def pace(self, step_s: Array) -> None:
+    def pace(self, first: int, last: int, step_s: Array) -> None:
         """Nothing: the reference is known beforehand."""
 
     def push(self, i: int, p: Array, v: Array) -> Array:
-        """Its part of the current (k,) [raw] in the middle of step i."""
-        return self.at[i, : len(p)]
+        """Its part of the current (k,) [raw] in the middle of step i, less the preload and what `stiffness` takes."""
+        return self.given[i, : len(p)]
 
-    def advance(self, middle: Array) -> None:
+    def advance(self, gone: Array) -> None:
         """Nothing: the profile does not see the drive."""
 
-
-class _Cascade:
-    """What a position loop round a speed loop adds to the current, at the steps (at); r goes with the drive within the deadband."""
-
-    def __init__(self, moves: Moves, q: Mapping[str, Array], times: Grid) -> None:
-        self.at_s, self.at, self.hold = times.at_s, np.zeros(times.at.shape), moves.hold
-        self.starting = (self.at_s.min(axis=1) < moves.start_s.max()).tolist()
-        self.gain, self.damping, self.half_gain, self.half_damping = q["gain"], q["damping"], 0.5 * q["gain"], 0.5 * q["damping"]
-        self.start_s, self.target, self.origin, self.loop = moves.start_s, moves.target, moves.origin, _Loop(q, moves.speed)
-
-    def first(self, p: Array, v: Array) -> Array:
-        """Current (B,) [raw] before the move: what held the drive."""
-        self.r, self.w = p + (self.hold + self.damping * v) / self.gain, np.zeros(len(p))
-        return self.hold
-
-    def narrow(self, k: int) -> None:
-        """Keep the first k drives."""
-        for name in ("gain", "damping", "half_gain", "half_damping", "start_s", "target", "origin", "r", "w", "step_s", "half"):
-            setattr(self, name, getattr(self, name)[:k])
-        self.loop.narrow(k)
-
-    def pace(self, step_s: Array) -> None:
-        """The steps (k,) [s] from here on."""
-        self.step_s, self.half = step_s, 0.5 * step_s
-        self.loop.pace(step_s)
-
-    def push(self, i: int, p: Array, v: Array) -> Array:
-        """Its part of the current (k,) [raw] in the middle of step i."""
-        r, w = self.r, self.w
-        share, change = self.loop.step(self.target - p, v, w)
-        if self.starting[i]:
-            # the share of this step that lies behind the command, so that its instant counts within a step too
-            since = np.minimum(np.maximum((self.at_s[i, : len(p)] + self.step_s - self.start_s) / self.step_s, 0.0), 1.0)
-            old_share, old_change = self.loop.step(self.origin - p, v, w)
-            share, change = since * share + (1 - since) * old_share, since * change + (1 - since) * old_change
-        self.w = w + change
-        both = w + self.w
-        self.share, self.r_next = share, r + self.half * both
-        self.at[i, : len(p)] = self.gain * r + self.damping * w
-        return self.half_gain * (r + self.r_next) + self.half_damping * both
-
-    def advance(self, middle: Array) -> None:
-        """One step with the drive at velocity `middle` (k,) [%/s]: within the deadband the integral holds."""
-        held = self.r + self.step_s * middle
-        self.r = held + self.share * (self.r_next - held)
+    def asked(self, position: Array) -> Array:
+        """What the reference adds to the current at the steps, (n, B) [raw]."""
+        return self.at
 
 
-class _Loop:
-    """The position loop of cascades: the wanted speed, within a slew rate, of a position error."""
+class _Ceiling:
+    """The most current [raw] that the controller may ask for."""
 
-    def __init__(self, q: Mapping[str, Array], speed: Array) -> None:
-        self.slope, self.top, self.delay = q["speed_full"] / np.maximum(q["rise"], 1e-4), q["speed_full"] * speed, q["delay"]
-        self.deadband, self.edge, self.gain, self.bottom = q["deadband"], q["edge"], q["position_gain"], -self.top
+    def __init__(self, q: Mapping[str, Array], late: Array, limit: Array | float) -> None:
+        self.q, self.late, self.limit = q, late, limit + np.zeros(len(late))
 
-    def pace(self, step_s: Array) -> None:
-        """The steps (k,) [s] from here on."""
+    def pace(self, first: int, last: int, step_s: Array) -> None:
+        """The first k drives from here on, in steps (k,) [s]."""
         k = len(step_s)
-        self.step_s, self.slew = step_s, step_s * self.slope[:k]
-        # where the drive will be seen at the middle and at the end of the step
-        self.middle, self.end, self.down = 0.5 * step_s - self.delay[:k], step_s - self.delay[:k], -self.slew
+        half, q, late = 0.5 * step_s, {n: self.q[n][:k] for n in ("inertia", "gain", "damping", "stiffness", "preload")}, self.late[:k]
+        self.now = q["inertia"] / half, q["stiffness"], q["preload"], self.limit[:k]
+        self.closed = 0.5 * (q["gain"] * (half - late) + q["damping"] * (1.0 - late / half))
 
-    def narrow(self, k: int) -> None:
-        """Keep the first k drives."""
-        for name in ("step_s", "slew", "top", "down", "bottom", "middle", "end", "deadband", "edge", "gain"):
-            setattr(self, name, getattr(self, name)[:k])
-
-    def step(self, error: Array, v: Array, wanted: Array) -> tuple[Array, Array]:
-        """Share (k,) (0..1) in which position errors (k,) [%] at velocities v (k,) [%/s] are outside the deadband, and the change of the wanted speed [%/s], in one step."""
-        # a deadband narrower than the step's travel sets in within the step
-        width = np.maximum(np.abs(self.step_s * v), self.edge)
-        share = np.minimum(np.maximum((np.abs(error - self.middle * v) - self.deadband) / width + 0.5, 0.0), 1.0)
-        outside = np.minimum(np.maximum(self.gain * (error - self.end * v), self.bottom), self.top) - wanted
-        outside = np.minimum(np.maximum(outside, self.down), self.slew)
-        inside = np.minimum(np.maximum(-wanted, self.down), self.slew)
-        return share, inside + share * (outside - inside)
+    def kept(self, both: Array, total: Array, resisting: Array, p: Array, v: Array, pressed: Array | float, friction: Stick | Bristles) -> Array:
+        """Sum of the velocities (k,) [%/s] at both ends of a step where the current that gives `both` is more than the limit."""
+        mass, stiffness, preload, limit = self.now
+        own = mass * v - stiffness * p - preload - pressed  # what is left without the controller
+        current = total - own - self.closed * both
+        over = np.abs(current) > limit
+        if not over.any():
+            return both
+        free = both.copy()
+        return np.where(over, friction.velocities(own + np.sign(current) * limit, resisting - self.closed, v), free)
 
 
 class _Contact:
@@ -359,28 +311,13 @@ class _Contact:
     def __init__(self, q: Mapping[str, Array]) -> None:
         self.stiffness, self.at, self.damping = q["contact_stiffness"], q["contact_at"], q["contact_damping"]
 
-    def pace(self, step_s: Array) -> None:
-        """The steps (k,) [s] from here on."""
-        self.reach = 0.5 * step_s + self.damping[: len(step_s)]
+    def pace(self, first: int, last: int, step_s: Array) -> None:
+        """The first k drives from here on, in steps (k,) [s]."""
+        k = len(step_s)
+        self.reach = 0.5 * step_s + self.damping[:k]
 
     def load(self, p: Array) -> tuple[Array, Array]:
         """Load (k,) [raw] at positions (k,) [%], and what it resists velocity with [raw s/%]."""
         k = len(p)
         pressed = np.where(p > self.at[:k], self.stiffness[:k], 0.0)
         return pressed * (p - self.at[:k]), pressed * self.reach[:k]
-
-
-def cascade_step(
-    q: Mapping[str, float], error: float, speed: float, reference: float, wanted: float, velocity: float, step_s: float
-) -> tuple[float, float]:
-    """Reference [%] and wanted speed [%/s] of the cascade after one step of step_s [s], for a controller in another simulator's loop.
-
-    error [%]: setpoint less position; speed: share of full; velocity [%/s] of the drive.
-    """
-    one = {k: np.atleast_1d(np.asarray(q[k], float)) for k in ("deadband", "edge", "position_gain", "speed_full", "rise", "delay")}
-    loop = _Loop(one, np.atleast_1d(speed))
-    loop.pace(np.atleast_1d(step_s))
-    share, change = (float(x[0]) for x in loop.step(*map(np.atleast_1d, (error, velocity, wanted))))
-    w = wanted + change
-    # within the deadband the integral holds: the reference goes with the drive
-    return share * (reference + 0.5 * step_s * (wanted + w)) + (1 - share) * (reference + step_s * velocity), w

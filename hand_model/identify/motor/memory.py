@@ -46,7 +46,7 @@ def freed(e: Array, channels: Sequence[Predictors]) -> Array:
         last = len(known) - 1
         for row in range(1, min(last, n)):
             a, share = known[row]
-            one[row] = (whole[row] - np.tensordot(a, whole[row - 1 :: -1], axes=1)) / share
+            one[row] = (whole[row] - a @ whole[row - 1 :: -1]) / share
         a, share = known[last]
         for i, x in enumerate(a, 1):
             one[last:] -= x * whole[last - i : n - i]

@@ -146,7 +146,7 @@ def _linearise(
     for i in range(own.shape[1]):
         owns[len(apart) + 1 + i :: width, i] += steps[len(apart) + i]
     coarse_s = step_s if controller == "cascade" else COARSE_S
-    varied = run(_arrays(data, owns, width), values, coarse_s, controller)
+    varied = run(_arrays(data, owns, width), values, coarse_s, controller, width)
     y, weight = _one(_single(data, q, own, controller, step_s), data, sigma) if step_s < coarse_s else _one(varied, data, sigma, width)
     residual = _split((_recorded(data) - y) * weight, data)
     with np.errstate(over="ignore", invalid="ignore"):  # drives that ran away
@@ -185,7 +185,7 @@ def _costs(
     """Misfit of several candidates (their shared values and own unknowns) at fixed weights, in one batch of simulations; the best, its residuals."""
     width = len(qs)
     values = {n: np.tile([q[n] for q in qs], len(data)) for n in qs[0]}
-    found = run(_arrays(data, np.stack(owns, axis=1).reshape(len(data) * width, -1), width), values, step_s, controller)
+    found = run(_arrays(data, np.stack(owns, axis=1).reshape(len(data) * width, -1), width), values, step_s, controller, width)
     y = found.sample([m.time_s for m in data], width)
     error = np.stack([(r[:, None] - x) * w[:, None] for r, x, w in zip(_recorded(data).T, y, np.concatenate(weights).T, strict=True)], axis=1)
     residual = [freed(e.transpose(1, 0, 2).reshape(-1, width), memory) for e in _split(error, data)]
