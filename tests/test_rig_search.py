@@ -12,10 +12,11 @@ import pytest
 from hand_model.effects.path import jenkins
 from hand_model.rig import diagnose_rig, load_rig
 from hand_model.rig.candidates import candidates
-from hand_model.rig.compete import compete, pose
+from hand_model.rig.compete import borne_out, compete, normal, pose, score, splits
 from hand_model.rig.diagnose import trusted_fit
 from hand_model.rig.diagnose_swing import _standing
 from hand_model.rig.evidence import weigh
+from hand_model.rig.laws import TURNING
 from hand_model.rig.swing import Lane, Swing
 from hand_model.rig.swing_build import ENOUGH_STEPS, thinned
 from hand_model.session import read_session
@@ -141,3 +142,25 @@ def test_a_long_swing_is_searched_on_some_of_its_stretches() -> None:
     assert len(some.train()) * size <= ENOUGH_STEPS
     short = replace(swing, lanes=tuple(lanes[::10]))
     assert thinned(short) is short
+
+
+def test_a_term_of_one_recording_is_borne_out_in_every_part_of_it(tmp_path: Path) -> None:
+    """Friction by load that is there all the time is; a load tied to a place that the first half alone was drawn to is not."""
+    folder = bench(tmp_path / "s", 0.3, 0.01)
+    text = (folder / "session.toml").read_text().split("[[trial]]")
+    (folder / "session.toml").write_text("[[trial]]".join([text[0], text[1], text[-1]]))
+    table = np.loadtxt(folder / "log/0.csv", delimiter=",", skiprows=1)
+    half = len(table) // 2
+    table[:half, 2] += 2.0 * np.exp(-(((table[:half, 1] - 0.1) / 0.05) ** 2))
+    np.savetxt(folder / "log/0.csv", table, delimiter=",", header="time,position,torque", comments="", fmt="%.8g")
+    rig = load_rig(read_session(folder))
+    fit = trusted_fit(rig)[0]
+    problem = pose(fit)
+    assert np.all(np.sum(splits(problem), 0) == 2)  # once in halves, once in thirds
+    parts = normal(problem, ())
+    stands = {}
+    for c in candidates(rig, fit, "hinge"):
+        s = score(problem, (), c, parts)
+        stands[c.key] = borne_out(problem, ((), parts), ((s.term,), s.parts))
+    assert stands[f"load_dependent_friction/{TURNING}@hinge"]
+    assert not stands["detent_load@hinge"]

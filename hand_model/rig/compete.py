@@ -18,7 +18,7 @@ from .balance import Rows
 from .candidates import Candidate
 from .consistent import consistent
 from .declared import DeclaredFit, bounds, prior
-from .evidence import weigh
+from .evidence import BEYOND_DOUBT, weigh
 from .solve import solve_bounded
 from .states import later
 
@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 FOLDS = 6
 FEW = 4  # recordings from which on whole ones are left out
 LEAST_SHARE = 0.05  # of the held-out residual variance: less is not worth a name
-MOST_TERMS = 4
+MOST_TERMS, MOST_OF_FEW = 4, 3  # of few recordings what is left after so many goes by many names
 MOST_WEIGHINGS = 8
 LEAST_SCALE = 1e-3  # of what the declared model leaves
 
@@ -44,10 +44,12 @@ Settle = Callable[[tuple[Term, ...]], tuple[tuple[Term, ...], Sequence[Candidate
 
 @dataclass(frozen=True)
 class Score:
-    """A candidate added to the terms so far. error (B,): squared error of every block when left out [normalised]."""
+    """A candidate added to the terms so far. error (B,): squared error of every block when left out [normalised]; parts: its
+    normal equations by block."""
 
     term: Term
     error: Array
+    parts: tuple = ()
 
 
 @dataclass(frozen=True)
@@ -148,15 +150,38 @@ def _pieces(block: Array) -> list[tuple[int, slice]]:
 
 def held_out(problem: Problem, terms: Sequence[Term], parts: tuple) -> Array:
     """Squared error (B,) of every block under the fit to the other folds."""
-    gram, moment, square, _ = parts
-    low, high, mean, weight = limits(problem, terms)
-    error = np.zeros(len(square))
-    total_g, total_m = gram.sum(0), moment.sum(0)
+    box, error = limits(problem, terms), np.zeros(len(problem.fold))
     for f in np.unique(problem.fold):
         out = problem.fold == f
-        theta = solve_bounded(total_g - gram[out].sum(0), total_m - moment[out].sum(0), low, high, mean, weight)
-        error[out] = square[out] - 2 * moment[out] @ theta + np.einsum("p,bpq,q->b", theta, gram[out], theta)
-    return np.maximum(error, 0.0)
+        error[out] = _left_out(parts, box, out)
+    return error
+
+
+def _left_out(parts: tuple, box: tuple[Array, Array, Array, Array], out: Array) -> Array:
+    """Squared errors of the blocks `out` (B,) bool under the fit to all others."""
+    gram, moment, square, _ = parts
+    theta = solve_bounded(gram[~out].sum(0), moment[~out].sum(0), *box)
+    return np.maximum(square[out] - 2 * moment[out] @ theta + np.einsum("p,bpq,q->b", theta, gram[out], theta), 0.0)
+
+
+def borne_out(problem: Problem, few: tuple[Sequence[Term], tuple], many: tuple[Sequence[Term], tuple]) -> bool:
+    """Whether more terms (with their normal equations each) predict better what took no part in their fit, however the
+    training recordings are split (repeated learning and testing, Burman 1989), and by enough to be worth a name."""
+    sides = [(parts, limits(problem, terms)) for terms, parts in (few, many)]
+    error = np.array([[_left_out(*side, out).sum() for side in sides] for out in splits(problem)])
+    return bool(np.mean(error[:, 1] < error[:, 0]) >= BEYOND_DOUBT
+                and error[:, 1].sum() < (1 - LEAST_SHARE) * error[:, 0].sum())  # fmt: skip
+
+
+def splits(problem: Problem) -> list[Array]:
+    """Blocks (B,) bool to leave out, split by split: of few recordings each alone and all but each; of a single one its
+    halves and thirds."""
+    names, group = np.unique(problem.group, return_inverse=True)
+    if len(names) == 1:
+        part = np.arange(len(group)) / len(group)
+        return [np.floor(part * k) == i for k in (2, 3) for i in range(k)]
+    alone = [group == i for i in range(len(names))]
+    return alone if len(names) == 2 else [*alone, *(~a for a in alone)]
 
 
 def training_error(problem: Problem, terms: Sequence[Term], parts: tuple) -> float:
@@ -250,7 +275,7 @@ def score(problem: Problem, terms: Sequence[Term], candidate: Candidate, parts: 
         train = training_error(problem, [*terms, term], extended)
         if best is None or train < best[0]:
             best = train, term, extended
-    return Score(best[1], held_out(problem, [*terms, best[1]], best[2]))
+    return Score(best[1], held_out(problem, [*terms, best[1]], best[2]), best[2])
 
 
 def refined(problem: Problem, terms: Sequence[Term], term: Term, parts: tuple) -> Term:
@@ -293,32 +318,31 @@ def _descended(train: Callable[[Mapping[str, float]], float], shapes: Sequence[M
 
 
 def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ...] = (),
-            most: int = MOST_TERMS, settle: Settle | None = None) -> tuple[tuple[Term, ...], tuple[Step, ...], tuple[Score, ...]]:  # fmt: skip
+            most: int | None = None, settle: Settle | None = None) -> tuple[tuple[Term, ...], tuple[Step, ...], tuple[Score, ...]]:  # fmt: skip
     """Forward selection: the candidate that lowers the held-out error most, while it does so beyond doubt.
 
     begin: terms that stand already; settle: terms and rivals again, at the loads of a fit with these terms. Returns all terms, the rounds, and the scores of the last round.
     """
-    terms = begin
+    terms, most = begin, most or (MOST_TERMS if left_out_whole(problem) else MOST_OF_FEW)
     steps: list[Step] = []
     scores: list[Score] = []
     while len(terms) < most:
         _CACHE.clear()
         problem = rescaled(problem, terms)
-        # Of what is left, where whole recordings were left out; within one and the same recording small terms always pay.
-        declared = 0.0 if left_out_whole(problem) else held_out(problem, (), normal(problem, ())).sum()
         parts = normal(problem, terms)
         none = held_out(problem, terms, parts)
         taken = {t.candidate.key for t in terms}
         scores = [score(problem, terms, c, parts) for c in rivals if c.repeats or c.key not in taken]
-        found = judge(none, scores, problem.group, max(declared, none.sum()))
+        stand = scores if left_out_whole(problem) else [s for s in scores if borne_out(problem, (terms, parts), ((*terms, s.term), s.parts))]
+        found = judge(none, stand, problem)
         if found is None:
             break
         # Between the points of a grid a rival may be better than on them: those not told apart meet again at their best.
-        last = [refined(problem, terms, scores[k].term, parts) for k in dict.fromkeys((found[0], *found[1].close))]
+        last = [refined(problem, terms, stand[k].term, parts) for k in dict.fromkeys((found[0], *found[1].close))]
         won, step = last[0], found[1]
         if len(last) > 1:
             errors = [Score(t, held_out(problem, (*terms, t), normal(problem, (*terms, t)))) for t in last]
-            again = judge(none, errors, problem.group, max(declared, none.sum()))
+            again = judge(none, errors, problem)
             won, step = (last[again[0]], again[1]) if again is not None else (won, step)
         terms = (*terms, won)
         if settle is not None:
@@ -327,13 +351,14 @@ def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ..
     return terms, tuple(steps), tuple(scores)
 
 
-def judge(none: Array, scores: Sequence[Score], group: Array, whole: float) -> tuple[int, Step] | None:
-    """Index of the winner and what the round says, or None where no candidate beats "nothing" (none (B,)) beyond doubt and by enough of an error
-    (whole)."""
+def judge(none: Array, scores: Sequence[Score], problem: Problem) -> tuple[int, Step] | None:
+    """Index of the winner and what the round says, or None where no candidate beats "nothing" (none (B,)) beyond doubt and by
+    enough of its error. Of few recordings the splits have said what is no chance."""
     if not scores:
         return None
-    said = weigh(none, np.array([s.error for s in scores]), [_size(s.term) for s in scores], group)
-    if said is None or none.sum() - scores[said.best].error.sum() < LEAST_SHARE * whole:
+    many = left_out_whole(problem)
+    said = weigh(none, np.array([s.error for s in scores]), [_size(s.term) for s in scores], problem.group, by_chance=many)
+    if said is None or none.sum() - scores[said.best].error.sum() < LEAST_SHARE * none.sum():
         return None
     rivals = tuple((scores[i].term.candidate.key, float(said.wins[i])) for i in np.argsort(-said.wins) if said.wins[i] > 0.005)
     equals = tuple(dict.fromkeys(scores[k].term.candidate.effect for k in said.close))

@@ -62,16 +62,17 @@ def beyond_chance(gains: Array, flips: int = RESAMPLES, seed: int = 0) -> float:
 
 
 def weigh(none: Array, errors: Array, sizes: Sequence[int], group: Array,
-          least: float = BEYOND_DOUBT) -> Verdict | None:  # fmt: skip
+          least: float = BEYOND_DOUBT, by_chance: bool = True) -> Verdict | None:  # fmt: skip
     """Compare rivals (errors (rivals, blocks), sizes: parameters) with each other and with "nothing" (none (blocks,)); None
-    where none of them beats nothing with probability `least`, the choice among them allowed for."""
+    where none of them beats nothing with probability `least`, the choice among them allowed for (by_chance: that they are
+    more than chance is asked here)."""
     draws = multiplicities(group)
     resampled, base, total = errors @ draws.T, draws @ none, errors.sum(1)
     against = np.mean(resampled < base, 1)
     unit = units(group)
     mine, theirs = np.bincount(unit, none), np.stack([np.bincount(unit, e) for e in errors])
     # Relative, or the loudest recording would speak for all. Of many rivals some win by chance.
-    if beyond_chance((mine - theirs) / (mine + theirs + 1e-300)) < least:
+    if by_chance and beyond_chance((mine - theirs) / (mine + theirs + 1e-300)) < least:
         return None
     sure = [k for k in range(len(errors)) if against[k] >= least]
     if not sure:
