@@ -34,6 +34,7 @@ SMOOTH = ("nonlinear_spring",)  # its knee belongs to fingers with a return spri
 LONGEST_DELAY_S = 0.03
 # Samples. A drive that holds its torque from one control step to the next acts half a step late: less than a sample of a log.
 DELAYS = (0.125, 0.25, 0.5, 1, 2, 3, 5, 8)
+SAME = 0.05  # of a column's variance
 UNDECLARED = "no spring is declared"
 BY_LEVEL = "a level for each that trials declare"
 REACHES = tuple(np.geomspace(0.004, 0.5, 8))  # of the range, over which friction turns round
@@ -101,7 +102,7 @@ def candidates(rig: RigModel, fit: DeclaredFit, joint: str) -> tuple[Candidate, 
     states = {r.trial: drive_state(rig, r, fit.theta) for r in fit.rows if r.joint == joint}
     train = tuple(states[r.trial] for r in rows)
     found = [_from_catalogue(e, joint, train, states) for e in catalogue("drive") if _usable(e)]
-    if not any(c.kind == "stiffness" and c.name == joint for c in fit.columns):
+    if not _is_declared([r.filtered(r.position) for r in rows], rows):
         found = [_with_line(c) if c.effect in SMOOTH else c for c in found]
     found += [*_own(rig, fit, joint, rows), *_turning_round(rig, fit, joint, train, states)]
     return tuple(c for c in found if c.grid)
@@ -121,8 +122,18 @@ def _from_catalogue(
                      lambda row, shape: np.asarray(found.columns(states[row.trial], shape), float), bool(found.warps))  # fmt: skip
 
 
+def _is_declared(columns: Sequence[Array], rows: Sequence[Rows]) -> bool:
+    """Whether a column (m,) of each row is, but for a small part of its variance, one of the declared ones or made of them:
+    beside a weight of unknown size a spring cannot be told."""
+    y = np.concatenate([c[r.moving] for c, r in zip(columns, rows, strict=True)])
+    x = np.concatenate([r.columns[r.moving] for r in rows])
+    x = np.column_stack([x[:, np.any(x != 0, 0)], np.ones(len(x))])
+    x = x / np.linalg.norm(x, axis=0)
+    return bool(np.var(y - x @ np.linalg.lstsq(x, y)[0]) < SAME * np.var(y))
+
+
 def _with_line(bend: Candidate) -> Candidate:
-    """A spring's bend with the line that it bends from: no spring at all is declared."""
+    """A spring's bend with the line that it bends from: no spring is declared, nor what could pass for one."""
     return replace(bend, variant=UNDECLARED, amplitudes=((LINE, "effort/position", -np.inf, np.inf), *bend.amplitudes),
                    columns=lambda r, s: np.column_stack([r.position, bend.columns(r, s)]))  # fmt: skip
 
