@@ -27,6 +27,6 @@ def test_without_an_encoder_error_every_ripple_stays() -> None:
 
 def test_a_small_load_beside_an_encoder_error_of_the_same_motor_is_its_shadow_and_a_large_one_is_none() -> None:
     error, (_, load) = periodic("encoder_periodic_error", "index", 15.1), periodic("detent_load", "index", 1.0)
-    assert _without_shadows([error, (0.08, load)]) == [error]
-    assert _without_shadows([error, (0.4, load)]) == [error, (0.4, load)]
+    assert _without_shadows([error, (0.2, load)]) == [error]
+    assert _without_shadows([error, (0.8, load)]) == [error, (0.8, load)]
     assert _without_shadows([error, (0.08, periodic("detent_load", "ring", 1.0)[1])])[1:]

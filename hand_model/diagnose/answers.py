@@ -59,11 +59,11 @@ def lateness(answers: Mapping[str, Answers]) -> dict[str, Lateness]:
     moved = {a: float(np.mean(x.motion_s)) for a, x in told.items() if len(x.motion_s) >= LEAST_ANSWERS}
     out = {}
     for actuator, x in told.items():
-        usual = min(first, x.step_s)  # a delay that all drives share is told beside the sample interval
+        usual = min(first, x.step_s) if alone else first
         late = x.current_s - usual
         begins = USUAL_START * x.step_s if alone else min(moved.values(), default=np.nan)
         behind = moved.get(actuator, np.nan) - begins  # nan where too few motions are seen to answer: late is the drive then
-        total = float(np.mean(x.current_s)) - (usual if alone else first)
+        total = float(np.mean(x.current_s)) - usual
         drive = not behind <= max(x.step_s, 0.5 * total) and np.mean(late) > LATE * x.step_s and np.mean(late > x.step_s) > MOSTLY
         channel = max(total - np.nan_to_num(behind, nan=total), 0.0) if drive else total
         # Neither clearly the one nor the other: the motion's own scatter decides between the two.

@@ -18,14 +18,14 @@ from .station import Station, channel_of, finding_of, unexplained_of, unrepeated
 
 UNLIKE_OTHERS = 2.0  # times the wander of the calmest finger
 HARMONICS, SAME_PERIOD = 4, 0.02
-SHADOW = 0.2  # of an encoder error's size: less, in the current of the same motor, may be what is left of it
+SHADOW = 0.5  # of an encoder error's size: less, in the current of the same motor, may be what is left of it
 UNREST = 0.3  # of the noise: wander that every machine is granted
 
 
 def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding]], notes: list[str],
              unexplained: Sequence[dict[str, Any]] = ()) -> Findings:
-    """One ranked list from all stations. A finding's weight, by which findings of different stations compare, is the size of what
-    it adds over the noise of one reading (root mean squares). unexplained: of the markers."""
+    """One ranked list from all stations. By a finding's weight findings of different stations compare (`findings.weighed`).
+    unexplained: of the markers."""
     ranked: list[tuple[float, Finding]] = list(marker_findings)
     rejected: list[dict[str, str]] = []
     unexplained = list(unexplained)

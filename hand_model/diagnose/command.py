@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..effects.base import DriveState
 from .answers import Answers, answers_of, lateness
-from .findings import Finding
+from .findings import Finding, weighed
 
 Array = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ REACTION_S = 0.15  # a person's quickest: a delay counts beside it
 @dataclass(frozen=True)
 class CommandFacts:
     """answers: to commands. sag: loss of speed per unit of load, its standard error, and the range of loads; nan where strokes do not tell. ceiling: current [raw] at which the drive is at its limit, or nan;
-    cut: what it takes away, over the noise of one reading (root mean squares). strokes: how many tell the sag."""
+    cut: the weight of what it takes away. strokes: how many tell the sag."""
 
     answers: Answers
     sag: float
@@ -104,8 +104,7 @@ def _sag(strokes: list[Stroke]) -> tuple[float, float, float]:
 
 
 def _ceiling(strokes: list[Stroke]) -> tuple[float, float]:
-    """Current [raw] at which the drive is at its limit, nan where it is at none, and what that cuts over the noise of one reading
-    (root mean squares): in the fastest flexing strokes speed falls by just what keeps the current from exceeding it. What
+    """Current [raw] at which the drive is at its limit, nan where it is at none, and the weight of what that cuts: in the fastest flexing strokes speed falls by just what keeps the current from exceeding it. What
     current each place would need at full speed is told by the slower strokes."""
     none = np.nan, 0.0
     fast = max((s.commanded for s in strokes), default=0.0)
@@ -131,8 +130,9 @@ def _ceiling(strokes: list[Stroke]) -> tuple[float, float]:
     alone = float(rest @ rest) < CEILING_LEFT * float(y @ y)  # speed changes for no other reason
     if not (told and alone and CEILING_SHARE < share < 1 / CEILING_SHARE):
         return none
-    noise = float(np.std(np.concatenate([s.current for s in slower]) - _load_design(slower) @ beta))
-    return limit, float(np.sqrt(y @ y / sum(len(s.current) for s in strokes))) / max(noise, 1e-9)
+    noise = max(float(np.std(np.concatenate([s.current for s in slower]) - _load_design(slower) @ beta)), 1e-9)
+    every = np.concatenate([s.current for s in strokes])
+    return limit, weighed(float(np.sqrt(y @ y / len(every))) / noise, float(np.std(every)) / noise)
 
 
 def _load_design(strokes: list[Stroke]) -> Array:
@@ -221,5 +221,5 @@ def _sag_finding(actuator: str, finger: str | None, fact: CommandFacts) -> tuple
            "ci95_reduction": None, "held_out": [], "engine": "strokes"}
     text = f"The {actuator} motor loses {100 * loss:.1f} % of its speed over the recorded loads."
     model = {"native": False, "mjcf": None, "urdf": "not expressible: kept in hand.json"}
-    weight = fact.sag / fact.sag_se / np.sqrt(fact.strokes)
-    return weight, Finding("drive_sag", ("drive_sag",), 0.999, (), _where(actuator, finger), text, parameters, fit, model)
+    per_stroke = fact.sag / fact.sag_se / np.sqrt(fact.strokes)
+    return weighed(per_stroke, per_stroke / max(loss, 1e-9)), Finding("drive_sag", ("drive_sag",), 0.999, (), _where(actuator, finger), text, parameters, fit, model)

@@ -56,7 +56,7 @@ def drive_states(session: Session, corrections: Mapping[str, Callable[[Array], A
     prepared = {a: _prepare(a, entries, (corrections or {}).get(a)) for a, entries in raw.items()}
     prepared = {a: tuple(states) for a, states in prepared.items() if states}
     give, granted = gives({a: states for a, states in prepared.items() if is_measured(states)})
-    return {a: tuple(with_coulomb(s, give.get(a, granted), granted) for s in states) for a, states in prepared.items()}
+    return {a: with_required(tuple(with_coulomb(s, give.get(a, granted), granted) for s in states)) for a, states in prepared.items()}
 
 
 def _prepare(
@@ -94,7 +94,8 @@ def _prepare(
         states.append(DriveState(trial.name, actuator, time_s, motion.position, motion.velocity, motion.acceleration,
                                  effort, declared, extra=extra, validate=trial.validate,
                                  declared_names=("inertia", "viscous", "coulomb", "spring", "preload")))
-    return states
+    total = max((float(s.elapsed_s[-1]) for s in states), default=0.0)
+    return [replace(s, extra={**s.extra, "session_s": np.full(len(s.time_s), total)}) for s in states]
 
 
 def bouts(time_s: Array, moving: NDArray[np.bool_]) -> list[tuple[float, float]]:
@@ -178,6 +179,15 @@ def with_timing(state: DriveState) -> DriveState:
     held = near < max(2 * float(state.extra["granted"][0]), 6 * float(state.extra["position_noise"][0]))
     sigma = np.where(held, np.hypot(sigma, beta[2]), sigma)
     return replace(state, extra={**state.extra, "sigma": sigma})
+
+
+def with_required(states: tuple[DriveState, ...]) -> tuple[DriveState, ...]:
+    """The states with the effort "required" (n,) by the declared model fitted to all of them."""
+    seen = [np.isfinite(s.effort) for s in states]
+    matrix = np.concatenate([s.declared[k] for s, k in zip(states, seen, strict=True)])
+    scale = np.linalg.norm(matrix, axis=0) + 1e-12
+    beta = np.linalg.lstsq(matrix / scale, np.concatenate([s.effort[k] for s, k in zip(states, seen, strict=True)]), rcond=None)[0] / scale
+    return tuple(replace(s, extra={**s.extra, "required": s.declared @ beta}) for s in states)
 
 
 def gives(prepared: Mapping[str, Sequence[DriveState]]) -> tuple[dict[str, float], float]:

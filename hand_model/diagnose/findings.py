@@ -92,6 +92,15 @@ class Findings:
         return target
 
 
+def weighed(size: float, contrast: float) -> float:
+    """What findings of different channels are ranked by: the geometric mean of what an effect adds over the noise of one reading (size) and over
+    all that the channel tells (all root mean squares). By noise alone the best sensor would come first, by the signal alone the best motion.
+
+    contrast: standard deviation of the channel's signal over that of its noise.
+    """
+    return size / math.sqrt(max(contrast, 1.0))
+
+
 def _plain(value: Any) -> Any:
     """numpy scalars and arrays as Python numbers and lists, nan and infinities as None."""
     if hasattr(value, "tolist"):

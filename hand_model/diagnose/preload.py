@@ -12,21 +12,22 @@ from typing import Any
 import numpy as np
 
 from ..effects import effect
-from .findings import Finding
+from .findings import Finding, weighed
 from .station import Station
 
-SPREAD = 0.2  # mean absolute deviation of the logarithm of a drive's preload within one hand
+SPREAD = 0.15  # mean absolute deviation of the logarithm of a drive's preload within one hand
 ODD_P = 0.03  # of two drives that differ as much by chance; beyond, one of them is odd
 LOST = 0.2  # of the other's preload: less, or the wrong sign, and there is none
 CLASS = ("asymmetric_friction", "spring_preload")
 
 
 def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]:
-    """Drives of which nothing else is missing and whose preload the others' do not let expect, with what that adds over the noise.
+    """Drives whose preload the others' do not let expect, with their weight.
 
-    The other drives' median is the reference, of those of which nothing is missing either.
+    The other drives' median is the reference. Drives of which something else is missing are compared where that is no load: the preload is the same with and
+    without its name.
     """
-    sound = [s for s in stations if s.signal == "current" and not s.missing and "preload" in s.naming.fit.declared]
+    sound = [s for s in stations if s.signal == "current" and "preload" in s.naming.fit.declared and _sound(s)]
     preload = {id(s): float(s.naming.fit.declared["preload"]) for s in sound}
     out = []
     for station in sound:
@@ -42,6 +43,14 @@ def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]
     return out
 
 
+def _sound(station: Station) -> bool:
+    """Whether a drive's preload is told apart from whatever else is missing of it."""
+    if not station.missing:
+        return True
+    named, plain = (float(fit.declared["preload"]) for fit in (station.naming.fit, station.naming.declared))
+    return station.believed and named > 0 and plain > 0 and abs(np.log(named / plain)) < SPREAD
+
+
 def _by_chance(own: float, error: float, usual: float) -> float:
     """Probability of two healthy preloads so far apart (logarithms by Laplace), at the nearer end of the standard error."""
     if usual <= 0:
@@ -52,9 +61,9 @@ def _by_chance(own: float, error: float, usual: float) -> float:
 
 
 def _standard_error(station: Station) -> float:
-    """Of the preload [raw], from the declared balance."""
+    """Of the preload [raw], beside what was named."""
     balance = station.naming.balance
-    matrix = balance.design(())[0] * (balance.weight * balance.train)[:, None]
+    matrix = balance.design(station.naming.fit.terms)[0] * (balance.weight * balance.train)[:, None]
     at = balance.names.index("preload")
     return float(np.sqrt(np.linalg.pinv(matrix.T @ matrix)[at, at] * balance.inflation))
 
@@ -69,4 +78,4 @@ def _finding(station: Station, half_difference: float, error: float, usual: floa
     fit = {"metric": "current_rmse", "unit": unit, "before": None, "after": None, "noise_floor": station.naming.balance.sigma,
            "ci95_reduction": None, "held_out": [], "engine": "comparison of the hand's motors"}
     model = {"native": True, "mjcf": f"joint[@name='{station.actuator}']/@springref", "urdf": "kept in hand.json"}
-    return abs(half_difference) / station.naming.balance.sigma, Finding(CLASS[0], CLASS, 1 - p, (), where, text, parameters, fit, model)
+    return weighed(abs(half_difference) / station.naming.balance.sigma, station.contrast), Finding(CLASS[0], CLASS, 1 - p, (), where, text, parameters, fit, model)

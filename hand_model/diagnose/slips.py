@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..identify.chain import propagate
 from ..identify.likelihood import OUTLIER_LIMIT
 from .angles import FingerAngles
 from .displacement import NO_HINGE
-from .findings import Finding
+from .findings import Finding, weighed
 from .markers import ALPHA, HINGE, MarkerEffect, MarkerNaming
 
 Array = NDArray[np.float64]
@@ -28,8 +29,7 @@ SWAP_FRAMES = 5  # shorter exchanges are ghosts
 
 
 def marker_findings(angles: FingerAngles, naming: MarkerNaming) -> list[tuple[float, Finding]]:
-    """Findings of one finger's markers, one per marker, support or joint, with their weight: how far they move markers over the
-    noise of one reading (root mean squares)."""
+    """Findings of one finger's markers, one per marker, support or joint, with their weight."""
     out = _swaps(angles)
     if not naming.believed:
         return out
@@ -43,8 +43,16 @@ def marker_findings(angles: FingerAngles, naming: MarkerNaming) -> list[tuple[fl
         if sum(e.gain for e in members) < SMALL * total:
             continue  # no more than the form of the large one being another
         readings = max(float(naming.blocks.weight.sum()) * 3, 1.0)
-        out.append((float(np.sqrt(sum(e.gain for e in members) / readings)), _finding(angles, naming, name, body, label, members)))
+        moved = float(np.sqrt(sum(e.gain for e in members) / readings))  # over the noise of one reading
+        out.append((weighed(moved, _contrast(angles)), _finding(angles, naming, name, body, label, members)))
     return out
+
+
+def _contrast(angles: FingerAngles) -> float:
+    """Standard deviation of a coordinate of the finger's markers as the finger moves over that of its noise."""
+    body = angles.records[0].data.body
+    path = np.concatenate([propagate(angles.chain, body, r.pose.angle_rad)[0][:, body > 0] for r in angles.records])
+    return float(np.sqrt(np.mean(np.nanvar(path, axis=0)))) / angles.noise_m
 
 
 def unexplained(angles: FingerAngles, naming: MarkerNaming) -> list[dict[str, Any]]:
@@ -156,10 +164,12 @@ def _swaps(angles: FingerAngles) -> list[tuple[float, Finding]]:
 
 
 def _displaced(angles: FingerAngles, labels: list[str], lasting_s: float) -> float:
-    """Size of an exchange of labels over the noise of one reading (root mean squares), as a robust likelihood sees it: a wrong
-    label is no more than an outlier, however far away the right one is."""
-    share = lasting_s / sum(float(np.ptp(r.mocap.time_s)) for r in angles.records)
-    return float(OUTLIER_LIMIT * np.sqrt(len(labels) * min(share, 1.0) / (3 * len(angles.records[0].data.labels))))
+    """Weight of an exchange of labels, as a robust likelihood sees it: a wrong label is no more than an outlier, however far away the right one
+    is, and tells nothing."""
+    share = min(lasting_s / sum(float(np.ptp(r.mocap.time_s)) for r in angles.records), 1.0)
+    lost = share * len(labels) / len(angles.records[0].data.labels)  # of all readings
+    size = OUTLIER_LIMIT * np.sqrt(lost / 3)
+    return weighed(float(size), float(size / max(lost, 1e-9)))
 
 
 def steps(angles: FingerAngles, naming: MarkerNaming) -> list[tuple[int, float]]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .findings import Finding
+from .findings import Finding, weighed
 from .interval import held_out, parameter_intervals, proven, sized, undisturbed
 from .name import ALPHA, EVIDENCE_LEAST, SMALL, Named, Naming, name_effects
 
@@ -65,6 +65,12 @@ class Station:
         return tuple(f for f in self.proven if f.share >= SMALL or f is self.proven[0])
 
     @property
+    def contrast(self) -> float:
+        """Standard deviation of the effort over its noise."""
+        balance = self.naming.balance
+        return float(np.std(balance.effort[balance.train])) / balance.sigma
+
+    @property
     def weight(self) -> float:
         """What the effects that stand add to the effort, over the noise (mean squares)."""
         return sum(f.size**2 for f in self.kept) if self.believed else 0.0
@@ -97,7 +103,7 @@ def judged(signal: str, finger: str | None, actuator: str | None, joint: str | N
 
 
 def finding_of(station: Station, named: Named, share: float, size: float) -> tuple[float, Finding]:
-    """The finding of one effect, with its size (over the noise of one reading) as its weight."""
+    """The finding of one effect, with its weight. size: over the noise of one reading."""
     naming = station.naming
     which = naming.fit.terms.index(named.term)
     effect = named.term.effect
@@ -124,7 +130,7 @@ def finding_of(station: Station, named: Named, share: float, size: float) -> tup
     members = named.members if effect.name in named.members else (effect.name, *named.members)
     recording = getattr(effect, "correction", None)
     model = None if recording else dict(UNWRITTEN)
-    return size, Finding(effect.name, members, named.probability, alternatives, where,
+    return weighed(size, station.contrast), Finding(effect.name, members, named.probability, alternatives, where,
                            effect.statement(where, values), parameters, fit, model, recording)
 
 

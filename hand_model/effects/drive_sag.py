@@ -5,19 +5,66 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from .base import Effect
+import numpy as np
+
+from .base import Amplitude, Array, DriveState, Effect, Shape, figure
+from .law import Law
+
+ASKED = 100.0  # [raw]
+MOST = 0.5  # share of the effort that a drive can lose
+ROUNDS = 30  # of a contraction by at least a half
 
 
 class DriveSag(Effect):
-    """Steady speed = commanded speed (1 - sag * load), the load being the current in the direction of motion."""
+    """Of a drive that follows its command in speed: steady speed = commanded speed (1 - sag * load), the load being the current in the direction of
+    motion. Of one whose current is what its controller asks for: effort = current (1 - share lost), which grows with the current (form 0) or its square.
+    """
 
     name = "drive_sag"
-    station = "command"
-    unwritten = "the controller's speed under load is no force: the command must be slowed by whoever gives it"
+
+    def amplitudes(self) -> tuple[Amplitude, ...]:
+        """Share of the effort that is lost where 100 raw are asked for, never negative."""
+        return (("torque_loss", "1", 0.0, np.inf),)
+
+    def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
+        """form 0: the share that is lost grows with the current; form 1: with its square."""
+        return (Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),)
+
+    def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
+        """The effort that gets lost, (n, 1); what is asked for is "required" in `extra`."""
+        asked = state.extra["required"]
+        return (asked * (np.abs(asked) / ASKED) ** (1 + shape["form"]))[:, None]
+
+    def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
+        """None where it is not known what the motion requires."""
+        return super().grid(states) if all("required" in s.extra for s in states) else []
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
-        """Speed lost per load."""
+        """Speed, or effort, lost per load."""
+        if "torque_loss" in parameters:
+            square = " (with its square)" if parameters.get("form") else ""
+            return f"the motor delivers less per current as it is loaded{square}: {figure(100 * parameters['torque_loss'])} % are lost at 100 raw"
         return f"the motor loses {1e4 * parameters['sag']:.1f} % of its speed for every 100 raw of current that its load takes"
+
+    def law(self, parameters: Mapping[str, float]) -> Law | None:
+        """What is lost of the effort; a loss of speed is no force: the command must be slowed by whoever gives it."""
+        if "torque_loss" not in parameters:
+            return None
+        return lambda now: now.load * _lost(abs(now.load), parameters)
+
+    def reading(self, effort: Array, time_s: Array, parameters: Mapping[str, float]) -> Array:
+        """The current that is asked for where this effort is needed."""
+        if "torque_loss" not in parameters:
+            return effort
+        asked = effort
+        for _ in range(ROUNDS):
+            asked = effort / (1 - _lost(np.abs(asked), parameters))
+        return asked
+
+
+def _lost(asked: Any, parameters: Mapping[str, float]) -> Any:
+    """Share of the effort that is lost, where a current of that size [raw] is asked for."""
+    return np.minimum(parameters["torque_loss"] * (asked / ASKED) ** (1 + parameters.get("form", 0.0)), MOST)
 
 
 EFFECT = DriveSag()
