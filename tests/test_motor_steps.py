@@ -7,8 +7,11 @@ import dataclasses
 import numpy as np
 import pytest
 
+from hand_model.identify.motor import output_error
 from hand_model.identify.motor.creep import begins, continued, creeping, end_state
 from hand_model.identify.motor.drive import Moves, run
+from hand_model.identify.motor.fit import BOUNDS, _hardened
+from hand_model.identify.motor.friction import Bristles
 from hand_model.identify.motor.grid import NEVER, grid, rows
 from hand_model.identify.motor.moves import MoveData
 from hand_model.identify.motor.output_error import _linearise, simulate_moves
@@ -102,3 +105,27 @@ def test_neighbours_that_share_their_steps_move_as_they_do_alone(controller: str
         alone = run(moves.some(np.array([k])), {n: v[k : k + 1] for n, v in each.items()}, 2e-3, controller).sample(times[:1])
         of_move = slice(69 * (k // 3), 69 * (k // 3 + 1))
         assert all(np.allclose(x[of_move, k % 3], y[:, 0], atol=1e-9) for x, y in zip(together, alone, strict=True))
+
+
+def test_bristles_are_as_stiff_whatever_friction_does_later() -> None:
+    """LuGre: at first friction grows by Coulomb's over the distance, however much it rises as speed falls."""
+    q = {n: np.full(2, VALUES[n]) for n in ("coulomb", "stribeck_speed", "stribeck_exponent", "bristle")} | {"presliding": np.full(2, 0.5), "static_ratio": np.array([1.0, 1.8])}
+    friction, step_s, v, fresh = Bristles(q), np.full(2, 1e-3), np.full(2, 0.1), np.empty(2)
+    friction.begin(np.zeros(2), np.zeros(2))
+    friction.pace(0, 1, step_s)
+    friction.velocities(np.full(2, 10.0), np.full(2, 20.0), v)
+    friction.advance(v, 2 * v, fresh)
+    assert np.allclose(friction.f, VALUES["coulomb"] / 0.5 * 1e-4, rtol=1e-3)
+
+
+def test_a_hard_drive_with_a_rise_is_not_left_on_bristles() -> None:
+    """Bristles shorter than the encoder's noise give way to friction that sticks, where that explains the moves as well."""
+    values = {**VALUES, "static_ratio": 1.6, "rise": 0.0, "fall": 0.0}
+    moves = [_move(a, b, s, 1.2, values, "profile", hold=VALUES["preload"] + VALUES["stiffness"] * a) for a, b, s in ((0.0, 60.0, 1.0), (60.0, 0.0, 0.6), (0.0, 30.0, 0.3), (30.0, 80.0, 0.6))]
+    rng = np.random.default_rng(2)
+    moves = [dataclasses.replace(m, position=m.position + 0.05 * rng.normal(size=len(m.time_s)), current=m.current + 5 * rng.normal(size=len(m.time_s))) for m in moves]
+    names = ("coulomb", "viscous", "presliding", "bristle", "static_ratio")
+    soft = output_error.fit(moves, {**values, "presliding": 0.021, "bristle": 0.004}, names, (0.05, 5.0), BOUNDS, "profile", (output_error.NEARLY,))
+    hard = _hardened(soft)
+    assert hard is not None and hard.values["presliding"] == 0.0 and "bristle" not in hard.names
+    assert _hardened(hard) is None

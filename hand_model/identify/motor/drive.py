@@ -1,7 +1,7 @@
 """The drive simulated in raw units: profile generator, controller, mass, spring and friction; many moves at once.
 
 Plant: inertia a = u - viscous v - F - stiffness p - preload, with the friction of LuGre (Canudas de Wit et al. 1995),
-    F = f + bristle f',  f' = (level(v) - f sign(v)) v / distance,  level(v) = coulomb (1 + (ratio - 1) exp(-|v / stribeck|^exponent)),
+    F = f + bristle f',  f' = coulomb / distance (1 - f sign(v) / level(v)) v,  level(v) = coulomb (1 + (ratio - 1) exp(-|v / stribeck|^exponent)),
 which sticks (any f within its bounds at v = 0). Without a presliding distance friction is Coulomb's, set-valued at rest: bristles however
 stiff let a drive off before they hold it, for a time that falls with the square root of their distance only.
 Controller: u = gain (r - p) + damping (r' - v), within the current limit. Two kinds make the reference r:

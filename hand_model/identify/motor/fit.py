@@ -14,7 +14,7 @@ from ...hand import Estimate, Motor
 from ...session import Session
 from . import output_error
 from .balance import NAMES
-from .controller import find_controller
+from .controller import JUMP, STICK, SUDDEN_S, find_controller
 from .creep import begins, creeping
 from .drive import STRIBECK
 from .moves import BEFORE, MoveData, moves_from_rest
@@ -230,7 +230,7 @@ def _fit_output_error(
     if lack_of_fit(best) < LACK_OF_FIT:
         states = begins(moves, best.values, best.own, best.controller)
         best = output_error.refined(dataclasses.replace(best, moves=creeping(best.moves, states)), BOUNDS)
-        best = _with_other_shape(best) if evidence else best
+        best = _with_other_shape(_with_other_speed(best)) if evidence else best
     return best, evidence
 
 
@@ -244,9 +244,22 @@ def _with_rise(base: OutputErrorFit, curved: Regression) -> tuple[OutputErrorFit
     start = {**base.values, "viscous": float(curved.values[1]), "coulomb": level, **rise, "stribeck_exponent": curved.stribeck_exponent}
     best = output_error.fit(base.moves, start, (*base.names, *STRIBECK), base.sigma, BOUNDS, base.controller, (FINE,), base.own)
     if base.cost - best.cost > EVIDENCE:  # far from where it began: once more
-        best = output_error.fit(base.moves, best.values, best.names, base.sigma, BOUNDS, base.controller, (FINE,), best.own)
+        best = _hardened(best) or output_error.fit(base.moves, best.values, best.names, base.sigma, BOUNDS, base.controller, (FINE,), best.own)
     evidence = (base.cost - best.cost) / max(1.0, *best.chi2)
     return (base, 0.0) if evidence < EVIDENCE else (best, evidence)
+
+
+def _hardened(f: OutputErrorFit) -> OutputErrorFit | None:
+    """The fit with friction that sticks hard and a reference whose speed jumps, where bristles and ramps were no more than what a rise does at low speed;
+    None where the encoder sees both, or without them the moves are not explained as well."""
+    bends = 0 < f.values["presliding"] < f.sigma[0]
+    ramps = f.controller == "profile" and 0 < min(f.values["rise"], f.values["fall"]) < SUDDEN_S
+    if not (bends or ramps):
+        return None
+    changed = (STICK if bends else {}) | (JUMP if ramps else {})
+    names = tuple(n for n in f.names if n not in changed)
+    hard = output_error.fit(f.moves, {**f.values, **changed}, names, f.sigma, BOUNDS, f.controller, (FINE,), f.own)
+    return hard if hard.cost < f.cost + EVIDENCE else None
 
 
 def _with_other_shape(best: OutputErrorFit) -> OutputErrorFit:
@@ -259,6 +272,29 @@ def _with_other_shape(best: OutputErrorFit) -> OutputErrorFit:
     other = output_error.fit(
         best.moves, {**best.values, "stribeck_exponent": exponent}, names, best.sigma, BOUNDS, best.controller, (FINE,), best.own, best.memory
     )
+    return _widened(best, other)
+
+
+def _with_other_speed(best: OutputErrorFit) -> OutputErrorFit:
+    """The better of the fit and of one begun at half the speed of the rise, its covariance as wide as the misfit tells between the two.
+
+    Coulomb and viscous friction make up for a broad rise: a long, flat valley, in which a search among kinks may end anywhere.
+    """
+    v0, exponent = best.values["stribeck_speed"], best.values["stribeck_exponent"]
+    v = np.linspace(0.01, 1.0, 100) * best.values["speed_full"]
+    columns = [np.column_stack([np.ones_like(v), np.exp(-((v / speed) ** exponent)), v]) for speed in (v0, 0.5 * v0)]
+    level = best.values["coulomb"]
+    friction = columns[0] @ [level, level * (best.values["static_ratio"] - 1), best.values["viscous"]]
+    level, rise, viscous = map(float, np.linalg.lstsq(columns[1], friction, rcond=None)[0])  # what comes nearest to the same friction
+    start = {"coulomb": level, "static_ratio": max(1 + rise / level, 1.05), "viscous": viscous, "stribeck_speed": 0.5 * v0}
+    other = output_error.fit(
+        best.moves, {**best.values, **start}, best.names, best.sigma, BOUNDS, best.controller, (FINE,), best.own, best.memory
+    )
+    return _widened(*sorted((best, other), key=lambda f: f.cost))
+
+
+def _widened(best: OutputErrorFit, other: OutputErrorFit) -> OutputErrorFit:
+    """The fit, its covariance as wide as the secant of the misfit to another says."""
     if (rise := other.cost - best.cost) > EVIDENCE:
         return best
     way = np.array([other.values[n] - best.values[n] for n in best.names])

@@ -70,9 +70,12 @@ class Bristles:
         push, share, work = self.push, self.share, self.work
         np.subtract(total, self.f, out=push)
         _, self.level = self.rise.levels(v)
+        self.softer = None if self.rise.flat else self.rise.coulomb / self.level  # bristles as stiff as ever bend further under more friction
         # (exp(x) - 1) / x, x the travel of a step over the distance: of so small a travel at least that rounding does not count
         np.absolute(v, out=work)
         np.multiply(work, self.per, out=work)
+        if self.softer is not None:
+            np.multiply(work, self.softer, out=work)
         np.minimum(work, self.least, out=work)
         np.exp(work, out=share)
         np.subtract(share, 1.0, out=share)
@@ -82,6 +85,8 @@ class Bristles:
         np.subtract(work, self.level, out=work)
         np.multiply(share, work, out=work)
         np.multiply(work, self.reach, out=work)
+        if self.softer is not None:
+            np.multiply(work, self.softer, out=work)
         np.add(work, resisting, out=work)
         return np.divide(push, work, out=self.both)
 
@@ -91,6 +96,8 @@ class Bristles:
         np.copysign(self.level, both, out=limit)
         np.absolute(both, out=work)
         np.multiply(work, self.half_per, out=work)
+        if self.softer is not None:
+            np.multiply(work, self.softer, out=work)
         np.exp(work, out=work)
         np.subtract(f, limit, out=f)
         np.multiply(f, work, out=f)
