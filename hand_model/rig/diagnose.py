@@ -14,6 +14,7 @@ from ..session import Session
 from .candidates import Candidate, candidates
 from .channels import ChannelIssue, check_balance, check_channels
 from .compete import (
+    LEAST_SHARE,
     Score,
     Step,
     Term,
@@ -199,8 +200,8 @@ def _prove(bench: Bench, fit: DeclaredFit, stories: Sequence[tuple[Step, Term]],
         reason = None
         if proof["before"] <= proof["noise_floor"]:
             reason = "without it the error is within the sensors' noise already"
-        elif proof["after"] >= proof["before"]:
-            reason = "error on validation trials does not fall"
+        elif proof["after"] ** 2 > (1 - LEAST_SHARE) * proof["before"] ** 2:
+            reason = "error on validation trials does not fall by enough"
         elif bench.mujoco and not _moves_better(bench, (fit, *few), (fit, *many)):
             reason = "the motion of the training trials, simulated from the commands, gets no better"
         if reason is not None:
