@@ -18,6 +18,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from .textbook import readings
+
 KIND_SHARE = ("single", "single", "single", "single", "weak", "weak", "none", "pair", "messy", "outside")
 
 
@@ -129,18 +131,20 @@ def score_case(name: str, answer: Mapping[str, Any], findings: Mapping[str, Any]
 
 
 def _parameter_errors(hidden: Sequence[Mapping[str, Any]], found: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Per parameter that the answer and a finding of the same effect both name: relative error, and whether the interval
-    (None where none is given) holds the truth. Parameters that the two call by other names are left out."""
+    """Per parameter of a finding that the answer knows (`textbook.readings`): relative error, and whether the interval (None where none is given)
+    holds the truth. Of effects named at their place and not as one of a class."""
     out: dict[str, dict[str, Any]] = {}
     for finding in found:
-        truth = next((e.get("parameters") or {} for e in hidden if e["effect"] == finding["effect"]), {})
-        for name, entry in finding["parameters"].items():
-            if entry.get("value") is None or not truth.get(name):
+        mine = [e for e in hidden if e["effect"] == finding["effect"] and finding["where"].get("finger") in (e.get("finger"), None)]
+        truth = readings(mine[0]) if mine and "form" in mine[0] else {}
+        for name, wanted in truth.items():
+            entry = finding["parameters"].get(name, {})
+            if entry.get("value") is None or not wanted:
                 continue
             ci = entry.get("ci95")
             out[f"{finding['effect']}.{name}"] = {
-                "error": abs(entry["value"] - truth[name]) / abs(truth[name]),
-                "covered": None if ci is None or None in ci else ci[0] <= truth[name] <= ci[1],
+                "error": abs(entry["value"] - wanted) / abs(wanted),
+                "covered": None if ci is None or None in ci else ci[0] <= wanted <= ci[1],
             }
     return out
 

@@ -66,7 +66,7 @@ def test_clock_and_counts_are_put_right_in_a_copy(session: Path, tmp_path: Path)
             continue
         a, b = old.log(), new.log()
         mine = old.finger == trial.finger
-        np.testing.assert_allclose(np.diff(b.time_s), np.diff(a.time_s) * (1.002 if mine else 1.0), rtol=1e-9)
+        np.testing.assert_allclose(np.diff(b.time_s), np.diff(a.time_s) / (1.002 if mine else 1.0), rtol=1e-9)
         shift = 5.0 if read.finger(old.finger).actuator == actuator else 0.0
         np.testing.assert_allclose(b.column("position"), a.column("position") + shift, rtol=1e-12)
         np.testing.assert_array_equal(b.column("current"), a.column("current"))

@@ -190,7 +190,7 @@ def test_statement_names_the_segment_that_follows(candidate) -> None:
 OPPOSITES = [
     ("nonlinear_spring", {"form": 0.0, "cubic_stiffness": 0.0}, "quadratic_stiffness", "stiffer", "softer"),
     ("nonlinear_spring", {"form": 1.0, "knee": 40.0}, "stiffness_beyond", "stiffer", "softer"),
-    ("clock_drift", {}, "rate_minus_one", "loses", "gains"),
+    ("clock_drift", {}, "rate_minus_one", "gains", "loses"),
     ("current_channel_delay", {"form": 0.0}, "delay", "earlier", "later"),
     ("detent_load", {"form": 0.0, "centre": 40.0, "width": 5.0}, "load", "against", "towards"),
     ("detent_load", {"form": 1.0, "centre": 40.0, "width": 5.0}, "load", "notch", "hump"),

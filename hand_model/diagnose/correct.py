@@ -28,7 +28,7 @@ def write_corrected(session: Session, findings: Sequence[Finding], encoders: Map
     manifest names them, everything else is copied as it is. Replaces an earlier copy.
     """
     markers = {str(f.where["finger"]) for f in findings if f.effect in (*SLIPS, "marker_swap")}
-    drifts = {name: f.parameters["rate_minus_one"]["value"] for f in findings if f.effect == "clock_drift" for name in _logs_of(session, f)}
+    drifts = {name: 1 / (1 + f.parameters["rate_minus_one"]["value"]) - 1 for f in findings if f.effect == "clock_drift" for name in _logs_of(session, f)}
     turned = {str(f.where["actuator"]) for f in findings if f.effect == "encoder_periodic_error"} & set(encoders)
     if not markers and not drifts and not turned:
         return None

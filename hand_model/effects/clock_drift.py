@@ -20,7 +20,7 @@ class ClockDrift(Effect):
     correction = "log time mapped to the mocap clock with the estimated rate"
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
-        """Rate of the log's clock over the mocap clock, minus one."""
+        """What the log's times must be stretched by, minus one, with the other sign."""
         return (("drift", "1", -np.inf, np.inf),)
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
@@ -30,13 +30,13 @@ class ClockDrift(Effect):
 
     def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
                    declared: Mapping[str, float]) -> dict[str, float]:
-        """Rate of the mocap clock over the log's, minus one: what a correction stretches the log's times by."""
-        return {"rate_minus_one": -amplitude["drift"]}
+        """Rate of the log's clock over the mocap clock, minus one: a correction divides the log's times by the rate."""
+        return {"rate_minus_one": 1 / (1 - amplitude["drift"]) - 1}
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """Time gained or lost in every second."""
         rate = parameters["rate_minus_one"]
-        return f"the log's clock {'loses' if rate > 0 else 'gains'} {1e3 * abs(rate):.2f} ms on the mocap clock in every second"
+        return f"the log's clock {'gains' if rate > 0 else 'loses'} {1e3 * abs(rate):.2f} ms on the mocap clock in every second"
 
 
 EFFECT = ClockDrift()
