@@ -34,6 +34,7 @@ SMOOTH = ("nonlinear_spring",)  # its knee belongs to fingers with a return spri
 LONGEST_DELAY_S = 0.03
 # Samples. A drive that holds its torque from one control step to the next acts half a step late: less than a sample of a log.
 DELAYS = (0.125, 0.25, 0.5, 1, 2, 3, 5, 8)
+TURNS = 4  # of friction and the load that it is reckoned from: what one changes of the load, friction changes by a fraction of
 SAME = 0.05  # of a column's variance
 UNDECLARED = "no spring is declared"
 BY_LEVEL = "a level for each that trials declare"
@@ -94,16 +95,20 @@ def drive_state(rig: RigModel, row: Rows, theta: Array) -> DriveState:
                       ("inertia", "viscous", "coulomb"), row.validate)  # fmt: skip
 
 
-def candidates(rig: RigModel, fit: DeclaredFit, joint: str) -> tuple[Candidate, ...]:
-    """All candidates at one joint, from the catalogue and from the rig itself."""
+def candidates(rig: RigModel, fit: DeclaredFit, joint: str, every: bool = False) -> tuple[Candidate, ...]:
+    """All candidates at one joint, from the catalogue and from the rig itself; every: also those that its recordings could
+    not tell from what is declared, as a file may name them."""
     rows = [r for r in fit.rows if r.joint == joint and not r.validate]
     if not rows:
         return ()
     states = {r.trial: drive_state(rig, r, fit.theta) for r in fit.rows if r.joint == joint}
     train = tuple(states[r.trial] for r in rows)
     found = [_from_catalogue(e, joint, train, states) for e in catalogue("drive") if _usable(e)]
-    if not _is_declared([r.filtered(r.position) for r in rows], rows):
-        found = [_with_line(c) if c.effect in SMOOTH else c for c in found]
+    bends = [c for c in found if c.effect in SMOOTH]
+    if every:
+        found += [_with_line(c) for c in bends]
+    elif not _is_declared([r.filtered(r.position) for r in rows], rows):
+        found = [c for c in found if c not in bends] + [_with_line(c) for c in bends]
     found += [*_own(rig, fit, joint, rows), *_turning_round(rig, fit, joint, train, states)]
     return tuple(c for c in found if c.grid)
 

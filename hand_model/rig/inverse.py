@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..errors import DescriptionError
 from .balance import Column, Rows, declared_columns, trial_rows
-from .candidates import Candidate, beside, candidates
+from .candidates import TURNS, Candidate, beside, candidates
 from .declared import DeclaredFit
 from .mjcf import read_effects
 from .model import RigModel, RigTrial
@@ -24,7 +24,6 @@ from .overrides import compile_model
 from .states import later
 
 Array = NDArray[np.float64]
-PASSES = 4  # what one changes of the load, friction changes by a fraction of
 
 
 @dataclass(frozen=True)
@@ -142,7 +141,7 @@ def _recolumned(rows: Sequence[Rows], columns: Sequence[Column]) -> tuple[Rows, 
 def _acting(rig: RigModel, fit: DeclaredFit, records: Sequence[Mapping[str, Any]]) -> list[tuple[Candidate, Mapping, Array]]:
     """Candidates that the file's records name, with shapes and amplitudes, at the loads of the file's parameters and, by
     turns, of the effects themselves."""
-    turns = PASSES if any(r["effect"] == "load_dependent_friction" for r in records) else 1
+    turns = TURNS if any(r["effect"] == "load_dependent_friction" for r in records) else 1
     acting: list[tuple[Candidate, Mapping, Array]] = []
     for _ in range(turns):
         at = replace(fit, beside=beside(fit.rows, acting))
@@ -153,7 +152,7 @@ def _acting(rig: RigModel, fit: DeclaredFit, records: Sequence[Mapping[str, Any]
 
 def _rebuilt(rig: RigModel, fit: DeclaredFit, record: Mapping[str, Any]) -> Candidate:
     """The candidate that a record of the file names, at the loads of the file's parameters."""
-    for c in candidates(rig, fit, record["joint"]):
+    for c in candidates(rig, fit, record["joint"], every=True):
         if (c.effect, c.variant) == (record["effect"], record["variant"]):
             return c
     raise DescriptionError(f'custom/text "hand_model": no effect "{record["effect"]}" at joint "{record["joint"]}"')

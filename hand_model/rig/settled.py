@@ -8,20 +8,19 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .candidates import beside, candidates
+from .candidates import TURNS, beside, candidates
 from .compete import Term, pose, solution
 from .declared import DeclaredFit
 from .model import RigModel
 
 Array = NDArray[np.float64]
-PASSES = 3  # what one changes of the load, friction changes by a fraction of
 
 
 def settled(rig: RigModel, fit: DeclaredFit, terms: Sequence[Term]) -> tuple[list[Term], Array, DeclaredFit]:
     """Terms and solution (P + J,) whose loads are those of the solution itself, by turns, and the fit that says them."""
     terms, problem, at = list(terms), pose(fit), fit
     theta = solution(problem, terms)
-    for _ in range(PASSES if any(t.candidate.effect == "load_dependent_friction" for t in terms) else 0):
+    for _ in range(TURNS if any(t.candidate.effect == "load_dependent_friction" for t in terms) else 0):
         at = at_loads(fit, terms, theta)
         known = {j: {c.key: c for c in candidates(rig, at, j)} for j in {t.candidate.joint for t in terms}}
         terms = [replace(t, candidate=known[t.candidate.joint][t.candidate.key]) for t in terms]
