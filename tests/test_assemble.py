@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from hand_model.diagnose.assemble import _without_shadows
-from hand_model.diagnose.findings import Finding
+from hand_model.diagnose.findings import Finding, weighed
 
 
 def periodic(effect: str, actuator: str, period: float) -> tuple[float, Finding]:
@@ -18,6 +18,12 @@ def periodic(effect: str, actuator: str, period: float) -> tuple[float, Finding]
 def test_a_ripple_at_a_harmonic_of_the_same_encoders_error_is_its_shadow(period: float, motor: str, stays: bool) -> None:
     error, ripple = periodic("encoder_periodic_error", "index", 10.79), periodic("torque_ripple", motor, period)
     assert _without_shadows([error, ripple]) == ([error, ripple] if stays else [error])
+
+
+def test_a_better_sensor_alone_does_not_put_an_effect_first() -> None:
+    strong, faint = 12.0, 1.5  # per cent of what the channel tells
+    assert weighed(strong * 0.1, 10.0) > weighed(faint * 1.0, 100.0)
+    assert weighed(strong * 0.1, 10.0) == pytest.approx((strong * 0.1 * strong * 0.01) ** 0.5)
 
 
 def test_without_an_encoder_error_every_ripple_stays() -> None:

@@ -95,6 +95,12 @@ def test_two_prompt_drives_have_no_delay() -> None:
     assert not command_findings(facts, {"index": "index", "ring": "ring"})
 
 
+def test_slow_references_of_all_drives_are_no_delay_of_the_one_that_friction_holds_longer() -> None:
+    steps = 3.4 + np.linspace(-0.5, 0.5, 40)
+    alike = {"index": Answers(steps * STEP_S, (steps + 1.5) * STEP_S, STEP_S), "ring": Answers(1.05 * steps * STEP_S, steps * STEP_S, STEP_S)}
+    assert not any(len(told.drive_s) for told in lateness(alike).values())
+
+
 def late_answers(current: float, motion: float, seed: int) -> Answers:
     """Answers of a drive whose current and motion follow their commands that many sample intervals late, with scatter."""
     rng = np.random.default_rng(seed)

@@ -117,6 +117,15 @@ def test_lowpass_of_a_step_is_exponential() -> None:
     np.testing.assert_allclose(y, 1 - np.exp(-t / 0.5), atol=2e-3)
 
 
+def test_an_obstacle_of_a_while_of_the_session_acts_in_every_recording_of_that_while_and_is_told_from_none() -> None:
+    contact, one = effect("external_contact"), state()
+    session = tuple(replace(one, extra={"trial_index": np.full(1200, float(i)), "elapsed": one.time_s + 30 * i, "session_s": np.full(1200, 81.6)}) for i in range(3))
+    shape = next(p for p in contact.grid(session) if p["trial"] == -1.0 and (p["since"], p["until"]) == (0.5, 1.0))
+    acting = [np.any(contact.columns(s, shape)[:, 0] > 0) for s in session]
+    assert acting == [False, True, True]
+    assert not any(p["trial"] == -1.0 and (p["since"], p["until"]) == (0.0, 1.0) for p in contact.grid(session))
+
+
 PLACE = {"finger": "index", "actuator": "index", "joint": "proximal", "signal": "current", "trials": ["first.csv", "second.csv"],
          "region": {"time": {"first.csv": [[1.0, 2.0], [4.0, 8.0]]}}}
 DECLARED = {"viscous": 0.15, "coulomb": 35.0, "spring": 0.22}

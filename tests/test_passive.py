@@ -23,6 +23,7 @@ MOTOR = f"""<mujoco><compiler angle="radian"/><option gravity="3 -9 0" integrato
  <custom><numeric name="index_effort_per_raw" data="{UNIT}"/></custom>
  <actuator><general name="index" joint="index_motor" gainprm="0" biastype="none"/><dcmotor name="index_friction" joint="index_motor"
  input="none" motorconst="0 0" resistance="1" lugre="{UNIT * 35 / GIVE} 0 {UNIT * 35} {UNIT * 35} 20"/></actuator></mujoco>"""
+SAG = 0.15  # of the effort, lost at 100 raw
 # shape, amplitude, share of the effect's size by which file and column may differ in 99 % of the samples
 DRIVE = [
     ("asymmetric_viscous_friction", {}, {"half_difference": 0.08}, 0.01),
@@ -31,6 +32,7 @@ DRIVE = [
     ("current_saturation", {"limit": 45.0}, {}, 0.02),
     ("detent_load", {"form": 0.0, "centre": 40.0, "width": 6.0}, {"load": -12.0}, 0.01),
     ("detent_load", {"form": 1.0, "centre": 60.0, "width": 4.0}, {"load": 12.0}, 0.01),
+    ("drive_sag", {"form": 0.0}, {"torque_loss": SAG}, 0.01),
     ("elastoplastic_hysteresis", {"form": 0.0, "reach": 15.0}, {"yield_load": 14.0}, 0.02),
     ("elastoplastic_hysteresis", {"form": 1.0, "reach": 12.0}, {"yield_load": 14.0}, 0.02),
     ("end_stop_contact", {"side": 1.0, "begin": 82.0, "end": 97.0, "inward": 15.0}, {"stiffness": 1.5}, 0.01),
@@ -65,6 +67,8 @@ def state(until_s: float = 24.0, elapsed_s: float = 5.0) -> DriveState:
     declared = np.stack([a, v, dahl(x, GIVE), x, np.ones_like(x)], axis=-1)
     extra = {"bandwidth_s": 0 * t, "give": 0 * t + GIVE, "elapsed": t + elapsed_s, "gravity_along": 0 * t + 3.0,
              "gravity_across": 0 * t - 9.0, "gravity_x": 0 * t + 3.0, "gravity_z": 0 * t - 9.0}
+    needed = declared @ np.array(list(DECLARED.values()))
+    extra["required"] = np.sign(needed) * (1 - np.sqrt(1 - 4 * SAG / 100 * np.abs(needed))) / (2 * SAG / 100)  # u (1 - SAG |u| / 100) = needed
     return DriveState("log/a.csv", "index", t, x, v, a, 0 * x, declared, declared_names=tuple(DECLARED), extra=extra)
 
 

@@ -125,6 +125,6 @@ def _read(motor: CompiledMotor, effort: Array, time_s: Array) -> Array:
     effort = np.interp(time_s - late, time_s, effort) if late else effort
     for e in motor.hand.effects:
         if e.where.get("actuator") == motor.actuator:
-            effort = effect(e.effect).reading(effort, time_s, {k: v.value for k, v in e.parameters.items()})
+            effort = motor.unit * effect(e.effect).reading(effort / motor.unit, time_s, {k: v.value for k, v in e.parameters.items()})
     cutoff = np.inf if current is None else float(current.get("cutoff", 0.0)) or np.inf
     return np.clip(effort, -cutoff, cutoff)

@@ -213,7 +213,7 @@ class Effect:
         return None
 
     def reading(self, effort: Array, time_s: Array, parameters: Mapping[str, float]) -> Array:
-        """What a channel shows of the drive's effort (n,): as it is, unless the effect is in the reading and no sensor holds it."""
+        """What a channel shows of the drive's effort (n,) [raw]: as it is, unless the effect is in the reading and no sensor holds it."""
         return effort
 
     def started(self, state: DriveState, parameters: Mapping[str, float]) -> dict[str, float]:
