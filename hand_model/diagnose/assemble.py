@@ -13,12 +13,15 @@ from ..effects.base import sample_interval
 from .distinguishability import protocol_pairs
 from .findings import Finding, Findings
 from .interval import variance_ratio
+from .markers import HINGE
 from .name import ALPHA, Named
 from .station import Station, channel_of, finding_of, unexplained_of, unrepeated_of
 
 UNLIKE_OTHERS = 2.0  # times the wander of the calmest finger
 HARMONICS, SAME_PERIOD = 4, 0.02
 SHADOW = 0.5  # of an encoder error's size: less, in the current of the same motor, may be what is left of it
+TILT = 0.2  # the same, of a wobble's or a travelling centre's, in the angles of the finger
+ANGULAR = {e.name for station in ("encoder", "linkage") for e in catalogue(station)} - {"clock_drift"}
 UNREST = 0.3  # of the noise: wander that every machine is granted
 
 
@@ -39,7 +42,7 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
         rejected += [{"effect": name, "where": str(station.finger), "reason": _reason(value)}
                      for name, value in station.naming.rejected[:4]]
     unexplained += [unrepeated_of(s) for s in stations if _wanders(s, stations)]
-    ranked = _without_shadows(_one_clock(ranked))
+    ranked = _without_tilts(_without_shadows(_one_clock(ranked)))
     ranked.sort(key=lambda item: -item[0])
     found = tuple(f for _, f in ranked)
     verdict = "mismatch" if found else "unexplained" if unexplained else "consistent"
@@ -87,6 +90,13 @@ def _without_shadows(ranked: list[tuple[float, Finding]]) -> list[tuple[float, F
         return harmonic or weight < SHADOW * error
 
     return [item for item in ranked if not shadow(*item)]
+
+
+def _without_tilts(ranked: list[tuple[float, Finding]]) -> list[tuple[float, Finding]]:
+    """Without what a joint that is no plain hinge leaves in its angle: small departures of that finger's angles are no evidence."""
+    crooked = {f.where["finger"]: weight for weight, f in ranked if f.effect in HINGE}
+    small = {id(f) for weight, f in ranked if f.effect in ANGULAR and weight < TILT * crooked.get(f.where["finger"], 0.0)}
+    return [(weight, f) for weight, f in ranked if id(f) not in small]
 
 
 def _merged(found: tuple[Named, ...]) -> list[tuple[Named, float, float]]:

@@ -15,6 +15,11 @@ from .angles import FingerAngles
 BESIDE = 0.4  # of an excursion's length, on either side: it is seen from where it stands out
 
 
+def while_driven(states: Sequence[DriveState], below: float) -> tuple[DriveState, ...]:
+    """A drive's states without the current where the finger does not follow it open, below that position [%]: the spring is not on it there."""
+    return tuple(replace(s, effort=np.where(s.position < below, np.nan, s.effort)) for s in states)
+
+
 def without_excursions(states: Sequence[DriveState], ahead: Sequence[DriveState], angles: FingerAngles) -> tuple[DriveState, ...]:
     """A drive's states without the current of whiles in which the finger was ahead of it: it carried no spring then.
 

@@ -20,7 +20,7 @@ from .assemble import assemble
 from .balance import Balance
 from .command import CommandFacts, command_facts, command_findings, refused, with_lateness
 from .correct import write_corrected
-from .decoupled import without_excursions
+from .decoupled import while_driven, without_excursions
 from .drive import drive_states, drive_trials, echoes_command, is_measured
 from .evidence import typical_coefficients
 from .findings import Finding, Findings
@@ -70,8 +70,10 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
     drives = {a: with_gravity(session, fingers, states)
               for a, states in drive_states(session, _encoder_corrections(stations), unread).items()}
     for station in (s for s in stations if s.believed and s.actuator in drives):
-        if any(f.term.effect.name == "spring_decoupling" and f.term.shape["form"] == 0.0 for f in station.kept):
-            drives[station.actuator] = without_excursions(drives[station.actuator], station.naming.balance.states, fingers[station.finger])
+        for term in (f.term for f in station.kept if f.term.effect.name == "spring_decoupling"):
+            states = drives[station.actuator]
+            drives[station.actuator] = (while_driven(states, term.shape["below"]) if term.shape["form"] > 0.5 else
+                                        without_excursions(states, station.naming.balance.states, fingers[station.finger]))
     for actuator in [a for a, states in drives.items() if not is_measured(states)]:
         found.append(refused(actuator, _finger_of(session, actuator), tuple(s.trial for s in drives.pop(actuator))))
     facts = _command(session, drives)

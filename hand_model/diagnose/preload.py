@@ -24,10 +24,11 @@ CLASS = ("asymmetric_friction", "spring_preload")
 def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]:
     """Drives whose preload the others' do not let expect, with their weight.
 
-    The other drives' median is the reference. Drives of which something else is missing are compared where that is no load: the preload is the same with and
+    The other drives' median is the reference. What pulls a finger off its drive pulls at its preload. Drives of which something else is missing are compared where that is no load: the preload is the same with and
     without its name.
     """
-    sound = [s for s in stations if s.signal == "current" and "preload" in s.naming.fit.declared and _sound(s)]
+    pulled = {s.actuator for s in stations if s.believed and any(f.term.effect.name == "spring_decoupling" for f in s.kept)}
+    sound = [s for s in stations if s.signal == "current" and s.actuator not in pulled and "preload" in s.naming.fit.declared and _sound(s)]
     preload = {id(s): float(s.naming.fit.declared["preload"]) for s in sound}
     out = []
     for station in sound:

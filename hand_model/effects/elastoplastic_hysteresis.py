@@ -11,6 +11,8 @@ from .base import Amplitude, Array, DriveState, Effect, Shape, figure, position_
 from .mjcf import bristle_friction, joint_tendon, motor_joint
 from .path import dahl, jenkins
 
+PRESLIDING, MOST = 20.0, 10.0  # log evidence for each time the yield load is the friction's, and the most times that count
+
 
 class ElastoplasticHysteresis(Effect):
     """Adds A z to the friction: a stop operator z = clip(z + ds / s, -1, 1) (form 0), or an exponential build-up (form 1)."""
@@ -32,6 +34,16 @@ class ElastoplasticHysteresis(Effect):
         """State along the recorded path, (n, 1), in [-1, 1]."""
         operator = jenkins if shape["form"] < 0.5 else dahl
         return operator(state.position, shape["reach"])[:, None]
+
+    def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
+                   declared: Mapping[str, float]) -> dict[str, float]:
+        """Reach and load at yield, also as a ratio to the friction that turns over at once."""
+        return {**shape, **amplitude, "ratio": amplitude["yield_load"] / (declared.get("coulomb") or np.nan)}
+
+    def log_prior(self, parameters: Mapping[str, float]) -> float:
+        """Where hardly any friction is left that turns over at once, it is the friction itself that gives: presliding, no further load."""
+        ratio = parameters["ratio"] if np.isfinite(parameters["ratio"]) else MOST
+        return -PRESLIDING * max(0.0, min(ratio, MOST) - 1.0)
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """How large, and over which way it builds up."""

@@ -9,11 +9,13 @@ import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
 from .mjcf import lugre_friction
-from .path import dahl
+from .path import dahl, jenkins
 
 
 class PreslidingFriction(Effect):
-    """The declared Coulomb friction builds up over a distance instead of at once: dz/ds = (1 - z sign(ds)) / length."""
+    """The declared Coulomb friction builds up over a distance instead of at once: dz/ds = (1 - z sign(ds)) / length (form 0), or evenly, as a
+    stiff bristle that then breaks away (form 1; Dupont 2002).
+    """
 
     name = "presliding_friction"
     replaces = "coulomb"
@@ -25,24 +27,27 @@ class PreslidingFriction(Effect):
         granted = states[0].extra.get("granted")
         least = 0.012 * span if granted is None else float(np.max(granted))
         return (Shape("bristle_length", states[0].position_unit, least, 0.35 * span,
-                      tuple(np.geomspace(1.1 * least, 0.25 * span, 11))),)
+                      tuple(np.geomspace(1.1 * least, 0.25 * span, 11))),
+                Shape("form", "1", 0.0, 1.0, (0.0, 1.0)))
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """No amplitude of its own: it is the Coulomb friction."""
         return ()
 
     def declared(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """Declared columns with the Dahl state in place of the Coulomb column."""
+        """Declared columns with the bristles' state in place of the Coulomb column."""
         if "coulomb" not in state.declared_names:
             return state.declared
         out = np.array(state.declared)
-        out[:, state.declared_names.index("coulomb")] = dahl(state.position, shape["bristle_length"])
+        bristles = jenkins if shape.get("form", 0.0) > 0.5 else dahl
+        out[:, state.declared_names.index("coulomb")] = bristles(state.position, shape["bristle_length"])
         return out
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """The way over which friction turns over."""
         length = parameters["bristle_length"]
-        return f"the drive gives before it slides: after a reversal two thirds of the friction turn over within {length:.1f} % of travel"
+        way = f"it turns over within {2 * length:.1f} %" if parameters.get("form") else f"two thirds of it turn over within {length:.1f} %"
+        return f"the drive gives before it slides: after a reversal friction needs a way, {way} of travel"
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """A passive DC motor's LuGre friction in place of the joint's `frictionloss`."""
