@@ -101,6 +101,15 @@ def test_slow_references_of_all_drives_are_no_delay_of_the_one_that_friction_hol
     assert not any(len(told.drive_s) for told in lateness(alike).values())
 
 
+def test_a_current_ahead_of_its_time_is_early_and_the_prompt_drive_beside_it_is_not_late() -> None:
+    (early, current), (prompt, other) = answering(0.0, 5), answering(0.0, 6)
+    ahead = np.interp(early.time_s + 0.1, early.time_s, current)
+    facts = {"index": command_facts((early,), (ahead,)), "ring": command_facts((prompt,), (other,))}
+    told = lateness({name: f.answers for name, f in facts.items()})
+    assert told["index"].channel_s == pytest.approx(-0.1, abs=STEP_S) and abs(told["ring"].channel_s) < 0.5 * STEP_S
+    assert not command_findings(facts, {"index": "index", "ring": "ring"})
+
+
 def late_answers(current: float, motion: float, seed: int) -> Answers:
     """Answers of a drive whose current and motion follow their commands that many sample intervals late, with scatter."""
     rng = np.random.default_rng(seed)

@@ -23,6 +23,8 @@ LEAST_ANSWERS = 5
 UNLIKE = 0.4  # sample intervals by which the answers of healthy drives of one session differ
 USUAL_START = 2.0  # sample intervals after which a healthy drive is seen to move
 
+EARLY_S = 0.2  # by which a current's time stamps may run ahead
+
 
 @dataclass(frozen=True)
 class Answers:
@@ -45,7 +47,7 @@ class Lateness:
 
 def answers_of(states: Sequence[DriveState], currents: Sequence[Array]) -> Answers:
     """Answers of one drive. currents: raw current (n,) of each state (its `effort` is masked at rest)."""
-    current = [x for s, c in zip(states, currents, strict=True) for x in _latencies(s, c)]
+    current = [x for s, c in zip(states, currents, strict=True) for x in _latencies(s, c, EARLY_S)]
     motion = [x for s in states for x in _latencies(s, s.position)]
     step = sample_interval(states)
     return Answers(_usual(np.array(current), step), _usual(np.array(motion), step), step)
@@ -55,7 +57,8 @@ def lateness(answers: Mapping[str, Answers]) -> dict[str, Lateness]:
     """Of each drive that answers often enough, beside the least late one of the session, or a usual one where it is alone."""
     told = {a: x for a, x in answers.items() if len(x.current_s) >= LEAST_ANSWERS}
     alone = len(told) == 1
-    first = min((float(np.mean(x.current_s)) for x in told.values()), default=0.0)
+    # who answers before it is told is early, and no measure for the others
+    first = min((m for m in (float(np.mean(x.current_s)) for x in told.values()) if m >= 0), default=0.0)
     moved = {a: float(np.mean(x.motion_s)) for a, x in told.items() if len(x.motion_s) >= LEAST_ANSWERS}
     out = {}
     for actuator, x in told.items():
@@ -75,21 +78,26 @@ def lateness(answers: Mapping[str, Answers]) -> dict[str, Lateness]:
     return out
 
 
-def _latencies(state: DriveState, channel: Array) -> list[float]:
-    """Time from each setpoint change to the first two samples beyond three standard deviations, in its direction."""
+def _latencies(state: DriveState, channel: Array, early_s: float = 0.0) -> list[float]:
+    """Time from each setpoint change to the first two samples beyond three standard deviations, in its direction.
+
+    early_s: by how much a channel may answer before it is told; it does where that much before the change it stood, and no longer does at the change.
+    """
     if "setpoint" not in state.extra:
         return []
     setpoint, t = state.extra["setpoint"], state.time_s
     out = []
     for k in np.flatnonzero(np.diff(setpoint)) + 1:
-        before = channel[(t > t[k] - 0.2) & (t < t[k])]
-        if len(before) < 5:
-            continue
-        way = np.sign(setpoint[k] - setpoint[k - 1])
-        away = way * (channel[k : k + 60] - np.median(before)) > 3 * max(float(np.std(before)), 1e-9)
-        hit = np.flatnonzero(away[:-1] & away[1:])
-        if len(hit):
-            out.append(float(t[k + hit[0]] - t[k]))
+        way, ahead = np.sign(setpoint[k] - setpoint[k - 1]), int(np.searchsorted(t, t[k] - early_s))
+        for begin in ((ahead, k) if ahead < k else (k,)):
+            before = channel[(t > t[begin] - 0.2) & (t < t[begin])]
+            if len(before) < 5:
+                continue
+            away = way * (channel[begin : k + 60] - np.median(before)) > 3 * max(float(np.std(before)), 1e-9)
+            hit = np.flatnonzero(away[:-1] & away[1:])
+            if len(hit) and (begin == k or (begin + hit[0] < k - 1 and away[hit[0] : k - begin].all())):
+                out.append(float(t[begin + hit[0]] - t[k]))
+                break
     return out
 
 

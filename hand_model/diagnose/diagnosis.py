@@ -191,6 +191,8 @@ def _delays_apart(drives: dict[str, tuple[DriveState, ...]]) -> dict[str, bool]:
             return abs(x) > bound
         if x >= -bound:
             return float(late[actuator][0]) > bound
+        if late[actuator][0] < -bound:
+            return True
         others = [float(np.sum(value)) for a, value in late.items() if a != actuator]
         return not others or max(others) - late[actuator][0] > bound  # who is early answers before the others
 

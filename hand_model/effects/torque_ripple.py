@@ -27,7 +27,7 @@ class TorqueRipple(Sinusoid):
         periods = span / np.arange(np.ceil(fewest), 40.01, 0.25)
         period = Shape("period", states[0].position_unit, 0.02 * span, span / fewest, tuple(periods))
         unseen = min((float(s.extra["bandwidth_s"][0]) if "bandwidth_s" in s.extra else 0.0 for s in states), default=0.0)
-        return (period, Shape("unseen", "s", 0.0, 3 * unseen, (unseen,))) if unseen > 0 else (period,)
+        return (period, Shape("unseen", "s", 0.0, 1.2 * unseen, (unseen,))) if unseen > 0 else (period,)
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """sin and cos of the position's phase, (n, 2), where they can be seen."""
