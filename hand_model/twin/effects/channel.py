@@ -39,13 +39,15 @@ def encoder_periodic(draw: Draw) -> Influence:
     )
 
 
-@effect("drive_sag", "channel", "current", ("speed", "supply"))
+@effect("drive_sag", "channel", "current", ("speed", "supply", "torque"))
 def drive_sag(draw: Draw) -> Influence:
-    """The drive delivers less speed per command as it is loaded: at once, or as its supply droops.
+    """The drive delivers less speed per command as it is loaded, at once or as its supply droops; or less torque per current the more it asks for.
 
-    (Less torque per current only rescales friction, damping and spring: a raw unit of current is left for anyone to see.)
+    (The same share of every torque would only rescale friction, damping and spring.)
     """
     share = draw.size("share_per_100_raw", 0.14, 0.24)
+    if draw.form == "torque":
+        return Influence(terms=DriveTerms(load=(lambda now: now.current * min(0.45, share * abs(now.current) / 100.0),)))
     droop = [0.0]
 
     def start(trial: TrialPlan) -> None:
@@ -87,14 +89,14 @@ def current_saturation(draw: Draw) -> Influence:
     )
 
 
-@effect("current_channel_delay", "channel", "current", ("delay", "lag"))
+@effect("current_channel_delay", "channel", "current", ("delay", "lag", "early"))
 def current_delay(draw: Draw) -> Influence:
-    """The current channel reports the past: a pure delay, or the lag of a first-order filter."""
+    """The current channel reports the past: a pure delay, or the lag of a first-order filter; or what the position will show only later."""
     delay = draw.size("delay_s", 0.035, 0.07)
 
     def shifted(motion: Motion, raw: Array) -> Array:
-        if draw.form == "delay":
-            return np.interp(motion.time_s - delay, motion.time_s, raw)
+        if draw.form != "lag":
+            return np.interp(motion.time_s - (delay if draw.form == "delay" else -delay), motion.time_s, raw)
         keep = math.exp(-(motion.time_s[1] - motion.time_s[0]) / max(delay, 1e-6))
         out, at = np.empty_like(raw), raw[0]
         for i, x in enumerate(raw.tolist()):
