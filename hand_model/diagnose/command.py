@@ -167,10 +167,10 @@ def with_lateness(drives: Mapping[str, tuple[DriveState, ...]], facts: Mapping[s
 
 
 def _lasting(state: DriveState, late_s: float) -> Array:
-    """What is not known of starts and stops (n,), as long as a current that late may show it."""
+    """What is not known of starts and stops (n,), as long as a current that late, or early, may show it."""
     sigma = state.extra.get("sigma", np.zeros(len(state.time_s)))
     step = float(np.median(np.diff(state.time_s)))
-    shifts = np.arange(step, late_s + 0.5 * step, step)
+    shifts = np.sign(late_s) * np.arange(step, abs(late_s) + 0.5 * step, step)
     return np.maximum.reduce([sigma, *(np.interp(state.time_s - shift, state.time_s, sigma) for shift in shifts)])
 
 

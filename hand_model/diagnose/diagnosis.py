@@ -34,6 +34,8 @@ from .prove import Replay
 from .stamps import Stamps, stamps
 from .station import Station, judged
 
+EARLY = 3.0  # standard deviations by which answers that come before the command say so for sure
+
 
 def diagnose(session: Session | str | Path, model: Any = None, output: str | Path | None = None,
              say: Callable[[str], None] | None = None) -> Findings:
@@ -189,10 +191,10 @@ def _delays_apart(drives: dict[str, tuple[DriveState, ...]]) -> dict[str, bool]:
         x, bound = best[actuator] - common, least * step[actuator]
         if actuator not in late:
             return abs(x) > bound
+        if late[actuator][0] < -max(bound, EARLY * late[actuator][1]):
+            return True
         if x >= -bound:
             return float(late[actuator][0]) > bound
-        if late[actuator][0] < -bound:
-            return True
         others = [float(np.sum(value)) for a, value in late.items() if a != actuator]
         return not others or max(others) - late[actuator][0] > bound  # who is early answers before the others
 
