@@ -15,7 +15,7 @@ from synthetic_hand import synthetic_hand
 
 from hand_model.compile import compile
 from hand_model.errors import HandModelError
-from hand_model.hand import Estimate, Motor
+from hand_model.hand import Estimate, Hand, Motor
 from hand_model.identify import identify
 from hand_model.output import new_file, new_folder
 from hand_model.replay import replay
@@ -58,7 +58,7 @@ def test_the_page_is_one_file_and_every_section_opens_with_a_sentence(residuals)
     outside = [v for v in tree.xpath("//@href | //@src") if not v.startswith("#")]
     assert outside == []
     sections = tree.xpath("//section")
-    ids = [s.get("id") for s in sections if s.get("id") != "motors"]
+    ids = [s.get("id") for s in sections if "motors" not in s.get("id")]
     assert ids == ["error", "axes", "maps", "linkages", "clocks", "engines", "repairs"]
     assert tree.xpath("//nav/a/@href") == [f"#{s.get('id')}" for s in sections]
     for section in sections:
@@ -190,6 +190,29 @@ def test_motors_stand_with_their_intervals(residuals):
     for words in ("30 (27 to 33)", "0.004", "index: mind this too", "3.5"):
         assert words in text
     assert "30 (27 to 33)" in hand_text(hand) and motors_section(replace(hand, motors=())) is None
+
+
+def test_the_published_motor_models_stand_beside_the_published_figures(tmp_path):
+    from hand_model.published import current_rmse_raw
+    from hand_model.report.published_motors import published_motors_section
+    from hand_model.session import read_session
+    from hand_model.twin.case import draw_case
+
+    draw_case(7, "none").record(tmp_path / "s")
+    session = read_session(tmp_path / "s")
+    actuators = sorted({f.actuator for f in session.fingers})
+    motors = tuple(Motor(a, 0.0, 100.0, {}, 3.5, ()) for a in actuators)
+    section = published_motors_section(Hand("h", session.side, {}, {}, (), 1e-4, {}, motors), session)
+    rows = [[cell.text_content() for cell in row] for row in section.body[0].xpath(".//tbody/tr")]
+    assert [r[0] for r in rows if r[0]] == actuators and len(rows) == 4 * len(actuators)
+    for i, actuator in enumerate(actuators):
+        mine = rows[4 * i : 4 * i + 4]
+        assert [float(r[6]) for r in mine] == pytest.approx(current_rmse_raw(session.side, actuator), abs=0.006)
+        for column in (2, 4):  # each model holds the one before it
+            errors = [float(r[column]) for r in mine]
+            assert errors == sorted(errors, reverse=True)
+        assert f"({actuator})" in section.conclusion
+    assert published_motors_section(Hand("h", session.side, {}, {}, (), 1e-4, {}, (Motor("absent", 0.0, 1.0, {}, 1.0, ()),)), session) is None
 
 
 def test_engines_that_disagree_are_said_to(residuals):

@@ -13,6 +13,7 @@ from ..replay import Residuals
 from .identified import axes_section, axis_sd_deg, coupling_section, maps_section, repairs_section
 from .motors import motors_section
 from .page import Section, heading, listing, page
+from .published_motors import published_motors_section
 from .replayed import (
     best_mode,
     by_finger,
@@ -51,6 +52,7 @@ def replay_page(residuals: Residuals, *further: Section) -> bytes:
         maps_section(hand, map_pictures(residuals)),
         coupling_section(hand),
         motors_section(hand),
+        published_motors_section(hand, residuals.session),
         clock_section(residuals),
         engines_section(residuals),
         _repairs(residuals),
