@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rig_bench import ARM, Motion, recorded
 
 from hand_model.rig import diagnose_rig, load_rig
 from hand_model.rig.candidates import UNDECLARED, candidates
@@ -14,20 +15,6 @@ from hand_model.rig.diagnose import trusted_fit
 from hand_model.rig.laws import GEAR, Now, law
 from hand_model.session import read_session
 
-ARM = """<mujoco><compiler angle="radian"/><option timestep="0.001" integrator="implicitfast" gravity="0 0 -9.81"/>
-<worldbody><body name="arm"><joint name="hinge" axis="0 -1 0" armature="0.002" damping="0.02" frictionloss="0.05"/>
-<inertial pos="0 0 -0.2" mass="0.5" diaginertia="0.002 0.002 0.0002"/></body></worldbody>
-<actuator><motor name="motor" joint="hinge"/></actuator></mujoco>
-"""
-HEAD = """format = "hand-session/1"
-[hand]
-name = "bench"
-[rig]
-model = "rig.xml"
-[signals]
-position = "joint:hinge:position"
-torque = "actuator:motor:force"
-"""
 SIZE = 0.25
 LAWS = {"motor side": lambda drive, load, bias: np.abs(drive), GEAR: lambda drive, load, bias: 0.5 * np.abs(drive + bias),
         "": lambda drive, load, bias: np.abs(load)}  # fmt: skip
@@ -36,25 +23,19 @@ LAWS = {"motor side": lambda drive, load, bias: np.abs(drive), GEAR: lambda driv
 def bench(folder: Path, side: str | None = None, offset: float = 0.0, stiffness: float = 0.0, weight: float = 9.81) -> Path:
     """Five recordings of two sines each, the last held out: friction in proportion to one side of the gear (None: constant),
     an offset [N m] and a spring [N m/rad] that nobody declared; weight [m/s2]: of the arm."""
-    random, text = np.random.default_rng(4), HEAD
-    (folder / "log").mkdir(parents=True)
-    (folder / "rig.xml").write_text(ARM.replace("-9.81", repr(-weight)))
-    t = np.arange(0, 12, 0.004)
-    for k in range(5):
-        rate, size = 2 * np.pi * random.uniform([0.2, 0.6], [0.45, 1.2]), random.uniform([0.5, 0.15], [0.9, 0.3])
-        phase = np.outer(rate, t) + random.uniform(0, 6, 2)[:, None]
-        q, v, a = size @ np.sin(phase), (size * rate) @ np.cos(phase), -(size * rate**2) @ np.sin(phase)
+
+    def torque(motion: Motion) -> np.ndarray:
+        _, q, v, a = motion
         bias = 0.6 * 0.2 * weight * np.sin(q)
         load = bias + (0.6 * 0.04 + 0.002) * a
         rest = load + 0.004 * a + 0.03 * v + offset + stiffness * q
-        torque = rest + 0.08 * np.sign(v)
+        asked = rest + 0.08 * np.sign(v)
         for _ in range(60 if side is not None else 0):  # the friction is part of the drive's effort that it grows with
-            torque = rest + np.sign(v) * (0.08 + SIZE * LAWS[side](torque, load, bias))
-        table = np.stack([t, np.round(q / 4e-4) * 4e-4, torque + 0.01 * random.standard_normal(len(t))], 1)
-        np.savetxt(folder / f"log/{k}.csv", table, delimiter=",", header="time,position,torque", comments="", fmt="%.8g")
-        text += f'[[trial]]\nkind = "motion"\nlog = "log/{k}.csv"\n' + ('purpose = "validate"\n' if k > 3 else "")
-    (folder / "session.toml").write_text(text)
-    return folder
+            asked = rest + np.sign(v) * (0.08 + SIZE * LAWS[side](asked, load, bias))
+        return asked
+
+    arm = ARM.replace('damping="', 'armature="0.002" damping="').replace("-9.81", repr(-weight))
+    return recorded(folder, arm, 5, torque, 0.01)
 
 
 @pytest.mark.parametrize("side", LAWS)

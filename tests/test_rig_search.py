@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from rig_bench import ARM, Motion, recorded
 
 from hand_model.effects.path import jenkins
 from hand_model.rig import diagnose_rig, load_rig
@@ -21,42 +22,17 @@ from hand_model.rig.swing import Lane, Swing
 from hand_model.rig.swing_build import ENOUGH_STEPS, thinned
 from hand_model.session import read_session
 
-ARM = """<mujoco><compiler angle="radian"/><option timestep="0.001" integrator="implicitfast" gravity="0 0 -9.81"/>
-<worldbody><body name="arm"><joint name="hinge" axis="0 -1 0" damping="0.02" frictionloss="0.05"/>
-<inertial pos="0 0 -0.2" mass="0.5" diaginertia="0.002 0.002 0.0002"/></body></worldbody>
-<actuator><motor name="motor" joint="hinge"/></actuator></mujoco>
-"""
-HEAD = """format = "hand-session/1"
-[hand]
-name = "bench"
-[rig]
-model = "rig.xml"
-[signals]
-position = "joint:hinge:position"
-torque = "actuator:motor:force"
-"""
-
 
 def bench(folder: Path, by_load: float, noise: float, late: float = 0.0, last: float = 1.0) -> Path:
     """Six recordings of two sines each, the last two held out; by_load: friction per load, which turns round over 0.1 rad;
     noise [N m] of the torque, which acts late [s] after it is recorded; last: times as fast the fourth of them."""
-    random, text = np.random.default_rng(4), HEAD
-    (folder / "log").mkdir(parents=True)
-    (folder / "rig.xml").write_text(ARM)
-    t = np.arange(0, 12, 0.004)
-    for k in range(6):
-        rate, size = 2 * np.pi * random.uniform([0.2, 0.6], [0.45, 1.2]), random.uniform([0.5, 0.15], [0.9, 0.3])
-        rate = rate * (last if k == 3 else 1.0)
-        phase = np.outer(rate, t) + random.uniform(0, 6, 2)[:, None]
-        q, v, a = size @ np.sin(phase), (size * rate) @ np.cos(phase), -(size * rate**2) @ np.sin(phase)
+
+    def torque(motion: Motion) -> np.ndarray:
+        t, q, v, a = motion
         load = (0.6 * 0.04 + 0.002) * a + 0.6 * 0.2 * 9.81 * np.sin(q)
-        torque = load + 0.03 * v + 0.08 * np.sign(v) + by_load * np.abs(load) * jenkins(q, 0.1)
-        torque = np.interp(t + late, t, torque)
-        table = np.stack([t, np.round(q / 4e-4) * 4e-4, torque + noise * random.standard_normal(len(t))], 1)
-        np.savetxt(folder / f"log/{k}.csv", table, delimiter=",", header="time,position,torque", comments="", fmt="%.8g")
-        text += f'[[trial]]\nkind = "motion"\nlog = "log/{k}.csv"\n' + ('purpose = "validate"\n' if k > 3 else "")
-    (folder / "session.toml").write_text(text)
-    return folder
+        return np.interp(t + late, t, load + 0.03 * v + 0.08 * np.sign(v) + by_load * np.abs(load) * jenkins(q, 0.1))
+
+    return recorded(folder, ARM, 6, torque, noise, last)
 
 
 def test_friction_by_load_that_turns_round_over_a_distance(tmp_path: Path) -> None:

@@ -22,7 +22,6 @@ UNCLEAR = 0.3  # share of the lateness that the motion has too, from which it is
 LEAST_ANSWERS = 5
 UNLIKE = 0.4  # sample intervals by which the answers of healthy drives of one session differ
 USUAL_START = 2.0  # sample intervals after which a healthy drive is seen to move
-
 EARLY_S = 0.2  # by which a current's time stamps may run ahead
 
 
@@ -89,16 +88,22 @@ def _latencies(state: DriveState, channel: Array, early_s: float = 0.0) -> list[
     out = []
     for k in np.flatnonzero(np.diff(setpoint)) + 1:
         way, ahead = np.sign(setpoint[k] - setpoint[k - 1]), int(np.searchsorted(t, t[k] - early_s))
-        for begin in ((ahead, k) if ahead < k else (k,)):
-            before = channel[(t > t[begin] - 0.2) & (t < t[begin])]
-            if len(before) < 5:
-                continue
-            away = way * (channel[begin : k + 60] - np.median(before)) > 3 * max(float(np.std(before)), 1e-9)
-            hit = np.flatnonzero(away[:-1] & away[1:])
-            if len(hit) and (begin == k or (begin + hit[0] < k - 1 and away[hit[0] : k - begin].all())):
-                out.append(float(t[begin + hit[0]] - t[k]))
-                break
+        hit, away = _departure(t, way * channel, ahead, k + 60) if ahead < k else (None, None)
+        if hit is None or hit >= k - 1 or not away[hit - ahead : k - ahead].all():
+            hit, _ = _departure(t, way * channel, k, k + 60)
+        if hit is not None:
+            out.append(float(t[hit] - t[k]))
     return out
+
+
+def _departure(t: Array, channel: Array, begin: int, end: int) -> tuple[int | None, NDArray[np.bool_]]:
+    """The first of two samples from `begin` on that lie above what the channel (n,) was before, and which do (end - begin,); None where none are."""
+    before = channel[(t > t[begin] - 0.2) & (t < t[begin])]
+    if len(before) < 5:
+        return None, np.zeros(0, bool)
+    away = channel[begin:end] - np.median(before) > 3 * max(float(np.std(before)), 1e-9)
+    hit = np.flatnonzero(away[:-1] & away[1:])
+    return (begin + int(hit[0]) if len(hit) else None), away
 
 
 def _usual(latency_s: Array, step_s: float) -> Array:

@@ -95,8 +95,7 @@ def _without_shadows(ranked: list[tuple[float, Finding]]) -> list[tuple[float, F
 def _without_tilts(ranked: list[tuple[float, Finding]]) -> list[tuple[float, Finding]]:
     """Without what a joint that is no plain hinge leaves in its angle: small departures of that finger's angles are no evidence."""
     crooked = {f.where["finger"]: weight for weight, f in ranked if f.effect in HINGE}
-    small = {id(f) for weight, f in ranked if f.effect in ANGULAR and weight < TILT * crooked.get(f.where["finger"], 0.0)}
-    return [(weight, f) for weight, f in ranked if id(f) not in small]
+    return [(weight, f) for weight, f in ranked if f.effect not in ANGULAR or weight >= TILT * crooked.get(f.where["finger"], 0.0)]
 
 
 def _merged(found: tuple[Named, ...]) -> list[tuple[Named, float, float]]:

@@ -28,7 +28,7 @@ def write_corrected(session: Session, findings: Sequence[Finding], encoders: Map
     manifest names them, everything else is copied as it is. Replaces an earlier copy.
     """
     markers = {str(f.where["finger"]) for f in findings if f.effect in (*SLIPS, "marker_swap")}
-    drifts = {name: 1 / (1 + f.parameters["rate_minus_one"]["value"]) - 1 for f in findings if f.effect == "clock_drift" for name in _logs_of(session, f)}
+    drifts = {name: f.parameters["rate_minus_one"]["value"] for f in findings if f.effect == "clock_drift" for name in _logs_of(session, f)}
     turned = {str(f.where["actuator"]) for f in findings if f.effect == "encoder_periodic_error"} & set(encoders)
     if not markers and not drifts and not turned:
         return None
@@ -95,7 +95,7 @@ def _write_log(session: Session, trial: Trial, drift: float, correct: Callable[[
     columns = dict(log.columns)
     if correct is not None:
         columns["position"] = correct(columns["position"])
-    time_s = log.time_s[0] + (log.time_s - log.time_s[0]) * (1 + drift)
+    time_s = log.time_s[0] + (log.time_s - log.time_s[0]) / (1 + drift)
     return _replace(session, trial.log_path, target, ".csv", lambda path: write_csv(path, time_s, columns))
 
 

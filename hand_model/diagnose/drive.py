@@ -117,8 +117,7 @@ def is_measured(states: tuple[DriveState, ...]) -> bool:
     if len(np.unique(current)) <= 3 or spread == 0:
         return False
     declared = np.concatenate([s.declared[np.isfinite(s.effort)] for s in states])
-    scale = np.linalg.norm(declared, axis=0) + 1e-12
-    left = float(np.std(current - declared @ (np.linalg.lstsq(declared / scale, current, rcond=None)[0] / scale)))
+    left = float(np.std(current - declared @ _coefficients(declared, current)))
     jitter = float(np.median(np.abs(np.diff(current, 2)))) / 0.6745 / np.sqrt(6)
     return left < UNMOVED * spread and not (jitter < 0.03 * spread and left > 10 * max(jitter, 0.02 * spread))
 
@@ -168,8 +167,7 @@ def with_timing(state: DriveState) -> DriveState:
     seen = np.isfinite(state.effort)
     if seen.sum() < 20:
         return state
-    scale = np.linalg.norm(state.declared[seen], axis=0) + 1e-12
-    beta = np.linalg.lstsq(state.declared[seen] / scale, state.effort[seen], rcond=None)[0] / scale
+    beta = _coefficients(state.declared[seen], state.effort[seen])
     step = float(np.median(np.diff(state.time_s)))
     slope = np.abs(np.gradient(state.declared @ beta, state.time_s))
     slope = np.maximum.reduce([np.roll(slope, k) for k in (-2, -1, 0, 1, 2)])
@@ -185,8 +183,7 @@ def with_required(states: tuple[DriveState, ...]) -> tuple[DriveState, ...]:
     """The states with the effort "required" (n,) by the declared model fitted to all of them."""
     seen = [np.isfinite(s.effort) for s in states]
     matrix = np.concatenate([s.declared[k] for s, k in zip(states, seen, strict=True)])
-    scale = np.linalg.norm(matrix, axis=0) + 1e-12
-    beta = np.linalg.lstsq(matrix / scale, np.concatenate([s.effort[k] for s, k in zip(states, seen, strict=True)]), rcond=None)[0] / scale
+    beta = _coefficients(matrix, np.concatenate([s.effort[k] for s, k in zip(states, seen, strict=True)]))
     return tuple(replace(s, extra={**s.extra, "required": s.declared @ beta}) for s in states)
 
 
@@ -211,5 +208,10 @@ def _misfit(states: Sequence[DriveState], give: float) -> float:
         columns.append(declared[seen])
         efforts.append(state.effort[seen])
     a, y = np.concatenate(columns), np.concatenate(efforts)
-    scale = np.linalg.norm(a, axis=0) + 1e-12
-    return float(np.sum((y - a @ (np.linalg.lstsq(a / scale, y, rcond=None)[0] / scale)) ** 2))
+    return float(np.sum((y - a @ _coefficients(a, y)) ** 2))
+
+
+def _coefficients(columns: Array, effort: Array) -> Array:
+    """Of columns (n, k) of any size, by least squares on the effort (n,)."""
+    scale = np.linalg.norm(columns, axis=0) + 1e-12
+    return np.linalg.lstsq(columns / scale, effort, rcond=None)[0] / scale

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from ..errors import HandModelError
 from ..hand import Hand
 from ..identify.motor.published import MODELS, PublishedFit, fit_published, smear_share
-from ..identify.motor.recording import MotorTrial, actuator_trials, check_trials, motor_trial, trial_scale
+from ..identify.motor.recording import MotorTrial, motor_trials
 from ..published import current_rmse_raw
 from ..session import Session
 from .page import Cell, Section, note, table
@@ -48,14 +48,7 @@ def _fit(fit: PublishedFit) -> tuple[str, str | Cell]:
 
 def _trials(session: Session, actuator: str) -> Sequence[MotorTrial]:
     """The trials from which a motor is identified; none where they cannot be used."""
-    full = next((a.speed_full for a in session.actuators if a.name == actuator), None)
     try:
-        logs = [(t.name, t.log()) for t in actuator_trials(session, actuator)] if full is not None else []
-        if not logs:
-            return ()
-        scale = trial_scale(logs, full)
-        trials = [motor_trial(name, log, scale) for name, log in logs]
-        check_trials(trials)
+        return motor_trials(session, actuator)[0]
     except HandModelError:
         return ()
-    return trials

@@ -20,7 +20,7 @@ from .drive import STRIBECK
 from .moves import BEFORE, MoveData, moves_from_rest
 from .output_error import FINE, OutputErrorFit
 from .published import PublishedFit, fit_published, smear_share
-from .recording import MotorTrial, Scale, actuator_trials, check_trials, motor_trial, trial_scale
+from .recording import MotorTrial, Scale, actuator_trials, motor_trials
 from .replicates import lack_of_fit
 from .weak_form import GIVE, Regression, fit_regressions
 
@@ -144,16 +144,7 @@ def identify_motor(session: Session, actuator: str) -> MotorFit:
 
     Raises IdentificationError where they hold no excitation, one direction only, or a current that is constant, clipped or a command.
     """
-    found = actuator_trials(session, actuator)
-    if not found:
-        raise IdentificationError(
-            f'{session.path}: actuator "{actuator}" has no excitation or flexion trial with a log; one with motion both ways is needed'
-        )
-    full = next(a.speed_full for a in session.actuators if a.name == actuator)
-    logs = [(t.name, t.log()) for t in found]
-    scale = trial_scale(logs, full)
-    trials = [motor_trial(name, log, scale) for name, log in logs]
-    check_trials(trials)
+    trials, scale = motor_trials(session, actuator)
     return fit_motor(trials, scale, actuator)
 
 

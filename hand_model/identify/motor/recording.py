@@ -205,3 +205,21 @@ def _follows_command(t: MotorTrial) -> str | None:
         if np.var(t.current - fitted) < 0.005 * np.var(t.current):
             return f'equals a function of column "{name}" to {100 * np.std(t.current - fitted) / np.std(t.current):.1f} %'
     return None
+
+
+def motor_trials(session: Session, actuator: str) -> tuple[list[MotorTrial], Scale]:
+    """The trials from which a motor is identified, checked, and their scale (validation trials take no part).
+
+    Raises IdentificationError where there are none, or where they hold no excitation, one direction only, or a current that is constant, clipped or a command.
+    """
+    found = actuator_trials(session, actuator)
+    if not found:
+        raise IdentificationError(
+            f'{session.path}: actuator "{actuator}" has no excitation or flexion trial with a log; one with motion both ways is needed'
+        )
+    full = next(a.speed_full for a in session.actuators if a.name == actuator)
+    logs = [(t.name, t.log()) for t in found]
+    scale = trial_scale(logs, full)
+    trials = [motor_trial(name, log, scale) for name, log in logs]
+    check_trials(trials)
+    return trials, scale

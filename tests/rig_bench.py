@@ -1,0 +1,42 @@
+"""An arm on a bench, as a rig session: one hinge with a motor, moved in two sines at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+ARM = """<mujoco><compiler angle="radian"/><option timestep="0.001" integrator="implicitfast" gravity="0 0 -9.81"/>
+<worldbody><body name="arm"><joint name="hinge" axis="0 -1 0" damping="0.02" frictionloss="0.05"/>
+<inertial pos="0 0 -0.2" mass="0.5" diaginertia="0.002 0.002 0.0002"/></body></worldbody>
+<actuator><motor name="motor" joint="hinge"/></actuator></mujoco>
+"""
+HEAD = """format = "hand-session/1"
+[hand]
+name = "bench"
+[rig]
+model = "rig.xml"
+[signals]
+position = "joint:hinge:position"
+torque = "actuator:motor:force"
+"""
+Motion = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # time [s], angle [rad], velocity, acceleration
+
+
+def recorded(folder: Path, arm: str, count: int, torque: Callable[[Motion], np.ndarray], noise: float, last: float = 1.0) -> Path:
+    """A session of `count` recordings, those after the fourth held out; torque [N m] of a motion, noise [N m]; last: times as fast the fourth of them."""
+    random, text = np.random.default_rng(4), HEAD
+    (folder / "log").mkdir(parents=True)
+    (folder / "rig.xml").write_text(arm)
+    t = np.arange(0, 12, 0.004)
+    for k in range(count):
+        rate, size = 2 * np.pi * random.uniform([0.2, 0.6], [0.45, 1.2]), random.uniform([0.5, 0.15], [0.9, 0.3])
+        rate = rate * (last if k == 3 else 1.0)
+        phase = np.outer(rate, t) + random.uniform(0, 6, 2)[:, None]
+        q, v, a = size @ np.sin(phase), (size * rate) @ np.cos(phase), -(size * rate**2) @ np.sin(phase)
+        table = np.stack([t, np.round(q / 4e-4) * 4e-4, torque((t, q, v, a)) + noise * random.standard_normal(len(t))], 1)
+        np.savetxt(folder / f"log/{k}.csv", table, delimiter=",", header="time,position,torque", comments="", fmt="%.8g")
+        text += f'[[trial]]\nkind = "motion"\nlog = "log/{k}.csv"\n' + ('purpose = "validate"\n' if k > 3 else "")
+    (folder / "session.toml").write_text(text)
+    return folder
