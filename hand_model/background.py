@@ -1,4 +1,5 @@
-"""The other cores for independent calls, where the platform can fork; elsewhere they simply run when their results are asked for."""
+"""The other cores: for independent calls where the platform can fork, elsewhere these simply run when their results are asked
+for; not for threads within a matrix product."""
 
 from __future__ import annotations
 
@@ -7,9 +8,20 @@ import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import contextmanager
 from typing import Any
 
 WORKERS = 2
+
+
+@contextmanager
+def single_threaded() -> Iterator[None]:
+    """BLAS on one thread, here and in what is forked from here: matrices are small, and threads of two processes on two cores
+    wait for each other. Also a decorator."""
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1, "blas"):
+        yield
 
 
 class Background:

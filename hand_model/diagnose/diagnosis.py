@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..background import Background
+from ..background import Background, single_threaded
 from ..effects import catalogue
 from ..effects.base import DriveState
 from ..errors import HandModelError
@@ -37,6 +37,7 @@ from .station import Station, judged
 EARLY = 3.0  # standard deviations by which answers that come before the command say so for sure
 
 
+@single_threaded()
 def diagnose(session: Session | str | Path, model: Any = None, output: str | Path | None = None,
              say: Callable[[str], None] | None = None) -> Findings:
     """Say what physics is missing from the declared model of a recorded hand.

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..background import Background
+from ..background import Background, single_threaded
 from ..errors import IdentificationError
 from ..hand import Finger, Hand, Joint, Motor
 from ..rotation import angle_between, kabsch, skew
@@ -54,6 +54,7 @@ def identify(session: Session | str | Path, say: Callable[[str], None] = lambda 
     return identify_all(session, say).hand
 
 
+@single_threaded()
 def identify_all(session: Session | str | Path, say: Callable[[str], None] = lambda _: None) -> Identification:
     """As `identify`, keeping poses, residuals and clocks for a report or a diagnosis."""
     session = session if isinstance(session, Session) else read_session(session)

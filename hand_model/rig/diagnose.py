@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..background import single_threaded
 from ..session import Session
 from .candidates import Candidate, candidates
 from .channels import ChannelIssue, check_balance, check_channels
@@ -51,6 +52,7 @@ PROBABILITY = (
 TIED_TO_POSITION = frozenset({"nonlinear_spring", "end_stop_contact", "detent_load", "torque_ripple"})
 
 
+@single_threaded()
 def diagnose_rig(session: Session, output: str | Path | None = None,
                  progress: Callable[[str], None] | None = None) -> RigFindings:  # fmt: skip
     """Diagnose a rig session; with `output`, also write findings.json and the improved rig.xml there.

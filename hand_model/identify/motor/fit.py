@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...background import single_threaded
 from ...errors import IdentificationError
 from ...hand import Estimate, Motor
 from ...session import Session
@@ -148,6 +149,7 @@ def identify_motor(session: Session, actuator: str) -> MotorFit:
     return fit_motor(trials, scale, actuator)
 
 
+@single_threaded()
 def identify_motors(session: Session) -> tuple[tuple[Motor, ...], tuple[str, ...]]:
     """Motors of all actuators with usable logs, and notes: one sentence for each that could not be identified.
 
