@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from hand_model.diagnose.correct import write_corrected, write_csv, write_tsv
+from hand_model.diagnose.correct import corrected_markers, write_corrected, write_csv, write_tsv
 from hand_model.diagnose.findings import Finding
 from hand_model.session import Mocap, read_session
 from hand_model.session.csv_log import read_csv_log
@@ -76,3 +78,45 @@ def test_nothing_is_written_where_nothing_is_to_be_put_right(session: Path, tmp_
     physics = replace(finding("stribeck_friction", []), correction=None)
     assert write_corrected(read_session(session), [physics], {}, tmp_path) is None
     assert not list(tmp_path.iterdir())
+
+
+def test_the_copy_names_its_files_however_the_manifest_spells_them_and_may_lie_in_the_session(session: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "it's mine"
+    shutil.copytree(session, folder)
+    manifest = folder / "session.toml"
+    manifest.write_text(manifest.read_text().replace('"log/', '"./log//') + "# the laboratory's own words\n")
+    read = read_session(folder)
+    trial = next(t for t in read.trials if t.kind == "flexion")
+    drift = finding("clock_drift", [trial.name], rate_minus_one={"value": 0.002, "unit": "1"})
+    for output in (folder / "diagnosis", folder):
+        for _ in range(2):  # again into the same folder
+            copy = write_corrected(read, [drift], {}, output)
+            again = read_session(copy)
+            assert [t.log_path.name for t in again.select("flexion", trial.finger)] == [
+                f"{t.log_path.stem}_corrected.csv" for t in read.select("flexion", trial.finger)]
+            assert not list(copy.rglob("corrected"))
+        shutil.rmtree(copy)
+
+
+def test_a_file_of_several_fingers_is_put_right_finger_by_finger(session: Path) -> None:
+    read = read_session(session)
+    recorded = read.select("flexion")[0].mocap()
+    seen = {label: recorded.markers([label]) for label in recorded.labels}
+    first, second = recorded.labels[-2:]
+    shift = np.array([0.0, 0.0, 0.004])
+
+    def angles_of(label: str) -> SimpleNamespace:
+        labels = (*read.palm.labels, label)
+        data = SimpleNamespace(labels=labels, position_world=recorded.markers(labels))
+        pose = SimpleNamespace(rotation=np.broadcast_to(np.eye(3), (len(recorded.time_s), 3, 3)))
+        return SimpleNamespace(records=[SimpleNamespace(mocap=recorded, data=data, pose=pose)])
+
+    columns = np.zeros((1, 12, 3))
+    columns[0, 9:] = np.eye(3)  # the last of four markers
+    slip = SimpleNamespace(effect="marker_slip", columns=columns, coefficients=shift)
+    naming = SimpleNamespace(blocks=SimpleNamespace(record=np.zeros(1, int), time_s=np.zeros(1)), found=[slip])
+    once = corrected_markers(angles_of(first), naming, 0, {"marker_slip"}, recorded)
+    both = corrected_markers(angles_of(second), naming, 0, {"marker_slip"}, once)
+    for label in recorded.labels:
+        moved = shift if label in (first, second) else 0.0
+        np.testing.assert_allclose(both.markers([label]), seen[label] - moved, atol=1e-12)

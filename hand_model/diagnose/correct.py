@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import posixpath
+import re
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -9,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..session import Finger, Mocap, Session, Trial
+from ..session import Mocap, Session, Trial
 from .angles import FingerAngles, finger_angles
 from .findings import Finding
 from .markers import MarkerNaming, name_markers
@@ -18,6 +20,7 @@ Array = NDArray[np.float64]
 
 SLIPS = ("marker_slip", "palm_marker_slip", "support_slip")
 FOLDER = "corrected"
+OURS = ("findings.json", "report.html", "model_before", "model", FOLDER)  # what a diagnosis writes
 
 
 def write_corrected(session: Session, findings: Sequence[Finding], encoders: Mapping[str, Callable[[Array], Array]],
@@ -25,22 +28,22 @@ def write_corrected(session: Session, findings: Sequence[Finding], encoders: Map
     """Write the session with every correction of `findings` applied into `output`/corrected; None where there is none to apply.
 
     encoders: actuator -> correction of its encoder counts. Marker files become QTM TSV, logs CSV, where they are changed; the
-    manifest names them, everything else is copied as it is. Replaces an earlier copy.
+    manifest names them, everything else is copied as it is, but for `output` itself. Replaces an earlier copy.
     """
-    markers = {str(f.where["finger"]) for f in findings if f.effect in (*SLIPS, "marker_swap")}
+    markers = {finger.name: {f.effect for f in findings if f.effect == "palm_marker_slip" or f.where["finger"] == finger.name}
+               & {*SLIPS, "marker_swap"} for finger in session.fingers}
     drifts = {name: f.parameters["rate_minus_one"]["value"] for f in findings if f.effect == "clock_drift" for name in _logs_of(session, f)}
     turned = {str(f.where["actuator"]) for f in findings if f.effect == "encoder_periodic_error"} & set(encoders)
-    if not markers and not drifts and not turned:
+    if not any(markers.values()) and not drifts and not turned:
         return None
     target = output / FOLDER
     if target.exists():
         shutil.rmtree(target)
-    shutil.copytree(session.path, target)
+    ours = {output.resolve(), *(output.resolve() / name for name in OURS)}  # the output may lie in the session
+    shutil.copytree(session.path, target, ignore=lambda folder, names: [n for n in names if (Path(folder) / n).resolve() in ours])
     renamed: dict[str, str] = {}
-    applied = {f.effect for f in findings}
-    for finger in session.fingers:
-        if finger.name in markers:
-            renamed |= _write_markers(session, finger, applied, target)
+    for path, mocap in _corrected_files(session, markers).items():
+        renamed |= _replace(session, path, target, ".tsv", lambda file, m=mocap: write_tsv(file, m))
     for trial in session.trials:
         actuator = session.finger(trial.finger).actuator if trial.finger is not None else None
         if trial.log_path is not None and (trial.name in drifts or actuator in turned):
@@ -56,38 +59,42 @@ def _logs_of(session: Session, finding: Finding) -> set[str]:
     return {t.name for t in session.trials if t.finger in fingers}
 
 
-def _write_markers(session: Session, finger: Finger, applied: set[str], target: Path) -> dict[str, str]:
-    """Write the corrected flexion recordings of one finger; old -> new path in the manifest."""
+def _corrected_files(session: Session, markers: Mapping[str, set[str]]) -> dict[Path, Mocap]:
+    """Marker file -> what it should have held; one file may hold several fingers. markers: finger -> effects to put right."""
     from ..identify.identification import palm_shape
 
-    angles = finger_angles(session, finger, palm_shape(session))
-    naming = name_markers(angles)
-    out = {}
-    for index, record in enumerate(angles.records):
-        mocap = corrected_markers(angles, naming, index, applied)
-        out |= _replace(session, record.trial.mocap_path, target, ".tsv", lambda path, m=mocap: write_tsv(path, m))
+    out: dict[Path, Mocap] = {}
+    for finger in (f for f in session.fingers if markers[f.name]):
+        angles = finger_angles(session, finger, palm_shape(session))
+        naming = name_markers(angles)
+        for index, record in enumerate(angles.records):
+            path = Path(str(record.trial.mocap_path))
+            out[path] = corrected_markers(angles, naming, index, markers[finger.name], out.get(path, record.mocap))
     return out
 
 
-def corrected_markers(angles: FingerAngles, naming: MarkerNaming, index: int, applied: set[str]) -> Mocap:
-    """One recording with exchanged labels put right and the named slips' displacement taken out. applied: effects that were found."""
+def corrected_markers(angles: FingerAngles, naming: MarkerNaming, index: int, applied: set[str], into: Mocap) -> Mocap:
+    """One recording with exchanged labels put right and the named slips' displacement taken out. applied: effects that were found.
+    into: the recording as it is, or as another finger's correction left it."""
     from dataclasses import replace
 
     record = angles.records[index]
-    position = np.array(record.mocap.position_world)
-    seen = record.data.position_world if "marker_swap" in applied else record.mocap.markers(record.data.labels)
+    position = np.array(into.position_world)
+    recorded = record.mocap.markers(record.data.labels)
+    right = np.array(record.data.position_world if "marker_swap" in applied else recorded)
     blocks = naming.blocks
     mine = np.flatnonzero(blocks.record == index)
     edges = 0.5 * (blocks.time_s[mine][1:] + blocks.time_s[mine][:-1])
     nearest = mine[np.searchsorted(edges, record.mocap.time_s)] if len(mine) else mine
-    right = np.array(seen)
     for found in naming.found if len(mine) else ():
         if found.effect in applied and found.effect in SLIPS:
             shift_palm = (found.columns[nearest] @ found.coefficients).reshape(right.shape)
             right -= np.einsum("nij,nmj->nmi", record.pose.rotation, shift_palm)
     for j, label in enumerate(record.data.labels):
-        position[:, record.mocap.labels.index(label)] = right[:, j]
-    return replace(record.mocap, position_world=position)
+        if not np.array_equal(right[:, j], recorded[:, j], equal_nan=True):
+            plain = label if label in into.labels else label.rpartition(":")[2]  # the manifest may carry a subject's prefix
+            position[:, into.labels.index(plain)] = right[:, j]
+    return replace(into, position_world=position)
 
 
 def _write_log(session: Session, trial: Trial, drift: float, correct: Callable[[Array], Array] | None, target: Path) -> dict[str, str]:
@@ -130,11 +137,10 @@ def write_csv(path: Path, time_s: Array, columns: Mapping[str, Array]) -> None:
 
 
 def _rename(manifest: Path, renamed: Mapping[str, str]) -> None:
-    """Put new paths in the place of old ones, in quotes, and leave the rest of the manifest as it is."""
-    text = manifest.read_text()
-    for old, new in renamed.items():
-        for quote in ('"', "'"):
-            text = text.replace(f"{quote}{old}{quote}", f"{quote}{new}{quote}")
-    manifest.write_text(text)
+    """Put new paths in the place of old ones, in quotes and however they are spelt, and leave the rest of the manifest as it is."""
+    def new(quoted: re.Match[str]) -> str:
+        path = renamed.get(posixpath.normpath(quoted[2]))
+        return quoted[0] if path is None else f"{quoted[1]}{path}{quoted[1]}"
 
-
+    text = manifest.read_text(encoding="utf-8-sig")
+    manifest.write_text(re.sub(r"""(["'])((?:(?!\1).)+)\1""", new, text), encoding="utf-8")
