@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from hand_model.diagnose.assemble import _without_shadows, _without_tilts
+from hand_model.diagnose.assemble import _shared, _without_shadows, _without_tilts
 from hand_model.diagnose.findings import Finding, weighed
 
 
@@ -43,3 +43,19 @@ def test_a_trifle_in_the_angles_of_a_finger_whose_joint_wobbles_is_no_finding_an
     drift, other = periodic("clock_drift", "index", 1.0), periodic("spring_decoupling", "ring", 1.0)[1]
     assert _without_tilts([wobble, (0.1, lead)]) == [wobble]
     assert len(_without_tilts([wobble, (0.4, lead), (0.1, drift[1]), (0.1, other)])) == 4
+
+
+def with_share(weight: float, effect: str, finger: str, signal: str, share: float) -> tuple[float, Finding]:
+    where = {"finger": finger, "actuator": finger, "joint": None, "signal": signal, "marker": None, "trials": [], "share_of_mismatch": share}
+    return weight, Finding(effect, (effect,), 1.0, (), where, "", {}, {}, None)
+
+
+def test_shares_of_the_mismatch_are_ranked_as_the_findings_and_are_those_of_the_whole_session() -> None:
+    ranked = [with_share(1e9, "command_as_measurement", "ring", "current", 1.0), with_share(2.0, "detent_load", "index", "current", 0.7),
+              with_share(1.0, "marker_slip", "index", "markers", 1.0)]
+    shares = [f.where["share_of_mismatch"] for f in _shared(ranked)]
+    assert shares == sorted(shares, reverse=True)
+    assert shares[0] == shares[1] == pytest.approx(4 * shares[2])
+    assert sum(shares) == pytest.approx((4 * 1.0 + 4 * 0.7 + 1 * 1.0) / 9)
+    alone = _shared([with_share(2.0, "detent_load", "index", "current", 0.7)])
+    assert alone[0].where["share_of_mismatch"] == pytest.approx(0.7)

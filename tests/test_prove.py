@@ -56,6 +56,16 @@ def test_page_says_what_where_how_sure_and_where_it_is_put_right() -> None:
     assert page.count("<svg") == 2
 
 
+def test_a_refused_channel_is_in_no_copy_and_every_parameter_says_its_interval() -> None:
+    refused = _finding(finding="command_as_measurement", model=None, correction="the channel is refused")
+    findings = Findings("mismatch", {}, {}, (refused,))
+    page = render(findings, (), (), "a session").decode()
+    assert "the channel is refused" in page
+    assert "corrected copy" not in page
+    bare = Finding("marker_swap", ("marker_swap",), 1.0, (), {}, "", {"begin": {"value": 3.0, "unit": "s"}}, {}, None, "put right")
+    assert bare.to_dict()["parameters"]["begin"] == {"value": 3.0, "unit": "s", "ci95": None}
+
+
 def test_page_of_a_consistent_session_has_no_findings() -> None:
     page = render(Findings("consistent", {}, {}, notes=("no palm markers",)), (), (), "a session").decode()
     assert "Nothing is missing" in page

@@ -44,7 +44,7 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
     unexplained += [unrepeated_of(s) for s in stations if _wanders(s, stations)]
     ranked = _without_tilts(_without_shadows(_one_clock(ranked)))
     ranked.sort(key=lambda item: -item[0])
-    found = tuple(f for _, f in ranked)
+    found = _shared(ranked)
     verdict = "mismatch" if found else "unexplained" if unexplained else "consistent"
     worst = max(stations, key=lambda s: variance_ratio(s.naming, s.naming.declared), default=None)
     lack = {"before": 1.0, "after": 1.0, "limit": 1.0}
@@ -55,6 +55,18 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
                 "after": variance_ratio(worst.naming, worst.naming.fit), "limit": 1 + 2.6 * float(np.sqrt(2 / count))}
     return Findings(verdict, lack, _protocol(stations), found, tuple(rejected), tuple(unexplained), _next(found),
                     tuple(channel_of(s) for s in stations), tuple(notes))
+
+
+def _shared(ranked: list[tuple[float, Finding]]) -> tuple[Finding, ...]:
+    """The findings with their shares of the whole session's mismatch, by the squares of the weights that rank them, times what the names of
+    their channels explain. A channel that is refused counts as the heaviest of the others."""
+    heaviest = max((w for w, f in ranked if f.effect != "command_as_measurement"), default=1.0)
+    power = np.array([min(w, heaviest) ** 2 for w, _ in ranked])
+    channels = [tuple(f.where[k] for k in ("finger", "joint", "actuator", "signal")) for _, f in ranked]
+    own = [f.where["share_of_mismatch"] for _, f in ranked]
+    explained = [min(sum(s for s, c in zip(own, channels, strict=True) if c == channel), 1.0) for channel in channels]
+    shares = power / max(power.sum(), 1e-300) * (np.average(explained, weights=power) if power.sum() > 0 else 1.0)
+    return tuple(replace(f, where={**f.where, "share_of_mismatch": float(s)}) for (_, f), s in zip(ranked, shares, strict=True))
 
 
 def _wanders(station: Station, stations: Sequence[Station]) -> bool:

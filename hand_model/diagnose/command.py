@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..effects.base import DriveState
 from .answers import Answers, answers_of, lateness
-from .findings import Finding, weighed
+from .findings import UNWRITTEN, Finding, weighed
 
 Array = NDArray[np.float64]
 
@@ -147,7 +147,7 @@ def command_findings(facts: dict[str, CommandFacts], fingers: dict[str, str | No
     late = lateness({a: f.answers for a, f in facts.items()})
     for actuator, fact in facts.items():
         if actuator in late and len(late[actuator].drive_s):
-            out.append(_delay(actuator, fingers.get(actuator), fact.answers.step_s, late[actuator].drive_s))
+            out.append(_delay(actuator, fingers.get(actuator), fact, late[actuator].drive_s))
         if np.isfinite(fact.ceiling):
             out.append(_ceiling_finding(actuator, fingers.get(actuator), fact))
         elif np.isfinite(fact.sag) and fact.sag > SAG_T * fact.sag_se and fact.sag * fact.load_range > SAG_LEAST:
@@ -180,9 +180,8 @@ def _ceiling_finding(actuator: str, finger: str | None, fact: CommandFacts) -> t
     where = {**_where(actuator, finger), "signal": "current", "trials": list(fact.trials)}
     text = (f"The {actuator} motor is at its limit of {fact.ceiling:.0f} raw in its fastest strokes: the current stays, and speed falls "
             "as the load rises.")
-    model = {"native": True, "mjcf": f"actuator[@name='{actuator}']/@forcerange", "urdf": "limit effort"}
     return fact.cut, Finding("current_saturation", ("current_saturation",), 0.999, (), where, text,
-                        {"limit": {"value": fact.ceiling, "unit": "raw"}}, fit, model)
+                        {"limit": {"value": fact.ceiling, "unit": "raw"}}, fit, dict(UNWRITTEN))
 
 
 def refused(actuator: str, finger: str | None, trials: tuple[str, ...], signal: str = "current") -> tuple[float, Finding]:
@@ -201,17 +200,17 @@ def _where(actuator: str, finger: str | None) -> dict[str, object]:
             "region": None, "share_of_mismatch": 1.0}
 
 
-def _delay(actuator: str, finger: str | None, step_s: float, late_s: Array) -> tuple[float, Finding]:
+def _delay(actuator: str, finger: str | None, fact: CommandFacts, late_s: Array) -> tuple[float, Finding]:
     """Finding of a drive that answers `late_s` (k,) [s] later than a healthy one."""
-    value = float(np.mean(late_s))
+    value, step_s = float(np.mean(late_s)), fact.answers.step_s
     error = 1.96 * float(np.std(late_s)) / np.sqrt(len(late_s))
     fit = {"metric": "command_latency", "unit": "s", "before": value, "after": float(np.std(late_s)),
            "noise_floor": step_s, "ci95_reduction": None, "held_out": [], "engine": "events"}
     half = 0.5 * step_s  # the event itself is known to a sample only
     parameters = {"delay": {"value": value, "unit": "s", "ci95": [value - error - half, value + error + half]}}
     text = f"The {actuator} motor answers its commands {1e3 * value:.0f} ms late."
-    model = {"native": True, "mjcf": f"actuator[@name='{actuator}'] delay", "urdf": "not expressible: kept in hand.json"}
-    return value / REACTION_S, Finding("command_delay", ("command_delay",), 0.999, (), _where(actuator, finger), text, parameters, fit, model)
+    where = {**_where(actuator, finger), "trials": list(fact.trials)}
+    return value / REACTION_S, Finding("command_delay", ("command_delay",), 0.999, (), where, text, parameters, fit, dict(UNWRITTEN))
 
 
 def _sag_finding(actuator: str, finger: str | None, fact: CommandFacts) -> tuple[float, Finding]:

@@ -10,13 +10,14 @@ from pathlib import Path
 from typing import Any
 
 FORMAT = "hand-findings/1"
+UNWRITTEN = {"native": False, "mjcf": None, "urdf": "not expressible"}  # `model` of a finding until a file holds it
 
 
 @dataclass(frozen=True)
 class Finding:
     """One named departure. members: the class of effects that these recordings cannot tell from it (itself included).
 
-    parameters: name -> {"value", "unit", "ci95"}; fit: before, after and noise floor on held-out recordings; model: where it
+    parameters: name -> {"value", "unit", "ci95" (null where none is given)}; fit: before, after and noise floor on held-out recordings; model: where it
     is written; correction: for recordings, what was corrected.
     """
 
@@ -40,7 +41,7 @@ class Finding:
             "alternatives": [{"effect": name, "probability": p} for name, p in self.alternatives],
             "where": dict(self.where),
             "statement": self.statement,
-            "parameters": {k: dict(v) for k, v in self.parameters.items()},
+            "parameters": {k: {**v, "ci95": v.get("ci95")} for k, v in self.parameters.items()},
             "fit": dict(self.fit),
             "model": None if self.model is None else dict(self.model),
         }

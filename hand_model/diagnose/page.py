@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 
 POINTS = 700
 CELLS = 40
+BY_SPEED = ("quadratic_damping", "asymmetric_viscous_friction")
 VERDICTS = {
     "consistent": "Nothing is missing: the declared model explains the recordings within their noise.",
     "mismatch": "Something is missing, and it is named below.",
@@ -87,7 +88,8 @@ def _ranked(findings: Findings) -> list[Any]:
 def _kept(finding: Finding) -> str:
     """Where a finding is written, in words."""
     if finding.correction is not None:
-        return f"in the corrected copy of the session: {finding.correction}"
+        copied = finding.effect != "command_as_measurement"
+        return f"in the corrected copy of the session: {finding.correction}" if copied else finding.correction
     model = finding.model or {}
     if model.get("mjcf"):
         return f"in the MJCF, {model['mjcf']}; URDF: {model['urdf']}"
@@ -128,9 +130,9 @@ def _replayed(replay: Replay, name: str) -> Section:
     """The compiled files' residual map before and after, on recordings that took no part."""
     fit = replay.finding.fit
     place = " ".join(str(replay.finding.where[k]) for k in ("finger", "joint") if replay.finding.where.get(k))
-    largest = _largest(replay.position, replay.velocity, replay.before)
-    drawn = [(f"{label} [{replay.unit}]", _map(replay.position, replay.velocity, residual, replay.noise, replay.position_unit,
-                                               replay.unit, largest))
+    at, axis = _axis(replay.finding.effect, replay.finding.where.get("region"), replay.position, replay.velocity, replay.position_unit)
+    largest = _largest(at, replay.velocity, replay.before)
+    drawn = [(f"{label} [{replay.unit}]", _map(at, replay.velocity, residual, replay.noise, axis, replay.unit, largest))
              for label, residual in (("model as it was: recorded minus replayed", replay.before), ("model with its effects", replay.after))]
     said = (f"{_words(replay.finding.effect)}, {place}: {fit['before']:.4g} to {fit['after']:.4g} {replay.unit}, noise {fit['noise_floor']:.4g}, "
             f"replayed by MuJoCo on {', '.join(replay.trials)}.")
@@ -152,13 +154,16 @@ def _place(station: Any) -> str:
 
 def _first_map(station: Any) -> tuple[str, bytes]:
     position, velocity, residuals, sigma, unit, effort = _maps(station)
-    return f"{_place(station)} [{effort}]", _map(position, velocity, residuals[0], sigma, unit, effort)
+    return f"{_place(station)} [{effort}]", _map(position, velocity, residuals[0], sigma, f"position [{unit}]", effort)
 
 
 def _station(station: Any, name: str) -> Section:
     position, velocity, residuals, sigma, unit, effort = _maps(station)
-    largest = _largest(position, velocity, residuals[0])
-    drawn = [(f"{label} [{effort}]", _map(position, velocity, residual, sigma, unit, effort, largest))
+    first = station.kept[0].term if station.believed else None
+    at, axis = (position, f"position [{unit}]") if first is None else _axis(
+        first.effect.name, first.effect.region(station.naming.balance.states, first.shape), position, velocity, unit)
+    largest = _largest(at, velocity, residuals[0])
+    drawn = [(f"{label} [{effort}]", _map(at, velocity, residual, sigma, axis, effort, largest))
              for label, residual in zip(("declared model, fitted: residual", "with what was named"), residuals, strict=True)]
     if station.believed:
         drawn += [(f"{_words(f.term.effect.name)}: its part through the data less the rest [{effort}]", _curve(station.naming, f, unit, effort))
@@ -166,17 +171,24 @@ def _station(station: Any, name: str) -> Section:
     return Section(name, _place(station), station.line().replace("_", " ") + ".", (figures(*drawn), KEY))
 
 
-def _largest(position: Array, velocity: Array, residual: Array) -> float:
+def _axis(effect: str, region: Mapping[str, Any] | None, position: Array, velocity: Array, unit: str) -> tuple[Array, str]:
+    """Over what (n,) an effect shows best, speed or position, and its name."""
+    if "speed" in (region or {}) or effect in BY_SPEED:
+        return np.abs(velocity), f"speed [{unit}/s]"
+    return position, f"position [{unit}]"
+
+
+def _largest(at: Array, velocity: Array, residual: Array) -> float:
     """Largest mean residual of the map's cells: both maps of a pair are drawn to it."""
-    return max((float(np.nanmax(np.abs(m))) for _, m in _means(position, velocity, residual)), default=0.0)
+    return max((float(np.nanmax(np.abs(m))) for _, m in _means(at, velocity, residual)), default=0.0)
 
 
-def _means(position: Array, velocity: Array, residual: Array) -> list[tuple[Array, Array]]:
-    """Mean position and mean residual (k,) of cells of equal occupation, for rising and for falling positions."""
-    edges = np.quantile(position, np.linspace(0, 1, CELLS + 1))
+def _means(at: Array, velocity: Array, residual: Array) -> list[tuple[Array, Array]]:
+    """Middle and mean residual (k,) of cells of equal occupation along `at` (n,), for rising and for falling positions."""
+    edges = np.quantile(at, np.linspace(0, 1, CELLS + 1))
     out = []
     for way in (velocity > 0, velocity <= 0):
-        cell = np.clip(np.searchsorted(edges, position[way], side="right") - 1, 0, CELLS - 1)
+        cell = np.clip(np.searchsorted(edges, at[way], side="right") - 1, 0, CELLS - 1)
         count = np.bincount(cell, minlength=CELLS)
         mean = np.bincount(cell, residual[way], minlength=CELLS) / np.maximum(count, 1)
         seen = count > 2
@@ -184,17 +196,17 @@ def _means(position: Array, velocity: Array, residual: Array) -> list[tuple[Arra
     return [o for o in out if len(o[0])]
 
 
-def _map(position: Array, velocity: Array, residual: Array, sigma: float, unit: str, effort: str, largest: float = 0.0) -> bytes:
-    """Mean residual over position, per direction, with the noise of one sample as a band."""
+def _map(at: Array, velocity: Array, residual: Array, sigma: float, axis: str, effort: str, largest: float = 0.0) -> bytes:
+    """Mean residual over position or speed (n,), whose name is `axis`, per direction, with the noise of one sample as a band."""
     with drawing() as d:
         d.axes.axhspan(-sigma, sigma, color=MUTED, alpha=0.15, linewidth=0)
         d.axes.axhline(0, color=INK, linewidth=0.6)
-        for colour, (at, mean) in zip(SERIES, _means(position, velocity, residual), strict=False):
-            d.axes.plot(at, mean, color=colour)
+        for colour, (middle, mean) in zip(SERIES, _means(at, velocity, residual), strict=False):
+            d.axes.plot(middle, mean, color=colour)
         if largest:
             span = 1.08 * max(largest, sigma)
             d.axes.set_ylim(-span, span)
-        d.axes.set_xlabel(f"position [{unit}]")
+        d.axes.set_xlabel(axis)
         d.axes.set_ylabel(f"residual [{effort}]")
     return d.svg
 
@@ -205,7 +217,7 @@ def _curve(naming: Any, named: Any, unit: str, effort: str) -> bytes:
     rest = balance.fit(tuple(t for t in fit.terms if t is not named.term))
     use = np.flatnonzero(balance.steady)
     region = named.term.effect.region(balance.states, named.term.shape) or {}
-    speed = "speed" in region or named.term.effect.name in ("quadratic_damping", "asymmetric_viscous_friction")
+    speed = "speed" in region or named.term.effect.name in BY_SPEED
     at = balance.gather(lambda s: s.velocity if speed else s.position)
     shown = use[:: max(1, len(use) // POINTS)]
     way = balance.gather(lambda s: s.velocity) > 0

@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from .findings import Finding, weighed
+from .findings import UNWRITTEN, Finding, weighed
 from .interval import held_out, parameter_intervals, proven, sized, undisturbed
 from .name import ALPHA, EVIDENCE_LEAST, SMALL, Named, Naming, name_effects
 
 # How before and after were computed, said in the findings: no compiled file is involved until one is replayed.
 ENGINE = {"current": "inverse dynamics of the motor's balance, motion as recorded", "encoder": "encoder map, motion as recorded",
           "markers": "linkage polynomial, motion as recorded"}
-UNWRITTEN = {"native": False, "mjcf": None, "urdf": "not expressible"}
 SECOND_HEARINGS, DISPLACING = 2, 0.1  # and the share of what was explained from which a fallen name has displaced others
 CHANNELS = 20  # of a session: what no test of one sees must stand against as many chances
 EXPLAINED_LEAST = 0.7  # of the explainable mismatch: below, the names are not believed
