@@ -197,8 +197,9 @@ def _own(rig: RigModel, fit: DeclaredFit, joint: str, rows: list[Rows]) -> list[
     sample = max(float(np.median(np.diff(t.time_s))) for t in rig.trials)
     late = sorted({round(d, 6) for d in [k * sample for k in DELAYS] + [k * LONGEST_DELAY_S / 6 for k in range(1, 7)]})
     delays = tuple({"delay": sign * d} for d in late if d <= max(8 * sample, LONGEST_DELAY_S) for sign in (-1.0, 1.0))
-    own = _by_load(fit, joint, rows, drive is not None)
-    if drive is not None:
+    driven = drive is not None and any(np.any(r.effort) for r in rows)  # connected somewhere, its channel not refused
+    own = _by_load(fit, joint, rows, driven)
+    if driven:
         measured = drive.kind == "force"
         if not measured:  # a drive can act later than told, not earlier
             delays = tuple(d for d in delays if d["delay"] < 0)

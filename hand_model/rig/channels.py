@@ -20,6 +20,7 @@ from .states import fill_gaps, uniform_time
 Array = NDArray[np.float64]
 SAME = 0.01  # a measured channel differs from its command by more than this share: drives, sensors and CAN buses do
 STRANGE = 0.7  # share of an effort that may stay unexplained before it is said to explain nothing
+UNSIGNED = "has no sign: it follows the size of the expected effort"
 CLIPPED = 0.05  # share of samples on one and the same extreme value
 
 
@@ -176,34 +177,43 @@ def copy_left(values: Array, other: Array) -> float:
 
 def check_balance(rig: RigModel, fit: DeclaredFit) -> tuple[ChannelIssue, ...]:
     """Issues that only the balance shows: an unsigned effort, a computed one, one that explains nothing of the motion."""
-    out: list[ChannelIssue] = []
-    column = {
-        name: c for c, (kind, name, attribute) in rig.quantity.items() if kind == "actuator" and attribute == "force"
-    }
+    force, told = ({name: c for c, (kind, name, attribute) in rig.quantity.items() if kind == "actuator" and attribute == a}
+                   for a in ("force", "ctrl"))  # fmt: skip
     start = np.array([c.value for c in fit.columns])
+    looks: list[tuple[str, Rows, str, float]] = []
     for row in fit.rows:
         drive = rig.drive(row.joint)
-        if drive is None or drive.name not in column or row.moving.sum() < 30:
+        name = None if drive is None else force.get(drive.name, told.get(drive.name))
+        if name is None or row.moving.sum() < 30:
             continue
         y, x = row.effort[row.moving], row.columns[row.moving]
-        predicted = x @ start
-        size = _rms(y)
-        found = None
-        signed, unsigned = copy_left(y, predicted), copy_left(y, np.abs(predicted))
-        if y.min() > -0.05 * y.max() and predicted.min() < -0.3 * predicted.max() and unsigned < 0.5 * signed:
-            found = ("has no sign: it follows the size of the expected effort", unsigned)
-        elif (static := _static(row, x, start)) is not None:
-            found = ("is a static function of the position, without the friction and inertia of the motion", static)
-        elif size > fit.scale[row.joint] and _stranger(fit, row) and (left := _own_fit(fit, row)) > STRANGE:
-            found = ("explains nothing of the motion, though it does in other recordings", left)
-        if found is not None:
-            name = column[drive.name]
-            out.append(
-                ChannelIssue(
-                    "command_as_measurement", name, row.joint, (row.trial,), f"{name} {found[0]}", True, found[1]
-                )
-            )
+        if (share := _unsigned(y, x @ start)) is not None:
+            looks.append((name, row, UNSIGNED, share))
+        elif drive.name not in force:  # what was put in may be any function, and need not explain anything
+            continue
+        elif (share := _static(row, x, start)) is not None:
+            looks.append((name, row, "is a static function of the position, without the friction and inertia of the motion", share))
+        elif _rms(y) > fit.scale[row.joint] and _stranger(fit, row) and (share := _own_fit(fit, row)) > STRANGE:
+            looks.append((name, row, "explains nothing of the motion, though it does in other recordings", share))
+    lacking = {row.joint: (name, share) for name, row, reason, share in looks if reason == UNSIGNED}
+    known = {(row.trial, row.joint) for _, row, _, _ in looks}
+    # A column that has no sign has none in recordings either whose efforts all go one way.
+    looks += [(lacking[r.joint][0], r, UNSIGNED, lacking[r.joint][1]) for r in fit.rows
+              if r.joint in lacking and (r.trial, r.joint) not in known and np.any(r.effort)]  # fmt: skip
+    out = []
+    for name, joint, reason in dict.fromkeys((name, row.joint, reason) for name, row, reason, _ in looks):
+        hits = [(row.trial, share) for n, row, r, share in looks if (n, row.joint, r) == (name, joint, reason)]
+        out.append(ChannelIssue("command_as_measurement", name, joint, tuple(t for t, _ in hits), f"{name} {reason}", True,
+                                float(np.median([share for _, share in hits]))))  # fmt: skip
     return tuple(out)
+
+
+def _unsigned(effort: Array, expected: Array) -> float | None:
+    """Share of an effort (m,) without sign that the size of the expected one (m,) leaves, where that is far less than its value."""
+    if effort.min() <= -0.05 * effort.max() or expected.min() >= -0.3 * expected.max():
+        return None
+    share = copy_left(effort, np.abs(expected))
+    return share if share < 0.5 * copy_left(effort, expected) else None
 
 
 def _stranger(fit: DeclaredFit, row: Rows) -> bool:

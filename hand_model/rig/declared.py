@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .balance import Column, Rows, declared_columns, trial_rows
+from .balance import MOMENTS, Column, Rows, declared_columns, trial_rows
 from .dynamics import inertial_parameters
 from .model import RigModel, RigTrial
 from .overrides import compile_model
@@ -36,7 +36,7 @@ class DeclaredFit:
     cutoff_hz: float
     quality: dict[tuple[str, str], float]
     bodies: Array = field(default_factory=lambda: np.zeros((0, 10)))  # declared inertial parameters, in columns' order
-    anchored: bool = False  # no effort is recorded anywhere: only ratios show, and the declared masses are the scale
+    anchored: bool = False  # no effort is recorded anywhere: only ratios show, and the declared weights are the scale
     beside: Mapping[tuple[str, str], Array] = field(default_factory=dict)  # (trial, joint) -> effort (n,) of effects at full rate
 
     def residual(self, row: Rows) -> Array:
@@ -56,7 +56,7 @@ def bounds(columns: Sequence[Column]) -> tuple[Array, Array]:
 
 def prior(columns: Sequence[Column], anchored: bool = False) -> tuple[Array, Array]:
     """Prior mean and weight (P,): a mass may be wrong by as much as itself, friction and springs by a hundred times;
-    masses are not wrong at all where they are the scale (anchored)."""
+    weights (masses, first moments) are not wrong at all where they are the scale (anchored)."""
     value = np.array([c.value for c in columns])
     moment = {c.name: 0.0 for c in columns if c.kind == "inertial"}
     for c in columns:
@@ -66,7 +66,7 @@ def prior(columns: Sequence[Column], anchored: bool = False) -> tuple[Array, Arr
     value_size = np.maximum(np.abs(value), zero)
     loose = np.array([1.0 if c.kind == "inertial" else 100.0 for c in columns])
     if anchored:
-        loose = np.where(loose == 1.0, 1e-6, loose)
+        loose = np.where([c.part in ("m", *MOMENTS) for c in columns], 1e-6, loose)
     weight = CORRELATED / np.maximum(value_size * loose, 1e-150) ** 2
     return value, np.where(value_size == 0, 1e-12, weight)
 

@@ -44,14 +44,16 @@ def open_loop(rig: RigModel, before: bytes, after: bytes, refused: Collection[tu
     for horizon in HORIZONS_S:
         old = _error(replace(rig, xml=before), trials, states, horizon)
         spread = np.sqrt(np.mean([np.nanvar(np.stack([t.position[j] for j in rig.joints], 1), 0) for t in trials], 0))
-        if (old < CARRIES * spread).all():
-            new = _error(replace(rig, xml=after), trials, states, horizon)
+        if not (old < CARRIES * spread).all():
+            continue
+        new = _error(replace(rig, xml=after), trials, states, horizon)
+        if np.isfinite(new).all():
             joints = {j: {"before": float(a), "after": float(b), "unit": rig.unit(j)}
                       for j, a, b in zip(rig.joints, old, new, strict=True)}  # fmt: skip
             return {"metric": "position_rmse", "horizon_s": "whole" if np.isinf(horizon) else horizon, "engine": "mujoco",
                     "ratio": float(np.sqrt(np.mean((new / np.maximum(old, 1e-300)) ** 2))), "joints": joints,
                     "held_out": [t.name for t in trials]}  # fmt: skip
-    return {"not_run": f"the declared model leaves the recordings within {HORIZONS_S[-1]:g} s"}
+    return {"not_run": f"a simulation leaves the recordings within {HORIZONS_S[-1]:g} s"}
 
 
 def _error(rig: RigModel, trials: Sequence[RigTrial], states: Sequence[States], horizon_s: float) -> Array:

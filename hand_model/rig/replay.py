@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -161,24 +163,42 @@ def simulate_trial(
         data.qvel[:] -= 0.5 * step * data.qacc_smooth
     out = np.empty((len(grid), model.nq))
     plain = not (effects.entries or effects.laws)
-    for k in range(len(grid)):
-        if k and k % stride == 0:
-            data.qpos[:], data.qvel[:] = (s[k // stride] for s in starts)
-        out[k] = data.qpos
-        data.ctrl[:] = control[k]
-        data.qfrc_applied[:] = applied[k]
-        if plain:
-            mujoco.mj_step(model, data)
-            continue
-        mujoco.mj_step1(model, data)
-        mujoco.mj_fwdActuation(model, data)
-        effects.passive(model, data)
-        mujoco.mj_step2(model, data)
-        if not np.isfinite(data.qpos).all():
-            out[k:] = np.nan
-            break
+    with _divergence() as broken:
+        for k in range(len(grid)):
+            if k and k % stride == 0:
+                if broken:
+                    mujoco.mj_resetData(model, data)
+                    broken.clear()
+                data.qpos[:], data.qvel[:] = (s[k // stride] for s in starts)
+            out[k] = np.nan if broken else data.qpos
+            if broken:
+                continue
+            data.ctrl[:] = control[k]
+            data.qfrc_applied[:] = applied[k]
+            if plain:
+                mujoco.mj_step(model, data)
+            else:
+                mujoco.mj_step1(model, data)
+                mujoco.mj_fwdActuation(model, data)
+                effects.passive(model, data)
+                mujoco.mj_step2(model, data)
     at = np.stack([np.interp(trial.time_s, grid, column) for column in out.T], 1)
     return trial.time_s, at
+
+
+@contextmanager
+def _divergence() -> Iterator[list[str]]:
+    """What MuJoCo says of states that are no numbers or too large, after which it goes on from the model's own start; unheard it
+    would write that to a file in the user's folder."""
+    import mujoco
+
+    said: list[str] = []
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda text: said.append(text) if "unstable" in text else None)
+    try:
+        yield said
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
 def can_simulate(rig: RigModel, trial: RigTrial) -> bool:

@@ -1,0 +1,86 @@
+"""Recordings of rigs that lack something: a sign, a drive that is plugged in, any drive at all; files that diverge."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rig_bench import ARM, HEAD, recorded
+
+from hand_model.rig import fit_declared, load_rig, replay_rig
+from hand_model.rig.candidates import candidates
+from hand_model.rig.diagnose import trusted_fit
+from hand_model.session import read_session
+
+VOLTAGE = ARM.replace('<motor name="motor" joint="hinge"/>', '<dcmotor name="motor" joint="hinge" motorconst="0.35 0.35" resistance="3.4"/>')
+OPEN = 'set = { "actuator:motor:gear" = [0, 0, 0, 0, 0, 0] }\n'
+
+
+def balance(motion: tuple[np.ndarray, ...]) -> np.ndarray:
+    """Torque [N m] of the declared arm."""
+    _, q, v, a = motion
+    return 0.022 * a + 0.5 * 0.2 * 9.81 * np.sin(q) + 0.02 * v + 0.05 * np.sign(v)
+
+
+def voltage_bench(folder: Path, size: bool) -> Path:
+    """The arm behind a motor whose voltage [V] is recorded, or only its size."""
+    gain = 0.35 / 3.4
+
+    def told(motion: tuple[np.ndarray, ...]) -> np.ndarray:
+        out = (balance(motion) + gain * 0.35 * motion[2]) / gain
+        return np.abs(out) if size else out
+
+    recorded(folder, VOLTAGE, 5, told, 0.0)
+    text = (folder / "session.toml").read_text().replace("motor:force", "motor:ctrl")
+    (folder / "session.toml").write_text(text)
+    return folder
+
+
+@pytest.mark.parametrize("size", [True, False])
+def test_a_voltage_without_sign_is_refused(tmp_path: Path, size: bool) -> None:
+    """A column that holds the size of a voltage is one issue in all recordings; one with its sign is none."""
+    _, issues = trusted_fit(load_rig(read_session(voltage_bench(tmp_path / "s", size))))
+    if size:
+        assert [i.refuse for i in issues] == [True] and "no sign" in issues[0].reason and len(issues[0].trials) == 5
+    else:
+        assert issues == ()
+
+
+def test_a_drive_that_is_unplugged_has_no_effects(tmp_path: Path) -> None:
+    """Nothing of the drive (a delay, friction by its effort) is a candidate where its leads are open in every recording."""
+    recorded(tmp_path / "s", ARM, 2, balance, 0.0)
+    rig = load_rig(read_session(tmp_path / "s"))
+    names = {c.key for c in candidates(rig, fit_declared(rig), "hinge")}
+    assert {"current_channel_delay@hinge", "load_dependent_friction/motor side@hinge"} <= names
+    path = tmp_path / "s" / "session.toml"
+    path.write_text(path.read_text().replace('.csv"\n', '.csv"\n' + OPEN))
+    rig = load_rig(read_session(tmp_path / "s"))
+    names = {c.key for c in candidates(rig, fit_declared(rig), "hinge")}
+    assert not names & {"current_channel_delay@hinge", "load_dependent_friction/motor side@hinge"}
+    assert "load_dependent_friction@hinge" in names
+
+
+def test_inertia_is_fitted_where_nothing_is_driven(tmp_path: Path) -> None:
+    """A free swing: the weight is the scale and stays as declared; its period tells the inertia, a fifth more than declared."""
+    folder, inertia = tmp_path / "s", 1.2 * (0.002 + 0.5 * 0.2**2)
+    (folder / "log").mkdir(parents=True)
+    (folder / "rig.xml").write_text(ARM.replace('<motor name="motor" joint="hinge"/>', "").replace("0.05", "1e-5"))
+    t = np.arange(0, 12, 0.004)
+    q = 0.02 * np.exp(-0.1 * t) * np.cos(np.sqrt(0.5 * 0.2 * 9.81 / inertia) * t)
+    np.savetxt(folder / "log/0.csv", np.stack([t, q], 1), delimiter=",", header="time,position", comments="", fmt="%.10g")
+    (folder / "session.toml").write_text(HEAD.replace('torque = "actuator:motor:force"\n', "") + '[[trial]]\nkind = "motion"\nlog = "log/0.csv"\n')
+    fit = fit_declared(load_rig(read_session(folder)))
+    found = {c.label: v for c, v in zip(fit.columns, fit.theta, strict=True)}
+    assert found["inertial:arm:hz"] == pytest.approx(-0.1, rel=1e-4)
+    assert found["inertial:arm:Iyy"] == pytest.approx(inertia, rel=0.01)
+
+
+def test_a_file_that_diverges_is_said_to_and_leaves_nothing_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beyond what a simulation can step there is no position error, and MuJoCo writes no log into the user's folder."""
+    stiff = ARM.replace('damping="0.02"', 'damping="0.02" stiffness="1e9"').replace('timestep="0.001"', 'timestep="0.01"').replace("implicitfast", "Euler")
+    session = read_session(recorded(tmp_path / "s", stiff, 1, balance, 0.0))
+    (tmp_path / "empty").mkdir()
+    monkeypatch.chdir(tmp_path / "empty")
+    assert np.isnan(replay_rig(session, efforts=False).joints[0].position_rmse)
+    assert list((tmp_path / "empty").iterdir()) == []
