@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from hand_model.diagnose.balance import Balance, bounded_least_squares
 from hand_model.diagnose.interval import held_out, parameter_intervals, undisturbed
 from hand_model.diagnose.motion import estimate_motion, local_quadratic
 from hand_model.diagnose.name import name_effects
+from hand_model.diagnose.station import judged
 from hand_model.effects import catalogue, effect
 from hand_model.effects.base import DriveState
 
@@ -109,6 +111,19 @@ def test_noise_and_its_correlation_are_measured_beside_a_misfit() -> None:
     white, red = Balance(drive(1, add)), Balance(drive(1, add, colour=0.5))
     assert white.inflation == 1.0 and abs(white.sigma / 5 - 1) < 0.06
     assert 2.0 < red.inflation < 4.2 and abs(red.sigma / 5 - 1) < 0.15  # AR(1), 0.5: (1 + r) / (1 - r) = 3
+
+
+@pytest.mark.parametrize("seed", [21, 24])
+def test_a_faint_effect_needs_the_word_of_untouched_recordings(seed: int) -> None:
+    def half_untouched(states: tuple[DriveState, ...]) -> tuple[DriveState, ...]:
+        return tuple(replace(s, validate=k > 1) for k, s in enumerate(states))
+
+    faint = half_untouched(drive(seed, planted("load_dependent_friction", {}, [0.012])))
+    healthy = half_untouched(drive(seed))
+    borne_out, refuted = (judged("current", "index", "index", None, states, catalogue("drive"))
+                          for states in (faint, (*faint[:2], *healthy[2:])))
+    assert [f.term.effect.name for f in borne_out.kept] == ["load_dependent_friction"] and borne_out.believed
+    assert not refuted.missing
 
 
 def test_naming_never_reads_validation_recordings() -> None:

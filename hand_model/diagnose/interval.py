@@ -181,22 +181,26 @@ def proven(naming: Naming, which: int) -> bool:
 
     True where nothing can be asked: no untouched recording, or an event that belongs to one recording only.
     """
+    brought = brought_held_out(naming, which)
+    return brought is None or brought > 0
+
+
+def brought_held_out(naming: Naming, which: int) -> float | None:
+    """Log likelihood that the term `which`, as fitted to the training recordings, brings to those that took no part, not more than it
+    would without claiming to know less: what they add to its log evidence. None where nothing can be asked: no untouched recording, or
+    an event that belongs to one recording only."""
     balance, fit = naming.balance, naming.fit
-    if "trial" in fit.terms[which].shape or balance.train.all():
-        return True
-    without = balance.fit(tuple(t for i, t in enumerate(fit.terms) if i != which))
     held = ~balance.train & balance.telling(fit.terms[which].effect)
-    if not held.any():
-        return True
-    likelihood = []
-    for f in (without, fit):
-        weight = balance.weights(f.terms)
-        w = weight * held
-        rss = np.sum(balance.whiten((balance.effort - f.prediction) * w, w) ** 2)
-        likelihood.append(balance.inflation * float(np.sum(np.log(weight[held]))) - 0.5 * float(rss))
-    w = balance.weight * held  # and not by claiming to know less alone
-    plain = [np.sum(balance.whiten((balance.effort - f.prediction) * w, w) ** 2) for f in (without, fit)]
-    return bool(likelihood[1] > likelihood[0] and plain[1] < plain[0])
+    if "trial" in fit.terms[which].shape or not held.any():
+        return None
+    without = balance.fit(tuple(t for i, t in enumerate(fit.terms) if i != which))
+    brought = []
+    for weights in ([balance.weights(f.terms) for f in (without, fit)], [balance.weight] * 2):
+        before, after = (balance.inflation * float(np.sum(np.log(w[held])))
+                         - 0.5 * float(np.sum(balance.whiten((balance.effort - f.prediction) * w * held, w * held) ** 2))
+                         for f, w in zip((without, fit), weights, strict=True))
+        brought.append((after - before) / balance.inflation)
+    return min(brought)
 
 
 def sized(reading: Reading, which: int) -> bool:

@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 
 ALPHA = 0.003  # false alarms per channel: 5 % over some fifteen channels of a session
 EVIDENCE_LEAST = 6.0  # log evidence an effect must bring: e^6 against "none", and against the search over shapes
+FAINT = 3.0  # the same of the only one, to be heard: recordings that took no part may bear out the rest
 CLASS_WIDTH = 3.0  # log evidence within which two effects are one class: 20 to 1
 MOST_TERMS = 5
 MOST_SEARCHES = 3  # each with noise that knows what did not repeat beside the effects of the one before
@@ -159,7 +160,7 @@ def _search(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str]
         ranked = rank(balance, effects, fit.terms, fit)
         for rival in ranked:
             brought[rival.name] = max(brought.get(rival.name, -np.inf), rival.evidence)
-        best = next((r for r in ranked if r.evidence >= EVIDENCE_LEAST and r.name not in refused), None)
+        best = next((r for r in ranked if r.evidence >= _least(balance, len(fit.terms)) and r.name not in refused), None)
         if best is None:
             break
         _, settled = settle(balance, effects, best.fit.terms)
@@ -172,6 +173,10 @@ def _search(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str]
         if progress is not None:
             progress(f"{balance.states[0].drive}: {', '.join(t.effect.name for t in fit.terms)}")
     return fit, brought, ranked
+
+
+def _least(balance: Balance, others: int) -> float:
+    return EVIDENCE_LEAST if others or balance.train.all() else FAINT
 
 
 def _names(fit: Fit) -> tuple[str, ...]:
@@ -345,7 +350,7 @@ def _drop(balance: Balance, fit: Fit) -> Fit | None:
     """The fit without the term that costs more than it brings; None where every term pays."""
     for which in range(len(fit.terms)):
         rest = balance.fit(tuple(t for i, t in enumerate(fit.terms) if i != which))
-        if evidence(balance, fit, rest, which, scale_of(balance, fit)) < EVIDENCE_LEAST:
+        if evidence(balance, fit, rest, which, scale_of(balance, fit)) < _least(balance, len(rest.terms)):
             return refit(balance, rest)
     return None
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .findings import UNWRITTEN, Finding, weighed
-from .interval import held_out, parameter_intervals, proven, sized, undisturbed
+from .interval import brought_held_out, held_out, parameter_intervals, sized, undisturbed
 from .name import ALPHA, EVIDENCE_LEAST, SMALL, Named, Naming, name_effects
 
 # How before and after were computed, said in the findings: no compiled file is involved until one is replayed.
@@ -27,8 +27,7 @@ class Station:
         places = {id(f): naming.fit.terms.index(f.term) for f in naming.found}
         self.reading = undisturbed(naming)
         least = EVIDENCE_LEAST + (np.log(CHANNELS) if naming.before.p >= ALPHA else 0.0)
-        stand = [places[id(f)] for f in naming.found
-                 if f.evidence >= least and proven(naming, places[id(f)]) and sized(self.reading, places[id(f)])]
+        stand = [places[id(f)] for f in naming.found if _stands(naming, f, places[id(f)], least) and sized(self.reading, places[id(f)])]
         self.parameters = {which: parameter_intervals(self.reading, which) for which in stand}
         self.proven = tuple(f for f in naming.found if places[id(f)] in stand)
 
@@ -83,6 +82,12 @@ class Station:
         return f"{place}: {names} (p {self.naming.before.p:.2g} -> {self.naming.after.p:.2g})"
 
 
+def _stands(naming: Naming, named: Named, which: int, least: float) -> bool:
+    """Whether recordings that took no part are predicted better with the effect, and all of them together bear it out."""
+    brought = brought_held_out(naming, which)
+    return named.evidence >= least if brought is None else brought > 0 and named.evidence + brought >= least
+
+
 def judged(signal: str, finger: str | None, actuator: str | None, joint: str | None, states: tuple[Any, ...], effects: Iterable[Any],
            typical: Mapping[str, float] | None = None) -> Station:
     """The station of the balance of `states`, named among `effects`. Where a name does not stand, those that it displaced are heard
@@ -91,7 +96,7 @@ def judged(signal: str, finger: str | None, actuator: str | None, joint: str | N
     station = Station(signal, finger, actuator, joint, name_effects(states, left, typical=typical))
     for _ in range(SECOND_HEARINGS):
         fallen = {f.term.effect.name for f in station.naming.found} - {f.term.effect.name for f in station.proven}
-        if sum(f.share for f in station.naming.found if f.term.effect.name in fallen) < DISPLACING:
+        if sum(f.share for f in station.naming.found if f.term.effect.name in fallen and f.evidence >= EVIDENCE_LEAST) < DISPLACING:
             break
         left = tuple(e for e in left if e.name not in fallen)
         other = Station(signal, finger, actuator, joint, name_effects(states, left, typical=typical))
