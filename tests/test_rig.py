@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from hand_model.rig import diagnose_rig, fit_declared, load_rig, replay_rig
 from hand_model.rig.balance import Column
 from hand_model.rig.consistent import BASIS, consistent, is_physical, pseudo_inertia
 from hand_model.rig.dynamics import INERTIAL, inertial_columns, inertial_parameters
+from hand_model.rig.findings import NOT_BORNE_OUT, NOT_TAKEN
 from hand_model.rig.mjcf import read_effects, write_effects
 from hand_model.rig.physical import physical
 from hand_model.rig.solve import solve_bounded
@@ -349,7 +351,10 @@ def test_first_effect_stays_when_the_recording_changes(planted_load: Path, tmp_p
 def test_report_of_a_rig_shows_what_was_found(planted_load: Path, tmp_path: Path) -> None:
     """One page with the map, the effect through the data, before and after; without outside resources."""
     session = read_session(planted_load)
-    page = write_rig_findings(session, diagnose_rig(session), tmp_path / "out").read_text()
+    rejected = ({"effect": "stribeck_friction@hinge", "reason": NOT_BORNE_OUT}, {"effect": "detent_load@hinge", "reason": NOT_TAKEN})
+    findings = replace(diagnose_rig(session), rejected=rejected)
+    page = write_rig_findings(session, findings, tmp_path / "out").read_text()
+    assert "then withdrawn" in page and f"stribeck friction at hinge: {NOT_BORNE_OUT}" in page and "not taken: detent load." in page
     for anchor in ('id="findings"', 'id="map"', 'id="effects"', 'id="validation"', "load dependent friction"):
         assert anchor in page
     assert "http://" not in page.replace("http://www.w3.org", "")

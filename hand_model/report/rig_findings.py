@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rig.findings import CouplingResidual, Finding, RigFindings
+from ..rig.findings import NOT_TAKEN, CouplingResidual, Finding, RigFindings
 from ..rig.inverse import EffortResidual, effort_residuals
 from ..rig.model import RigModel, load_rig
 from ..rig.replay import simulate_trial
@@ -289,11 +289,20 @@ def _motion(rig: RigModel, findings: RigFindings) -> list[Section]:
         key(("c2", "recorded"), ("c1", "declared model"), ("ink", "with what was found")), figures(*drawn[:PICTURES])))]  # fmt: skip
 
 
+def _place(key: str) -> str:
+    """effect@joint in words."""
+    effect, _, joint = key.partition("@")
+    return effect.replace("_", " ") + (f" at {joint}" if joint else "")
+
+
 def _rest(findings: RigFindings) -> tuple[Element, ...]:
     said = [f"{u['where']['joint'] or 'the joint'}: {100 * u['share_of_mismatch']:.0f} % of the mismatch stays unexplained."
             for u in findings.unexplained]  # fmt: skip
-    tried = sorted({r["effect"].split("@")[0].replace("_", " ") for r in findings.rejected})
+    withdrawn = [f"{_place(r['effect'])}: {r['reason']}." for r in findings.rejected if r["reason"] != NOT_TAKEN]
+    tried = sorted({r["effect"].split("@")[0].replace("_", " ") for r in findings.rejected if r["reason"] == NOT_TAKEN})
     parts = [listing(said)] if said else []
+    if withdrawn:
+        parts += [note("Chosen on the training recordings, then withdrawn:"), listing(withdrawn)]
     return (*parts, *([note(f"Tried and not taken: {', '.join(tried)}.")] if tried else []))
 
 

@@ -30,7 +30,7 @@ from .compete import (
 from .couplings import coupling_terms, with_couplings
 from .declared import DeclaredFit, fit_declared
 from .diagnose_swing import diagnose_swing
-from .findings import CouplingResidual, Finding, RigFindings
+from .findings import NOT_BORNE_OUT, NOT_TAKEN, CouplingResidual, Finding, RigFindings
 from .horizon import open_loop
 from .joint_search import as_term, offsets_first, search_joints
 from .model import RigModel, load_rig
@@ -174,7 +174,7 @@ def _diagnose_balance(rig: RigModel, fit: DeclaredFit, say: Callable[[str], None
         fit, finding = off_axis
     for joint, (won, left) in zip(joints, search_joints(rig, fit, first), strict=True):
         stories += [(w.step, as_term(rig, fit, w)) for w in won]
-        rejected += [{"effect": key, "reason": "held-out error does not fall enough"} for key in left]
+        rejected += [{"effect": key, "reason": NOT_TAKEN} for key in left]
         say(f"{rig.name}: {joint}: {', '.join(w.key for w in (first[joint], *won) if w) or 'nothing'}")
     base, bench = solution(pose(base_fit), []), Bench(rig, floor=floor)
     plain = (base_fit, (), base)
@@ -203,7 +203,7 @@ def _prove(bench: Bench, fit: DeclaredFit, stories: Sequence[tuple[Step, Term]],
         if proof["before"] <= proof["noise_floor"]:
             reason = "without it the error is within the sensors' noise already"
         elif proof["after"] ** 2 > (1 - LEAST_SHARE) * proof["before"] ** 2:
-            reason = "error on validation trials does not fall by enough"
+            reason = NOT_BORNE_OUT
         elif bench.mujoco and not _moves_better(bench, (fit, *few), (fit, *many)):
             reason = "the motion of the training trials, simulated from the commands, gets no better"
         if reason is not None:
@@ -314,7 +314,7 @@ def _diagnose_coupling(
     if known is None:
         return [], [], None
     fit, taken, steps, scores, moved = known
-    rejected = [{"effect": s.term.candidate.key, "reason": "held-out error does not fall enough"} for s in scores]
+    rejected = [{"effect": s.term.candidate.key, "reason": NOT_TAKEN} for s in scores]
     found, kept = _prove(Bench(rig, mujoco=False), fit, list(zip(steps, taken, strict=True)), [], rejected)
     named = []
     for f in found:

@@ -12,7 +12,7 @@ import numpy as np
 from ..background import Background
 from ..session import Session
 from .declared import DeclaredFit
-from .findings import Finding
+from .findings import NOT_BORNE_OUT, Finding
 from .model import RigModel, load_rig
 from .replay import RigResiduals, replay_rig
 from .states import fill_gaps, noise_std
@@ -25,7 +25,6 @@ from .swing_patch import write_swing
 from .words import shares, statement
 
 RESAMPLES = 500
-NOT_BORNE_OUT = "error on validation trials does not fall"
 Taken = tuple[Variant, Round]
 
 

@@ -14,6 +14,8 @@ from ..diagnose.findings import Finding, Findings
 
 __all__ = ["CouplingResidual", "Finding", "Findings", "RigFindings"]
 Array = NDArray[np.float64]
+NOT_TAKEN = "error on training recordings left out of the fit does not fall enough"
+NOT_BORNE_OUT = "error on validation recordings does not fall enough"
 
 
 @dataclass(frozen=True)
