@@ -184,12 +184,12 @@ def _ceiling_finding(actuator: str, finger: str | None, fact: CommandFacts) -> t
                         {"limit": {"value": fact.ceiling, "unit": "raw"}}, fit, dict(UNWRITTEN))
 
 
-def refused(actuator: str, finger: str | None, trials: tuple[str, ...], signal: str = "current") -> tuple[float, Finding]:
+def refused(actuator: str, finger: str | None, trials: tuple[str, ...], signal: str = "current",
+            why: str = "it does not follow the motion") -> tuple[float, Finding]:
     """The finding of a current (or position) channel that is no measurement."""
     fit = {"metric": f"{signal}_rmse", "unit": "raw", "before": None, "after": None, "noise_floor": None, "ci95_reduction": None,
            "held_out": [], "engine": None}
     where = {**_where(actuator, finger), "signal": signal, "trials": list(trials)}
-    why = "it does not follow the motion" if signal == "current" else "it is at every new setpoint at once"
     text = f"The {signal} of {actuator} is no measurement: {why}; nothing is fitted to it."
     return 1e9, Finding("command_as_measurement", ("command_as_measurement",), 0.999, (), where, text, {}, fit, None,
                         "the channel is refused")

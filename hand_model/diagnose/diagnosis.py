@@ -14,7 +14,7 @@ from ..effects import catalogue
 from ..effects.base import DriveState
 from ..errors import HandModelError
 from ..hand import Hand
-from ..session import Session, read_session
+from ..session import Log, Session, check_session, moves, read_session
 from .angles import FingerAngles
 from .assemble import assemble
 from .balance import Balance
@@ -51,16 +51,16 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
     session = session if isinstance(session, Session) else read_session(session)
     hand = read_model(model) if model not in (None, False) else None
     tell = say or (lambda line: None)
-    notes: list[str] = []
+    notes = list(check_session(session, dead=True))
     found: list[tuple[float, Finding]] = []
     fingers: dict[str, FingerAngles] = {}
     stations: list[Station] = []
     unexplained: list[dict[str, Any]] = []
     distrusted = _distrusted(session)
     unexplained += [_false_stamps(session, a, s) for a, s in distrusted.items()]
-    echoing = {a: trials for a, trials in drive_trials(session).items() if echoes_command([t.log() for t in trials])}
-    found += [refused(a, _finger_of(session, a), tuple(t.name for t in trials), "position") for a, trials in echoing.items()]
-    unread = (*distrusted, *echoing)
+    unmeasured = {a: why for a, trials in drive_trials(session).items() if (why := _no_measurement([t.log() for t in trials]))}
+    found += [refused(a, _finger_of(session, a), tuple(t.name for t in drive_trials(session)[a]), "position", why) for a, why in unmeasured.items()]
+    unread = (*distrusted, *unmeasured)
     for reading in finger_readings(session, unread):
         for line in reading.lines:
             tell(line)
@@ -109,6 +109,13 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
         write_page(findings, stations, replays, session.path.name, Path(output))
         findings.save(output)
     return findings
+
+
+def _no_measurement(logs: list[Log]) -> str:
+    """Why the position of a drive's logs is no measurement, "" where it is one."""
+    if echoes_command(logs):
+        return "it is at every new setpoint at once"
+    return "" if any(moves(log.column("position")) for log in logs) else "it never moves"
 
 
 def _distrusted(session: Session) -> dict[str, Stamps]:
@@ -207,10 +214,16 @@ def _command(session: Session, drives: dict[str, tuple[DriveState, ...]]) -> dic
     for actuator, trials in drive_trials(session).items():
         logs = {t.name: t.log() for t in trials}
         states = drives.get(actuator, ())
-        currents = tuple(np.interp(s.time_s, logs[s.trial].time_s, np.nan_to_num(logs[s.trial].column("current"))) for s in states)
+        currents = tuple(_current_at(s.time_s, logs[s.trial]) for s in states)
         if states:
             facts[actuator] = command_facts(states, currents)
     return facts
+
+
+def _current_at(time_s: Any, log: Log) -> Any:
+    """Current (n,) at times (n,), lost samples bridged."""
+    seen = np.isfinite(log.column("current"))
+    return np.interp(time_s, log.time_s[seen], log.column("current")[seen]) if seen.any() else np.zeros(len(time_s))
 
 
 def _once(found: list[tuple[float, Finding]]) -> list[tuple[float, Finding]]:

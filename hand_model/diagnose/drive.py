@@ -21,6 +21,7 @@ GIVE_LEAST, GIVE_MOST = 0.02, 1.2  # [%] of the declared Coulomb friction's bris
 GIVE_UNSEEN = 0.12  # [%] differences of bristles below this are within what starts tell
 SETTLE_SAMPLES = (14, 13)  # after a start and before a stop: where acceleration is smeared by the kernel
 
+UNFOLLOWED = 0.25  # of the range: commands that end farther than this from where the motion does are not its own
 ECHO = 0.003  # of the range: a third of what a fast motion covers in one sample
 UNMOVED = 0.95  # of a current's standard deviation: more than this left by the motion, and it measures nothing
 SETTLE_TRAVEL = 4.0  # [%] some six bristle lengths of a healthy drive
@@ -38,11 +39,22 @@ def drive_trials(session: Session) -> dict[str, list[Trial]]:
 
 
 def count_range(logs: list[Log]) -> tuple[float, float]:
-    """Counts at 0 % and 100 % of the range: the commanded extremes, else the recorded ones."""
-    name = "setpoint" if all("setpoint" in log.columns for log in logs) else "position"
-    values = np.concatenate([log.columns[name] for log in logs])
-    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    """Counts at 0 % and 100 % of the range: the commanded extremes, else the recorded ones, where the commands are not those
+    that the motion follows (lost, constant, in another unit)."""
+    low, high = _extremes(logs, "position")
+    if all("setpoint" in log.columns for log in logs):
+        told_low, told_high = _extremes(logs, "setpoint")
+        reached = np.nanpercentile(np.concatenate([log.columns["position"] for log in logs]), [1, 99])  # a glitch reaches farther
+        if max(abs(told_low - reached[0]), abs(told_high - reached[1])) < UNFOLLOWED * (reached[1] - reached[0]):
+            low, high = told_low, told_high
     return low, max(high, low + 1e-9)
+
+
+def _extremes(logs: list[Log], name: str) -> tuple[float, float]:
+    """Least and largest value of a column over several logs, nan where it is empty in all."""
+    values = np.concatenate([log.columns[name] for log in logs])
+    values = values[np.isfinite(values)]
+    return (float(values.min()), float(values.max())) if len(values) else (np.nan, np.nan)
 
 
 def drive_states(session: Session, corrections: Mapping[str, Callable[[Array], Array]] | None = None,
@@ -74,8 +86,8 @@ def _prepare(
             continue
         time_s, position = log.time_s[seen], 100 * (counts[seen] - low) / (high - low)
         motion = estimate_motion(time_s, position if correct is None else correct(position))
-        extra = {name: log.columns[name][seen] for name in ("setpoint", "speed", "current_limit", "temperature")
-                 if name in log.columns and np.isfinite(log.columns[name][seen]).all()}
+        extra = {name: _held(log.columns[name])[seen] for name in ("setpoint", "speed", "current_limit", "temperature")
+                 if name in log.columns and np.isfinite(log.columns[name]).any()}
         extra["elapsed"] = time_s - first
         if end is not None:
             history[-1] = (history[-1][0], history[-1][1] + max(float(time_s[0]) - end, 0.0))
@@ -96,6 +108,12 @@ def _prepare(
                                  declared_names=("inertia", "viscous", "coulomb", "spring", "preload")))
     total = max((float(s.elapsed_s[-1]) for s in states), default=0.0)
     return [replace(s, extra={**s.extra, "session_s": np.full(len(s.time_s), total)}) for s in states]
+
+
+def _held(values: Array) -> Array:
+    """A column (n,) in which a lost sample holds the value before it, or the first one."""
+    last = np.maximum.accumulate(np.where(np.isfinite(values), np.arange(len(values)), -1))
+    return values[np.where(last < 0, int(np.argmax(np.isfinite(values))), last)]
 
 
 def bouts(time_s: Array, moving: NDArray[np.bool_]) -> list[tuple[float, float]]:
@@ -130,7 +148,8 @@ def echoes_command(logs: Sequence[Log]) -> bool:
         if "setpoint" not in log.columns:
             return False
         position, setpoint = log.column("position"), log.column("setpoint")
-        span = max(float(np.nanmax(setpoint) - np.nanmin(setpoint)), 1e-9)
+        low, high = _extremes([log], "setpoint")
+        span = max(high - low, 1e-9)
         changed = np.r_[False, np.abs(np.diff(setpoint)) > 0]
         near.append(np.abs(position - setpoint)[changed & np.isfinite(position) & np.isfinite(setpoint)] / span)
     gaps = np.concatenate(near) if near else np.zeros(0)

@@ -1,6 +1,6 @@
 """Recording sessions (`hand-session/1`): what a laboratory hands over, read and checked, nothing interpreted."""
 
-from .check import check_session
+from .check import check_session, moves
 from .log import Log, read_log
 from .manifest import read_session
 from .mocap import Mocap, read_mocap
@@ -18,6 +18,7 @@ __all__ = [
     "Session",
     "Trial",
     "check_session",
+    "moves",
     "read_log",
     "read_mocap",
     "read_session",

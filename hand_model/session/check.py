@@ -30,8 +30,10 @@ INTERVAL_S = 2.0
 MOTION_OVER_NOISE = 10.0
 
 
-def check_session(session: Session) -> tuple[str, ...]:
+def check_session(session: Session, dead: bool = False) -> tuple[str, ...]:
     """Read every recording of a session once and check it for identification; readings are kept for later use.
+
+    dead: whether an encoder that never moves is let through, for a diagnosis to name.
 
     Returns notes: what was mended or ignored, one sentence each, the session's own included. Raises SessionError for the
     first recording that lacks a marker or column, has one that is never seen, markers on one line, a length or time that
@@ -56,7 +58,7 @@ def check_session(session: Session) -> tuple[str, ...]:
         if trial.log_path is not None:
             log = trial.log()
             notes += [f"{_place(session, log)}: {note}" for note in log.notes]
-            notes += check_log(session, trial, log)
+            notes += check_log(session, trial, log, dead)
             unknown |= set(log.columns) - set(COLUMNS)
         if trial.mocap_path is not None and trial.log_path is not None:
             _check_durations(mocap, log)
@@ -193,8 +195,8 @@ def _check_palm_sizes(sizes: dict[str, float]) -> None:
             )
 
 
-def check_log(session: Session, trial: Trial, log: Log) -> list[str]:
-    """Columns of one log: there, not empty, in seconds, and moving where they must. Returns notes; raises SessionError."""
+def check_log(session: Session, trial: Trial, log: Log, dead: bool = False) -> list[str]:
+    """Columns of one log: there, not empty, in seconds, and moving where they must (unless `dead`). Returns notes; raises SessionError."""
     interval_s = float(np.median(np.diff(log.time_s)))
     if interval_s > INTERVAL_S:
         raise SessionError(f"{log.path}: samples are {interval_s:.3g} s apart by `time`; `time` in seconds is needed")
@@ -209,7 +211,7 @@ def check_log(session: Session, trial: Trial, log: Log) -> list[str]:
             raise SessionError(f'{log.path}: the column "{name}" has no sample; a log with it is needed')
         if lost > 0.1:
             notes.append(f"{_place(session, log)}: {100 * lost:.0f} % of the samples of {name} are lost")
-    if trial.kind != "grasp" and not moves(log.column("position")):
+    if trial.kind != "grasp" and not dead and not moves(log.column("position")):
         raise SessionError(
             f'{log.path}: the column "position" does not move; a {trial.kind} trial needs the finger to move'
         )
