@@ -12,13 +12,26 @@ from pathlib import Path
 from .errors import HandModelError
 
 
+def refuse_file(folder: str | Path) -> None:
+    """Raise HandModelError where a file stands where a folder is to be written."""
+    for place in (Path(folder), *Path(folder).parents):
+        if place.exists() and not place.is_dir():
+            raise HandModelError(f"{place}: is a file; name a folder to write into")
+
+
+def forget(folder: str | Path, names: Collection[str], mark: str) -> None:
+    """Remove the folders of these names that an earlier run wrote into `folder`, which its file `mark` shows; without it nothing."""
+    if (Path(folder) / mark).is_file():
+        for name in names:
+            shutil.rmtree(Path(folder) / name, ignore_errors=True)
+
+
 def refuse_foreign(folder: str | Path, ours: Collection[str]) -> None:
     """Raise HandModelError where `folder` is a file, or holds anything that is not named in `ours`."""
     target = Path(folder)
+    refuse_file(target)
     if not target.exists():
         return
-    if not target.is_dir():
-        raise HandModelError(f"{target}: is a file; name a folder to write into")
     foreign = sorted(entry.name for entry in target.iterdir() if entry.name not in ours)
     if foreign:
         raise HandModelError(

@@ -10,8 +10,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hand_model.diagnose.correct import corrected_markers, write_corrected, write_csv, write_tsv
+from hand_model.diagnose.correct import corrected_markers, refuse_output, write_corrected, write_csv, write_tsv
 from hand_model.diagnose.findings import Finding
+from hand_model.errors import HandModelError
+from hand_model.output import forget
 from hand_model.session import Mocap, read_session
 from hand_model.session.csv_log import read_csv_log
 from hand_model.session.qtm_tsv import read_qtm_tsv
@@ -120,3 +122,21 @@ def test_a_file_of_several_fingers_is_put_right_finger_by_finger(session: Path) 
     for label in recorded.labels:
         moved = shift if label in (first, second) else 0.0
         np.testing.assert_allclose(both.markers([label]), seen[label] - moved, atol=1e-12)
+
+
+def test_an_output_that_is_a_file_or_holds_somebodys_corrections_is_refused_and_an_earlier_runs_are_forgotten(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("x")
+    for path in (tmp_path / "file", tmp_path / "file" / "deeper"):
+        with pytest.raises(HandModelError, match="is a file"):
+            refuse_output(path)
+    theirs = tmp_path / "out" / "corrected" / "mine.c3d"
+    theirs.parent.mkdir(parents=True)
+    theirs.write_text("x")
+    with pytest.raises(HandModelError, match='"corrected", which no diagnosis wrote'):
+        refuse_output(tmp_path / "out")
+    forget(tmp_path / "out", ("corrected",), "findings.json")
+    assert theirs.is_file()
+    (tmp_path / "out" / "findings.json").write_text("{}")
+    refuse_output(tmp_path / "out")
+    forget(tmp_path / "out", ("corrected", "model"), "findings.json")
+    assert [p.name for p in (tmp_path / "out").iterdir()] == ["findings.json"]

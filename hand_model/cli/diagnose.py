@@ -34,5 +34,10 @@ def run(options: Namespace, say: Callable[[str], None]) -> int:
     print(f"verdict: {findings.verdict}")
     for finding in findings.findings:
         print(f"- {finding.statement}")
+    for entry in findings.unexplained:
+        place = " ".join(str(entry["where"][k]) for k in ("finger", "joint", "signal") if entry["where"].get(k))
+        print(f"- unexplained: {place + ': ' if place else ''}{entry['shape']}")
+    for note in findings.notes:
+        print(f"note: {note}")
     print(f"\n{options.output}/findings.json")
     return 0

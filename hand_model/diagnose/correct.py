@@ -11,16 +11,24 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import HandModelError
+from ..output import refuse_file
 from ..session import Mocap, Session, Trial
 from .angles import FingerAngles, finger_angles
-from .findings import Finding
+from .findings import FILES, FOLDERS, Finding
 from .markers import MarkerNaming, name_markers
 
 Array = NDArray[np.float64]
 
 SLIPS = ("marker_slip", "palm_marker_slip", "support_slip")
 FOLDER = "corrected"
-OURS = ("findings.json", "report.html", "model_before", "model", FOLDER)  # what a diagnosis writes
+
+
+def refuse_output(output: Path) -> None:
+    """Raise HandModelError where `output` is a file, or holds a corrected copy that no diagnosis wrote: recordings are never thrown away."""
+    refuse_file(output)
+    if (output / FOLDER).exists() and not (output / FILES[0]).is_file():
+        raise HandModelError(f'{output}: holds "{FOLDER}", which no diagnosis wrote; name another folder')
 
 
 def write_corrected(session: Session, findings: Sequence[Finding], encoders: Mapping[str, Callable[[Array], Array]],
@@ -39,7 +47,7 @@ def write_corrected(session: Session, findings: Sequence[Finding], encoders: Map
     target = output / FOLDER
     if target.exists():
         shutil.rmtree(target)
-    ours = {output.resolve(), *(output.resolve() / name for name in OURS)}  # the output may lie in the session
+    ours = {output.resolve(), *(output.resolve() / name for name in (*FILES, *FOLDERS))}  # the output may lie in the session
     shutil.copytree(session.path, target, ignore=lambda folder, names: [n for n in names if (Path(folder) / n).resolve() in ours])
     renamed: dict[str, str] = {}
     for path, mocap in _corrected_files(session, markers).items():

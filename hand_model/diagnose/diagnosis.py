@@ -14,16 +14,17 @@ from ..effects import catalogue
 from ..effects.base import DriveState
 from ..errors import HandModelError
 from ..hand import Hand
+from ..output import forget
 from ..session import Log, Session, check_session, moves, read_session
 from .angles import FingerAngles
 from .assemble import assemble
 from .balance import Balance
 from .command import CommandFacts, command_facts, command_findings, refused, with_lateness
-from .correct import write_corrected
+from .correct import refuse_output, write_corrected
 from .decoupled import while_driven, without_excursions
 from .drive import drive_states, drive_trials, echoes_command, is_measured
 from .evidence import typical_coefficients
-from .findings import Finding, Findings
+from .findings import FILES, FOLDERS, Finding, Findings
 from .finger import finger_readings
 from .gravity import with_gravity
 from .improve import read_model, write_improved
@@ -46,11 +47,14 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
     (what is missing is judged by the declared model fitted to the session itself); None identifies the session's own, False
     writes none. output: folder that gets `findings.json`, `report.html` and, where physics was named, `model_before` and `model`,
     compiled; where the recording was put right, `corrected`, a session. say: called with one line per result as it comes.
-    Raises SessionError for a session that breaks its format, HandFileError for a model that is none.
+    Raises SessionError for a session that breaks its format, HandFileError for a model that is none, HandModelError for an output
+    that is a file or holds a `corrected` that no diagnosis wrote.
     """
     session = session if isinstance(session, Session) else read_session(session)
     hand = read_model(model) if model not in (None, False) else None
     tell = say or (lambda line: None)
+    if output is not None:
+        refuse_output(Path(output))
     notes = list(check_session(session, dead=True))
     found: list[tuple[float, Finding]] = []
     fingers: dict[str, FingerAngles] = {}
@@ -103,6 +107,7 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
     findings = assemble(stations, _once(found), notes, unexplained)
     if output is not None:
         replays: tuple[Replay, ...] = ()
+        forget(output, FOLDERS, FILES[0])
         if model is not False:
             findings, replays = _modelled(findings, session, hand, stations, Path(output), tell)
             write_corrected(session, findings.findings, _counts_corrected(session, stations), Path(output))

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 FORMAT = "hand-findings/1"
+FILES, FOLDERS = ("findings.json", "report.html"), ("model_before", "model", "corrected")  # what a diagnosis writes
 UNWRITTEN = {"native": False, "mjcf": None, "urdf": "not expressible"}  # `model` of a finding until a file holds it
 
 

@@ -78,10 +78,12 @@ def _ranked(findings: Findings) -> list[Any]:
         out.append(table(("of", "parameter", "unit", "value", "95 % interval"), held, text_columns=3))
     out.append(table(("effect", "where it is put right"), [[_words(f.effect), Cell(_kept(f), "wrap")] for f in findings.findings],
                      text_columns=2))
+    said = [f.statement for f in findings.findings[1:]]  # the first one leads
     more = [f"Not told apart from {', '.join(_words(m) for m in f.members if m != f.effect)}: {_words(f.effect)}."
             for f in findings.findings if len(f.members) > 1]
     more += [f"Next experiment: {findings.next_experiment}."] if findings.next_experiment else []
     more += [f"Unexplained: {u['where']['finger']} {u['where']['signal']}, {u['shape']}." for u in findings.unexplained]
+    out = [listing(said), *out] if said else out
     return [*out, listing([*more, *findings.notes])] if more or findings.notes else out
 
 
