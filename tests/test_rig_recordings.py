@@ -10,6 +10,7 @@ from rig_bench import ARM, HEAD, recorded
 
 from hand_model.rig import fit_declared, load_rig, replay_rig
 from hand_model.rig.candidates import candidates
+from hand_model.rig.channels import sinusoids_left
 from hand_model.rig.diagnose import trusted_fit
 from hand_model.session import read_session
 
@@ -84,3 +85,20 @@ def test_a_file_that_diverges_is_said_to_and_leaves_nothing_behind(tmp_path: Pat
     monkeypatch.chdir(tmp_path / "empty")
     assert np.isnan(replay_rig(session, efforts=False).joints[0].position_rmse)
     assert list((tmp_path / "empty").iterdir()) == []
+
+
+def test_a_ramp_is_no_sinusoid_and_an_unplugged_drive_no_command(tmp_path: Path) -> None:
+    """A slow lift's torque is a piece of many a sinusoid, and a torque of zero beside open leads is true: neither is refused. A
+    sinusoid that comes several times is one."""
+    t = np.arange(0, 2, 0.005)
+    assert sinusoids_left(t, np.sin(0.5 * np.pi * t / 2 - 0.1)) == 1.0
+    assert sinusoids_left(t, np.sin(2 * np.pi * 2.3 * t)) < 1e-3
+    recorded(tmp_path / "s", ARM, 5, balance, 0.0)
+    head, *trials = (path := tmp_path / "s" / "session.toml").read_text().split("[[trial]]\n")
+    trials[0] += OPEN
+    path.write_text("[[trial]]\n".join([head, *trials]))
+    log = tmp_path / "s" / "log" / "0.csv"
+    table = np.genfromtxt(log, delimiter=",", skip_header=1)
+    table[:, 2] = 0.0
+    np.savetxt(log, table, delimiter=",", header="time,position,torque", comments="", fmt="%.8g")
+    assert trusted_fit(load_rig(read_session(tmp_path / "s")))[1] == ()

@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 SAME = 0.01  # a measured channel differs from its command by more than this share: drives, sensors and CAN buses do
 STRANGE = 0.7  # share of an effort that may stay unexplained before it is said to explain nothing
 UNSIGNED = "has no sign: it follows the size of the expected effort"
+LEAST_PERIODS = 2.0
 CLIPPED = 0.05  # share of samples on one and the same extreme value
 
 
@@ -120,7 +121,8 @@ def _gather(rig: RigModel, joint: str, channel: str, found: dict, usable: int) -
 
 
 def sinusoids_left(time_s: Array, values: Array, most: int = 2) -> float:
-    """Share (residual rms over rms) that up to `most` sinusoids and a mean leave; frequencies refined from the spectrum."""
+    """Share (residual rms over rms) that up to `most` sinusoids and a mean leave; frequencies refined from the spectrum. One where
+    the first does not come twice: any smooth curve is a piece of some sinusoid."""
     from scipy.optimize import minimize_scalar
 
     grid = uniform_time(time_s)
@@ -143,6 +145,8 @@ def sinusoids_left(time_s: Array, values: Array, most: int = 2) -> float:
         f = minimize_scalar(
             cost, bounds=((k - 1) * step, (k + 1) * step), method="bounded", options={"xatol": 1e-6 * step}
         ).x
+        if f < LEAST_PERIODS * step and len(design) == 1:
+            return 1.0
         design += [np.sin(2 * np.pi * f * grid), np.cos(2 * np.pi * f * grid)]
         left = _solve(design, y)
     return float(np.median(np.abs(left)) / 0.6745 / total)
@@ -180,10 +184,11 @@ def check_balance(rig: RigModel, fit: DeclaredFit) -> tuple[ChannelIssue, ...]:
     force, told = ({name: c for c, (kind, name, attribute) in rig.quantity.items() if kind == "actuator" and attribute == a}
                    for a in ("force", "ctrl"))  # fmt: skip
     start = np.array([c.value for c in fit.columns])
+    live = {(t.name, j) for t in rig.trials for j in t.live}
     looks: list[tuple[str, Rows, str, float]] = []
     for row in fit.rows:
         drive = rig.drive(row.joint)
-        name = None if drive is None else force.get(drive.name, told.get(drive.name))
+        name = None if drive is None or (row.trial, row.joint) not in live else force.get(drive.name, told.get(drive.name))
         if name is None or row.moving.sum() < 30:
             continue
         y, x = row.effort[row.moving], row.columns[row.moving]
@@ -199,7 +204,7 @@ def check_balance(rig: RigModel, fit: DeclaredFit) -> tuple[ChannelIssue, ...]:
     known = {(row.trial, row.joint) for _, row, _, _ in looks}
     # A column that has no sign has none in recordings either whose efforts all go one way.
     looks += [(lacking[r.joint][0], r, UNSIGNED, lacking[r.joint][1]) for r in fit.rows
-              if r.joint in lacking and (r.trial, r.joint) not in known and np.any(r.effort)]  # fmt: skip
+              if r.joint in lacking and (r.trial, r.joint) in live - known]  # fmt: skip
     out = []
     for name, joint, reason in dict.fromkeys((name, row.joint, reason) for name, row, reason, _ in looks):
         hits = [(row.trial, share) for n, row, r, share in looks if (n, row.joint, r) == (name, joint, reason)]
