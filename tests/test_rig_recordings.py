@@ -7,11 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rig_bench import ARM, HEAD, recorded
+from scipy.signal import butter, filtfilt
 
 from hand_model.rig import fit_declared, load_rig, replay_rig
 from hand_model.rig.candidates import candidates
 from hand_model.rig.channels import sinusoids_left
 from hand_model.rig.diagnose import trusted_fit
+from hand_model.rig.states import low_pass
 from hand_model.session import read_session
 
 VOLTAGE = ARM.replace('<motor name="motor" joint="hinge"/>', '<dcmotor name="motor" joint="hinge" motorconst="0.35 0.35" resistance="3.4"/>')
@@ -102,3 +104,11 @@ def test_a_ramp_is_no_sinusoid_and_an_unplugged_drive_no_command(tmp_path: Path)
     table[:, 2] = 0.0
     np.savetxt(log, table, delimiter=",", header="time,position,torque", comments="", fmt="%.8g")
     assert trusted_fit(load_rig(read_session(tmp_path / "s")))[1] == ()
+
+
+@pytest.mark.parametrize("shape", [(400,), (400, 3), (35,)])
+def test_the_low_pass_is_that_of_scipy(shape: tuple[int, ...]) -> None:
+    """Both ways, ends reflected, started as if settled."""
+    x = np.cumsum(np.random.default_rng(1).standard_normal(shape), 0)
+    pad = min(len(x) - 2, int(3 * 100 / 4.0))
+    assert low_pass(x, 100.0, 4.0) == pytest.approx(filtfilt(*butter(2, 4.0 / 50.0), x, axis=0, padlen=pad), abs=1e-9)

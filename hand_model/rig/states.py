@@ -45,21 +45,31 @@ def noise_std(values: Array) -> float:
 
 
 def low_pass(values: Array, rate_hz: float, cutoff_hz: float) -> Array:
-    """Zero-phase Butterworth low-pass (both ways, order 4) along the first axis; no change where the cut-off is too high."""
-    from scipy.signal import sosfiltfilt
+    """Zero-phase Butterworth low-pass (both ways, order 4) along the first axis; no change where the cut-off is too high.
+
+    Ends are extended by their point reflection and the filter starts settled there: what scipy.signal.filtfilt
+    does, without working out the start anew in each of many thousand calls.
+    """
+    from scipy.signal import lfilter
 
     if cutoff_hz >= 0.45 * rate_hz or len(values) < 30:
         return values
     pad = min(len(values) - 2, int(3 * rate_hz / cutoff_hz))
-    return sosfiltfilt(_butterworth(cutoff_hz / (0.5 * rate_hz)), values, axis=0, padlen=pad)
+    b, a, settled = _butterworth(cutoff_hz / (0.5 * rate_hz))
+    out = np.concatenate([2 * values[:1] - values[pad:0:-1], values, 2 * values[-1:] - values[-2 : -pad - 2 : -1]])
+    settled = settled.reshape(-1, *[1] * (out.ndim - 1))
+    for _ in range(2):
+        out = lfilter(b, a, out, axis=0, zi=settled * out[:1])[0][::-1]
+    return out[pad : len(out) - pad]
 
 
 @lru_cache(maxsize=256)
-def _butterworth(cutoff: float) -> Array:
-    """Second-order sections (k, 6) of the filter; cutoff: share of half the sampling rate."""
-    from scipy.signal import butter
+def _butterworth(cutoff: float) -> tuple[Array, Array, Array]:
+    """Numerator and denominator (3,) of the filter and its state on a constant one; cutoff: share of half the sampling rate."""
+    from scipy.signal import butter, lfilter_zi
 
-    return butter(ORDER // 2, cutoff, output="sos")
+    b, a = butter(ORDER // 2, cutoff)
+    return b, a, lfilter_zi(b, a)
 
 
 def later(time_s: Array, values: Array, delay_s: float) -> Array:
