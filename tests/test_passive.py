@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -270,3 +271,13 @@ def test_delays_and_clipping_are_what_mujoco_does() -> None:
     force, seen = run("current_saturation", {"limit": 20.0})
     assert force.max() == pytest.approx(30)
     assert seen.max() == pytest.approx(20)
+
+
+@pytest.mark.parametrize(("name", "said"), [("command_delay", "| yes | not needed |"), ("detent_load", "| no | yes |"), 
+                                            ("joint_wobble", "| no: its size"), ("quadratic_damping", "| yes | not needed |")])
+def test_the_readme_says_where_an_effect_is(name, said) -> None:
+    from hand_model.compile.readme import _effects
+
+    values = {"detent_load": {"centre": 40.0, "width": 5.0, "load": 20.0, "form": 0.0}}.get(name, {})
+    found = Effect(name, {"finger": "index", "actuator": "index"}, {k: Estimate(v, None, "1", "test") for k, v in values.items()})
+    assert f"| {name} | index {said}" in _effects(SimpleNamespace(effects=(found,)))

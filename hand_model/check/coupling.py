@@ -127,9 +127,9 @@ def _pushed(mj: Any, tip: str, joints: list[str], held: bool, sign: float) -> Ar
         mj.dof_armature[[mj.joint(j).dofadr[0] for j in joints if mj.joint(j).id not in coupled]] = 1e3
     data = mujoco.MjData(mj)
     data.qpos[:] = engine.on_linkages(mj, 0.5 * (mj.key("open").qpos + mj.key("close").qpos))
-    for i in range(mj.nu):  # servos hold where the push starts
+    for i in np.flatnonzero(mj.actuator_ctrlnum):  # servos hold where the push starts; passive motors have no control
         if mj.actuator_trntype[i] == int(mujoco.mjtTrn.mjTRN_JOINT):
-            data.ctrl[i] = data.qpos[mj.jnt_qposadr[mj.actuator_trnid[i, 0]]]
+            data.ctrl[mj.actuator_ctrladr[i]] = data.qpos[mj.jnt_qposadr[mj.actuator_trnid[i, 0]]]
     site, last = mj.site(tip).id, mj.joint(joints[-1]).id
     gaps = []
     for _ in range(round(PUSH_S / mj.opt.timestep)):

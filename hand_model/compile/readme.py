@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..effects import effect
+from ..effects.base import Effect
 from ..hand import Hand
 from .clearance import SHARE_A_JOINT
 from .plan import Plan
@@ -161,8 +162,9 @@ def _effects(hand: Hand) -> str:
         kind = effect(found.effect)
         law = kind.law({name: e.value for name, e in found.parameters.items()}) is not None
         place = " ".join(str(found.where[k]) for k in ("finger", "joint") if found.where.get(k))
-        held = f"no: {kind.unwritten}" if kind.unwritten and not law else "no" if law else "yes"
-        rows.append(f"| {found.effect} | {place} | {held} | {'yes' if law else 'not needed' if held == 'yes' else 'no'} | no: hand.json |")
+        native = not law and type(kind).write_mjcf is not Effect.write_mjcf
+        held = "yes" if native else f"no: {kind.unwritten}" if kind.unwritten and not law else "no"
+        rows.append(f"| {found.effect} | {place} | {held} | {'yes' if law else 'not needed' if native else 'no'} | no: hand.json |")
         called |= law
     if called:
         rows += ["\nEffects of the callback act once it is switched on, in every `mj_step` from then on:\n", "```python",
