@@ -13,6 +13,7 @@ from ..effects.base import sample_interval
 from .distinguishability import protocol_pairs
 from .findings import Finding, Findings
 from .interval import variance_ratio
+from .magnitude import channel_figures, magnitude
 from .markers import HINGE
 from .name import ALPHA, Named
 from .station import Station, channel_of, finding_of, unexplained_of, unrepeated_of
@@ -22,13 +23,14 @@ HARMONICS, SAME_PERIOD = 4, 0.02
 SHADOW = 0.5  # of an encoder error's size: less, in the current of the same motor, may be what is left of it
 TILT = 0.2  # the same, of a wobble's or a travelling centre's, in the angles of the finger
 ANGULAR = {e.name for station in ("encoder", "linkage") for e in catalogue(station)} - {"clock_drift"}
+SIGNALS = {"drive": "current", "encoder": "encoder", "linkage": "markers"}
 UNREST = 0.3  # of the noise: wander that every machine is granted
 
 
 def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding]], notes: list[str],
              unexplained: Sequence[dict[str, Any]] = ()) -> Findings:
-    """One ranked list from all stations. By a finding's weight findings of different stations compare (`findings.weighed`).
-    unexplained: of the markers."""
+    """One ranked list from all stations: by what a finding shows in its channel (its weight, `findings.weighed`) and how large it is for its
+    kind, the geometric mean of both. unexplained: of the markers."""
     ranked: list[tuple[float, Finding]] = list(marker_findings)
     rejected: list[dict[str, str]] = []
     unexplained = list(unexplained)
@@ -43,6 +45,7 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
                      for name, value in station.naming.rejected[:4]]
     unexplained += [unrepeated_of(s) for s in stations if _wanders(s, stations)]
     ranked = _without_tilts(_without_shadows(_one_clock(ranked)))
+    ranked = [(float(np.sqrt(weight * _magnitude(f, stations))), f) for weight, f in ranked]
     ranked.sort(key=lambda item: -item[0])
     found = _shared(ranked)
     verdict = "mismatch" if found else "unexplained" if unexplained else "consistent"
@@ -55,6 +58,14 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
                 "after": variance_ratio(worst.naming, worst.naming.fit), "limit": 1 + 2.6 * float(np.sqrt(2 / count))}
     return Findings(verdict, lack, _protocol(stations), found, tuple(rejected), tuple(unexplained), _next(found),
                     tuple(channel_of(s) for s in stations), tuple(notes))
+
+
+def _magnitude(finding: Finding, stations: Sequence[Station]) -> float:
+    """How large a finding is for its kind, measured by the channel in which effects of its kind show."""
+    signal = {e.name: SIGNALS[s] for s in SIGNALS for e in catalogue(s)}.get(finding.effect)
+    states = next((s.naming.balance.states for s in stations if s.signal == signal and s.finger == finding.where["finger"]), None)
+    values = {name: entry["value"] for name, entry in finding.parameters.items()}
+    return magnitude(finding.effect, values, None if states is None else channel_figures(states))
 
 
 def _shared(ranked: list[tuple[float, Finding]]) -> tuple[Finding, ...]:

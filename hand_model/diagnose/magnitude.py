@@ -1,0 +1,128 @@
+"""How large a named effect is for one of its kind: one where it is plain in a hand that has it.
+
+Shares of noise or of signal do not compare across channels: a marker tells a tenth of a slip better than a motor's current tells a
+worn gear. The figures are conventions, from what the published hands and recordings with one known effect show; they rank
+findings and decide nothing else. An effect without an entry counts as plain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..effects.base import DriveState, position_range, speed_range
+
+LEAST, MOST = 1e-3, 3.0  # beyond, a figure says nothing more about its kind
+NEAR = 0.02  # of a limit: within, a reading is at it
+
+
+@dataclass(frozen=True)
+class Channel:
+    """What magnitudes refer to. effort, load: standard deviations; low, high: range of positions; fastest: speed; at_limit: share of
+    readings within two per cent of the largest; ahead: farthest that a joint ran ahead of its drive."""
+
+    effort: float = 1.0
+    load: float = 0.0
+    low: float = 0.0
+    high: float = 100.0
+    fastest: float = 100.0
+    at_limit: float = 0.0
+    ahead: float = 0.0
+
+    @property
+    def span(self) -> float:
+        """Range of positions."""
+        return self.high - self.low
+
+
+def channel_figures(states: tuple[DriveState, ...]) -> Channel:
+    """The figures of one balance's recordings."""
+    effort = np.concatenate([s.effort[np.isfinite(s.effort)] for s in states])
+    load, ahead = (np.concatenate([s.extra.get(name, np.zeros(1)) for s in states]) for name in ("load", "ahead"))
+    low, high = position_range(states)
+    top = (1 - NEAR) * np.quantile(np.abs(effort), 0.999)
+    return Channel(max(float(np.std(effort)), 1e-12), float(np.nanstd(load)), low, high, speed_range(states)[1],
+                   float(np.mean(np.abs(effort) > top)), float(np.nanmax(ahead)))
+
+
+def magnitude(effect: str, parameters: Mapping[str, float], channel: Channel | None = None) -> float:
+    """Size of an effect over one at which it is plain, within [LEAST, MOST]. parameters: name -> value, as in a finding; channel: of the
+    balance that named it, where it is one."""
+    rule = PLAIN.get(effect)
+    if rule is None:
+        return 1.0
+    known = {name: abs(float(value)) for name, value in parameters.items() if value is not None and np.isfinite(value)}
+    try:
+        size = rule(known, channel or Channel())
+    except KeyError:
+        return 1.0
+    return float(np.clip(size, LEAST, MOST)) if np.isfinite(size) else 1.0
+
+
+Rule = Callable[[Mapping[str, float], Channel], float]
+
+
+def _asymmetry(p: Mapping[str, float], _: Channel) -> float:
+    there, back = p["viscous_flexion"], p["viscous_extension"]
+    return abs(there - back) / max(there + back, 1e-12) / 0.5
+
+
+def _bend(p: Mapping[str, float], c: Channel) -> float:
+    """Largest departure from a straight line over the recorded range, for a third of the effort's deviation."""
+    if "knee" in p:
+        return p["stiffness_beyond"] * max(c.high - p["knee"], 0.0) / 2 / (0.35 * c.effort)
+    return (p["quadratic_stiffness"] * c.span**2 / 4 + 0.19 * p["cubic_stiffness"] * c.span**3) / (0.35 * c.effort)
+
+
+def _depth(p: Mapping[str, float], c: Channel) -> float:
+    """Load of a stop or an obstacle at the end of the range, for half of the effort's deviation."""
+    return p["stiffness"] * max(c.high - p["begin"], p["begin"] - c.low if p["begin"] < c.low + c.span / 4 else 0.0) / (0.6 * c.effort)
+
+
+def _apart(p: Mapping[str, float], c: Channel) -> float:
+    return (p["lead"] * (p["below"] - c.low) if p["form"] > 0.5 else c.ahead) / (0.3 * c.effort)
+
+
+def _give(p: Mapping[str, float], c: Channel) -> float:
+    return p["compliance"] * c.load / (0.01 * (c.span if p.get("form") == 0.0 else 3.5 * c.effort))
+
+
+PLAIN: Mapping[str, Rule] = {
+    "asymmetric_friction": lambda p, c: p["half_difference"] / (0.3 * c.effort),
+    "asymmetric_viscous_friction": _asymmetry,
+    "stribeck_friction": lambda p, c: p["static_excess"] * min(p["stribeck_speed"] / (0.25 * c.fastest), 1.0) / (0.5 * c.effort),
+    "load_dependent_friction": lambda p, _: p["load_coefficient"] / 0.4,
+    "position_dependent_friction": lambda p, c: p["extra_friction"] / (0.4 * c.effort),
+    "quadratic_damping": lambda p, c: p["drag"] * c.fastest**2 / (0.6 * c.effort),
+    "presliding_friction": lambda p, c: p["bristle_length"] / (0.02 * c.span),
+    "thermal_friction_drift": lambda p, c: p["cold_excess"] / (0.3 * c.effort),
+    "detent_load": lambda p, c: p["load"] / (0.35 * c.effort),
+    "nonlinear_spring": _bend,
+    "gravity_load": lambda p, c: float(np.hypot(p["along"], p["across"])) / (0.25 * c.effort),
+    "torque_ripple": lambda p, c: p["amplitude"] / (0.17 * c.effort),
+    "elastoplastic_hysteresis": lambda p, c: p["yield_load"] / (0.3 * c.effort),
+    "viscoelastic_spring": lambda p, c: p["stiffness"] * c.span / (0.6 * c.effort),
+    "end_stop_contact": _depth,
+    "external_contact": _depth,
+    "drive_backlash": lambda p, c: p["gap"] / (0.018 * c.span),
+    "linkage_backlash": lambda p, c: p["gap"] / (0.018 * c.span),
+    "spring_decoupling": _apart,
+    "series_elasticity": _give,
+    "linkage_compliance": _give,
+    "coupling_deadband": lambda p, c: p["until"] / (0.1 * c.span),
+    "distal_stop": lambda p, c: (c.high - p["from"]) / (0.12 * c.span),
+    "encoder_periodic_error": lambda p, c: p["amplitude"] / (0.005 * c.span),
+    "drive_sag": lambda p, _: p["sag"] / 0.002 if "sag" in p else p["torque_loss"] / 0.3,
+    "current_saturation": lambda _, c: c.at_limit / 0.1,
+    "current_channel_delay": lambda p, _: p["delay"] / 0.06,
+    "command_delay": lambda p, _: p["delay"] / 0.11,
+    "clock_drift": lambda p, _: p["rate_minus_one"] / 0.001,
+    "joint_wobble": lambda p, _: p["amplitude"] / 0.05,
+    "moving_centre": lambda p, _: min(p["travel"] / 0.002, 1.0),
+    "marker_slip": lambda p, _: p["distance"] / 0.002,
+    "palm_marker_slip": lambda p, _: p["distance"] / 0.0025,
+    "support_slip": lambda p, _: p["turn"] / 0.07,
+    "marker_swap": lambda p, _: (p["end"] - p["begin"]) / 4.0,
+}

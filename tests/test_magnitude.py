@@ -1,0 +1,35 @@
+"""How large an effect is for its kind."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_diagnose import drive, planted
+
+from hand_model.diagnose.magnitude import LEAST, MOST, PLAIN, channel_figures, magnitude
+from hand_model.effects import catalogue
+
+RAW = {"asymmetric_friction": {"half_difference": 4.0}, "detent_load": {"load": 5.0}, "elastoplastic_hysteresis": {"yield_load": 3.0},
+       "quadratic_damping": {"drag": 3e-4}, "position_dependent_friction": {"extra_friction": 4.0}, "torque_ripple": {"amplitude": 2.0},
+       "viscoelastic_spring": {"stiffness": 0.1}, "gravity_load": {"along": 3.0, "across": -2.0}, "thermal_friction_drift": {"cold_excess": -2.0},
+       "nonlinear_spring": {"quadratic_stiffness": 1e-3, "cubic_stiffness": 2e-6}}
+
+
+@pytest.mark.parametrize("effect", RAW)
+def test_a_tenth_is_a_tenth_and_the_unit_of_the_current_does_not_matter(effect: str) -> None:
+    states = drive(0, planted("detent_load", {"form": 0.0, "centre": 60.0, "width": 6.0}, [-12.0]))
+    milliampere = tuple(replace(s, effort=1e3 * s.effort) for s in states)
+    plain = magnitude(effect, RAW[effect], channel_figures(states))
+    assert LEAST < plain < MOST
+    thousand = {k: 1e3 * v for k, v in RAW[effect].items()}
+    assert magnitude(effect, thousand, channel_figures(milliampere)) == pytest.approx(plain)
+    assert magnitude(effect, {k: 0.1 * v for k, v in RAW[effect].items()}, channel_figures(states)) == pytest.approx(0.1 * plain)
+
+
+def test_every_effect_of_a_hand_has_a_figure_and_what_has_none_counts_as_plain() -> None:
+    named = {e.name for s in ("drive", "encoder", "linkage") for e in catalogue(s)}
+    assert named - set(PLAIN) == set()
+    assert magnitude("something_new", {"size": 7.0}) == 1.0
+    assert magnitude("detent_load", {"load": np.nan}) == 1.0
