@@ -426,3 +426,34 @@ def test_what_hands_and_rigs_need(rig, loop, recorded, tmp_path, capsys):
     assert "rig" in refused(capsys, "identify", rig, "--output", tmp_path / "x.hand")
     assert 'kind "grasp"' in refused(capsys, "touch", recorded)
     assert not (tmp_path / "r").exists()
+
+
+def test_a_bar_stands_below_the_results_and_leaves_nothing_behind():
+    import io
+
+    from hand_model.cli.progress import WIDTH, Progress
+
+    def screen(text: str) -> list[str]:
+        rows, column = [""], 0
+        for letter in text:
+            if letter == "\n":
+                rows, column = [*rows, ""], 0
+            elif letter == "\r":
+                column = 0
+            else:
+                rows[-1] = rows[-1][:column] + letter + rows[-1][column + 1 :]
+                column += 1
+        return [row.rstrip() for row in rows]
+
+    stream = io.StringIO()
+    progress = Progress(stream, lines=True, bar=True)
+    progress.share(0.5)
+    progress("index: consistent")
+    assert screen(stream.getvalue()) == ["index: consistent", f"[{'#' * (WIDTH // 2)}{'.' * (WIDTH // 2)}]  50 %"]
+    progress.share(1.0)
+    assert screen(stream.getvalue()) == ["index: consistent", ""]
+    plain = io.StringIO()
+    progress = Progress(plain, lines=True, bar=False)
+    progress.share(0.5)
+    progress("index: consistent")
+    assert plain.getvalue() == "index: consistent\n"

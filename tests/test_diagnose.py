@@ -175,7 +175,10 @@ def test_findings_are_json_without_nan(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["shown_00", "shown_04"])
 def test_shown_sessions(name: str, tmp_path: Path) -> None:
     answer = json.loads((SHARED / name / "answer.json").read_text())["effects"]
-    findings = diagnose(SHARED / name, output=tmp_path)
+    shares: list[float] = []
+    findings = diagnose(SHARED / name, output=tmp_path, progress=shares.append)
+    assert shares == sorted(shares) and shares[0] == 0.0 and shares[-1] == 1.0
+    assert len(shares) > 4
     named = [(f.effect, f.where["finger"], f.where["joint"]) for f in findings.findings]
     assert named == [(e["effect"], e["finger"], e["joint"]) for e in answer if e["effect"] != "none"]
     assert json.loads((tmp_path / "findings.json").read_text())["verdict"] == findings.verdict

@@ -7,9 +7,10 @@ import importlib
 import os
 import sys
 from collections.abc import Sequence
-from typing import Any, NoReturn
+from typing import NoReturn
 
 from ..errors import HandModelError, did_you_mean
+from .progress import Progress
 
 # Command -> module here with SUMMARY, add_arguments(parser) and run(options, say) -> exit status.
 COMMANDS = {
@@ -49,8 +50,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(words)
     for name in THREADS:
         os.environ.setdefault(name, "1")
+    progress = _progress(options)
     try:
-        status = options.run(options, _progress(options))
+        try:
+            status = options.run(options, progress)
+        finally:
+            progress.clear()
         sys.stdout.flush()
         return status
     except HandModelError as error:
@@ -79,10 +84,9 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _progress(options: argparse.Namespace) -> Any:
-    if options.verbose or (sys.stderr.isatty() and not options.quiet):
-        return lambda line: print(line, file=sys.stderr, flush=True)
-    return lambda line: None
+def _progress(options: argparse.Namespace) -> Progress:
+    terminal = sys.stderr.isatty() and not options.quiet
+    return Progress(sys.stderr, options.verbose or terminal, terminal)
 
 
 def _refuse(command: str, message: str, status: int = BAD_INPUT) -> int:

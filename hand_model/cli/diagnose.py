@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable
+
+from .progress import Progress
 
 SUMMARY = "say what physics is missing: where recording and declared model differ, what was left out, how sure that is"
 
@@ -17,7 +18,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--output", required=True, metavar="DIR", help="folder for findings.json, report.html and the improved model")
 
 
-def run(options: Namespace, say: Callable[[str], None]) -> int:
+def run(options: Namespace, say: Progress) -> int:
     """Diagnose and print the findings."""
     from ..diagnose import diagnose
     from ..session import read_session
@@ -30,7 +31,8 @@ def run(options: Namespace, say: Callable[[str], None]) -> int:
         findings = diagnose_rig(session, options.output, say)
         write_rig_findings(session, findings, options.output)
     else:
-        findings = diagnose(session, False if options.no_model else options.model, options.output, say)
+        findings = diagnose(session, False if options.no_model else options.model, options.output, say, say.share)
+    say.clear()
     print(f"verdict: {findings.verdict}")
     for finding in findings.findings:
         print(f"- {finding.statement}")

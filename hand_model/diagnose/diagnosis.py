@@ -40,19 +40,27 @@ EARLY = 3.0  # standard deviations by which answers that come before the command
 
 @single_threaded()
 def diagnose(session: Session | str | Path, model: Any = None, output: str | Path | None = None,
-             say: Callable[[str], None] | None = None) -> Findings:
+             say: Callable[[str], None] | None = None, progress: Callable[[float], None] | None = None) -> Findings:
     """Say what physics is missing from the declared model of a recorded hand.
 
     session: a session or its folder. model: a Hand, a .hand file or a compiled folder into which the effects are written
     (what is missing is judged by the declared model fitted to the session itself); None identifies the session's own, False
     writes none. output: folder that gets `findings.json`, `report.html` and, where physics was named, `model_before` and `model`,
-    compiled; where the recording was put right, `corrected`, a session. say: called with one line per result as it comes.
+    compiled; where the recording was put right, `corrected`, a session. say: called with one line per result as it comes. progress:
+    called with the share of the work that is done, 0 to 1.
     Raises SessionError for a session that breaks its format, HandFileError for a model that is none, HandModelError for an output
     that is a file or holds a `corrected` that no diagnosis wrote.
     """
     session = session if isinstance(session, Session) else read_session(session)
     hand = read_model(model) if model not in (None, False) else None
     tell = say or (lambda line: None)
+    steps = iter(np.linspace(0, 1, len(session.fingers) + len(drive_trials(session)) + 2).tolist())
+
+    def step() -> None:
+        if progress is not None:
+            progress(next(steps, 1.0))
+
+    step()
     if output is not None:
         refuse_output(Path(output))
     notes = list(check_session(session, dead=True))
@@ -66,6 +74,7 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
     found += [refused(a, _finger_of(session, a), tuple(t.name for t in drive_trials(session)[a]), "position", why) for a, why in unmeasured.items()]
     unread = (*distrusted, *unmeasured)
     for reading in finger_readings(session, unread):
+        step()
         for line in reading.lines:
             tell(line)
         stations += reading.stations
@@ -95,6 +104,7 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
         typical = typical_coefficients([fit for a, fit in alone.items() if a != actuator])
         calls.append(("current", _finger_of(session, actuator), actuator, None, states, effects, typical))
     for station in Background(judged, calls).results():
+        step()
         stations.append(station)
         tell(station.line())
     odd = preload_findings(stations)
@@ -113,6 +123,8 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
             write_corrected(session, findings.findings, _counts_corrected(session, stations), Path(output))
         write_page(findings, stations, replays, session.path.name, Path(output))
         findings.save(output)
+    if progress is not None:
+        progress(1.0)
     return findings
 
 

@@ -93,7 +93,7 @@ def _finding(angles: FingerAngles, naming: MarkerNaming, name: str, body: int, l
         else:
             parameters["distance"] = {"value": size, "unit": "m", "ci95": [size - sd, size + sd]}
         parameters["moment"] = {"value": at, "unit": "s"}
-        text = f"{label or joint}: {name.replace('_', ' ')} of {1e3 * size:.2f} mm at {at:.1f} s of {record.trial.name}."
+        text = f"{label or f'{angles.finger.name} {joint}'}: {name.replace('_', ' ')} of {1e3 * size:.2f} mm at {at:.1f} s of {record.trial.name}."
     elif name == "joint_wobble":
         tilt = _amount(naming, main)
         parameters["amplitude"] = {"value": tilt, "unit": "rad"}
