@@ -66,6 +66,15 @@ def test_a_refused_channel_is_in_no_copy_and_every_parameter_says_its_interval()
     assert bare.to_dict()["parameters"]["begin"] == {"value": 3.0, "unit": "s", "ci95": None}
 
 
+def test_lengths_of_markers_are_read_in_millimetres() -> None:
+    fit = {"unit": "m", "before": 2.03e-4, "after": 7.06e-5, "noise_floor": 7.06e-5, "ci95_reduction": None}
+    slip = Finding("marker_slip", ("marker_slip",), 1.0, (), {}, "P1: a slip.", {"distance": {"value": 0.00238, "unit": "m", "ci95": [0.0023, 0.0025]}},
+                   fit, None, "taken out")
+    page = render(Findings("mismatch", {}, {}, (slip, _finding())), (), (), "a session").decode()
+    for said in ("0.203", "0.0706", "2.38", "2.3 to 2.5", "mm", "P1: a slip.", "A detent."):
+        assert said in page, said
+
+
 def test_page_of_a_consistent_session_has_no_findings() -> None:
     page = render(Findings("consistent", {}, {}, notes=("no palm markers",)), (), (), "a session").decode()
     assert "Nothing is missing" in page

@@ -44,9 +44,11 @@ def render(findings: Findings, stations: Sequence[Any], replays: Sequence[Replay
         tiles += [(f"{findings.lack_of_fit[k]:.2f}", f"residual over noise variance, {k}") for k in ("before", "after")]
     sections = [Section("findings", "Findings", _lead(findings), tuple(_ranked(findings)))]
     sections += [_replayed(replay, f"replay-{i}") for i, replay in enumerate(replays)]
-    apart = [s for s in stations if s.missing or s.believed]
-    sections += [_station(station, f"station-{i}") for i, station in enumerate(apart)]
-    calm = [s for s in stations if not (s.missing or s.believed)]
+    shapes = {_where(u["where"]): u["shape"] for u in findings.unexplained}
+    places = [_where(vars(s)) for s in stations]
+    apart = [s.missing or s.believed or p in shapes for s, p in zip(stations, places, strict=True)]
+    sections += [_station(s, f"station-{i}", shapes.get(p, "")) for i, (s, p, own) in enumerate(zip(stations, places, apart, strict=True)) if own]
+    calm = [s for s, own in zip(stations, apart, strict=True) if not own]
     if calm:
         sections.append(Section("consistent", "Consistent channels", "Nothing is missing here; residual of the declared model, mean over strokes.",
                                 (figures(*(_first_map(s) for s in calm)), KEY)))
@@ -66,14 +68,17 @@ def _lead(findings: Findings) -> str:
 def _ranked(findings: Findings) -> list[Any]:
     if not findings.findings:
         return [listing(list(findings.notes))] if findings.notes else []
-    rows = [[_words(f.effect), str(f.where.get("finger") or "all"), str(f.fit.get("unit", "")),
-             f"{f.where.get('share_of_mismatch', 0):.0%}", f"{f.probability:.3f}", _number(f.fit.get("before")),
-             _number(f.fit.get("after")), _number(f.fit.get("noise_floor")), _interval(f.fit.get("ci95_reduction"))]
-            for f in findings.findings]
+    rows = []
+    for f in findings.findings:
+        unit, scale = _unit(f.fit.get("unit"))
+        rows.append([_words(f.effect), str(f.where.get("finger") or "all"), unit, f"{f.where.get('share_of_mismatch', 0):.0%}", f"{f.probability:.3f}",
+                     *(_number(f.fit.get(k), scale) for k in ("before", "after", "noise_floor")), _interval(f.fit.get("ci95_reduction"), scale)])
     columns = ("effect", "finger", "unit", "share", "probability", "error before", "after", "noise", "95 % of the reduction")
     out = [table(columns, rows, text_columns=3), note("; ".join(sorted({_proof(f) for f in findings.findings})) + ".")]
-    held = [[_words(f.effect), str(name), str(value.get("unit", "")), _number(value["value"]), _interval(value.get("ci95"))]
-            for f in findings.findings for name, value in f.parameters.items()]
+    held = []
+    for effect, name, value in ((f.effect, *item) for f in findings.findings for item in f.parameters.items()):
+        unit, scale = _unit(value.get("unit"))
+        held.append([_words(effect), str(name), unit, _number(value["value"], scale), _interval(value.get("ci95"), scale)])
     if held:
         out.append(table(("of", "parameter", "unit", "value", "95 % interval"), held, text_columns=3))
     out.append(table(("effect", "where it is put right"), [[_words(f.effect), Cell(_kept(f), "wrap")] for f in findings.findings],
@@ -111,12 +116,17 @@ def _words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _number(value: Any) -> str:
-    return "" if value is None or not np.isfinite(value) else f"{value:.4g}"
+def _unit(unit: Any) -> tuple[str, float]:
+    """A unit as it is read, and the factor to it: markers move by millimetres."""
+    return ("mm", 1e3) if unit == "m" else (str(unit or ""), 1.0)
 
 
-def _interval(value: Any) -> str:
-    return "" if value is None else f"{value[0]:.4g} to {value[1]:.4g}"
+def _number(value: Any, scale: float = 1.0) -> str:
+    return "" if value is None or not np.isfinite(value) else f"{scale * value:.4g}"
+
+
+def _interval(value: Any, scale: float = 1.0) -> str:
+    return "" if value is None else f"{scale * value[0]:.4g} to {scale * value[1]:.4g}"
 
 
 def _channels(findings: Findings) -> Any:
@@ -159,7 +169,12 @@ def _first_map(station: Any) -> tuple[str, bytes]:
     return f"{_place(station)} [{effort}]", _map(position, velocity, residuals[0], sigma, f"position [{unit}]", effort)
 
 
-def _station(station: Any, name: str) -> Section:
+def _where(where: Mapping[str, Any]) -> tuple[Any, ...]:
+    """Where a station is, or an entry of what is unexplained."""
+    return tuple(where.get(k) for k in ("finger", "joint", "signal"))
+
+
+def _station(station: Any, name: str, unexplained: str) -> Section:
     position, velocity, residuals, sigma, unit, effort = _maps(station)
     first = station.kept[0].term if station.believed else None
     at, axis = (position, f"position [{unit}]") if first is None else _axis(
@@ -170,7 +185,8 @@ def _station(station: Any, name: str) -> Section:
     if station.believed:
         drawn += [(f"{_words(f.term.effect.name)}: its part through the data less the rest [{effort}]", _curve(station.naming, f, unit, effort))
                   for f in station.kept[:3]]
-    return Section(name, _place(station), station.line().replace("_", " ") + ".", (figures(*drawn), KEY))
+    said = f"{_place(station)}: unexplained, {unexplained}" if unexplained and not station.missing else station.line().replace("_", " ")
+    return Section(name, _place(station), said + ".", (figures(*drawn), KEY))
 
 
 def _axis(effect: str, region: Mapping[str, Any] | None, position: Array, velocity: Array, unit: str) -> tuple[Array, str]:

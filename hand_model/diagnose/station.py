@@ -150,9 +150,9 @@ def unrepeated_of(station: Station) -> dict[str, Any]:
     """The entry of what changes from one while to the next at the same place, speed and direction."""
     wander = station.naming.wander
     length = 0.0 if wander is None else wander.length_s
-    span = f"whiles of {length:.1g} s" if np.isfinite(length) else "stroke to stroke"
+    span = f"over whiles of {length:.1g} s" if np.isfinite(length) else "from stroke to stroke"
     entry = unexplained_of(station, station.wander**2 / (1 + station.wander**2))
-    return {**entry, "shape": f"does not repeat: changes over {span} by {station.wander:.1f} times the noise"}
+    return {**entry, "shape": f"does not repeat: changes {span} by {station.wander:.1f} times the noise"}
 
 
 def channel_of(station: Station) -> dict[str, Any]:
