@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from hand_model.diagnose.assemble import _shared, _without_shadows, _without_tilts
+from hand_model.diagnose.assemble import _shared, _without_shadows, _without_tilts, assemble
 from hand_model.diagnose.findings import Finding, weighed
 
 
@@ -59,3 +59,40 @@ def test_shares_of_the_mismatch_are_ranked_as_the_findings_and_are_those_of_the_
     assert sum(shares) == pytest.approx((4 * 1.0 + 4 * 0.7 + 1 * 1.0) / 9)
     alone = _shared([with_share(2.0, "detent_load", "index", "current", 0.7)])
     assert alone[0].where["share_of_mismatch"] == pytest.approx(0.7)
+
+
+FIT = {"metric": "current_rmse", "unit": "raw", "before": 2.0, "after": 1.0, "noise_floor": 1.0, "held_out": []}
+
+
+def finding(effect: str, finger: str, signal: str, **parameters: float) -> Finding:
+    where = {"finger": finger, "joint": None, "actuator": finger, "signal": signal, "marker": None, "trials": [], "region": None,
+             "share_of_mismatch": 1.0}
+    return Finding(effect, (effect,), 1.0, (), where, "", {k: {"value": v, "unit": "1"} for k, v in parameters.items()}, FIT)
+
+
+def names(*weighted: tuple[float, Finding]) -> list[str]:
+    return [f.effect for f in assemble([], list(weighted), []).findings]
+
+
+def test_a_slip_of_a_tenth_comes_after_a_plain_friction_however_sharp_the_cameras_are() -> None:
+    slip, drag = finding("marker_slip", "index", "markers", distance=2e-4), finding("load_dependent_friction", "index", "current", load_coefficient=0.4)
+    assert names((0.2, slip), (0.1, drag)) == ["load_dependent_friction", "marker_slip"]
+    full = finding("marker_slip", "index", "markers", distance=2e-3)
+    assert names((2.0, full), (0.1, drag)) == ["marker_slip", "load_dependent_friction"]
+
+
+def test_one_effect_of_one_drive_is_one_finding() -> None:
+    speed, torque = finding("drive_sag", "index", "command", sag=0.002), finding("drive_sag", "index", "current", torque_loss=0.3)
+    findings = assemble([], [(0.1, speed), (0.3, torque)], []).findings
+    assert [f.where["signal"] for f in findings] == ["current"]
+    assert names((0.1, speed), (0.3, finding("drive_sag", "ring", "current", torque_loss=0.3))) == ["drive_sag", "drive_sag"]
+
+
+def test_a_trifle_beside_a_large_effect_of_the_same_finger_is_no_finding_but_is_said() -> None:
+    main, trifle = finding("clock_drift", "index", "log", rate_minus_one=2e-3), finding("current_channel_delay", "index", "current", delay=0.004)
+    found = assemble([], [(1.0, main), (0.01, trifle)], [])
+    assert [f.effect for f in found.findings] == ["clock_drift"]
+    assert [r["effect"] for r in found.rejected] == ["current_channel_delay"] and "trifle" in found.rejected[0]["reason"]
+    elsewhere = finding("current_channel_delay", "ring", "current", delay=0.004)
+    assert names((1.0, main), (0.01, elsewhere)) == ["clock_drift", "current_channel_delay"]
+    assert names((1.0, main), (0.01, finding("current_channel_delay", "index", "current", delay=0.06))) == ["clock_drift", "current_channel_delay"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -23,6 +23,8 @@ HARMONICS, SAME_PERIOD = 4, 0.02
 SHADOW = 0.5  # of an encoder error's size: less, in the current of the same motor, may be what is left of it
 TILT = 0.2  # the same, of a wobble's or a travelling centre's, in the angles of the finger
 ANGULAR = {e.name for station in ("encoder", "linkage") for e in catalogue(station)} - {"clock_drift"}
+REFUSED = "command_as_measurement"  # a channel that tells nothing: no other finding is small beside it
+TRIFLE, SLIGHT = 0.01, 0.25  # of the square of the heaviest weight, and of the magnitude at which an effect is plain
 SIGNALS = {"drive": "current", "encoder": "encoder", "linkage": "markers"}
 UNREST = 0.3  # of the noise: wander that every machine is granted
 
@@ -45,8 +47,12 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
                      for name, value in station.naming.rejected[:4]]
     unexplained += [unrepeated_of(s) for s in stations if _wanders(s, stations)]
     ranked = _without_tilts(_without_shadows(_one_clock(ranked)))
-    ranked = [(float(np.sqrt(weight * _magnitude(f, stations))), f) for weight, f in ranked]
-    ranked.sort(key=lambda item: -item[0])
+    sized = [(_magnitude(f, stations), weight, f) for weight, f in ranked]
+    ranked = sorted(((float(np.sqrt(m * weight)), f) for m, weight, f in sized), key=lambda item: -item[0])
+    ranked = _once(ranked)
+    trifles = _trifles(ranked, {id(f): m for m, _, f in sized})
+    rejected += [{"effect": f.effect, "where": str(f.where["finger"]), "reason": reason} for f, reason in trifles]
+    ranked = [(w, f) for w, f in ranked if all(f is not trifle for trifle, _ in trifles)]
     found = _shared(ranked)
     verdict = "mismatch" if found else "unexplained" if unexplained else "consistent"
     worst = max(stations, key=lambda s: variance_ratio(s.naming, s.naming.declared), default=None)
@@ -68,10 +74,30 @@ def _magnitude(finding: Finding, stations: Sequence[Station]) -> float:
     return magnitude(finding.effect, values, None if states is None else channel_figures(states))
 
 
+def _once(ranked: list[tuple[float, Finding]]) -> list[tuple[float, Finding]]:
+    """The heaviest of findings that say the same of the same place: a sag shows in speed and in current."""
+    first: dict[Any, tuple[float, Finding]] = {}
+    for item in ranked:
+        where = item[1].where
+        first.setdefault((item[1].effect, *(str(where.get(k)) for k in ("finger", "joint", "actuator", "marker", "markers"))), item)
+    return list(first.values())
+
+
+def _trifles(ranked: list[tuple[float, Finding]], magnitudes: Mapping[int, float]) -> list[tuple[Finding, str]]:
+    """Findings that are small for their kind and hardly show beside the heaviest one of the same finger, each with the reason: they may
+    be no more than its form being another."""
+    out = []
+    for weight, finding in ranked:
+        heaviest, main = next(((w, f) for w, f in ranked if f.where["finger"] == finding.where["finger"] and f.effect != REFUSED), (0.0, finding))
+        if weight**2 < TRIFLE * heaviest**2 and magnitudes[id(finding)] < SLIGHT:
+            out.append((finding, f"a trifle beside {main.effect.replace('_', ' ')}, whose form may be slightly another"))
+    return out
+
+
 def _shared(ranked: list[tuple[float, Finding]]) -> tuple[Finding, ...]:
     """The findings with their shares of the whole session's mismatch, by the squares of the weights that rank them, times what the names of
     their channels explain. A channel that is refused counts as the heaviest of the others."""
-    heaviest = max((w for w, f in ranked if f.effect != "command_as_measurement"), default=1.0)
+    heaviest = max((w for w, f in ranked if f.effect != REFUSED), default=1.0)
     power = np.array([min(w, heaviest) ** 2 for w, _ in ranked])
     channels = [tuple(f.where[k] for k in ("finger", "joint", "actuator", "signal")) for _, f in ranked]
     own = [f.where["share_of_mismatch"] for _, f in ranked]
