@@ -16,6 +16,7 @@ ENGINE = {"current": "inverse dynamics of the motor's balance, motion as recorde
           "markers": "linkage polynomial, motion as recorded"}
 SECOND_HEARINGS, DISPLACING = 2, 0.1  # and the share of what was explained from which a fallen name has displaced others
 CHANNELS = 20  # of a session: what no test of one sees must stand against as many chances
+ALIKE = 1 / 3  # of the size of a larger effect of the same family: below, no finding of its own
 EXPLAINED_LEAST = 0.7  # of the explainable mismatch: below, the names are not believed
 
 
@@ -60,7 +61,13 @@ class Station:
     def kept(self) -> tuple[Named, ...]:
         """The effects that stand beside each other: one of a small share may be no more than the form of the large one being
         another, and is left to the unexplained part."""
-        return tuple(f for f in self.proven if f.share >= SMALL or f is self.proven[0])
+        return tuple(f for f in self.proven if (f.share >= SMALL or f is self.proven[0]) and f not in self.forms)
+
+    @property
+    def forms(self) -> tuple[Named, ...]:
+        """What adds little beside another of its family: a play with a mass that floats in it gives a little, too."""
+        return tuple(f for f in self.proven for g in self.proven
+                     if f.term.effect.family is not None and f.term.effect.family == g.term.effect.family and f.size < ALIKE * g.size)
 
     @property
     def contrast(self) -> float:
@@ -90,8 +97,8 @@ def _stands(naming: Naming, named: Named, which: int, least: float) -> bool:
 
 def judged(signal: str, finger: str | None, actuator: str | None, joint: str | None, states: tuple[Any, ...], effects: Iterable[Any],
            typical: Mapping[str, float] | None = None) -> Station:
-    """The station of the balance of `states`, named among `effects`. Where a name does not stand, those that it displaced are heard
-    without it."""
+    """The station of the balance of `states`, named among `effects`. Where a name does not stand, or is another's form, the others are
+    heard without it."""
     left = tuple(effects)
     station = Station(signal, finger, actuator, joint, name_effects(states, left, typical=typical))
     for _ in range(SECOND_HEARINGS):
@@ -103,6 +110,10 @@ def judged(signal: str, finger: str | None, actuator: str | None, joint: str | N
         if other.weight <= station.weight:
             break
         station = other
+    if station.forms:
+        left = tuple(e for e in left if e.name not in {f.term.effect.name for f in station.forms})
+        other = Station(signal, finger, actuator, joint, name_effects(states, left, typical=typical))
+        station = other if other.believed else station
     return station
 
 

@@ -18,6 +18,7 @@ class Backlash(Effect):
     """follower = map(play(driver)), or play(map(driver)): the lag and the travel that crosses it are one gap."""
 
     replaces = "power_1"
+    family = "lost motion"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """Full width of the gap in the driver's unit; form 0: at the driver, hard ends; form 1: ends that give (half to one and a

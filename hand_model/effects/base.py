@@ -132,6 +132,7 @@ class Effect:
     needs: ClassVar[str | None] = None  # declared column without which the effect is none (a ratio to a friction of zero)
     of_the_hand: ClassVar[bool] = True  # False of what only one recording had, such as an obstacle
     unwritten: ClassVar[str | None] = None  # why no file can hold it or no replay show it, where that is so
+    family: ClassVar[str | None] = None  # effects of one family move alike: a small one beside a large one may be its form
     repeats: ClassVar[bool] = False  # may be named more than once in one balance, with other shapes
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:

@@ -18,6 +18,8 @@ class Compliance(Effect):
     compliance is known from what friction and speed add.
     """
 
+    family = "lost motion"
+
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """form 0: give at the driver's end, in its unit; form 1: at the end of what follows, in its unit."""
         loaded = all("load" in s.extra for s in states)
