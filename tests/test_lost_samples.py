@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,10 @@ from session_writers import write_log, write_session
 
 from hand_model.diagnose import diagnose
 from hand_model.diagnose.diagnosis import _current_at, _no_measurement
-from hand_model.diagnose.drive import _held, count_range
+from hand_model.diagnose.drive import _held, count_range, drive_states, opposes
 from hand_model.errors import SessionError
-from hand_model.session import Log
+from hand_model.identify.clock import align
+from hand_model.session import Log, read_session
 
 
 def log(position, **columns) -> Log:
@@ -64,3 +66,22 @@ def test_a_session_that_breaks_its_format_is_refused_before_anything_is_computed
             diagnose(session, model=False, output=tmp_path / "out")
         assert "index.csv" in str(refused.value)
     assert not (tmp_path / "out").exists()
+
+
+def test_counts_that_fall_with_flexion_are_refused() -> None:
+    at = np.arange(0, 30, 0.01)
+    angle = np.interp(at, [0, 1, 4, 5, 7, 9, 9.5, 14, 16, 17, 19, 23, 24, 30], [0, 0, 1.2, 1.2, 0, 0, 0.6, 0.6, 0, 0, 1.2, 1.2, 0, 0])
+    with pytest.raises(SessionError, match="must increase with flexion"):
+        align(at, angle, at + 100, 9000 - 3000 * angle, "log/index.csv")
+    assert align(at, angle, at + 100, 9000 + 3000 * angle, "log/index.csv").offset_s == pytest.approx(100, abs=1e-3)
+
+
+def test_a_current_of_the_other_sign_is_told_from_the_friction(tmp_path: Path) -> None:
+    from hand_model.twin.case import draw_case
+
+    draw_case(3, "none").record(tmp_path / "s")
+    for states in drive_states(read_session(tmp_path / "s")).values():
+        assert not opposes(states)
+        assert opposes(tuple(replace(s, effort=-s.effort) for s in states))
+        noise = np.random.default_rng(0)
+        assert not opposes(tuple(replace(s, effort=noise.normal(0, 5, len(s.effort))) for s in states))

@@ -12,7 +12,7 @@ import numpy as np
 from ..background import Background, single_threaded
 from ..effects import catalogue
 from ..effects.base import DriveState
-from ..errors import HandModelError
+from ..errors import HandModelError, SessionError
 from ..hand import Hand
 from ..output import forget
 from ..session import Log, Session, check_session, moves, read_session
@@ -22,7 +22,7 @@ from .balance import Balance
 from .command import CommandFacts, command_facts, command_findings, refused, with_lateness
 from .correct import refuse_output, write_corrected
 from .decoupled import while_driven, without_excursions
-from .drive import drive_states, drive_trials, echoes_command, is_measured
+from .drive import drive_states, drive_trials, echoes_command, is_measured, opposes
 from .evidence import typical_coefficients
 from .findings import FILES, FOLDERS, Finding, Findings
 from .finger import finger_readings
@@ -92,6 +92,9 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
                                         without_excursions(states, station.naming.balance.states, fingers[station.finger]))
     for actuator in [a for a, states in drives.items() if not is_measured(states)]:
         found.append(refused(actuator, _finger_of(session, actuator), tuple(s.trial for s in drives.pop(actuator))))
+    for actuator in (a for a, states in drives.items() if opposes(states)):
+        raise SessionError(f'{session.path}: actuator "{actuator}": friction would drive the motion; `position` must increase with flexion and '
+                           "positive `current` drive flexion, and one of them has the other sign")
     facts = _command(session, drives)
     found += command_findings(facts, {a: _finger_of(session, a) for a in facts})
     drives = with_lateness(drives, facts)

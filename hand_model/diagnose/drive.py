@@ -140,6 +140,21 @@ def is_measured(states: tuple[DriveState, ...]) -> bool:
     return left < UNMOVED * spread and not (jitter < 0.03 * spread and left > 10 * max(jitter, 0.02 * spread))
 
 
+def opposes(states: tuple[DriveState, ...]) -> bool:
+    """Whether friction would drive the motion: the current and the position of a drive have opposite signs. Of steady samples, by ten
+    standard errors."""
+    use = [s.extra["steady"] > 0 for s in states]
+    effort = np.concatenate([s.effort[u] for s, u in zip(states, use, strict=True)])
+    columns = np.concatenate([s.declared[u] for s, u in zip(states, use, strict=True)])[np.isfinite(effort)]
+    effort = effort[np.isfinite(effort)]
+    if len(effort) < 50:
+        return False
+    beta = _coefficients(columns, effort)
+    scale = np.linalg.norm(columns, axis=0) + 1e-12
+    spread = np.linalg.pinv((columns / scale).T @ (columns / scale))[2, 2] * np.var(effort - columns @ beta)
+    return bool(beta[2] < -10 * np.sqrt(spread) / scale[2])
+
+
 def echoes_command(logs: Sequence[Log]) -> bool:
     """Whether the position column repeats the setpoint: just after each change of the setpoint it is already there, which no
     machine of finite speed is."""

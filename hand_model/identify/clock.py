@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
-from ..errors import IdentificationError
+from ..errors import IdentificationError, SessionError
 
 Array = NDArray[np.float64]
 
@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 MAP_DEGREE = 4
 # Below this share of explained variance the two recordings show no common motion.
 LEAST_EXPLAINED = 0.5
+FALLING = 0.9  # counts of the other sign explain more than this, as recorded less
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ def align(mocap_time_s: Array, angle_rad: Array, log_time_s: Array, counts: Arra
     """Align a joint angle (n,) [rad] on the mocap clock with encoder counts (m,) on the log's clock.
 
     nan samples are left out. name: for the message. Raises IdentificationError where either does not move or they never
-    correlate.
+    correlate, SessionError where counts fall as the angle rises.
     """
     seen, kept = np.isfinite(angle_rad), np.isfinite(counts) & np.isfinite(log_time_s)
     t, q, s, c = mocap_time_s[seen], angle_rad[seen], log_time_s[kept], counts[kept]
@@ -59,6 +60,10 @@ def align(mocap_time_s: Array, angle_rad: Array, log_time_s: Array, counts: Arra
     lags, correlation = _correlate(t, q, s, c)
     offset, rate = float(lags[np.argmax(correlation)]), 1.0
     offset, rate, offset_sd, rate_sd, explained = _refine(t, q, s, c, offset)
+    if explained < FALLING:
+        lowest = float(lags[np.argmin(np.where(correlation > -1, correlation, 1.0))])
+        if _refine(t, q, s, -c, lowest)[-1] > FALLING:
+            raise SessionError(f"{name}: `position` falls as the finger flexes; it must increase with flexion")
     if explained < LEAST_EXPLAINED:
         raise IdentificationError(
             f"{name}: mocap and log never correlate (best alignment explains {100 * max(explained, 0):.0f} % of the motion); "
