@@ -11,6 +11,7 @@ import pytest
 from hand_model.diagnose.excursions import with_excursions
 from hand_model.diagnose.name import name_effects
 from hand_model.diagnose.slips import _swaps
+from hand_model.diagnose.station import Station, judged
 from hand_model.effects import catalogue, effect
 from hand_model.effects.base import DriveState
 from hand_model.effects.driven import driven, play, soft_play
@@ -108,6 +109,19 @@ def test_give_that_grows_with_load_is_no_lost_motion(station: str, name: str) ->
     states = joint(2, add=lambda t, x, v: -0.03 * (15.0 + 0.2 * x + 35.0 * np.tanh(v) + 0.15 * v))
     found = named(states, station)
     assert list(found) == [name]
+
+
+def test_a_play_and_as_much_give_are_both_named_and_little_give_is_the_plays_form() -> None:
+    states = joint(1, move=lambda x: play(x, 2.5), add=lambda t, x, v: -0.03 * (15.0 + 0.2 * x + 35.0 * np.tanh(v) + 0.15 * v), noise=0.2)
+    station = judged("encoder", "index", "index", "proximal", states, catalogue("encoder"))
+    assert {f.term.effect.name for f in station.kept} == {"drive_backlash", "series_elasticity"}
+
+    def of(name: str, size: float) -> SimpleNamespace:
+        return SimpleNamespace(term=SimpleNamespace(effect=effect(name)), size=size)
+
+    play_, little, other = of("drive_backlash", 3.0), of("series_elasticity", 0.9), of("encoder_periodic_error", 0.1)
+    assert Station.forms.fget(SimpleNamespace(proven=(play_, little, other))) == (little,)
+    assert Station.forms.fget(SimpleNamespace(proven=(play_, of("series_elasticity", 1.1), other))) == ()
 
 
 def test_deadband_and_stop_are_told_apart_and_placed() -> None:
