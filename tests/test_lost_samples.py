@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from session_writers import write_log, write_session
 from hand_model.diagnose import diagnose
 from hand_model.diagnose.diagnosis import _current_at, _no_measurement
 from hand_model.diagnose.drive import _held, count_range, drive_states, opposes
-from hand_model.errors import SessionError
+from hand_model.errors import HandFileError, SessionError
 from hand_model.identify.clock import align
 from hand_model.session import Log, read_session
 
@@ -85,3 +86,16 @@ def test_a_current_of_the_other_sign_is_told_from_the_friction(tmp_path: Path) -
         assert opposes(tuple(replace(s, effort=-s.effort) for s in states))
         noise = np.random.default_rng(0)
         assert not opposes(tuple(replace(s, effort=noise.normal(0, 5, len(s.effort))) for s in states))
+
+
+def test_a_model_of_another_hand_is_refused() -> None:
+    from hand_model.diagnose.improve import refuse_other
+
+    def hand(side: str, *fingers: str) -> SimpleNamespace:
+        return SimpleNamespace(side=side, fingers=[SimpleNamespace(name=f) for f in fingers])
+
+    refuse_other(hand("left", "index", "ring"), hand("left", "index"))
+    with pytest.raises(HandFileError, match="right hand"):
+        refuse_other(hand("right", "index"), hand("left", "index"))
+    with pytest.raises(HandFileError, match="none of the session's fingers"):
+        refuse_other(hand("left", "ring"), hand("left", "index"))

@@ -27,7 +27,7 @@ from .evidence import typical_coefficients
 from .findings import FILES, FOLDERS, Finding, Findings
 from .finger import finger_readings
 from .gravity import with_gravity
-from .improve import read_model, write_improved
+from .improve import read_model, refuse_other, write_improved
 from .name import polish, scan
 from .page import write_page
 from .preload import preload_findings
@@ -48,11 +48,13 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
     writes none. output: folder that gets `findings.json`, `report.html` and, where physics was named, `model_before` and `model`,
     compiled; where the recording was put right, `corrected`, a session. say: called with one line per result as it comes. progress:
     called with the share of the work that is done, 0 to 1.
-    Raises SessionError for a session that breaks its format, HandFileError for a model that is none, HandModelError for an output
+    Raises SessionError for a session that breaks its format, HandFileError for a model that is none or of another hand, HandModelError for an output
     that is a file or holds a `corrected` that no diagnosis wrote.
     """
     session = session if isinstance(session, Session) else read_session(session)
     hand = read_model(model) if model not in (None, False) else None
+    if hand is not None:
+        refuse_other(hand, session)
     tell = say or (lambda line: None)
     steps = iter(np.linspace(0, 1, len(session.fingers) + len(drive_trials(session)) + 2).tolist())
 

@@ -11,7 +11,9 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from ..effects import effect
+from ..errors import HandFileError
 from ..hand import Coupling, Effect, EncoderMap, Estimate, Finger, Hand, Motor, load_hand
+from ..session import Session
 from .findings import Finding
 from .prove import Replay, errors_along, proved, untouched
 
@@ -27,6 +29,15 @@ def read_model(model: Any) -> Hand:
         return model
     path = Path(model)
     return load_hand(path / "hand.json" if path.is_dir() else path)
+
+
+def refuse_other(hand: Hand, session: Session) -> None:
+    """Raise HandFileError where a hand is not the session's: of the other side, or without any of its fingers."""
+    if hand.side != session.side:
+        raise HandFileError(f"the model is a {hand.side} hand, and the session's is a {session.side} one; a model of this hand is needed")
+    fingers = [f.name for f in session.fingers]
+    if not {f.name for f in hand.fingers} & set(fingers):
+        raise HandFileError(f"the model has none of the session's fingers ({', '.join(fingers)}); a model of this hand is needed")
 
 
 def as_fitted(hand: Hand, stations: Sequence[Any], counts: Mapping[str, tuple[float, float]],
