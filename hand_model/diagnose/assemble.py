@@ -25,6 +25,7 @@ TILT = 0.2  # the same, of a wobble's or a travelling centre's, in the angles of
 ANGULAR = {e.name for station in ("encoder", "linkage") for e in catalogue(station)} - {"clock_drift"}
 REFUSED = "command_as_measurement"  # a channel that tells nothing: no other finding is small beside it
 TRIFLE, SLIGHT = 0.01, 0.25  # of the square of the heaviest weight, and of the magnitude at which an effect is plain
+MINUTE = 0.08  # of that magnitude: less, where the lack-of-fit test sees nothing, is left to the imperfections of reading angles and speeds
 SIGNALS = {"drive": "current", "encoder": "encoder", "linkage": "markers"}
 UNREST = 0.3  # of the noise: wander that every machine is granted
 
@@ -38,7 +39,12 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
     unexplained = list(unexplained)
     for station in stations:
         if station.believed:
-            ranked += [finding_of(station, *merged) for merged in _merged(station.kept)]
+            for weight, finding in (finding_of(station, *merged) for merged in _merged(station.kept)):
+                if station.naming.before.p >= ALPHA and _magnitude(finding, stations) < MINUTE:
+                    rejected.append({"effect": finding.effect, "where": str(station.finger),
+                                     "reason": "no test sees it beside the noise, and it is minute for one of its kind"})
+                else:
+                    ranked.append((weight, finding))
         elif station.missing:
             unexplained.append(unexplained_of(station, 1.0))
         if station.believed and station.naming.after.p < ALPHA and station.explained < 0.95:

@@ -176,7 +176,8 @@ def _search(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str]
 
 
 def _least(balance: Balance, others: int) -> float:
-    return EVIDENCE_LEAST if others or balance.train.all() else FAINT
+    restless = balance.wander is not None and balance.wander.real
+    return EVIDENCE_LEAST if others or restless or balance.train.all() else FAINT
 
 
 def _names(fit: Fit) -> tuple[str, ...]:
