@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..effects.base import DriveState
-from ..errors import IdentificationError
+from ..errors import IdentificationError, SessionError
 from ..identify.chain import Chain, palm_pose
 from ..identify.clock import align
 from ..identify.finger import observations
@@ -60,11 +60,16 @@ def _in_finger(session: Session, fingers: Mapping[str, FingerAngles], trial: Tri
         time_s, flexed = record.mocap.time_s, record.angle_rad[:, 0]
     else:
         tip, base = (np.nanmean(data.position_world[:, data.body == k], axis=1) for k in (data.body.max(), 0))
-        time_s, flexed = mocap.time_s, -np.linalg.norm(tip - base, axis=1)  # the finger's reach shrinks as it flexes
+        time_s, flexed = mocap.time_s, -np.linalg.norm(tip - base, axis=1)  # a finger's reach shrinks as it flexes, a thumb's may grow
     good = np.isfinite(flexed)
-    try:
-        clock = align(time_s[good], flexed[good], state.time_s, state.position, trial.name)
-    except IdentificationError:
+    clock = None
+    for course in (flexed, -flexed) if record is None else (flexed,):
+        try:
+            clock = align(time_s[good], course[good], state.time_s, state.position, trial.name)
+            break
+        except (IdentificationError, SessionError):
+            continue
+    if clock is None:
         return None
     gravity_palm = np.einsum("nij,i->nj", palm_pose(chain, data).rotation, session.gravity_world)
     smooth = np.stack([local_quadratic(mocap.time_s, g, SMOOTH_S)[0] for g in (gravity_palm @ plane(chain).T).T], axis=-1)
