@@ -21,6 +21,7 @@ from ..identify.start import start_chain
 from ..session import Finger, Mocap, Session, Trial
 from .drive import count_range
 from .excursions import with_excursions
+from .ghosts import ghosts
 from .motion import Motion, estimate_motion, local_quadratic
 from .name import Naming
 
@@ -36,7 +37,8 @@ DEPARTURES_S = (0.1, 0.25, 0.6, 1.5)  # bandwidths of what a joint departs from 
 @dataclass(frozen=True)
 class FlexionAngles:
     """One flexion recording of one finger. angle_rad: (n, k), nan in frames that do not tell. swaps: labels put right.
-    data: markers as recorded, labels put right. pose: of every frame, by the identified chain."""
+    data: markers as recorded, labels put right. pose: of every frame, by the identified chain. ghost: (n,) frames in which a label
+    sits on something else."""
 
     trial: Trial
     mocap: Mocap
@@ -44,6 +46,7 @@ class FlexionAngles:
     swaps: tuple[Swap, ...]
     data: ChainData
     pose: Pose
+    ghost: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -90,9 +93,10 @@ def _learned_from(recordings: Sequence[_Recording]) -> tuple[ChainData, NDArray[
     """Thinned frames of the training recordings (of all, where none is for training), and which of them are at rest."""
     parts, rest, count = [], [], 0
     for recording in [r for r in recordings if not r.trial.validate] or recordings:
-        step = max(1, len(recording.mocap.time_s) // LEARN_FRAMES)
-        parts.append(recording.markers.position_world[::step])
-        rest.append(count + np.flatnonzero(recording.mocap.time_s[::step] < REST_S))
+        frames = np.flatnonzero(~ghosts(recording.markers, recording.mocap.time_s))
+        frames = frames[:: max(1, len(frames) // LEARN_FRAMES)]
+        parts.append(recording.markers.position_world[frames])
+        rest.append(count + np.flatnonzero(recording.mocap.time_s[frames] < REST_S))
         count += len(parts[-1])
     first = recordings[0].markers
     return ChainData(np.concatenate(parts), first.body, first.labels), np.concatenate(rest)
@@ -105,8 +109,9 @@ def _posed(finger: Finger, recordings: Sequence[_Recording], start: Chain) -> Fi
     records = []
     for r in recordings:
         pose, sound = _poses(r.markers, chain, fit.noise_m)
-        angle = np.where(sound[:, None], pose.angle_rad, np.nan)
-        records.append(FlexionAngles(r.trial, r.mocap, angle, r.swaps, r.markers, pose))
+        ghost = ghosts(r.markers, r.mocap.time_s)
+        angle = np.where((sound & ~ghost)[:, None], pose.angle_rad, np.nan)
+        records.append(FlexionAngles(r.trial, r.mocap, angle, r.swaps, r.markers, pose, ghost))
     return FingerAngles(finger, chain, fit.noise_m, tuple(records))
 
 

@@ -54,7 +54,7 @@ def blocks_of(angles: FingerAngles) -> Blocks:
         size = np.linalg.norm(residual, axis=-1)
         sound = np.isfinite(record.angle_rad).all(1)
         far = ~(size < FARTHEST_M) | _passing(size > OUTLIER_LIMIT * angles.noise_m, record.mocap.time_s)
-        good = np.flatnonzero(sound | (~far.any(1) & ~_passing(~sound, record.mocap.time_s)))
+        good = np.flatnonzero(~record.ghost & (sound | (~far.any(1) & ~_passing(~sound, record.mocap.time_s))))
         count = len(good) // BLOCK
         if count < 20:
             continue
