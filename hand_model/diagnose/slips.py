@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -78,15 +79,14 @@ def _finding(angles: FingerAngles, naming: MarkerNaming, name: str, body: int, l
     blocks = naming.blocks
     joint = angles.finger.segments[body - 1].name if body > 0 else None
     main = max(members, key=lambda e: e.gain)
-    shift = sum((e.columns @ e.coefficients).reshape(len(blocks.residual), -1, 3) for e in members)
-    size = float(np.median(np.linalg.norm(shift, axis=-1).max(1)[main.begin or 0 :]))
+    size = displacement(members, main)
     parameters: dict[str, dict[str, Any]] = {}
     trials = [r.trial.name for r in angles.records]
     if main.begin is not None:
         record = angles.records[int(blocks.record[main.begin])]
         at = float(blocks.time_s[main.begin])
         trials = [record.trial.name]
-        sd = naming.sigma_m / np.sqrt(max(len(blocks.residual) - main.begin, 1)) * 4
+        sd = naming.sigma_m / np.sqrt(max((main.end or len(blocks.residual)) - main.begin, 1)) * 4
         if name == "support_slip":
             turn = float(np.linalg.norm(main.coefficients[3:6]))
             parameters["turn"] = {"value": turn, "unit": "rad"}
@@ -110,6 +110,12 @@ def _finding(angles: FingerAngles, naming: MarkerNaming, name: str, body: int, l
     correction = CORRECTION.get(name)
     model = None if correction else {"native": False, "mjcf": None, "urdf": "not expressible"}
     return Finding(name, (name,), float(1 - np.exp(-min(main.evidence, 700))), (), where, text, parameters, fit, model, correction)
+
+
+def displacement(members: Sequence[MarkerEffect], main: MarkerEffect) -> float:
+    """Median over the time in which `main` acts of how far [m] its effects together move the marker that they move most."""
+    shift = sum((e.columns @ e.coefficients).reshape(len(e.columns), -1, 3) for e in members)
+    return float(np.median(np.linalg.norm(shift, axis=-1).max(1)[main.begin or 0 : main.end]))
 
 
 def _amount(naming: MarkerNaming, effect: MarkerEffect) -> float:
