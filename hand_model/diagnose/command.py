@@ -22,6 +22,7 @@ FULL_SPEED = 0.9  # quantile of the velocity in the fastest strokes
 CEILING_SHARE = 0.6  # of the current beyond its limit that a drive takes from its speed: one, but for noise in the limit
 CEILING_LEFT, CEILING_T = 0.1, 6.0
 REACTION_S = 0.15  # a person's quickest: a delay counts beside it
+UNLIKE = 0.1  # of a delay by which answers may miss it: controllers of other gains rise otherwise
 
 
 @dataclass(frozen=True)
@@ -160,7 +161,7 @@ def with_lateness(drives: Mapping[str, tuple[DriveState, ...]], facts: Mapping[s
     current shows starts and stops late as well, whatever model it is held against."""
     out = dict(drives)
     for actuator, told in lateness({a: f.answers for a, f in facts.items()}).items():
-        late = np.array([told.channel_s, told.doubt_s])
+        late = np.array([told.channel_s, float(np.hypot(told.doubt_s, UNLIKE * told.channel_s))])
         out[actuator] = tuple(replace(s, extra={**s.extra, "late": late, "sigma": _lasting(s, told.channel_s)})
                               for s in drives[actuator])
     return out

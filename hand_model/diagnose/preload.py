@@ -18,6 +18,7 @@ from .station import Station
 SPREAD = 0.15  # mean absolute deviation of the logarithm of a drive's preload within one hand
 ODD_P = 0.03  # of two drives that differ as much by chance; beyond, one of them is odd
 LOST = 0.2  # of the other's preload: less, or the wrong sign, and there is none
+SURE_LEAST = 0.1  # of a half difference counts in the ranking, however uncertain the rest is
 CLASS = ("asymmetric_friction", "spring_preload")
 
 
@@ -79,4 +80,5 @@ def _finding(station: Station, half_difference: float, error: float, usual: floa
     fit = {"metric": "current_rmse", "unit": unit, "before": None, "after": None, "noise_floor": station.naming.balance.sigma,
            "ci95_reduction": None, "held_out": [], "engine": "comparison of the hand's motors"}
     model = {"native": True, "mjcf": f"joint[@name='{station.actuator}']/@springref", "urdf": "kept in hand.json"}
-    return weighed(abs(half_difference) / station.naming.balance.sigma, station.contrast), Finding(CLASS[0], CLASS, 1 - p, (), where, text, parameters, fit, model)
+    sure = max(abs(half_difference) - doubt, SURE_LEAST * abs(half_difference))
+    return weighed(sure / station.naming.balance.sigma, station.contrast), Finding(CLASS[0], CLASS, 1 - p, (), where, text, parameters, fit, model)
