@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from test_diagnose import drive, planted
 
+from hand_model.diagnose.assemble import SIGNALS, _sure
 from hand_model.diagnose.magnitude import LEAST, MOST, PLAIN, channel_figures, magnitude
 from hand_model.effects import catalogue
 
@@ -29,7 +30,14 @@ def test_a_tenth_is_a_tenth_and_the_unit_of_the_current_does_not_matter(effect: 
 
 
 def test_every_effect_of_a_hand_has_a_figure_and_what_has_none_counts_as_plain() -> None:
-    named = {e.name for s in ("drive", "encoder", "linkage") for e in catalogue(s)}
+    named = {e.name for e in catalogue()} - {"command_as_measurement"}  # a refusal
+    assert {e.station for e in catalogue()} - {"markers"} == set(SIGNALS)  # and its figure refers to the channel in which it shows
     assert named - set(PLAIN) == set()
     assert magnitude("something_new", {"size": 7.0}) == 1.0
     assert magnitude("detent_load", {"load": np.nan}) == 1.0
+
+
+@pytest.mark.parametrize(("entry", "sure"), [({"value": 3.0}, 3.0), ({"value": -3.0, "ci95": [-4.0, -2.0]}, -2.0), ({"value": 3.0, "ci95": [-1.0, 7.0]}, 0.0),
+                                             ({"value": None, "ci95": None}, None)])
+def test_what_is_sure_of_a_figure_is_the_end_of_its_interval_nearer_to_zero(entry, sure) -> None:
+    assert _sure(entry) == sure

@@ -26,7 +26,7 @@ ANGULAR = {e.name for station in ("encoder", "linkage") for e in catalogue(stati
 REFUSED = "command_as_measurement"  # a channel that tells nothing: no other finding is small beside it
 TRIFLE, SLIGHT = 0.01, 0.25  # of the square of the heaviest weight, and of the magnitude at which an effect is plain
 MINUTE = 0.08  # of that magnitude: less, where the lack-of-fit test sees nothing, is left to the imperfections of reading angles and speeds
-SIGNALS = {"drive": "current", "encoder": "encoder", "linkage": "markers"}
+SIGNALS = {"drive": "current", "motors": "current", "command": "current", "encoder": "encoder", "linkage": "markers"}
 UNREST = 0.3  # of the noise: wander that every machine is granted
 
 
@@ -73,11 +73,19 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
 
 
 def _magnitude(finding: Finding, stations: Sequence[Station]) -> float:
-    """How large a finding is for its kind, measured by the channel in which effects of its kind show."""
+    """How large a finding surely is for its kind (by the ends of intervals nearer to zero), measured by the channel in which effects of its
+    kind show."""
     signal = {e.name: SIGNALS[s] for s in SIGNALS for e in catalogue(s)}.get(finding.effect)
     states = next((s.naming.balance.states for s in stations if s.signal == signal and s.finger == finding.where["finger"]), None)
-    values = {name: entry["value"] for name, entry in finding.parameters.items()}
+    values = {name: _sure(entry) for name, entry in finding.parameters.items()}
     return magnitude(finding.effect, values, None if states is None else channel_figures(states))
+
+
+def _sure(entry: Mapping[str, Any]) -> float | None:
+    value, interval = entry["value"], entry.get("ci95")
+    if value is None or interval is None or None in interval:
+        return value
+    return min(interval, key=abs) if interval[0] * interval[1] > 0 else 0.0
 
 
 def _once(ranked: list[tuple[float, Finding]]) -> list[tuple[float, Finding]]:
