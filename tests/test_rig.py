@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rig_bench import HEAD
 
 from hand_model.errors import DescriptionError, SessionError
 from hand_model.report.rig_findings import write_rig_findings
@@ -34,15 +35,6 @@ PENDULUM = """<mujoco model="rig">
     <inertial pos="0 0 -0.2" mass="0.5" diaginertia="0.002 0.002 0.0001"/></body></worldbody>
   <actuator><motor name="motor" joint="hinge"/></actuator></mujoco>
 """
-SESSION = """format = "hand-session/1"
-[hand]
-name = "planted"
-[rig]
-model = "rig.xml"
-[signals]
-position = "joint:hinge:position"
-torque = "actuator:motor:force"
-"""
 MASS, LEVER, INERTIA = 0.6, 0.2, 0.6 * 0.04 + 0.002
 
 
@@ -50,7 +42,7 @@ def planted(folder: Path, effect: str = "none", trials: int = 4, seconds: float 
     """A pendulum moved along sums of sinusoids; its torque by the true balance (mass 0.6, not 0.5), with an effect or none."""
     (folder / "log").mkdir(parents=True)
     (folder / "rig.xml").write_text(PENDULUM)
-    text, random = SESSION, np.random.default_rng(3)
+    text, random = HEAD, np.random.default_rng(3)
     for k in range(trials):
         t = np.arange(0, seconds, 0.005)
         w = 2 * np.pi * np.array([0.31, 0.83]) * (1 + 0.13 * k)
@@ -202,7 +194,7 @@ def test_simulation_agrees_with_mujoco(tmp_path: Path) -> None:
     table = np.stack([np.arange(n) * 2e-3, q], 1)
     np.savetxt(tmp_path / "log/a.csv", table, delimiter=",", header="time,position", comments="", fmt="%.12g")
     (tmp_path / "session.toml").write_text(
-        SESSION.replace('torque = "actuator:motor:force"\n', "") + '[[trial]]\nkind = "motion"\nlog = "log/a.csv"\n'
+        HEAD.replace('torque = "actuator:motor:force"\n', "") + '[[trial]]\nkind = "motion"\nlog = "log/a.csv"\n'
     )
     residuals = replay_rig(read_session(tmp_path))
     assert residuals.figure("position_rmse", False) < 0.02 * np.std(q)
@@ -282,7 +274,7 @@ def test_a_passive_session_without_validation_is_diagnosed(tmp_path: Path) -> No
     text = text.replace('frictionloss="0.05"', 'frictionloss="0.004"')
     (tmp_path / "log").mkdir()
     (tmp_path / "rig.xml").write_text(text)
-    manifest, n = SESSION.replace('torque = "actuator:motor:force"\n', ""), 2500
+    manifest, n = HEAD.replace('torque = "actuator:motor:force"\n', ""), 2500
     truth = vector({"inertia": 0.0225, "damping": 0.001, "coulomb": 0.004, "drag": 0.004})
     for k, start in enumerate((1.4, 0.8)):
         lane = Lane("x", False, np.zeros(n), 1.0, np.zeros(n), (start, 0.0), np.zeros(n), np.ones(n))

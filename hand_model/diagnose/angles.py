@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,12 +89,17 @@ class _Recording:
     markers: ChainData
     swaps: tuple[Swap, ...]
 
+    @cached_property
+    def ghost(self) -> NDArray[np.bool_]:
+        """Frames (n,) in which a label sits on something else."""
+        return ghosts(self.markers, self.mocap.time_s)
+
 
 def _learned_from(recordings: Sequence[_Recording]) -> tuple[ChainData, NDArray[np.int64]]:
     """Thinned frames of the training recordings (of all, where none is for training), and which of them are at rest."""
     parts, rest, count = [], [], 0
     for recording in [r for r in recordings if not r.trial.validate] or recordings:
-        frames = np.flatnonzero(~ghosts(recording.markers, recording.mocap.time_s))
+        frames = np.flatnonzero(~recording.ghost)
         frames = frames[:: max(1, len(frames) // LEARN_FRAMES)]
         parts.append(recording.markers.position_world[frames])
         rest.append(count + np.flatnonzero(recording.mocap.time_s[frames] < REST_S))
@@ -109,9 +115,8 @@ def _posed(finger: Finger, recordings: Sequence[_Recording], start: Chain) -> Fi
     records = []
     for r in recordings:
         pose, sound = _poses(r.markers, chain, fit.noise_m)
-        ghost = ghosts(r.markers, r.mocap.time_s)
-        angle = np.where((sound & ~ghost)[:, None], pose.angle_rad, np.nan)
-        records.append(FlexionAngles(r.trial, r.mocap, angle, r.swaps, r.markers, pose, ghost))
+        angle = np.where((sound & ~r.ghost)[:, None], pose.angle_rad, np.nan)
+        records.append(FlexionAngles(r.trial, r.mocap, angle, r.swaps, r.markers, pose, r.ghost))
     return FingerAngles(finger, chain, fit.noise_m, tuple(records))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -27,6 +27,7 @@ REFUSED = "command_as_measurement"  # a channel that tells nothing: no other fin
 TRIFLE, SLIGHT = 0.01, 0.25  # of the square of the heaviest weight, and of the magnitude at which an effect is plain
 MINUTE = 0.08  # of that magnitude: less, where the lack-of-fit test sees nothing, is left to the imperfections of reading angles and speeds
 SIGNALS = {"drive": "current", "motors": "current", "command": "current", "encoder": "encoder", "linkage": "markers"}
+SHOWN_IN = {e.name: SIGNALS[e.station] for e in catalogue() if e.station in SIGNALS}
 UNREST = 0.3  # of the noise: wander that every machine is granted
 
 
@@ -34,7 +35,7 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
              unexplained: Sequence[dict[str, Any]] = ()) -> Findings:
     """One ranked list from all stations: by what a finding shows in its channel (its weight, `findings.weighed`) and how large it is for its
     kind, the geometric mean of both. unexplained: of the markers."""
-    ranked: list[tuple[float, Finding]] = list(marker_findings)
+    ranked: list[tuple[float, Finding]] = _heaviest(marker_findings, _palm_marker)
     rejected: list[dict[str, str]] = []
     unexplained = list(unexplained)
     for station in stations:
@@ -55,7 +56,7 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
     ranked = _without_tilts(_without_shadows(_one_clock(ranked)))
     sized = [(_magnitude(f, stations), weight, f) for weight, f in ranked]
     ranked = sorted(((float(np.sqrt(m * weight)), f) for m, weight, f in sized), key=lambda item: -item[0])
-    ranked = _once(ranked)
+    ranked = _heaviest(ranked, _same_place)
     trifles = _trifles(ranked, {id(f): m for m, _, f in sized})
     rejected += [{"effect": f.effect, "where": str(f.where["finger"]), "reason": reason} for f, reason in trifles]
     ranked = [(w, f) for w, f in ranked if all(f is not trifle for trifle, _ in trifles)]
@@ -75,8 +76,7 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
 def _magnitude(finding: Finding, stations: Sequence[Station]) -> float:
     """How large a finding surely is for its kind (by the ends of intervals nearer to zero), measured by the channel in which effects of its
     kind show."""
-    signal = {e.name: SIGNALS[s] for s in SIGNALS for e in catalogue(s)}.get(finding.effect)
-    states = next((s.naming.balance.states for s in stations if s.signal == signal and s.finger == finding.where["finger"]), None)
+    states = next((s.naming.balance.states for s in stations if s.signal == SHOWN_IN.get(finding.effect) and s.finger == finding.where["finger"]), None)
     values = {name: _sure(entry) for name, entry in finding.parameters.items()}
     return magnitude(finding.effect, values, None if states is None else channel_figures(states))
 
@@ -88,13 +88,22 @@ def _sure(entry: Mapping[str, Any]) -> float | None:
     return min(interval, key=abs) if interval[0] * interval[1] > 0 else 0.0
 
 
-def _once(ranked: list[tuple[float, Finding]]) -> list[tuple[float, Finding]]:
-    """The heaviest of findings that say the same of the same place: a sag shows in speed and in current."""
-    first: dict[Any, tuple[float, Finding]] = {}
-    for item in ranked:
-        where = item[1].where
-        first.setdefault((item[1].effect, *(str(where.get(k)) for k in ("finger", "joint", "actuator", "marker", "markers"))), item)
-    return list(first.values())
+def _heaviest(found: Sequence[tuple[float, Finding]], key: Callable[[Finding], Any]) -> list[tuple[float, Finding]]:
+    """The heaviest of the findings that share a key."""
+    best: dict[Any, tuple[float, Finding]] = {}
+    for item in found:
+        best[key(item[1])] = max(best.get(key(item[1]), item), item, key=lambda i: i[0])
+    return list(best.values())
+
+
+def _palm_marker(finding: Finding) -> Any:
+    """A palm marker is seen with every finger: its slip is one finding, where it shows most."""
+    return (finding.effect, finding.where["marker"]) if finding.effect == "palm_marker_slip" else id(finding)
+
+
+def _same_place(finding: Finding) -> Any:
+    """What says the same of the same place: a sag shows in speed and in current."""
+    return (finding.effect, *(str(finding.where.get(k)) for k in ("finger", "joint", "actuator", "marker", "markers")))
 
 
 def _trifles(ranked: list[tuple[float, Finding]], magnitudes: Mapping[int, float]) -> list[tuple[Finding, str]]:

@@ -119,7 +119,7 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
     clipped = {s.actuator for s in stations if s.believed for f in s.kept if f.term.effect.clips}
     # a reading that clips says little of the load, on which a sag is judged
     found = [i for i in found if i[1].effect != "drive_sag" or i[1].where["actuator"] not in clipped]
-    findings = assemble(stations, _once(found), notes, unexplained)
+    findings = assemble(stations, found, notes, unexplained)
     if output is not None:
         replays: tuple[Replay, ...] = ()
         forget(output, FOLDERS, FILES[0])
@@ -246,16 +246,6 @@ def _current_at(time_s: Any, log: Log) -> Any:
     """Current (n,) at times (n,), lost samples bridged."""
     seen = np.isfinite(log.column("current"))
     return np.interp(time_s, log.time_s[seen], log.column("current")[seen]) if seen.any() else np.zeros(len(time_s))
-
-
-def _once(found: list[tuple[float, Finding]]) -> list[tuple[float, Finding]]:
-    """A palm marker is seen with every finger: its slip is one finding, where it shows most."""
-    best: dict[Any, tuple[float, Finding]] = {}
-    for weight, finding in found:
-        key = (finding.effect, finding.where["marker"]) if finding.effect == "palm_marker_slip" else id(finding)
-        if key not in best or weight > best[key][0]:
-            best[key] = (weight, finding)
-    return list(best.values())
 
 
 def _finger_of(session: Session, actuator: str) -> str | None:

@@ -176,15 +176,6 @@ def held_out(reading: Reading, which: int, seed: int = 0) -> dict[str, Any]:
     }
 
 
-def proven(naming: Naming, which: int) -> bool:
-    """Whether recordings that took no part are predicted better with the term `which` than by the best fit without it.
-
-    True where nothing can be asked: no untouched recording, or an event that belongs to one recording only.
-    """
-    brought = brought_held_out(naming, which)
-    return brought is None or brought > 0
-
-
 def brought_held_out(naming: Naming, which: int) -> float | None:
     """Log likelihood that the term `which`, as fitted to the training recordings, brings to those that took no part, not more than it
     would without claiming to know less: what they add to its log evidence. None where nothing can be asked: no untouched recording, or
