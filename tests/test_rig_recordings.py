@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rig_bench import ARM, HEAD, recorded
+from rig_bench import ARM, HEAD, Motion, recorded
 from scipy.signal import butter, filtfilt
 
+from hand_model.effects.path import jenkins
 from hand_model.rig import fit_declared, load_rig, replay_rig
 from hand_model.rig.candidates import candidates
 from hand_model.rig.channels import sinusoids_left
@@ -44,6 +45,23 @@ def voltage_bench(folder: Path, size: bool) -> Path:
 def test_a_voltage_without_sign_is_refused(tmp_path: Path, size: bool) -> None:
     """A column that holds the size of a voltage is one issue in all recordings; one with its sign is none."""
     _, issues = trusted_fit(load_rig(read_session(voltage_bench(tmp_path / "s", size))))
+    if size:
+        assert [i.refuse for i in issues] == [True] and "no sign" in issues[0].reason and len(issues[0].trials) == 5
+    else:
+        assert issues == ()
+
+
+@pytest.mark.parametrize("size", [True, False])
+def test_a_friction_without_sign_is_refused(tmp_path: Path, size: bool) -> None:
+    """Friction that outweighs all else and turns round over a distance: its size touches zero at every reversal and is refused; beside
+    an offset that keeps it on one side it has its sign."""
+    heavy = ARM.replace('frictionloss="0.05"', 'frictionloss="4"')
+
+    def told(motion: Motion) -> np.ndarray:
+        out = balance(motion) + 4.0 * jenkins(motion[1], 0.1)
+        return np.abs(out) if size else out + 6.0
+
+    _, issues = trusted_fit(load_rig(read_session(recorded(tmp_path / "s", heavy, 5, told, 0.02))))
     if size:
         assert [i.refuse for i in issues] == [True] and "no sign" in issues[0].reason and len(issues[0].trials) == 5
     else:

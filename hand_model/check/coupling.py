@@ -132,17 +132,18 @@ def _pushed(mj: Any, tip: str, joints: list[str], held: bool, sign: float) -> Ar
             data.ctrl[mj.actuator_ctrladr[i]] = data.qpos[mj.jnt_qposadr[mj.actuator_trnid[i, 0]]]
     site, last = mj.site(tip).id, mj.joint(joints[-1]).id
     gaps = []
-    for _ in range(round(PUSH_S / mj.opt.timestep)):
-        mujoco.mj_kinematics(mj, data)
-        lever = data.site_xpos[site] - data.xanchor[last]
-        push = np.cross(data.xaxis[last], lever)
-        push *= sign * FORCE / max(float(np.linalg.norm(push)), 1e-9)
-        data.qfrc_applied[:] = 0
-        mujoco.mj_comPos(mj, data)
-        mujoco.mj_applyFT(mj, data, push, np.zeros(3), data.site_xpos[site], mj.site_bodyid[site], data.qfrc_applied)
-        mujoco.mj_step(mj, data)
-        wanted = engine.on_linkages(mj, data.qpos)
-        gaps.append(max(abs(wanted[mj.jnt_qposadr[j]] - data.qpos[mj.jnt_qposadr[j]]) for j in coupled if j in mine))
+    with engine.divergence():
+        for _ in range(round(PUSH_S / mj.opt.timestep)):
+            mujoco.mj_kinematics(mj, data)
+            lever = data.site_xpos[site] - data.xanchor[last]
+            push = np.cross(data.xaxis[last], lever)
+            push *= sign * FORCE / max(float(np.linalg.norm(push)), 1e-9)
+            data.qfrc_applied[:] = 0
+            mujoco.mj_comPos(mj, data)
+            mujoco.mj_applyFT(mj, data, push, np.zeros(3), data.site_xpos[site], mj.site_bodyid[site], data.qfrc_applied)
+            mujoco.mj_step(mj, data)
+            wanted = engine.on_linkages(mj, data.qpos)
+            gaps.append(max(abs(wanted[mj.jnt_qposadr[j]] - data.qpos[mj.jnt_qposadr[j]]) for j in coupled if j in mine))
     return np.nan_to_num(np.array(gaps), nan=np.inf)
 
 

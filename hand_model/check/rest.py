@@ -64,13 +64,14 @@ def quiet(description: Description, model: Model) -> Finding:
     beyond, hold = 0.0, max(1, round(HOLD_S / mj.opt.timestep))
     own = {mj.joint(name).id for name in load(model.mjcf).joints}  # a motor's own joint is in other units
     limited = np.array([j for j in range(mj.njnt) if mj.jnt_limited[j] and j in own], int)
-    for step in range(round(RANDOM_S / mj.opt.timestep)):
-        if step % hold == 0:
-            data.ctrl[:] = random.uniform(low, high)
-        mujoco.mj_step(mj, data)
-        angle = data.qpos[mj.jnt_qposadr[limited]]
-        out = np.maximum(mj.jnt_range[limited, 0] - angle, angle - mj.jnt_range[limited, 1])
-        beyond = max(beyond, float(out.max(initial=0.0)))
+    with engine.divergence():
+        for step in range(round(RANDOM_S / mj.opt.timestep)):
+            if step % hold == 0:
+                data.ctrl[:] = random.uniform(low, high)
+            mujoco.mj_step(mj, data)
+            angle = data.qpos[mj.jnt_qposadr[limited]]
+            out = np.maximum(mj.jnt_range[limited, 0] - angle, angle - mj.jnt_range[limited, 1])
+            beyond = max(beyond, float(out.max(initial=0.0)))
     warnings = engine.raised(data)
     passed = bool(not warnings and beyond < 0.2 and np.isfinite(data.qpos).all())
     said = f"{RANDOM_S:.0f} s of random control: {', '.join(warnings) or 'no warning'}, at most {np.degrees(beyond):.2g} deg beyond a limit"

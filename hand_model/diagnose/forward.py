@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..effects.base import DriveState
 from ..effects.input import SUFFIX
-from ..engines.mujoco import HOLD, on_linkages
+from ..engines.mujoco import HOLD, divergence, on_linkages
 from ..hand import load_hand
 from ..passive import effects_on
 
@@ -97,7 +97,7 @@ def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, pat
     data.qpos[at] = position[0]
     data.qpos[:] = _started(model, data.qpos, driver)
     rest = data.qpos[address].copy()
-    with effects_on(model, hand):
+    with effects_on(model, hand), divergence():
         for i, (x, v, f) in enumerate(zip(position, velocity, load, strict=True)):
             data.qpos[address], data.qvel[dof] = rest, 0.0
             data.qpos[at], data.qvel[rate] = x, v

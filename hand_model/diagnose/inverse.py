@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..effects import effect
 from ..effects.base import DriveState
 from ..effects.mjcf import motor_joint
-from ..engines.mujoco import HOLD
+from ..engines.mujoco import HOLD, divergence
 from ..hand import Estimate, Hand, load_hand
 from ..passive import effects_on
 
@@ -98,7 +98,7 @@ def current_along(motor: CompiledMotor, state: DriveState) -> Array:
         gravity = np.stack([np.interp(grid, state.time_s, state.extra[f"gravity_{k}"]) for k in ("along", "across")], axis=-1)
     else:
         gravity = np.broadcast_to(model.opt.gravity[:2], (len(grid), 2))
-    with effects_on(model, started(motor.hand, state)):
+    with effects_on(model, started(motor.hand, state)), divergence():
         for i, (x, v, a) in enumerate(zip(*path, strict=True)):
             model.opt.gravity[:2] = gravity[i]
             data.qpos[0], data.qvel[0], data.qacc[0] = x, v, a

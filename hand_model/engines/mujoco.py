@@ -3,7 +3,8 @@ joints."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -193,11 +194,27 @@ def _roll(mj: Any, prescribed: list[int], grid: Array, spline: Any) -> tuple[Arr
     data.qpos[address] = path[0]
     data.qpos[:] = on_linkages(mj, data.qpos)
     qpos = np.empty((len(grid), mj.nq))
-    for i in range(len(grid)):
-        data.qpos[address], data.qvel[dof], data.qfrc_applied[dof] = path[i], speed[i], push[i]
-        qpos[i] = data.qpos
-        mujoco.mj_step(mj, data)
+    with divergence():
+        for i in range(len(grid)):
+            data.qpos[address], data.qvel[dof], data.qfrc_applied[dof] = path[i], speed[i], push[i]
+            qpos[i] = data.qpos
+            mujoco.mj_step(mj, data)
     return qpos, raised(data)
+
+
+@contextmanager
+def divergence() -> Iterator[list[str]]:
+    """What MuJoCo says of states that are no numbers or too large, after which it goes on from the model's own start; unheard it
+    would write that to a file in the user's folder."""
+    import mujoco
+
+    said: list[str] = []
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda text: said.append(text) if "unstable" in text else None)
+    try:
+        yield said
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
 def raised(data: Any) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ drives is unsigned.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ SAME = 0.01  # a measured channel differs from its command by more than this sha
 STRANGE = 0.7  # share of an effort that may stay unexplained before it is said to explain nothing
 UNSIGNED = "has no sign: it follows the size of the expected effort"
 LEAST_PERIODS = 2.0
+LEAST_TURNS = 4  # changes of sign that must be seen before a channel is said to have none
 CLIPPED = 0.05  # share of samples on one and the same extreme value
 
 
@@ -185,6 +187,7 @@ def check_balance(rig: RigModel, fit: DeclaredFit) -> tuple[ChannelIssue, ...]:
                    for a in ("force", "ctrl"))  # fmt: skip
     start = np.array([c.value for c in fit.columns])
     live = {(t.name, j) for t in rig.trials for j in t.live}
+    trials = {t.name: t for t in rig.trials}
     looks: list[tuple[str, Rows, str, float]] = []
     for row in fit.rows:
         drive = rig.drive(row.joint)
@@ -192,7 +195,7 @@ def check_balance(rig: RigModel, fit: DeclaredFit) -> tuple[ChannelIssue, ...]:
         if name is None or row.moving.sum() < 30:
             continue
         y, x = row.effort[row.moving], row.columns[row.moving]
-        if (share := _unsigned(y, x @ start)) is not None:
+        if (share := _unsigned(trials[row.trial], row, start)) is not None:
             looks.append((name, row, UNSIGNED, share))
         elif drive.name not in force:  # what was put in may be any function, and need not explain anything
             continue
@@ -213,12 +216,32 @@ def check_balance(rig: RigModel, fit: DeclaredFit) -> tuple[ChannelIssue, ...]:
     return tuple(out)
 
 
-def _unsigned(effort: Array, expected: Array) -> float | None:
-    """Share of an effort (m,) without sign that the size of the expected one (m,) leaves, where that is far less than its value."""
-    if effort.min() <= -0.05 * effort.max() or expected.min() >= -0.3 * expected.max():
+def _unsigned(trial: RigTrial, row: Rows, start: Array) -> float | None:
+    """Share of an effort without sign that the size of the one that the declared start (P,) expects leaves (moving samples of
+    both), where that is far less than its value, or where the effort turns back at zero; None where it has a sign."""
+    effort, expected = row.effort[row.moving], row.columns[row.moving] @ start
+    raw = fill_gaps(trial.time_s, trial.effort.get(row.joint, trial.voltage.get(row.joint)))
+    side = np.sign(effort.mean())
+    if (side * effort).min() <= -0.05 * (side * effort).max() or expected.min() >= -0.3 * expected.max():
         return None
-    share = copy_left(effort, np.abs(expected))
-    return share if share < 0.5 * copy_left(effort, expected) else None
+    share = copy_left(side * effort, np.abs(expected))
+    lost = share < 0.5 * copy_left(effort, expected) or _turns_back_at_zero(trial.time_s, side * raw, row, start)
+    return share if lost else None
+
+
+def _turns_back_at_zero(time_s: Array, effort: Array, row: Rows, start: Array) -> bool:
+    """Whether an effort (n,) at time_s touches zero between the strokes of the effort that the declared start (P,) expects, and
+    goes up again on the same side: between the middles of one stroke and of the next it falls to a third of both. A force
+    that truly reverses goes through zero; one with an offset goes from one level to another."""
+    expected = np.interp(time_s, row.time_s, row.full_columns @ start - row.load_known)
+    large = np.flatnonzero(np.abs(expected) > 0.5 * np.median(np.abs(expected)))
+    turns = [(a + b) // 2 for a, b in pairwise(large) if expected[a] * expected[b] < 0]
+    if len(turns) < LEAST_TURNS:
+        return False
+    strokes = list(pairwise([0, *turns, len(effort) - 1]))
+    level = [np.median(effort[a : b + 1]) for a, b in strokes]
+    least = [effort[(a + b) // 2 : (b + c) // 2 + 1].min() for (a, b), (_, c) in pairwise(strokes)]
+    return bool(np.mean([low < min(pair) / 3 for low, pair in zip(least, pairwise(level), strict=True)]) > 0.8)
 
 
 def _stranger(fit: DeclaredFit, row: Rows) -> bool:

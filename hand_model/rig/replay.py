@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..engines.mujoco import divergence
 from ..session import Session
 from .inverse import apply_levels, effort_residuals
 from .laws import Now, law
@@ -163,7 +162,7 @@ def simulate_trial(
         data.qvel[:] -= 0.5 * step * data.qacc_smooth
     out = np.empty((len(grid), model.nq))
     plain = not (effects.entries or effects.laws)
-    with _divergence() as broken:
+    with divergence() as broken:
         for k in range(len(grid)):
             if k and k % stride == 0:
                 if broken:
@@ -184,21 +183,6 @@ def simulate_trial(
                 mujoco.mj_step2(model, data)
     at = np.stack([np.interp(trial.time_s, grid, column) for column in out.T], 1)
     return trial.time_s, at
-
-
-@contextmanager
-def _divergence() -> Iterator[list[str]]:
-    """What MuJoCo says of states that are no numbers or too large, after which it goes on from the model's own start; unheard it
-    would write that to a file in the user's folder."""
-    import mujoco
-
-    said: list[str] = []
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda text: said.append(text) if "unstable" in text else None)
-    try:
-        yield said
-    finally:
-        mujoco.set_mju_user_warning(before)
 
 
 def can_simulate(rig: RigModel, trial: RigTrial) -> bool:
