@@ -17,11 +17,12 @@ from .model import RigModel, load_rig
 from .replay import RigResiduals, replay_rig
 from .states import fill_gaps, noise_std
 from .swing import INDEX, PARAMETERS, STEP_S, Swing, parameter_units, vector
-from .swing_build import build_swing, search_step_s, thinned, windows_s
+from .swing_build import build_swing, free_period_s, search_step_s, thinned, windows_s
 from .swing_compete import LEAST_GAIN, Round, Variant, all_free, compete_swing, fit_stages, free_declared
 from .swing_fit import Fitted, Task
 from .swing_interval import intervals
 from .swing_patch import write_swing
+from .swing_start import started
 from .words import shares, statement
 
 RESAMPLES = 500
@@ -34,13 +35,17 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
     stages = [thinned(build_swing(rig, fit, step, w)) for w in windows]
     free = free_declared(stages[0])
     declared = fit_stages(stages, [Task(free, vector(stages[0].initial), ())], 15)[0]
+    period = free_period_s(rig)
+    if not stages[0].driven:
+        stages = [started(swing, declared.theta, period) for swing in stages]
+        declared = fit_stages(stages, [Task(free, declared.theta, ())], 15)[0]
     floor, held = _resolution(rig), bool(rig.select(True))  # without validation recordings the training ones measure
-    taken, rounds = compete_swing(stages, declared, floor)
+    taken, rounds = compete_swing(stages, declared, floor, build_swing(rig, fit, step))
     say(f"{rig.name}: {', '.join(v.key for v in taken) or 'nothing'}")
     # Last, at the step of the replay; a free swing over whole recordings, for its phase is known well enough by now. What
     # a coarse step there does to the period (4e-4 of it at most, with a hundred steps in each) the last steps take back.
-    last_stages = [(STEP_S, windows[-1], 8)] if stages[0].driven else [(2 * step, np.inf, 12), (STEP_S, np.inf, 3)]
-    fine = [(build_swing(rig, fit, step_s, window_s), most) for step_s, window_s, most in last_stages]
+    last_stages = [(STEP_S, windows[-1], 8)] if stages[0].driven else [(2 * step, windows[-1], 8), (2 * step, np.inf, 12), (STEP_S, np.inf, 3)]
+    fine = [(started(build_swing(rig, fit, step_s, window_s), declared.theta, period), most) for step_s, window_s, most in last_stages]
     known: dict[tuple[str, ...], Link] = {}
 
     def chain_of(some: Sequence[Taken]) -> list[Link]:
@@ -49,7 +54,7 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
     kept, chain, rejected = _standing(list(zip(taken, rounds, strict=True)), chain_of)
     figures = [c.error for c in chain]
     found = []
-    ends = intervals(build_swing(rig, fit, STEP_S, windows[-1]), chain[-1].free, chain[-1].fit.theta)
+    ends = intervals(started(build_swing(rig, fit, STEP_S, windows[-1]), declared.theta, period), chain[-1].free, chain[-1].fit.theta)
     for k, (variant, round_) in enumerate(kept):
         before, after = _sides(kept, chain, k, chain_of)
         proof = {"metric": "position_rmse", "unit": rig.unit(rig.joints[0]), "before": before.error, "after": after.error,

@@ -19,7 +19,7 @@ from .swing_fit import Fitted, Task, fit_together
 
 Array = NDArray[np.float64]
 FOLDS, SHORTLIST, ALIKE = 4, 6, 3
-LEAST_GAIN, MOST_TERMS = 0.025, 5
+LEAST_GAIN, MOST_TERMS, MOST_OF_FEW = 0.025, 5, 3  # of few recordings what is left after so many goes by many names
 BETTER = 1.01  # an exchange of variants has to pay
 FEW_RUNS = 500
 PARTS = 4  # a recording's error is resampled in so many parts
@@ -58,7 +58,7 @@ def variants(swing: Swing) -> tuple[Variant, ...]:
         / swing.step_s
     )
     out = [
-        Variant("stribeck_friction", f"{k:g}", {"static_excess": 0.0, "stribeck_speed": k * speed}) for k in (0.05, 0.2)
+        Variant("stribeck_friction", f"{k:g}", {"static_excess": 0.0, "stribeck_speed": k * speed}) for k in (0.05, 0.2, 0.8)
     ]
     out += [
         Variant("asymmetric_friction", "", {"offset": 0.0}),
@@ -138,25 +138,27 @@ def fit_stages(stages: Sequence[Swing], tasks: Sequence[Task], iterations: int =
 
 
 def compete_swing(
-    stages: Sequence[Swing], current: Fitted, floor: float = 0.0
+    stages: Sequence[Swing], current: Fitted, floor: float = 0.0, whole: Swing | None = None
 ) -> tuple[tuple[Variant, ...], tuple[Round, ...]]:
     """Forward selection from the declared model (fitted as current), while the error is above what the recordings can tell
-    (floor [rad or m]); returns the variants and their rounds, each with the fit of all taken so far."""
+    (floor [rad or m]); returns the variants and their rounds, each with the fit of all taken so far. whole: the recordings
+    uncut; those left out whole are predicted so, as the ones that validate are."""
     swing = stages[-1]
     train = tuple(int(i) for i in swing.train())
-    folds = _folds(swing, train)
+    test, folds = _folds(swing, train, whole)
     taken: tuple[Variant, ...] = ()
     rounds: list[Round] = []
-    while len(taken) < MOST_TERMS and current.cost > floor**2:
+    most = MOST_TERMS if len({swing.lanes[i].trial for i in train}) >= FOLDS else MOST_OF_FEW
+    while len(taken) < most and current.cost > floor**2:
         free = all_free(swing, taken)
         rivals = [v for v in variants(swing) if not set(v.start) <= set(free)]
         tasks = [Task(all_free(swing, (*taken, v)), _started(current.theta, v), ()) for v in rivals]
         fits = fit_stages(stages, tasks, 8)
         order = _shortlist(rivals, fits)
-        best = _several(swing, [Task(tasks[k].free, fits[k].theta, train) for k in order])
-        none, scores = _left_out(swing, folds, (Task(free, current.theta, train), current),
-                                 [(tasks[k], f) for k, f in zip(order, best, strict=True)])  # fmt: skip
-        group = np.array([name for _, left in folds for i in left for name in [swing.lanes[i].trial] * PARTS])
+        same = Task(free, current.theta, train)  # nothing more has the same starts as they have, or they would win by theirs
+        current, *best = _several(swing, [same, *(Task(tasks[k].free, fits[k].theta, train) for k in order)])
+        none, scores = _left_out(swing, test, folds, (same, current), [(tasks[k], f) for k, f in zip(order, best, strict=True)])
+        group = np.array([name for _, left in folds for i in left for name in [test.lanes[i].trial] * PARTS])
         found = _judge(none, scores, [rivals[k] for k in order], best, group, len(train))
         if found is None:
             break
@@ -200,9 +202,9 @@ def _exchanged(
 
 def _several(swing: Swing, tasks: Sequence[Task], starts: int = 2, iterations: int = 8) -> list[Fitted]:
     """Every task from several starts around its own, in one batch; the best of each."""
-    random = np.random.default_rng(2)
     more = []
     for task in tasks:
+        random = np.random.default_rng(2)
         free = [INDEX[n] for n in task.free]
         for k in range(starts):
             theta = task.start.copy()
@@ -212,16 +214,25 @@ def _several(swing: Swing, tasks: Sequence[Task], starts: int = 2, iterations: i
     return [min(fits[k * starts : (k + 1) * starts], key=lambda f: f.cost) for k in range(len(tasks))]
 
 
-def _folds(swing: Swing, train: Sequence[int]) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
-    """(kept, left out) stretches: whole recordings are left out where there are several, as the validation trials are; else
-    neighbouring stretches together: what is held out then lies elsewhere in the motion, and a term that fits only where it
-    was fitted is told (blocked cross-validation, Roberts et al. 2017)."""
+def _folds(
+    swing: Swing, train: Sequence[int], whole: Swing | None = None
+) -> tuple[Swing, list[tuple[tuple[int, ...], tuple[int, ...]]]]:
+    """The swing in which errors are measured, and (stretches kept, stretches of it left out): whole recordings are left out where
+    there are several, as the validation trials are; else neighbouring stretches together: what is held out then lies
+    elsewhere in the motion, and a term that fits only where it was fitted is told (blocked cross-validation, Roberts et al. 2017)."""
     trials = {name: k for k, name in enumerate(dict.fromkeys(swing.lanes[i].trial for i in train))}
-    whole = len(trials) >= FOLDS
-    count = FOLDS if whole else min(FOLDS, len(train))
-    fold = [trials[swing.lanes[i].trial] % count if whole else k * count // len(train) for k, i in enumerate(train)]
-    return [(tuple(i for i, g in zip(train, fold, strict=True) if g != f),
-             tuple(i for i, g in zip(train, fold, strict=True) if g == f)) for f in range(count)]  # fmt: skip
+    if len(trials) < FOLDS:
+        count = min(FOLDS, len(train))
+        fold = [k * count // len(train) for k in range(len(train))]
+        return swing, [_parted(train, fold, train, fold, f) for f in range(count)]
+    test = whole or swing
+    fold, apart = ([trials[s.lanes[i].trial] % FOLDS for i in some] for s, some in ((swing, train), (test, test.train())))
+    return test, [_parted(train, fold, test.train(), apart, f) for f in range(FOLDS)]
+
+
+def _parted(train: Sequence[int], fold: Sequence[int], test: Sequence[int], apart: Sequence[int], f: int) -> tuple:
+    """Stretches of all folds but f to fit to, and those of fold f to measure on."""
+    return tuple(i for i, g in zip(train, fold, strict=True) if g != f), tuple(i for i, g in zip(test, apart, strict=True) if g == f)
 
 
 def all_free(swing: Swing, taken: Sequence[Variant]) -> tuple[str, ...]:
@@ -239,15 +250,15 @@ def _started(theta: Array, variant: Variant) -> Array:
 
 
 def _left_out(
-    swing: Swing, folds: list, none: tuple[Task, Fitted], rivals: list[tuple[Task, Fitted]]
+    swing: Swing, test: Swing, folds: list, none: tuple[Task, Fitted], rivals: list[tuple[Task, Fitted]]
 ) -> tuple[Array, list[Array]]:
-    """Block errors of "none" and of each rival on the recordings left out."""
+    """Block errors of "none" and of each rival on what is left out of `test`."""
     everyone = [none, *rivals]
     tasks = [replace(task, start=fit.theta, stretches=kept) for task, fit in everyone for kept, _ in folds]
     fits = fit_apart(swing, tasks, 5)
     out = []
     for k in range(len(everyone)):
-        parts = [_blocks(swing, fits[k * len(folds) + f].theta, left) for f, (_, left) in enumerate(folds)]
+        parts = [_blocks(test, fits[k * len(folds) + f].theta, left) for f, (_, left) in enumerate(folds)]
         out.append(np.concatenate(parts))
     return out[0], out[1:]
 
@@ -257,13 +268,15 @@ def _judge(
 ) -> tuple[int, Round] | None:
     """Index of the winner and what the round says, or None where nothing beats "none" by a standard error. Which effect it
     is, recordings left out decide; between forms of it that they cannot tell apart, the likelihood: BIC with every
-    stretch as one sample (Schwarz 1978)."""
+    stretch as one sample (Schwarz 1978). One that has more parameters has to predict what is left out better as well."""
     said = weigh(none, np.array(scores), [f.free for f in fits], group, ONE_STANDARD_ERROR)
     if said is None or none.sum() - scores[said.best].sum() < LEAST_GAIN * none.sum():
         return None
     same = tuple(dict.fromkeys(rivals[k].effect for k in said.close))
     wins = tuple((rivals[k].key, float(said.wins[k])) for k in np.argsort(-said.wins) if said.wins[k] > 0.005)
-    forms = [k for k in {*said.close, said.chosen} if rivals[k].effect == rivals[said.chosen].effect]
+    first = said.chosen
+    forms = [k for k in {*said.close, first} if rivals[k].effect == rivals[first].effect
+             and (fits[k].free <= fits[first].free or scores[k].sum() <= scores[first].sum())]  # fmt: skip
     best = min(forms, key=lambda k: stretches * np.log(fits[k].cost) + fits[k].free * np.log(stretches))
     gain = float(1.0 - scores[best].sum() / max(none.sum(), 1e-300))
     return best, Round(rivals[best], said.probability, gain, wins, same)
