@@ -53,14 +53,22 @@ def blind_trial(cases: int, seed: int, folder: str | Path | None = None, kinds: 
         with tempfile.TemporaryDirectory() as temporary:
             return blind_trial(cases, seed, temporary, kinds, effects, workers, say)
     root = Path(folder)
-    answers = _record(cases, seed, root, kinds, effects, workers)
+    return judged(root, _record(cases, seed, root, kinds, effects, workers), workers, say)
+
+
+def judged(root: str | Path, answers: Mapping[str, Any], workers: int = 2, say: Callable[[str], None] = print) -> Trial:
+    """Write the answers, say their hash, diagnose the sessions in processes of their own, open the answers and score.
+
+    root: folder with sessions/NAME; answers: NAME -> {"case": kind, "effects": [{"effect", "finger", ...}]}, as a recorder gives them.
+    """
+    root = Path(root)
     text = json.dumps(answers, indent=1)
     (root / "answers.json").write_text(text)
     digest = hashlib.sha256(text.encode()).hexdigest()
     say(f"answers.json SHA-256 {digest}")
     with ThreadPoolExecutor(workers) as pool:
         for done, line in enumerate(pool.map(lambda name: _diagnose(root, name), answers), start=1):
-            say(f"{done}/{cases} {line}")
+            say(f"{done}/{len(answers)} {line}")
     answers = json.loads((root / "answers.json").read_text())
     rows = [score_case(name, answer, json.loads((root / "findings" / name / "findings.json").read_text()))
             for name, answer in answers.items()]

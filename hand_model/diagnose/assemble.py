@@ -16,7 +16,7 @@ from .interval import variance_ratio
 from .magnitude import channel_figures, magnitude
 from .markers import HINGE
 from .name import ALPHA, Named
-from .station import Station, channel_of, finding_of, unexplained_of, unrepeated_of
+from .station import Station, channel_of, finding_of, outsider_of, unexplained_of, unrepeated_of
 
 UNLIKE_OTHERS = 2.0  # times the wander of the calmest finger
 HARMONICS, SAME_PERIOD = 4, 0.02
@@ -28,6 +28,7 @@ TRIFLE, SLIGHT = 0.01, 0.25  # of the square of the heaviest weight, and of the 
 MINUTE = 0.08  # of that magnitude: less, where the lack-of-fit test sees nothing, is left to the imperfections of reading angles and speeds
 SIGNALS = {"drive": "current", "motors": "current", "command": "current", "encoder": "encoder", "linkage": "markers"}
 SHOWN_IN = {e.name: SIGNALS[e.station] for e in catalogue() if e.station in SIGNALS}
+NAMES = {e.name for e in catalogue()}
 UNREST = 0.3  # of the noise: wander that every machine is granted
 
 
@@ -40,6 +41,7 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
     unexplained = list(unexplained)
     for station in stations:
         if station.believed:
+            unexplained += [outsider_of(station, f) for f in station.outsiders]
             for weight, finding in (finding_of(station, *merged) for merged in _merged(station.kept)):
                 if station.naming.before.p >= ALPHA and _magnitude(finding, stations) < MINUTE:
                     rejected.append({"effect": finding.effect, "where": str(station.finger),
@@ -51,7 +53,7 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
         if station.believed and station.naming.after.p < ALPHA and station.explained < 0.95:
             unexplained.append(unexplained_of(station, 1 - station.explained))
         rejected += [{"effect": name, "where": str(station.finger), "reason": _reason(value)}
-                     for name, value in station.naming.rejected[:4]]
+                     for name, value in station.naming.rejected[:4] if name in NAMES]
     unexplained += [unrepeated_of(s) for s in stations if _wanders(s, stations)]
     ranked = _without_tilts(_without_shadows(_one_clock(ranked)))
     sized = [(_magnitude(f, stations), weight, f) for weight, f in ranked]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..background import Background, single_threaded
-from ..effects import catalogue
+from ..effects import catalogue, outsiders
 from ..effects.base import DriveState
 from ..errors import HandModelError, SessionError
 from ..hand import Hand
@@ -22,8 +22,8 @@ from .balance import Balance
 from .command import CommandFacts, command_facts, command_findings, refused, with_lateness
 from .correct import refuse_output, write_corrected
 from .decoupled import while_driven, without_excursions
-from .drive import drive_states, drive_trials, echoes_command, is_measured, opposes
-from .evidence import typical_coefficients
+from .drive import drive_states, drive_trials, echoes_command, is_measured, opposes, with_gives
+from .evidence import gain, typical_coefficients
 from .findings import FILES, FOLDERS, Finding, Findings
 from .finger import finger_readings
 from .gravity import with_gravity
@@ -36,6 +36,7 @@ from .stamps import Stamps, stamps
 from .station import Station, judged
 
 EARLY = 3.0  # standard deviations by which answers that come before the command say so for sure
+DELAY_TOLD = 2.0  # log likelihood that a shift of a drive's current must bring: less, and its drive tells none (two standard deviations)
 
 
 @single_threaded()
@@ -99,13 +100,17 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
                            "positive `current` drive flexion, and one of them has the other sign")
     facts = _command(session, drives)
     found += command_findings(facts, {a: _finger_of(session, a) for a in facts})
-    drives = with_lateness(drives, facts)
     for _, finding in found:
         tell(finding.statement)
-    allowed, alone = _delays_apart(drives), {a: Balance(states).fit() for a, states in drives.items()}
+    allowed = _delays_apart(with_lateness(drives, facts))
+    in_time = [a for a in drives if not allowed[a]]
+    if 0 < len(in_time) < len(drives):  # at a reversal a late current looks like a give, an early one like none
+        drives = with_gives(drives, in_time)
+    drives = with_lateness(drives, facts)
+    alone = {a: Balance(states).fit() for a, states in drives.items()}
     calls = []
     for actuator, states in drives.items():
-        effects = [e for e in catalogue("drive") if not e.warps or allowed[actuator]]
+        effects = [*(e for e in catalogue("drive") if not e.warps or allowed[actuator]), *outsiders("drive")]
         typical = typical_coefficients([fit for a, fit in alone.items() if a != actuator])
         calls.append(("current", _finger_of(session, actuator), actuator, None, states, effects, typical))
     for station in Background(judged, calls).results():
@@ -211,7 +216,9 @@ def _delays_apart(drives: dict[str, tuple[DriveState, ...]]) -> dict[str, bool]:
         balance = Balance(tuple(replace(s, extra={k: v for k, v in s.extra.items() if k != "late"}) for s in states))
         delay = next(e for e in catalogue("drive") if e.warps)
         fit = scan(balance, delay, ())
-        best[actuator] = polish(balance, fit, 0).terms[0].shape["delay"] if fit is not None else 0.0
+        polished = None if fit is None else polish(balance, fit, 0)
+        told = polished is not None and gain(balance, polished, balance.fit()) > DELAY_TOLD
+        best[actuator] = polished.terms[0].shape["delay"] if told else 0.0
     step = {a: float(np.median(np.diff(s[0].time_s))) for a, s in drives.items()}
     # a lone drive cannot tell how the log is read from what its own channel does: twice as much is asked of it
     common, least = (min(best.values(), key=abs), 0.75) if len(best) > 1 else (0.0, 2.0)

@@ -67,8 +67,13 @@ def drive_states(session: Session, corrections: Mapping[str, Callable[[Array], A
     raw = {a: [(t, t.log()) for t in trials] for a, trials in drive_trials(session).items() if a not in unread}
     prepared = {a: _prepare(a, entries, (corrections or {}).get(a)) for a, entries in raw.items()}
     prepared = {a: tuple(states) for a, states in prepared.items() if states}
-    give, granted = gives({a: states for a, states in prepared.items() if is_measured(states)})
-    return {a: with_required(tuple(with_coulomb(s, give.get(a, granted), granted) for s in states)) for a, states in prepared.items()}
+    return with_gives(prepared, [a for a, states in prepared.items() if is_measured(states)])
+
+
+def with_gives(drives: Mapping[str, tuple[DriveState, ...]], trusted: Collection[str]) -> dict[str, tuple[DriveState, ...]]:
+    """The states with each drive's bristle length, and what the `trusted` ones say that any drive of the session may have."""
+    give, granted = gives({a: states for a, states in drives.items() if a in trusted})
+    return {a: with_required(tuple(with_coulomb(s, give.get(a, granted), granted) for s in states)) for a, states in drives.items()}
 
 
 def _prepare(
@@ -196,7 +201,7 @@ def with_coulomb(state: DriveState, give: float, granted: float) -> DriveState:
 
 
 def with_timing(state: DriveState) -> DriveState:
-    """Adds "sigma" around starts and stops, zero in steady motion: what half a sample interval of timing means for the
+    """Adds "slides", zero where the drive rests or has not left its place, and "sigma" around starts and stops, zero in steady motion: what half a sample interval of timing means for the
     declared prediction, what is not known of friction while it turns over, and all that it may hold where the drive rests or has not left its place."""
     seen = np.isfinite(state.effort)
     if seen.sum() < 20:
@@ -210,7 +215,7 @@ def with_timing(state: DriveState) -> DriveState:
     near = np.minimum(from_rest(state.position, seen), from_rest(state.position[::-1], seen[::-1])[::-1])
     held = near < max(2 * float(state.extra["granted"][0]), 6 * float(state.extra["position_noise"][0]))
     sigma = np.where(held, np.hypot(sigma, beta[2]), sigma)
-    return replace(state, extra={**state.extra, "sigma": sigma})
+    return replace(state, extra={**state.extra, "sigma": sigma, "slides": 1.0 - held})
 
 
 def with_required(states: tuple[DriveState, ...]) -> tuple[DriveState, ...]:

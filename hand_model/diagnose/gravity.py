@@ -26,7 +26,7 @@ TURNED = 0.12  # spread of gravity's direction below which a weight is as good a
 def with_gravity(session: Session, fingers: Mapping[str, FingerAngles], states: tuple[DriveState, ...]) -> tuple[DriveState, ...]:
     """The states with `gravity_along` and `gravity_across` [m/s^2] in `extra`: gravity along the open finger and across it.
 
-    fingers: by name. Recordings without markers get the mean of the others, as a hand left where it was; those with them have `pose_seen`. Unchanged where the session names no
+    fingers: by name. Recordings with markers have `pose_seen`; those without get `pose_unseen` instead. Unchanged where the session names no
     gravity, where no recording shows the palm, or where it never turned.
     """
     if session.gravity_world is None:
@@ -40,10 +40,10 @@ def with_gravity(session: Session, fingers: Mapping[str, FingerAngles], states: 
         return states
     out = []
     for state in states:
-        g = seen.get(state.trial, np.broadcast_to(everything.mean(0), (len(state.time_s), 2)))
-        extra: dict[str, Array] = {**state.extra, "gravity_along": g[:, 0], "gravity_across": g[:, 1]}
+        extra: dict[str, Array] = dict(state.extra)
         if state.trial in seen:
-            extra["pose_seen"] = np.ones(len(state.time_s))
+            extra["gravity_along"], extra["gravity_across"] = seen[state.trial].T
+        extra["pose_seen" if state.trial in seen else "pose_unseen"] = np.ones(len(state.time_s))
         out.append(replace(state, extra=extra))
     return tuple(out)
 

@@ -150,13 +150,14 @@ def held_out(reading: Reading, which: int, seed: int = 0) -> dict[str, Any]:
     """Root-mean-square error on recordings that took no part, without and with the term `which`, the noise floor, and a
     bootstrap interval over strokes of the reduction.
 
-    Steady samples; all compared ones for a delay or a give, which act at starts and stops, where the floor is what timing grants. `held_out` is empty where there
+    Steady samples; all sliding ones for a delay or a give, which act at starts and stops, where the floor is what timing grants. `held_out` is empty where there
     are no validation recordings or where the naming had to look at them: figures are then in-sample.
     """
     balance, fit = reading.balance, reading.fit
     without = balance.fit(tuple(t for i, t in enumerate(fit.terms) if i != which))
     effect = fit.terms[which].effect
-    seen = np.ones(len(balance.train), bool) if effect.warps or effect.replaces else balance.steady
+    slides = balance.gather(lambda s: s.extra.get("slides", np.ones(len(s.time_s)))) > 0
+    seen = slides if effect.warps or effect.replaces else balance.steady
     use = ~balance.train & seen & balance.telling(effect)
     untouched = bool(use.any())
     if not untouched:

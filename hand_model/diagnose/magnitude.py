@@ -15,20 +15,18 @@ import numpy as np
 from ..effects.base import DriveState, position_range, speed_range
 
 LEAST, MOST = 1e-3, 3.0  # beyond, a figure says nothing more about its kind
-NEAR = 0.02  # of a limit: within, a reading is at it
 
 
 @dataclass(frozen=True)
 class Channel:
-    """What magnitudes refer to. effort, load: standard deviations; low, high: range of positions; fastest: speed; at_limit: share of
-    readings within two per cent of the largest; ahead: farthest that a joint ran ahead of its drive."""
+    """What magnitudes refer to. effort, load: standard deviations; low, high: range of positions; fastest: speed; ahead: farthest that
+    a joint ran ahead of its drive."""
 
     effort: float = 1.0
     load: float = 0.0
     low: float = 0.0
     high: float = 100.0
     fastest: float = 100.0
-    at_limit: float = 0.0
     ahead: float = 0.0
 
     @property
@@ -42,9 +40,8 @@ def channel_figures(states: tuple[DriveState, ...]) -> Channel:
     effort = np.concatenate([s.effort[np.isfinite(s.effort)] for s in states])
     load, ahead = (np.concatenate([s.extra.get(name, np.zeros(1)) for s in states]) for name in ("load", "ahead"))
     low, high = position_range(states)
-    top = (1 - NEAR) * np.quantile(np.abs(effort), 0.999)
     return Channel(max(float(np.std(effort)), 1e-12), float(np.nanstd(load)), low, high, speed_range(states)[1],
-                   float(np.mean(np.abs(effort) > top)), float(np.nanmax(ahead)))
+                   float(np.nanmax(ahead)))
 
 
 def magnitude(effect: str, parameters: Mapping[str, float], channel: Channel | None = None) -> float:
@@ -115,7 +112,7 @@ PLAIN: Mapping[str, Rule] = {
     "distal_stop": lambda p, c: (c.high - p["from"]) / (0.12 * c.span),
     "encoder_periodic_error": lambda p, c: p["amplitude"] / (0.005 * c.span),
     "drive_sag": lambda p, _: p["sag"] / 0.002 if "sag" in p else p["torque_loss"] / 0.3,
-    "current_saturation": lambda _, c: c.at_limit / 0.1,
+    "current_saturation": lambda p, _: p["share_cut"] / 0.15,
     "current_channel_delay": lambda p, _: p["delay"] / 0.06,
     "command_delay": lambda p, _: p["delay"] / 0.11,
     "clock_drift": lambda p, _: p["rate_minus_one"] / 0.001,

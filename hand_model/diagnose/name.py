@@ -66,8 +66,8 @@ class Named:
     @property
     def members(self) -> tuple[str, ...]:
         """The class: every effect that these recordings cannot tell from this one."""
-        top = self.rivals[0].evidence
-        return tuple(r.name for r in self.rivals if r.evidence > top - CLASS_WIDTH)
+        near = [r for r in self.rivals if r.evidence > self.rivals[0].evidence - CLASS_WIDTH]
+        return tuple(r.name for r in near if r.name == self.term.effect.name or r.fit.terms[-1].effect.listed)
 
 
 @dataclass(frozen=True)
@@ -91,14 +91,14 @@ class Naming:
 
 
 def name_effects(states: tuple[Any, ...], effects: Iterable[Any], progress: Callable[[str], None] | None = None,
-                 typical: Mapping[str, float] | None = None) -> Naming:
+                 typical: Mapping[str, float] | None = None, whole: bool = False) -> Naming:
     """Name what is missing from the balance of `states` among `effects`; raises nothing for healthy recordings.
 
     states: DriveStates of one balance, validation recordings marked by `validate`. The lack-of-fit test alone decides
     whether anything is missing; without it no effect is named, however well it fits. typical: declared coefficients of the
-    hand's other motors, by name.
+    hand's other motors, by name. whole: learn from the validation recordings, too.
     """
-    balance = Balance(tuple(states), typical=typical)
+    balance = Balance(tuple(states), whole, typical)
     naming = _name(balance, tuple(effects), progress)
     if naming.before.p < ALPHA and not naming.found and any(s.validate for s in states):
         # What happened in a validation recording only cannot be learned from the others.

@@ -115,9 +115,8 @@ def kept_out(states: Sequence[DriveState]) -> tuple[DriveState, ...]:
 
 
 def _used(state: DriveState, every: bool) -> NDArray[np.bool_]:
-    """Samples (n,) that are compared: steady ones, or every moving one for what acts at starts and stops."""
-    steady = np.ones(len(state.time_s)) if every else state.extra.get("steady", np.ones(len(state.time_s)))
-    return np.isfinite(state.effort) & (steady > 0)
+    """Samples (n,) that are compared: steady ones, or every sliding one for what acts at starts and stops."""
+    return np.isfinite(state.effort) & (state.extra.get("slides" if every else "steady", np.ones(len(state.time_s))) > 0)
 
 
 def _blocks(state: DriveState) -> NDArray[np.int64]:

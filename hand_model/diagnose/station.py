@@ -61,6 +61,15 @@ class Station:
     def kept(self) -> tuple[Named, ...]:
         """The effects that stand beside each other: one of a small share may be no more than the form of the large one being
         another, and is left to the unexplained part."""
+        return tuple(f for f in self._beside if f.term.effect.listed)
+
+    @property
+    def outsiders(self) -> tuple[Named, ...]:
+        """What stands beside them and no table of effects names."""
+        return tuple(f for f in self._beside if not f.term.effect.listed)
+
+    @property
+    def _beside(self) -> tuple[Named, ...]:
         return tuple(f for f in self.proven if (f.share >= SMALL or f is self.proven[0]) and f not in self.forms)
 
     @property
@@ -85,7 +94,7 @@ class Station:
         place = " ".join(x for x in (self.finger, self.joint, self.signal) if x)
         if not self.missing:
             return f"{place}: consistent (p {self.naming.before.p:.2g})"
-        names = ", ".join(f.term.effect.name for f in self.kept) if self.believed else "unexplained"
+        names = ", ".join(f.term.effect.name for f in self.kept) if self.believed and self.kept else "unexplained"
         return f"{place}: {names} (p {self.naming.before.p:.2g} -> {self.naming.after.p:.2g})"
 
 
@@ -110,6 +119,10 @@ def judged(signal: str, finger: str | None, actuator: str | None, joint: str | N
         if other.weight <= station.weight:
             break
         station = other
+    if station.missing and not station.believed and any(s.validate for s in states):
+        # what the training recordings cannot tell apart, a pose that one of the others alone has may tell
+        other = Station(signal, finger, actuator, joint, name_effects(states, tuple(effects), typical=typical, whole=True))
+        station = other if other.believed and other.naming.after.p >= ALPHA else station
     if station.forms:
         left = tuple(e for e in left if e.name not in {f.term.effect.name for f in station.forms})
         other = Station(signal, finger, actuator, joint, name_effects(states, left, typical=typical))
@@ -139,7 +152,7 @@ def finding_of(station: Station, named: Named, share: float, size: float) -> tup
     weights = np.exp(np.array([r.evidence for r in named.rivals] + [0.0]) - max(top, 0.0))
     weights = weights / weights.sum()
     alternatives = tuple((r.name, float(p)) for r, p in zip(named.rivals, weights[:-1], strict=True)
-                         if r.name != effect.name and p > 1e-3)[:4]
+                         if r.name != effect.name and p > 1e-3 and r.fit.terms[-1].effect.listed)[:4]
     unit = naming.balance.states[0].effort_unit
     fit = {"metric": f"{station.signal}_rmse", "unit": unit, **held_out(station.reading, which), "engine": ENGINE[station.signal]}
     members = named.members if effect.name in named.members else (effect.name, *named.members)
@@ -147,6 +160,13 @@ def finding_of(station: Station, named: Named, share: float, size: float) -> tup
     model = None if recording else dict(UNWRITTEN)
     return weighed(size, station.contrast), Finding(effect.name, members, named.probability, alternatives, where,
                            effect.statement(where, values), parameters, fit, model, recording)
+
+
+def outsider_of(station: Station, named: Named) -> dict[str, Any]:
+    """The unexplained entry of what no table of effects names, with what it looks like."""
+    values = {k: v["value"] for k, v in station.parameters[station.naming.fit.terms.index(named.term)].items()}
+    entry = unexplained_of(station, named.share * station.explained)
+    return {**entry, "shape": f"no known effect, but {named.term.effect.statement(entry['where'], values)}"}
 
 
 def unexplained_of(station: Station, share: float) -> dict[str, Any]:

@@ -133,6 +133,7 @@ class Effect:
     of_the_hand: ClassVar[bool] = True  # False of what only one recording had, such as an obstacle
     unwritten: ClassVar[str | None] = None  # why no file can hold it or no replay show it, where that is so
     family: ClassVar[str | None] = None  # effects of one family move alike: a small one beside a large one may be its form
+    listed: ClassVar[bool] = True  # False of an outsider: no row of the table of effects, told as unexplained
     repeats: ClassVar[bool] = False  # may be named more than once in one balance, with other shapes
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:

@@ -31,6 +31,13 @@ class CurrentSaturation(Effect):
         """The prediction within the limits."""
         return np.clip(prediction, -shape["limit"], shape["limit"])
 
+    def further(self, states: tuple[DriveState, ...], parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+        """Share of the readings whose motion requires more than the limit."""
+        required = [np.abs(s.extra["required"][np.isfinite(s.effort)]) for s in states if "required" in s.extra]
+        if not required:
+            return {}
+        return {"share_cut": {"value": float(np.mean(np.concatenate(required) > parameters["limit"]["value"])), "unit": "1"}}
+
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """The limit."""
         return f"the current does not exceed {figure(parameters['limit'])} raw: its reading, or the drive, clips there"

@@ -24,16 +24,28 @@ class GravityLoad(Effect):
         return (Shape("sweep", "rad", 0.5, 2.5, (0.8, 1.4, 2.0)),)
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
-        """Weight times lever along the open finger and across it."""
-        return (("along", "effort", -np.inf, np.inf), ("across", "effort", -np.inf, np.inf))
+        """Weight times lever along the open finger and across it; and what it does in the one pose of all recordings that show none."""
+        return tuple((name, "effort", -np.inf, np.inf) for name in ("along", "across", "unseen_cosine", "unseen_sine"))
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """Torque of a unit weight on the finger's line and across it, (n, 2) in parts of 9.81 m/s^2; none without a pose."""
-        if "gravity_along" not in state.extra or not shape:
-            return np.zeros((len(state.time_s), 2))
+        """Torque of a unit weight on the finger's line and across it, in parts of 9.81 m/s^2, and cosine and sine of the angle where the
+        pose was not recorded, (n, 4); none where no recording has a pose."""
+        out = np.zeros((len(state.time_s), 4))
+        if not shape or not ("gravity_along" in state.extra or "pose_unseen" in state.extra):
+            return out
         angle = shape["sweep"] * state.position / 100.0
+        cosine, sine = np.cos(angle), np.sin(angle)
+        if "pose_unseen" in state.extra:
+            out[:, 2], out[:, 3] = cosine, sine
+            return out
         along, across = state.extra["gravity_along"] / 9.81, state.extra["gravity_across"] / 9.81
-        return np.stack([across * np.cos(angle) - along * np.sin(angle), along * np.cos(angle) + across * np.sin(angle)], axis=-1)
+        out[:, 0], out[:, 1] = across * cosine - along * sine, along * cosine + across * sine
+        return out
+
+    def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
+                   declared: Mapping[str, float]) -> dict[str, float]:
+        """The weight; not what it did in a pose that nobody knows."""
+        return {**shape, "along": amplitude["along"], "across": amplitude["across"]}
 
     def told_by(self, state: DriveState) -> bool:
         """One in which the pose of the hand was recorded."""

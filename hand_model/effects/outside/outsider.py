@@ -1,0 +1,29 @@
+"""What an outsider has in common with all others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from ..base import DriveState, Effect, Shape
+
+UNLIKELY = 4.0  # log evidence by which an outsider must beat what the table holds: more than the width of a class
+
+
+class Outsider(Effect):
+    """An effect that the table does not name."""
+
+    listed: ClassVar[bool] = False
+
+    def log_prior(self, parameters: Mapping[str, float]) -> float:
+        """What is known comes first."""
+        return -UNLIKELY
+
+
+def moments(states: tuple[DriveState, ...]) -> Shape:
+    """A moment of the session [s] while something is recorded, with starts all along."""
+    recorded = np.concatenate([s.elapsed_s[np.isfinite(s.effort)] for s in states])
+    starts = np.quantile(recorded, np.linspace(0.04, 0.96, 24))
+    return Shape("moment", "s", float(starts[0]), float(max(starts[-1], starts[0] + 1e-9)), tuple(np.unique(starts).tolist()))

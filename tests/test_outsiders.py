@@ -1,0 +1,89 @@
+"""Outsiders: what no table of effects holds competes, is told as unexplained and never named; what is known comes first."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_diagnose import PLANTED, drive, planted
+
+from hand_model.diagnose.assemble import assemble
+from hand_model.diagnose.drive import with_required
+from hand_model.diagnose.station import Station, judged
+from hand_model.effects import catalogue, effect, outsiders
+from hand_model.effects.base import DriveState
+
+BY_NAME = {e.name: e for e in outsiders("drive")}
+
+
+def heard(states: tuple[DriveState, ...]) -> Station:
+    total = max(float(s.elapsed_s[-1]) for s in states)
+    states = tuple(replace(s, extra={**s.extra, "session_s": np.full(len(s.time_s), total)}) for s in states)
+    return judged("current", "index", "index", None, with_required(states), [*catalogue("drive"), *outsiders("drive")])
+
+
+def gain(state: DriveState) -> np.ndarray:
+    load = state.declared @ np.array([0.012, 0.15, 35.0, 0.22, 9.0])
+    return 0.4 * load * state.elapsed_s / 150.0
+
+
+def jump(state: DriveState) -> np.ndarray:
+    return 12.0 * np.sign(state.velocity) * (state.elapsed_s > 52.0)
+
+
+def tooth(state: DriveState) -> np.ndarray:
+    shape = {"form": 1.0, "centre": 45.0, "width": 4.0}
+    return BY_NAME["cycle_memory"].columns(state, shape)[:, 0] * 30.0
+
+
+@pytest.mark.parametrize(("name", "add"), [("gain_change", gain), ("friction_jump", jump), ("cycle_memory", tooth)])
+def test_an_outsider_is_unexplained_and_said(name: str, add) -> None:
+    station = heard(drive(3, add))
+    assert not station.kept and [f.term.effect.name for f in station.outsiders] == [name]
+    told = assemble([station], [], [])
+    assert told.verdict == "unexplained" and not told.findings
+    assert told.unexplained[0]["shape"].startswith("no known effect, but index: ")
+    assert name not in {r["effect"] for r in told.rejected}
+
+
+@pytest.mark.parametrize(("name", "shape", "amplitude"), PLANTED, ids=[p[0] for p in PLANTED])
+def test_what_is_known_comes_first(name: str, shape: dict[str, float], amplitude: list[float]) -> None:
+    station = heard(drive(3, planted(name, shape, amplitude)))
+    assert [f.term.effect.name for f in station.kept] == [name] and not station.outsiders
+    assert not set(station.kept[0].members) & set(BY_NAME)
+
+
+def test_no_outsider_is_a_row_of_the_table() -> None:
+    assert BY_NAME and not set(BY_NAME) & {e.name for e in catalogue()}
+    assert not any(e.listed for e in BY_NAME.values()) and all(e.listed for e in catalogue())
+
+
+def weighed(states: tuple[DriveState, ...], poses: list[tuple[float, float] | None]) -> tuple[DriveState, ...]:
+    """The states with a weight of 20 raw whose poses (along, across) are recorded, or not."""
+    out = []
+    for state, pose in zip(states, poses, strict=True):
+        along, across = pose or (9.0, -3.0)
+        n = np.ones(len(state.time_s))
+        seen = replace(state, extra={**state.extra, "gravity_along": along * n, "gravity_across": across * n, "pose_seen": n})
+        load = effect("gravity_load").columns(seen, {"sweep": 1.4}) @ np.array([20.0, 0.0, 0.0, 0.0])
+        bare = {**state.extra, "pose_unseen": n}
+        out.append(replace(seen if pose else replace(state, extra=bare), effort=state.effort + load))
+    return tuple(out)
+
+
+def test_a_weight_is_named_where_only_the_recording_kept_out_shows_another_pose() -> None:
+    states = drive(8, trials=5)
+    states = weighed(tuple(replace(s, validate=k > 2) for k, s in enumerate(states)), [(9.81, 0.0), None, None, (-8.0, 5.0), None])
+    station = heard(states)
+    assert [f.term.effect.name for f in station.kept] == ["gravity_load"]
+    size = station.parameters[station.naming.fit.terms.index(station.kept[0].term)]
+    assert set(size) == {"sweep", "along", "across"}
+    assert abs(np.hypot(size["along"]["value"], size["across"]["value"]) / 20.0 - 1) < 0.15
+
+
+def test_the_share_that_a_ceiling_cuts_is_what_the_motion_requires_beyond_it() -> None:
+    states = with_required(drive(2))
+    required = np.concatenate([np.abs(s.extra["required"][np.isfinite(s.effort)]) for s in states])
+    entry = effect("current_saturation").further(states, {"limit": {"value": float(np.quantile(required, 0.8))}})
+    assert abs(entry["share_cut"]["value"] - 0.2) < 0.01
