@@ -14,7 +14,7 @@ from hand_model.rig import fit_declared, load_rig, replay_rig
 from hand_model.rig.candidates import candidates
 from hand_model.rig.channels import sinusoids_left
 from hand_model.rig.diagnose import trusted_fit
-from hand_model.rig.states import low_pass
+from hand_model.rig.states import low_pass, noise_std
 from hand_model.session import read_session
 
 VOLTAGE = ARM.replace('<motor name="motor" joint="hinge"/>', '<dcmotor name="motor" joint="hinge" motorconst="0.35 0.35" resistance="3.4"/>')
@@ -122,6 +122,17 @@ def test_a_ramp_is_no_sinusoid_and_an_unplugged_drive_no_command(tmp_path: Path)
     table[:, 2] = 0.0
     np.savetxt(log, table, delimiter=",", header="time,position,torque", comments="", fmt="%.8g")
     assert trusted_fit(load_rig(read_session(tmp_path / "s")))[1] == ()
+
+
+def test_uneven_stamps_are_no_noise() -> None:
+    """What moves smoothly has none, however its samples lie; what noise there is comes out, and with even stamps as without any."""
+    random = np.random.default_rng(0)
+    even = np.arange(4000) * 1e-3
+    t = even + 0.4e-3 * random.uniform(-1, 1, len(even))
+    assert noise_std(np.sin(9 * t), t) < 1e-6
+    noisy = np.sin(9 * t) + 1e-4 * random.standard_normal(len(t))
+    assert noise_std(noisy, t) == pytest.approx(1e-4, rel=0.1)
+    assert noise_std(noisy, even) == pytest.approx(noise_std(noisy), rel=1e-6)
 
 
 @pytest.mark.parametrize("shape", [(400,), (400, 3), (35,)])

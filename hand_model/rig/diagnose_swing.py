@@ -156,7 +156,7 @@ def _resolution(rig: RigModel) -> float:
     for t in rig.trials:
         q = fill_gaps(t.time_s, t.position[joint])
         step = float(np.median(np.diff(t.time_s)))
-        floors.append(np.hypot(noise_std(q), float(np.std(np.gradient(q, t.time_s))) * step / np.sqrt(12.0)))
+        floors.append(np.hypot(noise_std(q, t.time_s), float(np.std(np.gradient(q, t.time_s))) * step / np.sqrt(12.0)))
     return float(np.median(floors))
 
 

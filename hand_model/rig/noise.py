@@ -51,4 +51,4 @@ def _noisier(trial: RigTrial, seed: int) -> RigTrial:
 def _white(time_s: Array, values: Array) -> float:
     """White noise of a channel with gaps; none where it never moves."""
     filled = fill_gaps(time_s, values)
-    return noise_std(filled) if np.ptp(filled) > 0 else 0.0
+    return noise_std(filled, time_s) if np.ptp(filled) > 0 else 0.0

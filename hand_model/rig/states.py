@@ -31,10 +31,11 @@ def uniform_time(time_s: Array) -> Array:
     return np.arange(int(np.floor((time_s[-1] - time_s[0]) / step + 1e-6)) + 1) * step + time_s[0]
 
 
-def noise_std(values: Array) -> float:
-    """Standard deviation of the white part of an evenly sampled signal, from fourth differences, or its step/sqrt(12)."""
-    fourth = np.diff(values, 4)
-    white = float(np.median(np.abs(fourth - np.median(fourth)))) / 0.6745 / np.sqrt(70.0)
+def noise_std(values: Array, time_s: Array | None = None) -> float:
+    """Standard deviation of the white part of a signal, from fourth differences, or its step/sqrt(12); time_s: its own
+    stamps, where they are uneven (fourth divided differences: of even ones what moves smoothly would be noise)."""
+    fourth = np.diff(values, 4) / np.sqrt(70.0) if time_s is None else _fourth(time_s, values)
+    white = float(np.median(np.abs(fourth - np.median(fourth)))) / 0.6745
     grain = 1e-6 * np.ptp(values) + 1e-300  # what differs by less is equal but for rounding
     levels = grain * np.unique(np.round(values / grain))
     apart = np.diff(levels) if 1 < len(levels) < 0.5 * len(values) else np.zeros(1)
@@ -42,6 +43,15 @@ def noise_std(values: Array) -> float:
     if np.percentile(apart, 10) < 0.5 * step:  # no ladder: samples that recur (a periodic motion)
         step = 0.0
     return max(white, step / np.sqrt(12.0), 1e-12 * (np.ptp(values) + 1e-12))
+
+
+def _fourth(time_s: Array, values: Array) -> Array:
+    """Fourth divided differences (n - 4,), each scaled so that white noise of one gives one: no cubic is seen by them."""
+    at = np.lib.stride_tricks.sliding_window_view(time_s, 5)
+    at = (at - at[:, :1]) / (at[:, -1:] - at[:, :1])
+    weights = 1.0 / np.prod(at[:, :, None] - at[:, None, :] + np.eye(5), 2)
+    weights /= np.linalg.norm(weights, axis=1)[:, None]
+    return np.sum(weights * np.lib.stride_tricks.sliding_window_view(values, 5), 1)
 
 
 def low_pass(values: Array, rate_hz: float, cutoff_hz: float) -> Array:
