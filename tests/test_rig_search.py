@@ -122,6 +122,16 @@ def test_a_long_swing_is_searched_on_some_of_its_stretches() -> None:
     assert thinned(short) is short
 
 
+def test_a_recording_with_a_level_of_its_own_is_not_left_out_whole(tmp_path: Path) -> None:
+    """Two recordings: each is left out alone where they share all parameters, in halves and thirds where each sets its own friction."""
+    folder = bench(tmp_path / "s", 0.3, 0.01)
+    head, *trials = (path := folder / "session.toml").read_text().split("[[trial]]")
+    for levels, count in ((("", ""), 2), (('set = { "joint:hinge:frictionloss" = 0.05 }\n', 'set = { "joint:hinge:frictionloss" = 0.1 }\n'), 5)):
+        path.write_text("[[trial]]".join([head, *(t + level for t, level in zip(trials[:2], levels, strict=True))]))
+        parts = splits(pose(trusted_fit(load_rig(read_session(folder)))[0]))
+        assert len(parts) == count and np.all(np.sum(parts, 0) == (1 if count == 2 else 2))
+
+
 def test_a_free_swing_starts_where_its_first_period_says() -> None:
     """Starts that are wrong by half a degree and 0.1 rad/s come back to what the recording was made with, at a friction that is wrong
     by a tenth; those of a driven joint stay."""

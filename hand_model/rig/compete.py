@@ -175,13 +175,19 @@ def borne_out(problem: Problem, few: tuple[Sequence[Term], tuple], many: tuple[S
 
 def splits(problem: Problem) -> list[Array]:
     """Blocks (B,) bool to leave out, split by split: of few recordings each alone and all but each; of a single one its
-    halves and thirds."""
+    halves and thirds, and so of all where one has a parameter of its own, which no other could tell."""
     names, group = np.unique(problem.group, return_inverse=True)
-    if len(names) == 1:
-        part = np.arange(len(group)) / len(group)
+    if len(names) == 1 or _own_parameters(problem):
+        part = np.arange(len(group)) % np.bincount(group).max() / np.bincount(group).max()
         return [np.floor(part * k) == i for k in (2, 3) for i in range(k)]
     alone = [group == i for i in range(len(names))]
     return alone if len(names) == 2 else [*alone, *(~a for a in alone)]
+
+
+def _own_parameters(problem: Problem) -> bool:
+    """Whether any declared parameter acts in one of several recordings alone (a level that the laboratory set there)."""
+    acts = {t: np.any([np.any(r.columns, 0) for r in problem.rows if r.trial == t], 0) for t in {r.trial for r in problem.rows}}
+    return bool(np.any(np.sum(list(acts.values()), 0) == 1))
 
 
 def training_error(problem: Problem, terms: Sequence[Term], parts: tuple) -> float:
