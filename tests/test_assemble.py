@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from hand_model.diagnose.assemble import _shared, _without_shadows, _without_tilts, assemble
+from hand_model.diagnose.assemble import _of_hinges, _shared, _without_shadows, _without_tilts, assemble
+from hand_model.diagnose.displacement import NO_HINGE
 from hand_model.diagnose.findings import Finding, weighed
 
 
@@ -96,3 +97,11 @@ def test_a_trifle_beside_a_large_effect_of_the_same_finger_is_no_finding_but_is_
     elsewhere = finding("current_channel_delay", "ring", "current", delay=0.004)
     assert names((1.0, main), (0.01, elsewhere)) == ["clock_drift", "current_channel_delay"]
     assert names((1.0, main), (0.01, finding("current_channel_delay", "index", "current", delay=0.06))) == ["clock_drift", "current_channel_delay"]
+
+
+def test_where_no_finger_is_a_hinge_to_the_cameras_angles_tell_nothing() -> None:
+    bent = [{"where": {"finger": f}, "shape": f"{NO_HINGE}: the markers leave it", "share_of_mismatch": 1.0} for f in ("index", "ring")]
+    ranked = [with_share(1.0, "linkage_backlash", "index", "markers", 1.0), with_share(0.5, "joint_wobble", "ring", "markers", 1.0),
+              with_share(0.5, "stribeck_friction", "index", "current", 1.0), with_share(0.5, "linkage_backlash", "little", "markers", 1.0)]
+    assert _of_hinges(ranked, bent) == ranked[2:]
+    assert _of_hinges(ranked, bent[:1]) == ranked  # one finger's joint may be none

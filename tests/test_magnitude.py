@@ -15,7 +15,7 @@ from hand_model.effects import catalogue
 RAW = {"asymmetric_friction": {"half_difference": 4.0}, "detent_load": {"load": 5.0}, "elastoplastic_hysteresis": {"yield_load": 3.0},
        "quadratic_damping": {"drag": 3e-4}, "position_dependent_friction": {"extra_friction": 4.0}, "torque_ripple": {"amplitude": 2.0},
        "viscoelastic_spring": {"stiffness": 0.1}, "gravity_load": {"along": 3.0, "across": -2.0}, "thermal_friction_drift": {"cold_excess": -2.0},
-       "nonlinear_spring": {"quadratic_stiffness": 1e-3, "cubic_stiffness": 2e-6}}
+       "nonlinear_spring": {"bend": 4.0}}
 
 
 @pytest.mark.parametrize("effect", RAW)

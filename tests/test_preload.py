@@ -36,3 +36,12 @@ def test_the_lopsided_one_is_named_in_a_class_with_another_preload(half: float) 
 def test_of_two_that_differ_the_heavier_is_odd_unless_one_has_lost_its_preload() -> None:
     assert [f.where["finger"] for _, f in preload_findings(hand(25.0, 0.0))] == ["finger_0"]
     assert [f.where["finger"] for _, f in preload_findings(hand(-12.0, 0.0))] == ["finger_0"]
+
+
+def test_a_motor_that_does_not_repeat_itself_is_not_compared() -> None:
+    def shaken(state):
+        return 12.0 + 15.0 * np.sin(2 * np.pi * 0.37 * state.elapsed_s)
+
+    one = judged("current", "index", "index", None, drive(4, shaken), [effect("torque_ripple")])
+    assert one.wander > 1.0
+    assert not preload_findings([one, *hand(0.0, 0.5)])

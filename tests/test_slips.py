@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from hand_model.diagnose.markers import MarkerEffect
-from hand_model.diagnose.slips import displacement
+from hand_model.diagnose.slips import displacement, turn
+from hand_model.diagnose.wobble import wobble_amplitude
 
 
 @pytest.mark.parametrize(("begin", "end"), [(10, 100), (10, 30), (None, None)])
@@ -15,3 +18,40 @@ def test_a_slip_is_as_large_as_it_is_while_it_lasts(begin: int | None, end: int 
     everywhere[:, 3:] = np.eye(3)
     slip = MarkerEffect("marker_slip", 1, "P1", begin, end, everywhere, 50.0, 100.0, np.array([1e-3, -2e-3, 2e-3]))
     assert displacement([slip], slip) == pytest.approx(3e-3)
+
+
+def turned(about: np.ndarray, angle: float) -> np.ndarray:
+    x, y, z = angle * about / np.linalg.norm(about)
+    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) / angle * k + (1 - np.cos(angle)) / angle**2 * k @ k
+
+
+def test_a_support_turns_by_the_angle_of_all_its_effects_together() -> None:
+    rng = np.random.default_rng(0)
+    position = rng.normal(size=(1, 5, 3)) * 0.01 + np.zeros((60, 1, 1))
+    body = np.array([0, 0, 1, 1, 1])
+    shift = np.zeros((60, 5, 3))
+    shift[:, 2:] = position[:, 2:] @ (turned(np.array([1.0, -2.0, 0.5]), 0.12) - np.eye(3)).T + 1e-3
+    halves = [MarkerEffect("support_slip", 1, None, 20, 60, 0.5 * shift.reshape(60, 15, 1), 50.0, 100.0, np.ones(1)) for _ in range(2)]
+    blocks = SimpleNamespace(body=body, position=position)
+    assert turn(blocks, halves, halves[0]) == pytest.approx(0.12, rel=1e-3)
+
+
+@pytest.mark.parametrize(("wave", "amplitude"), [(lambda u: np.sin(2 * np.pi * u + 0.8), 0.04), (lambda u: np.sin(np.pi * u), 0.03)])
+@pytest.mark.parametrize("body", [1, 2])
+def test_a_wobble_is_read_whatever_another_axis_would_explain(wave, amplitude: float, body: int) -> None:
+    rng, u = np.random.default_rng(1), np.r_[np.linspace(0, 1, 150), np.linspace(1, 0, 150)]
+    first, angle, axis = 0.9 * u, 1.3 * u, np.array([0.0, 1.0, 0.0])
+    before = np.stack([turned(axis, a + 1e-9) if body == 2 else np.eye(3) for a in first])
+    own = before @ np.stack([turned(axis, a + 1e-9) for a in angle])
+    arms = rng.normal(size=(3, 3)) * 0.01 + [0.02, 0.0, 0.0]
+    position = np.zeros((300, 6, 3))
+    position[:, 3:] = np.einsum("bij,mj->bmi", own, arms)
+    across = np.array([0.6, 0.0, 0.8])
+    tilt = amplitude * wave(u)[:, None] * (before @ across)  # and what a hinge's axis and the markers' places would do
+    tilt = tilt + before @ np.array([0.05, 0.0, -0.02]) + own @ np.array([-0.03, 0.0, 0.04])
+    shift = np.zeros_like(position)
+    shift[:, 3:] = np.cross(tilt[:, None], position[:, 3:]) + rng.normal(size=3) * 1e-3
+    blocks = SimpleNamespace(body=np.repeat([body - 1, body], 3), position=position, angle=np.stack([first, angle][-body:], axis=1),
+                             axes=np.broadcast_to(axis, (300, body, 3)), rotation=np.concatenate([np.repeat(before[:, None], 3, 1), np.repeat(own[:, None], 3, 1)], 1))
+    assert wobble_amplitude(blocks, body, shift) == pytest.approx(amplitude, rel=0.02)

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..effects import catalogue
 from ..effects.base import sample_interval
+from .displacement import NO_HINGE
 from .distinguishability import protocol_pairs
 from .findings import Finding, Findings
 from .interval import variance_ratio
@@ -55,7 +56,7 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
         rejected += [{"effect": name, "where": str(station.finger), "reason": _reason(value)}
                      for name, value in station.naming.rejected[:4] if name in NAMES]
     unexplained += [unrepeated_of(s) for s in stations if _wanders(s, stations)]
-    ranked = _without_tilts(_without_shadows(_one_clock(ranked)))
+    ranked = _without_tilts(_without_shadows(_one_clock(_of_hinges(ranked, unexplained))))
     sized = [(_magnitude(f, stations), weight, f) for weight, f in ranked]
     ranked = sorted(((float(np.sqrt(m * weight)), f) for m, weight, f in sized), key=lambda item: -item[0])
     ranked = _heaviest(ranked, _same_place)
@@ -164,6 +165,15 @@ def _without_shadows(ranked: list[tuple[float, Finding]]) -> list[tuple[float, F
         return harmonic or weight < SHADOW * error
 
     return [item for item in ranked if not shadow(*item)]
+
+
+def _of_hinges(ranked: list[tuple[float, Finding]], unexplained: Sequence[Mapping[str, Any]]) -> list[tuple[float, Finding]]:
+    """Without what angles tell where no finger's joint is a hinge to the cameras: it is the cameras that bend space, and angles read in
+    it are none."""
+    bent = {entry["where"]["finger"] for entry in unexplained if NO_HINGE in entry["shape"]}
+    if len(bent) < 2:
+        return ranked
+    return [item for item in ranked if item[1].where["finger"] not in bent or item[1].effect not in ANGULAR | set(HINGE)]
 
 
 def _without_tilts(ranked: list[tuple[float, Finding]]) -> list[tuple[float, Finding]]:

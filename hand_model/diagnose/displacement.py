@@ -17,7 +17,7 @@ NO_HINGE = "no plain hinge"  # a joint whose markers leave the hinge in step wit
 
 @dataclass(frozen=True)
 class Candidate:
-    """columns: (b, 3m, c) [m per unit]. step: it begins at some moment. lasting: a step that lasts for the session, or until the
+    """columns: (b, 3m, c) [m per unit]. shifts: which of them (c,) shift what a joint carries and do not turn it. step: it begins at some moment. lasting: a step that lasts for the session, or until the
     end of the recording (it was put right after)."""
 
     effect: str
@@ -26,6 +26,7 @@ class Candidate:
     columns: Array
     step: bool
     lasting: bool = True
+    shifts: tuple[bool, ...] = ()
 
 
 def candidates_of(blocks: Blocks) -> list[Candidate]:
@@ -81,7 +82,8 @@ def _no_hinge(blocks: Blocks, k: int) -> list[Candidate]:
     def candidate(name: str, functions: list[Array], ways: list[Array]) -> Candidate:
         columns = np.zeros((b, m, 3, len(functions) * len(ways)))
         columns[:, moved] = np.stack([f[:, :, None] * way for f in functions for way in ways], axis=-1)
-        return Candidate(name, k, None, columns.reshape(b, 3 * m, -1), False)
+        mask = tuple(any(way is s for s in shifts) for _ in functions for way in ways)
+        return Candidate(name, k, None, columns.reshape(b, 3 * m, -1), False, shifts=mask)
 
     out = []
     for form in forms:

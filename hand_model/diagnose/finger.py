@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..background import Background
-from ..effects import catalogue
+from ..effects import catalogue, outsiders
 from ..errors import IdentificationError
 from ..session import Finger, Session
 from .angles import FingerAngles, encoder_states, expected_angles, finger_angles, linkage_states, ranges_of_counts
@@ -75,6 +75,7 @@ def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, f
         expected = expected_angles(stations[0].naming) if stations and joint == 1 else {}
         states = linkage_states(angles, joint, moments, expected)
         if states:
-            stations.append(judged("markers", finger.name, finger.actuator, finger.segments[joint].name, states, catalogue("linkage")))
+            effects = [*catalogue("linkage"), *outsiders("linkage")]
+            stations.append(judged("markers", finger.name, finger.actuator, finger.segments[joint].name, states, effects))
     lines += [s.line() for s in stations]
     return FingerReading(finger.name, seen, tuple(stations), found, tuple(unexplained_of(seen, markers)), (), tuple(lines))

@@ -147,21 +147,22 @@ def _covariance(balance: Balance, fit: Fit, theta: Array, build: Any) -> Array:
 
 
 def held_out(reading: Reading, which: int, seed: int = 0) -> dict[str, Any]:
-    """Root-mean-square error on recordings that took no part, without and with the term `which`, the noise floor, and a
-    bootstrap interval over strokes of the reduction.
+    """Root-mean-square error on recordings that took no part, without and with the term `which` and others of the same effect (one finding
+    may have several), the noise floor, and a bootstrap interval over strokes of the reduction.
 
     Steady samples; all sliding ones for a delay or a give, which act at starts and stops, where the floor is what timing grants. `held_out` is empty where there
-    are no validation recordings or where the naming had to look at them: figures are then in-sample.
+    are no validation recordings, where the naming had to look at them, and for an event: figures are then in-sample.
     """
     balance, fit = reading.balance, reading.fit
-    without = balance.fit(tuple(t for i, t in enumerate(fit.terms) if i != which))
     effect = fit.terms[which].effect
+    without = balance.fit(tuple(t for t in fit.terms if t.effect.name != effect.name))
     slides = balance.gather(lambda s: s.extra.get("slides", np.ones(len(s.time_s)))) > 0
     seen = slides if effect.warps or effect.replaces else balance.steady
-    use = ~balance.train & seen & balance.telling(effect)
+    of_one = "trial" in fit.terms[which].shape  # what happened in one recording tells nothing of another
+    use = ~balance.train & seen & balance.telling(effect) & (not of_one)
     untouched = bool(use.any())
     if not untouched:
-        use = seen
+        use = seen & balance.train
     r0, r1 = ((balance.effort - f.prediction)[use] ** 2 for f in (without, fit))
     _, block = np.unique(balance.stroke[use], return_inverse=True)
     n, s0, s1 = (np.bincount(block, v) for v in (np.ones(use.sum()), r0, r1))

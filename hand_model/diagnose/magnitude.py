@@ -66,13 +66,6 @@ def _asymmetry(p: Mapping[str, float], _: Channel) -> float:
     return abs(there - back) / max(there + back, 1e-12) / 0.5
 
 
-def _bend(p: Mapping[str, float], c: Channel) -> float:
-    """Largest departure from a straight line over the recorded range, for a third of the effort's deviation."""
-    if "knee" in p:
-        return p["stiffness_beyond"] * max(c.high - p["knee"], 0.0) / 2 / (0.35 * c.effort)
-    return (p["quadratic_stiffness"] * c.span**2 / 4 + 0.19 * p["cubic_stiffness"] * c.span**3) / (0.35 * c.effort)
-
-
 def _depth(p: Mapping[str, float], c: Channel) -> float:
     """Load of a stop or an obstacle at the end of the range, for half of the effort's deviation."""
     return p["stiffness"] * max(c.high - p["begin"], p["begin"] - c.low if p["begin"] < c.low + c.span / 4 else 0.0) / (0.6 * c.effort)
@@ -96,7 +89,7 @@ PLAIN: Mapping[str, Rule] = {
     "presliding_friction": lambda p, c: p["bristle_length"] / (0.02 * c.span),
     "thermal_friction_drift": lambda p, c: p["cold_excess"] / (0.3 * c.effort),
     "detent_load": lambda p, c: p["load"] / (0.35 * c.effort),
-    "nonlinear_spring": _bend,
+    "nonlinear_spring": lambda p, c: p["bend"] / (0.15 * c.effort),
     "gravity_load": lambda p, c: float(np.hypot(p["along"], p["across"])) / (0.25 * c.effort),
     "torque_ripple": lambda p, c: p["amplitude"] / (0.17 * c.effort),
     "elastoplastic_hysteresis": lambda p, c: p["yield_load"] / (0.3 * c.effort),

@@ -19,12 +19,13 @@ from .displacement import NO_HINGE, Candidate, candidates_of
 Array = NDArray[np.float64]
 
 EVIDENCE_LEAST = 15.0  # log evidence of a marker effect, beyond its parameters and the search over moments
-MOST = 4
+MOST = 10  # a slip that is put right between recordings is one a recording
 SKIP_P = 0.3  # lack of fit above which no candidate is tried
 ALPHA = 0.003  # false alarms per finger
 EXPLAINED_LEAST = 0.7  # of the misfit: below, the names are not believed
 SPELL = 12  # blocks, about a second, whose mean shows what stays correlated
 HINGE = ("joint_wobble", "moving_centre")
+REACH = 0.06  # m: the other axis of a wobble passes nearer to its joint; farther, its centre travels
 MOSTLY = 0.7  # share of what any motion in step with the angle explains
 
 
@@ -42,6 +43,7 @@ class MarkerEffect:
     evidence: float
     gain: float
     coefficients: Array = field(default_factory=lambda: np.zeros(0))
+    shifts: tuple[bool, ...] = ()
 
     @property
     def columns(self) -> Array:
@@ -101,8 +103,10 @@ def name_markers(angles: FingerAngles) -> MarkerNaming:
             moments = {id(c.columns): _moments(project(blocks, c.columns), shared, y) for c in candidates}
         known = {e.body for e in found if e.effect in HINGE}
         chain = _chain_part(shared, y)
-        best = _choose([_try(c, blocks, moments[id(c.columns)], chain, sigma) for c in candidates
-                        if c.effect != NO_HINGE or c.body not in known])
+        tried = [_try(c, blocks, moments[id(c.columns)], chain, sigma) for c in candidates if c.effect != NO_HINGE or c.body not in known]
+        best = _choose(tried)
+        if best.effect == "joint_wobble" and _reach(best, blocks, shared, y) > REACH:
+            best = max((e for e in tried if e.effect == "moving_centre" and e.body == best.body), key=lambda e: e.evidence)
         more = project(blocks, best.columns)
         wider = np.concatenate([shared, more], axis=-1)
         # What stays correlated beside the best candidate weighs all of them down.
@@ -130,6 +134,22 @@ def _choose(tried: list[MarkerEffect]) -> MarkerEffect:
         return best
     named = max((e for e in tried if e.effect in HINGE and e.body == best.body), key=lambda e: e.evidence)
     return named if named.gain > MOSTLY * best.gain else best
+
+
+def _reach(wobble: MarkerEffect, blocks: Blocks, shared: Array, y: Array) -> float:
+    """How far [m] from the joint the other axis of a wobble passes: what it shifts over what it turns (root mean squares)."""
+    shifts = np.array(wobble.shifts)
+    if not shifts.any():
+        return 0.0
+    more = project(blocks, wobble.everywhere)
+    own = _solve(np.concatenate([shared, more], axis=-1), y)[0][shared.shape[-1] :]
+    moved = (wobble.everywhere[..., shifts] @ own[shifts]).reshape(len(y), -1, 3)
+    turned = (wobble.everywhere[..., ~shifts] @ own[~shifts]).reshape(len(y), -1, 3)
+    carried = np.flatnonzero(blocks.body == wobble.body)
+    spread = turned[:, carried] - turned[:, carried].mean(1, keepdims=True)
+    arm = blocks.position[:, carried] - blocks.position[:, carried].mean(1, keepdims=True)
+    tilt = np.sqrt(np.sum(spread**2) / max(float(np.sum(arm**2)) * 2 / 3, 1e-300))  # of arms in all directions, two thirds are across
+    return float(np.sqrt(np.mean(np.sum(moved[:, carried] ** 2, axis=-1))) / max(tilt, 1e-12))
 
 
 def _inflation(residual: Array, blocks: Blocks) -> float:
@@ -209,7 +229,8 @@ def _try(candidate: Candidate, blocks: Blocks, moments: _Moments, chain: tuple[A
     evidence = 0.5 * float(gain[at]) - 0.5 * parameters * np.log(max((blocks.weight > 0).sum() * 2, 2))
     begin = at if candidate.step else None
     end = None if begin is None else len(blocks.residual) if candidate.lasting else int(last[at])
-    return MarkerEffect(candidate.effect, candidate.body, candidate.label, begin, end, candidate.columns, float(evidence), float(gain[at]))
+    return MarkerEffect(candidate.effect, candidate.body, candidate.label, begin, end, candidate.columns, float(evidence), float(gain[at]),
+                        shifts=candidate.shifts)
 
 
 def _until(values: Array, last: NDArray[np.int64]) -> Array:

@@ -19,6 +19,7 @@ SPREAD = 0.15  # mean absolute deviation of the logarithm of a drive's preload w
 ODD_P = 0.03  # of two drives that differ as much by chance; beyond, one of them is odd
 LOST = 0.2  # of the other's preload: less, or the wrong sign, and there is none
 SURE_LEAST = 0.1  # of a half difference counts in the ranking, however uncertain the rest is
+RESTLESS = 0.5  # of the noise
 CLASS = ("asymmetric_friction", "spring_preload")
 
 
@@ -46,11 +47,13 @@ def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]
 
 
 def _sound(station: Station) -> bool:
-    """Whether a drive's preload is told apart from whatever else is missing of it."""
+    """Whether a drive's preload is told apart from whatever else is missing of it; one that does not repeat itself has none to speak of."""
+    if station.wander > RESTLESS:
+        return False
     if not station.missing:
         return True
     named, plain = (float(fit.declared["preload"]) for fit in (station.naming.fit, station.naming.declared))
-    return station.believed and named > 0 and plain > 0 and abs(np.log(named / plain)) < SPREAD
+    return station.believed and abs(named - plain) < SPREAD * max(abs(named), abs(plain))
 
 
 def _by_chance(own: float, error: float, usual: float) -> float:

@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 from ..identify.chain import propagate
 from ..identify.likelihood import OUTLIER_LIMIT
 from .angles import FingerAngles
+from .blocks import Blocks
 from .displacement import NO_HINGE
 from .findings import Finding, weighed
 from .markers import ALPHA, HINGE, MarkerEffect, MarkerNaming
+from .wobble import wobble_amplitude
 
 Array = NDArray[np.float64]
 
@@ -88,8 +90,7 @@ def _finding(angles: FingerAngles, naming: MarkerNaming, name: str, body: int, l
         trials = [record.trial.name]
         sd = naming.sigma_m / np.sqrt(max((main.end or len(blocks.residual)) - main.begin, 1)) * 4
         if name == "support_slip":
-            turn = float(np.linalg.norm(main.coefficients[3:6]))
-            parameters["turn"] = {"value": turn, "unit": "rad"}
+            parameters["turn"] = {"value": turn(blocks, members, main), "unit": "rad"}
         else:
             parameters["distance"] = {"value": size, "unit": "m", "ci95": [size - sd, size + sd]}
         parameters["moment"] = {"value": at, "unit": "s"}
@@ -114,22 +115,35 @@ def _finding(angles: FingerAngles, naming: MarkerNaming, name: str, body: int, l
 
 def displacement(members: Sequence[MarkerEffect], main: MarkerEffect) -> float:
     """Median over the time in which `main` acts of how far [m] its effects together move the marker that they move most."""
+    return float(np.median(np.linalg.norm(_shift(members, main), axis=-1).max(1)))
+
+
+def turn(blocks: Blocks, members: Sequence[MarkerEffect], main: MarkerEffect) -> float:
+    """Median over the time in which `main` acts of the angle [rad] by which its effects together turn the segment's markers (Kabsch 1976)."""
+    mine = blocks.body == main.body
+    arm = blocks.position[main.begin or 0 : main.end, mine]
+    moved = arm + _shift(members, main)[:, mine]
+    arm, moved = (x - x.mean(1, keepdims=True) for x in (arm, moved))
+    u, _, vt = np.linalg.svd(np.swapaxes(moved, 1, 2) @ arm)
+    straight = np.linalg.det(u @ vt)
+    trace = np.einsum("bij,bji->b", u[..., :2], vt[:, :2]) + straight * np.einsum("bi,bi->b", u[..., 2], vt[:, 2])
+    return float(np.median(np.arccos(np.clip((trace - 1) / 2, -1, 1))))
+
+
+def _shift(members: Sequence[MarkerEffect], main: MarkerEffect) -> Array:
+    """Displacement (b, m, 3) [m] of all markers by effects together, in the blocks in which `main` acts."""
     shift = sum((e.columns @ e.coefficients).reshape(len(e.columns), -1, 3) for e in members)
-    return float(np.median(np.linalg.norm(shift, axis=-1).max(1)[main.begin or 0 : main.end]))
+    return shift[main.begin or 0 : main.end]
 
 
 def _amount(naming: MarkerNaming, effect: MarkerEffect) -> float:
-    """Largest tilt [rad] or travel [m] over the recorded angles, beyond the line that another axis or centre explains."""
+    """Amplitude of a joint's second rotation [rad], or the largest travel of its centre [m], over the recorded angles."""
     blocks = naming.blocks
-    j = int(np.flatnonzero(blocks.body >= effect.body)[0])
-    shift = (effect.columns @ effect.coefficients).reshape(len(blocks.residual), -1, 3)[:, j]
-    if effect.effect == "joint_wobble":
-        arm = blocks.position[:, j] - blocks.centres[:, effect.body - 1]
-        axis = blocks.axes[:, effect.body - 1]
-        across = arm - axis * np.einsum("bi,bi->b", axis, arm)[:, None]
-        size = np.einsum("bi,bi->b", shift, axis) / np.maximum(np.linalg.norm(across, axis=1), 1e-6)
-        return float(0.5 * np.ptp(size))
-    return float(np.linalg.norm(shift - shift[np.argmin(blocks.angle[:, effect.body - 1])], axis=1).max())
+    shift = (effect.columns @ effect.coefficients).reshape(len(blocks.residual), -1, 3)
+    if effect.effect != "joint_wobble":
+        first = shift[:, int(np.flatnonzero(blocks.body >= effect.body)[0])]
+        return float(np.linalg.norm(first - first[np.argmin(blocks.angle[:, effect.body - 1])], axis=1).max())
+    return wobble_amplitude(blocks, effect.body, shift)
 
 
 def _proof(naming: MarkerNaming) -> dict[str, Any]:

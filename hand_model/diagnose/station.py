@@ -17,6 +17,8 @@ ENGINE = {"current": "inverse dynamics of the motor's balance, motion as recorde
 SECOND_HEARINGS, DISPLACING = 2, 0.1  # and the share of what was explained from which a fallen name has displaced others
 CHANNELS = 20  # of a session: what no test of one sees must stand against as many chances
 ALIKE = 1 / 3  # of the size of a larger effect of the same family: below, no finding of its own
+RESTLESS = 0.3  # of the noise: wander that is no explanation
+WORSE = 1.5  # times the mean square of training recordings
 EXPLAINED_LEAST = 0.7  # of the explainable mismatch: below, the names are not believed
 
 
@@ -104,12 +106,21 @@ def _stands(naming: Naming, named: Named, which: int, least: float) -> bool:
     return named.evidence >= least if brought is None else brought > 0 and named.evidence + brought >= least
 
 
+def _elsewhere(naming: Naming) -> bool:
+    """Whether what the training recordings taught fails in those kept out: something happens there that they do not have."""
+    balance = naming.balance
+    square = ((balance.effort - naming.fit.prediction) * balance.weight) ** 2
+    inside, outside = balance.steady & balance.train, balance.steady & ~balance.train
+    return bool(outside.any() and inside.any() and np.mean(square[outside]) > WORSE * np.mean(square[inside]))
+
+
 def judged(signal: str, finger: str | None, actuator: str | None, joint: str | None, states: tuple[Any, ...], effects: Iterable[Any],
            typical: Mapping[str, float] | None = None) -> Station:
     """The station of the balance of `states`, named among `effects`. Where a name does not stand, or is another's form, the others are
     heard without it."""
     left = tuple(effects)
     station = Station(signal, finger, actuator, joint, name_effects(states, left, typical=typical))
+    elsewhere = _elsewhere(station.naming)
     for _ in range(SECOND_HEARINGS):
         fallen = {f.term.effect.name for f in station.naming.found} - {f.term.effect.name for f in station.proven}
         if sum(f.share for f in station.naming.found if f.term.effect.name in fallen and f.evidence >= EVIDENCE_LEAST) < DISPLACING:
@@ -119,10 +130,11 @@ def judged(signal: str, finger: str | None, actuator: str | None, joint: str | N
         if other.weight <= station.weight:
             break
         station = other
-    if station.missing and not station.believed and any(s.validate for s in states):
-        # what the training recordings cannot tell apart, a pose that one of the others alone has may tell
+    if station.missing and (not station.believed or elsewhere and station.naming.after.p < ALPHA) and any(s.validate for s in states):
+        # what the training recordings cannot tell, a pose that one of the others alone has may tell
         other = Station(signal, finger, actuator, joint, name_effects(states, tuple(effects), typical=typical, whole=True))
-        station = other if other.believed and other.naming.after.p >= ALPHA else station
+        known = other.believed and other.naming.after.p >= ALPHA and other.wander <= max(station.wander, RESTLESS)
+        station = other if known else station
     if station.forms:
         left = tuple(e for e in left if e.name not in {f.term.effect.name for f in station.forms})
         other = Station(signal, finger, actuator, joint, name_effects(states, left, typical=typical))
