@@ -52,7 +52,7 @@ READINGS: Mapping[str, Mapping[str | None, Mapping[str, Read]]] = {
     "palm_marker_slip": {EVERY: {"distance": _same("distance_m")}},
     "position_dependent_friction": {"gaussian": {"extra_friction": _same("height_raw"), "width": _same("width_percent")},
                                     EVERY: {"centre": _same("centre_percent")}},
-    "presliding_friction": {"dahl": {"bristle_length": _same("give_percent")}},
+    "presliding_friction": {EVERY: {"bristle_length": _same("give_percent")}, "lugre": {"bristle_time": _same("bristle_damping_raw")}},
     "quadratic_damping": {"square": {"drag": _same("drag_at_100_raw", 1e-4)}},
     "stribeck_friction": {f: {"static_excess": _same("static_excess_raw"), "stribeck_speed": _same("stribeck_speed")}
                           for f in ("exponential", "gaussian")},

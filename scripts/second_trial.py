@@ -11,13 +11,64 @@ import argparse
 import json
 import shutil
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 from second_recorder.compose import make_set
+from second_recorder.hand import COUNTS as RANGES
 
 from hand_model.blind_trial import judged
 
+# What a finding should read of the recorder's settings s (all groups together) and of the motor m, where both have the figure.
+READINGS: dict[str, Callable[[dict[str, Any], dict[str, float]], dict[str, float]]] = {
+    "stribeck_friction": lambda s, m: {"static_ratio": s["Fs_ratio"], "stribeck_speed": s["vs"]},
+    "asymmetric_viscous_friction": lambda s, m: {"viscous_flexion": m["b"] * s.get("b_flex_ratio", 1.0), "viscous_extension": m["b"] * s.get("b_ext_ratio", 1.0)},
+    "asymmetric_friction": lambda s, m: {"half_difference": m["Fc"] * s["fc_asym"]},
+    "load_dependent_friction": lambda s, m: {"load_coefficient": s["load_mu"]},
+    "position_dependent_friction": lambda s, m: {"centre": s["pos_c"], "width": s["pos_w"], "ratio": s["pos_amp"]},
+    "detent_load": lambda s, m: {"centre": s["detent_c"], "width": s["detent_w"], "load": s["detent_amp"]},
+    "nonlinear_spring": lambda s, m: {"cubic_stiffness": m["k"] * s["spring_cubic"] / 1e4},
+    "torque_ripple": lambda s, m: {"amplitude": s["ripple_amp"], "period": s["ripple_period"]},
+    "quadratic_damping": lambda s, m: {"drag": s["quad"]},
+    "elastoplastic_hysteresis": lambda s, m: {"yield_load": s["plastic_amp"], "reach": s["plastic_dist"]},
+    "viscoelastic_spring": lambda s, m: {"stiffness": s["relax_k"], "relaxation_time": s["relax_tau"]},
+    "presliding_friction": lambda s, m: {"bristle_length": m["Fc"] / s["bristle"]},
+    "end_stop_contact": lambda s, m: {"begin": s["stop_x"], "stiffness": s["stop_k"]},
+    "thermal_friction_drift": lambda s, m: {"cold_excess": m["Fc"] * s["thermal_amp"], "warm_up_time": s["thermal_tau"]},
+    "external_contact": lambda s, m: {"begin": s["contact_x"], "stiffness": s["contact_k"]},
+    "encoder_periodic_error": lambda s, m: {"period": 100 * s["encoder_period"] / m["counts"]},
+    "command_delay": lambda s, m: {"delay": s["command_delay"]},
+    "current_channel_delay": lambda s, m: {"delay": s["current_delay"]},
+    "current_saturation": lambda s, m: {"limit": s.get("clip", s.get("limit"))},
+    "clock_drift": lambda s, m: {"rate_minus_one": s["skew"] - 1},
+    "joint_wobble": lambda s, m: {"amplitude": s["wobble_amp"]},
+    "moving_centre": lambda s, m: {"travel": float(np.linalg.norm(s["travel"]))},
+    "marker_slip": lambda s, m: {"distance": float(np.linalg.norm(s["slip"][3]))},
+    "palm_marker_slip": lambda s, m: {"distance": float(np.linalg.norm(s["palm_slip"][2]))},
+    "support_slip": lambda s, m: {"turn": float(np.linalg.norm(s["support"][2]))},
+    "linkage_backlash": lambda s, m: {"segment_gap": float(np.rad2deg(2 * s["linkage_play"]))},
+    "drive_backlash": lambda s, m: {"segment_gap": float(np.rad2deg(2 * s["drive_play"]))},
+}  # fmt: skip
 COUNTS = {"single": 36, "none": 4, "pair": 10, "weak": 10, "messy": 10, "outside": 10}
+
+
+def parameters(folder: Path, made: list[dict[str, Any]]) -> list[tuple[str, float, float, list[float] | None]]:
+    """Effect and name, truth, value and interval of every figure that recorder and finding both have; messy sessions left out."""
+    out = []
+    for answer in made:
+        if answer["kind"] not in ("single", "weak", "pair"):
+            continue
+        findings = json.loads((folder / "findings" / answer["case"] / "findings.json").read_text())["findings"]
+        for hidden in (e for e in answer["effects"] if e["effect"] in READINGS):
+            settings = {k: v for group in answer["settings_by_finger"][hidden["finger"]].values() for k, v in group.items()}
+            open_counts, full_counts = RANGES[hidden["finger"]]
+            truth = READINGS[hidden["effect"]](settings, {**answer["motor"][hidden["finger"]], "counts": full_counts - open_counts})
+            for found in (f for f in findings if f["effect"] == hidden["effect"] and f["where"]["finger"] in (hidden["finger"], None)):
+                read = {name: found["parameters"][name] for name in truth if name in found["parameters"]}
+                out += [(f"{hidden['effect']}.{name}", float(truth[name]), entry["value"], entry.get("ci95")) for name, entry in read.items()]
+    return out
 
 
 def main() -> None:
@@ -34,14 +85,19 @@ def main() -> None:
     sessions = options.folder / "sessions"
     make_set(sessions, options.seed, {kind: getattr(options, kind) for kind in COUNTS}, None)
     apart = sessions.with_name("sessions.answers")
-    answers = {a["case"]: {"case": a["kind"], "effects": a["effects"], "settings": a["settings"]}
-               for a in json.loads((apart / "answers.json").read_text())}
+    made = json.loads((apart / "answers.json").read_text())
+    answers = {a["case"]: {"case": a["kind"], "effects": a["effects"], "settings": a["settings"]} for a in made}
     shutil.rmtree(apart)
     trial = judged(options.folder, answers, options.workers)
     for row in trial.rows:
         if not row["right"]:
             print(f"{row['case']} {row['kind']}: {', '.join(row['truth'][:2])} -> {', '.join(row['named'][:4]) or row['verdict']}")
     print(trial.table())
+    figures = parameters(options.folder, made)
+    right = [abs(value - truth) <= 0.1 * abs(truth) or bool(ci and ci[0] <= truth <= ci[1]) for _, truth, value, ci in figures]
+    print(f"parameters within 10 % or inside the interval: {sum(right)} of {len(right)}")
+    for name, truth, value, ci in (f for f, good in zip(figures, right, strict=True) if not good):
+        print(f"  {name}: {value:.4g} {'' if ci is None else [float(f'{c:.4g}') for c in ci]} for {truth:.4g}")
 
 
 if __name__ == "__main__":

@@ -104,6 +104,14 @@ def test_dahl_solves_its_differential_equation() -> None:
     assert np.abs(z).max() <= 1
 
 
+def test_damped_bristles_follow_the_state_of_lugre() -> None:
+    s, presliding = state(6000), effect("presliding_friction")
+    z, damped = (presliding.declared(s, {"bristle_length": 8.0, "bristle_time": time, "form": 0.0})[:, 2] for time in (0.0, 0.05))
+    rate = np.gradient(z, s.time_s)
+    assert np.corrcoef(damped - z, 0.05 * rate)[0, 1] > 0.99
+    assert np.ptp(damped - z) == pytest.approx(np.ptp(0.05 * rate), rel=0.1)
+
+
 def test_jenkins_is_elastic_then_yields() -> None:
     x = np.concatenate([np.linspace(0, 10, 500), np.linspace(10, 0, 500)])
     z = jenkins(x, 2.0, threshold=0.1)
@@ -277,7 +285,8 @@ def test_native_elements_are_not_written_where_there_is_no_motor() -> None:
 
 @pytest.mark.parametrize(("name", "parameters", "lugre"), [
     ("stribeck_friction", {"static_ratio": 1.8, "stribeck_speed": 18.0, "static_excess": 28.0}, [350.0, 0.0, 36.372, 56.476, 20.556]),
-    ("presliding_friction", {"bristle_length": 7.0}, [5.0, 0.0, 35.0, 35.0, 20.0])])
+    ("presliding_friction", {"bristle_length": 7.0}, [5.0, 0.0, 35.0, 35.0, 20.0]),
+    ("presliding_friction", {"bristle_length": 7.0, "bristle_time": 0.04}, [5.0, 0.2, 35.0, 35.0, 20.0])])
 def test_lugre_replaces_the_joints_friction(name, parameters, lugre) -> None:
     mujoco = pytest.importorskip("mujoco")
     from lxml import etree

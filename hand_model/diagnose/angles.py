@@ -24,7 +24,7 @@ from .drive import count_range
 from .excursions import with_excursions
 from .ghosts import ghosts
 from .motion import Motion, estimate_motion, local_quadratic
-from .name import Naming
+from .naming import Naming
 
 Array = NDArray[np.float64]
 

@@ -16,8 +16,8 @@ from .findings import Finding, Findings
 from .interval import variance_ratio
 from .magnitude import channel_figures, magnitude
 from .markers import HINGE
-from .name import ALPHA, Named
-from .station import Station, channel_of, finding_of, outsider_of, unexplained_of, unrepeated_of
+from .naming import ALPHA, Named
+from .station import UNREST, Station, channel_of, finding_of, outsider_of, unexplained_of, unrepeated_of
 
 UNLIKE_OTHERS = 2.0  # times the wander of the calmest finger
 HARMONICS, SAME_PERIOD = 4, 0.02
@@ -30,7 +30,6 @@ MINUTE = 0.08  # of that magnitude: less, where the lack-of-fit test sees nothin
 SIGNALS = {"drive": "current", "motors": "current", "command": "current", "encoder": "encoder", "linkage": "markers"}
 SHOWN_IN = {e.name: SIGNALS[e.station] for e in catalogue() if e.station in SIGNALS}
 NAMES = {e.name for e in catalogue()}
-UNREST = 0.3  # of the noise: wander that every machine is granted
 
 
 def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding]], notes: list[str],

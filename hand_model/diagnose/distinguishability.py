@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .balance import Balance, Fit, Term
-from .name import CLASS_WIDTH
+from .naming import CLASS_WIDTH
 
 Array = NDArray[np.float64]
 

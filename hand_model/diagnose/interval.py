@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from .balance import DISCRETE, Balance, Fit, Term
 from .evidence import gain, oddity
-from .name import Naming, refit
+from .name import refit
+from .naming import Naming
 
 Array = NDArray[np.float64]
 

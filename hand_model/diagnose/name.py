@@ -8,7 +8,6 @@ recording.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,75 +18,20 @@ from ..effects.base import sample_interval
 from .balance import DISCRETE, Balance, Fit, Term
 from .evidence import evidence, gain, rough_evidence, scale_of
 from .grid import Grid
-from .lack_of_fit import LackOfFit, lack_of_fit
+from .lack_of_fit import lack_of_fit
+from .naming import ALPHA, Named, Naming, Rival
 from .wander import Wander, estimate_wander
 
 Array = NDArray[np.float64]
 
-ALPHA = 0.003  # false alarms per channel: 5 % over some fifteen channels of a session
 EVIDENCE_LEAST = 6.0  # log evidence an effect must bring: e^6 against "none", and against the search over shapes
 FAINT = 3.0  # the same of the only one, to be heard: recordings that took no part may bear out the rest
-CLASS_WIDTH = 3.0  # log evidence within which two effects are one class: 20 to 1
 MOST_TERMS = 5
 MOST_SEARCHES = 3  # each with noise that knows what did not repeat beside the effects of the one before
 REFUTED = 3.0  # standard deviations by which a delay may miss what answers to commands say
 ALONG = 1e-6  # of a column's length: less left beside the design, and it says nothing of its own
 SMALL = 0.07  # share of the explained mismatch: less beside a larger effect may be no more than its form being another
 GROWN = 1.3  # change of that noise, from which another search is worth its time
-
-
-@dataclass(frozen=True)
-class Rival:
-    """A candidate in the place of a finding: its log evidence relative to none, and its fit."""
-
-    name: str
-    evidence: float
-    fit: Fit
-
-
-@dataclass(frozen=True)
-class Named:
-    """One finding of a balance. rivals: every candidate that was tried in its place (best first), the winner included.
-    share: of the explainable residual variance. size: of what it adds beyond what declared coefficients could, over the noise of
-    one reading (root mean squares). probability: against all rivals and none."""
-
-    term: Term
-    amplitudes: dict[str, float]
-    rivals: tuple[Rival, ...]
-    share: float
-    size: float
-    probability: float
-
-    @property
-    def evidence(self) -> float:
-        """Log evidence of the effect in its own place."""
-        return next(r.evidence for r in self.rivals if r.name == self.term.effect.name)
-
-    @property
-    def members(self) -> tuple[str, ...]:
-        """The class: every effect that these recordings cannot tell from this one."""
-        near = [r for r in self.rivals if r.evidence > self.rivals[0].evidence - CLASS_WIDTH]
-        return tuple(r.name for r in near if r.name == self.term.effect.name or r.fit.terms[-1].effect.listed)
-
-
-@dataclass(frozen=True)
-class Naming:
-    """What a balance says. wander: what does not repeat beside the fit. before, after: lack of fit of the declared model and of the final one. rejected: tried and
-    not kept, with the log evidence that it brought."""
-
-    balance: Balance
-    declared: Fit
-    fit: Fit
-    wander: Wander | None
-    before: LackOfFit
-    after: LackOfFit
-    found: tuple[Named, ...]
-    rejected: tuple[tuple[str, float], ...]
-
-    @property
-    def consistent(self) -> bool:
-        """True where nothing is missing beyond the noise."""
-        return self.before.p >= ALPHA and not self.found
 
 
 def name_effects(states: tuple[Any, ...], effects: Iterable[Any], progress: Callable[[str], None] | None = None,

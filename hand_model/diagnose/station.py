@@ -9,7 +9,8 @@ import numpy as np
 
 from .findings import UNWRITTEN, Finding, weighed
 from .interval import brought_held_out, held_out, parameter_intervals, sized, undisturbed
-from .name import ALPHA, EVIDENCE_LEAST, SMALL, Named, Naming, name_effects
+from .name import EVIDENCE_LEAST, SMALL, name_effects
+from .naming import ALPHA, Named, Naming
 
 # How before and after were computed, said in the findings: no compiled file is involved until one is replayed.
 ENGINE = {"current": "inverse dynamics of the motor's balance, motion as recorded", "encoder": "encoder map, motion as recorded",
@@ -17,7 +18,7 @@ ENGINE = {"current": "inverse dynamics of the motor's balance, motion as recorde
 SECOND_HEARINGS, DISPLACING = 2, 0.1  # and the share of what was explained from which a fallen name has displaced others
 CHANNELS = 20  # of a session: what no test of one sees must stand against as many chances
 ALIKE = 1 / 3  # of the size of a larger effect of the same family: below, no finding of its own
-RESTLESS = 0.3  # of the noise: wander that is no explanation
+UNREST = 0.3  # of the noise: wander that every machine is granted; more is no explanation
 WORSE = 1.5  # times the mean square of training recordings
 EXPLAINED_LEAST = 0.7  # of the explainable mismatch: below, the names are not believed
 
@@ -133,7 +134,7 @@ def judged(signal: str, finger: str | None, actuator: str | None, joint: str | N
     if station.missing and (not station.believed or elsewhere and station.naming.after.p < ALPHA) and any(s.validate for s in states):
         # what the training recordings cannot tell, a pose that one of the others alone has may tell
         other = Station(signal, finger, actuator, joint, name_effects(states, tuple(effects), typical=typical, whole=True))
-        known = other.believed and other.naming.after.p >= ALPHA and other.wander <= max(station.wander, RESTLESS)
+        known = other.believed and other.naming.after.p >= ALPHA and other.wander <= max(station.wander, UNREST)
         station = other if known else station
     if station.forms:
         left = tuple(e for e in left if e.name not in {f.term.effect.name for f in station.forms})

@@ -38,7 +38,7 @@ def lugre_friction(root: Any, where: Mapping[str, Any], parameters: Mapping[str,
     """Give the motor joint the LuGre friction of a passive `dcmotor`, in place of its `frictionloss` or of such an element that is
     there; its path, or None without friction.
 
-    parameters: bristle_length (give before sliding) and stribeck_speed in the joint's unit; coulomb_ratio and static_ratio (sliding
+    parameters: bristle_length (give before sliding) and stribeck_speed in the joint's unit; bristle_time [s]: damping over stiffness; coulomb_ratio and static_ratio (sliding
     and static friction over the Coulomb friction that is there). What is not given stays, or is a short bristle without excess.
     """
     found = motor_joint(root, where)
@@ -48,12 +48,12 @@ def lugre_friction(root: Any, where: Mapping[str, Any], parameters: Mapping[str,
     name = f"{where['actuator']}_friction"
     there = next((m for m in root.iterfind("actuator/dcmotor") if m.get("name") == name), None)
     if there is not None:
-        bristle, _, coulomb, static, speed = (float(x) for x in there.get("lugre").split())
-        length = coulomb / bristle
+        bristle, damping, coulomb, static, speed = (float(x) for x in there.get("lugre").split())
+        length, time_s = coulomb / bristle, damping / bristle
         there.getparent().remove(there)
     else:
         coulomb = static = float(joint.attrib.get("frictionloss", "0"))
-        length, speed = SHORT_BRISTLE, 20.0
+        length, time_s, speed = SHORT_BRISTLE, 0.0, 20.0
     if coulomb <= 0:
         return None
     for key in ("frictionloss", "solreffriction", "solimpfriction"):
@@ -61,7 +61,8 @@ def lugre_friction(root: Any, where: Mapping[str, Any], parameters: Mapping[str,
     sliding = coulomb * parameters.get("coulomb_ratio", 1.0)
     static = max(sliding, coulomb * parameters.get("static_ratio", static / coulomb))
     stiffness = coulomb / parameters.get("bristle_length", length)
-    return bristle_friction(root, joint, name, (stiffness, 0.0, sliding, static, parameters.get("stribeck_speed", speed)))
+    damping = stiffness * parameters.get("bristle_time", time_s)
+    return bristle_friction(root, joint, name, (stiffness, damping, sliding, static, parameters.get("stribeck_speed", speed)))
 
 
 def add_damping(joint: Any, linear: float, quadratic: float) -> bool:

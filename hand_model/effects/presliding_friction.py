@@ -13,22 +13,27 @@ from .path import dahl, jenkins
 
 
 class PreslidingFriction(Effect):
-    """The declared Coulomb friction builds up over a distance instead of at once: dz/ds = (1 - z sign(ds)) / length (form 0), or evenly, as a
-    stiff bristle that then breaks away (form 1; Dupont 2002).
+    """The declared Coulomb friction builds up over a distance instead of at once: dz/ds = (1 - z sign(ds)) / length, with z + time dz/dt in
+    its place where the bristles are damped (form 0), or evenly, as a stiff bristle that then breaks away (form 1; Dupont 2002).
     """
 
     name = "presliding_friction"
     replaces = "coulomb"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """Bristle length: from what is granted to any drive of the session (or 1.2 % of the range) to a third of it."""
+        """Bristle length: from what is granted to any drive of the session (or 1.2 % of the range) to a third of it; their damping over their
+        stiffness."""
         low, high = position_range(states)
         span = high - low
         granted = states[0].extra.get("granted")
         least = 0.012 * span if granted is None else float(np.max(granted))
         return (Shape("bristle_length", states[0].position_unit, least, 0.35 * span,
                       tuple(np.geomspace(1.1 * least, 0.25 * span, 11))),
-                Shape("form", "1", 0.0, 1.0, (0.0, 1.0)))
+                Shape("bristle_time", "s", 0.0, 0.1, (0.0, 0.03)), Shape("form", "1", 0.0, 1.0, (0.0, 1.0)))
+
+    def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
+        """What breaks away is not damped."""
+        return [p for p in super().grid(states) if p["form"] < 0.5 or p["bristle_time"] == 0.0]
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """No amplitude of its own: it is the Coulomb friction."""
@@ -39,8 +44,13 @@ class PreslidingFriction(Effect):
         if "coulomb" not in state.declared_names:
             return state.declared
         out = np.array(state.declared)
-        bristles = jenkins if shape.get("form", 0.0) > 0.5 else dahl
-        out[:, state.declared_names.index("coulomb")] = bristles(state.position, shape["bristle_length"])
+        length, place = shape["bristle_length"], state.declared_names.index("coulomb")
+        if shape.get("form", 0.0) > 0.5:
+            out[:, place] = jenkins(state.position, length)
+            return out
+        z = dahl(state.position, length)
+        rate = state.velocity * (1 - z * np.sign(state.velocity)) / length
+        out[:, place] = z + shape.get("bristle_time", 0.0) * rate
         return out
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:

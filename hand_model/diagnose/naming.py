@@ -1,0 +1,66 @@
+"""What a balance says: the effects that were named there, each with its rivals, beside the declared model and the final one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .balance import Balance, Fit, Term
+from .lack_of_fit import LackOfFit
+from .wander import Wander
+
+ALPHA = 0.003  # false alarms per channel: 5 % over some fifteen channels of a session
+CLASS_WIDTH = 3.0  # log evidence within which two effects are one class: 20 to 1
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A candidate in the place of a finding: its log evidence relative to none, and its fit."""
+
+    name: str
+    evidence: float
+    fit: Fit
+
+
+@dataclass(frozen=True)
+class Named:
+    """One finding of a balance. rivals: every candidate that was tried in its place (best first), the winner included.
+    share: of the explainable residual variance. size: of what it adds beyond what declared coefficients could, over the noise of
+    one reading (root mean squares). probability: against all rivals and none."""
+
+    term: Term
+    amplitudes: dict[str, float]
+    rivals: tuple[Rival, ...]
+    share: float
+    size: float
+    probability: float
+
+    @property
+    def evidence(self) -> float:
+        """Log evidence of the effect in its own place."""
+        return next(r.evidence for r in self.rivals if r.name == self.term.effect.name)
+
+    @property
+    def members(self) -> tuple[str, ...]:
+        """The class: every effect that these recordings cannot tell from this one."""
+        near = [r for r in self.rivals if r.evidence > self.rivals[0].evidence - CLASS_WIDTH]
+        return tuple(r.name for r in near if r.name == self.term.effect.name or r.fit.terms[-1].effect.listed)
+
+
+@dataclass(frozen=True)
+class Naming:
+    """What a balance says. wander: what does not repeat beside the fit. before, after: lack of fit of the declared model and of the final one. rejected: tried and
+    not kept, with the log evidence that it brought."""
+
+    balance: Balance
+    declared: Fit
+    fit: Fit
+    wander: Wander | None
+    before: LackOfFit
+    after: LackOfFit
+    found: tuple[Named, ...]
+    rejected: tuple[tuple[str, float], ...]
+
+    @property
+    def consistent(self) -> bool:
+        """True where nothing is missing beyond the noise."""
+        return self.before.p >= ALPHA and not self.found
