@@ -45,3 +45,10 @@ def test_a_motor_that_does_not_repeat_itself_is_not_compared() -> None:
     one = judged("current", "index", "index", None, drive(4, shaken), [effect("torque_ripple")])
     assert one.wander > 1.0
     assert not preload_findings([one, *hand(0.0, 0.5)])
+
+
+def test_a_motor_of_which_something_is_missing_accuses_no_other() -> None:
+    spot = effect("position_dependent_friction")
+    one = judged("current", "ring", "ring", None, drive(9, lambda s: 25.0 * spot.columns(s, {"centre": 50.0, "width": 6.0})[:, 0]), [spot])
+    assert one.missing and one.believed
+    assert preload_findings(hand(25.0, 0.0)) and not preload_findings([*hand(25.0), one])

@@ -176,15 +176,15 @@ def _where(where: Mapping[str, Any]) -> tuple[Any, ...]:
 
 def _station(station: Any, name: str, unexplained: str) -> Section:
     position, velocity, residuals, sigma, unit, effort = _maps(station)
-    first = station.kept[0].term if station.believed else None
+    stands = (*station.kept, *station.outsiders) if station.believed else ()
+    first = stands[0].term if stands else None
     at, axis = (position, f"position [{unit}]") if first is None else _axis(
         first.effect.name, first.effect.region(station.naming.balance.states, first.shape), position, velocity, unit)
     largest = _largest(at, velocity, residuals[0])
     drawn = [(f"{label} [{effort}]", _map(at, velocity, residual, sigma, axis, effort, largest))
              for label, residual in zip(("declared model, fitted: residual", "with what was named"), residuals, strict=True)]
-    if station.believed:
-        drawn += [(f"{_words(f.term.effect.name)}: its part through the data less the rest [{effort}]", _curve(station.naming, f, unit, effort))
-                  for f in station.kept[:3]]
+    drawn += [(f"{_words(f.term.effect.name)}: its part through the data less the rest [{effort}]", _curve(station.naming, f, unit, effort))
+              for f in stands[:3]]
     said = f"{_place(station)}: unexplained, {unexplained}" if unexplained and not station.missing else station.line().replace("_", " ")
     return Section(name, _place(station), said + ".", (figures(*drawn), KEY))
 

@@ -34,7 +34,10 @@ def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]
     preload = {id(s): float(s.naming.fit.declared["preload"]) for s in sound}
     out = []
     for station in sound:
-        others = [preload[id(s)] for s in sound if s is not station]
+        rest = [s for s in sound if s is not station]
+        if not any(not s.missing for s in rest):  # a drive of which something is missing accuses no other
+            continue
+        others = [preload[id(s)] for s in rest]
         usual = float(np.median(others)) if others else 0.0
         # Of two that differ the larger is odd, unless one has lost its preload altogether: springs do not push.
         if usual <= 0 or (len(others) == 1 and usual < LOST * preload[id(station)]):

@@ -56,15 +56,16 @@ class Station:
     @property
     def believed(self) -> bool:
         """Whether the names stand: the final model passes the test, or takes most of the mismatch away. Names that take nothing of a
-        plain mismatch away do not, however little is left to see."""
-        idle = self.naming.before.p < ALPHA and self.explained < SMALL
+        plain mismatch away do not, however little is left to see, nor where more than the noise does not repeat."""
+        idle = self.explained < SMALL and (self.naming.before.p < ALPHA or self.wander > 1)
         return bool(self.proven) and not idle and (self.naming.after.p >= ALPHA or self.explained >= EXPLAINED_LEAST)
 
     @property
     def kept(self) -> tuple[Named, ...]:
         """The effects that stand beside each other: one of a small share may be no more than the form of the large one being
-        another, and is left to the unexplained part."""
-        return tuple(f for f in self._beside if f.term.effect.listed)
+        another, and is left to the unexplained part; so is what is smaller than something that no table names."""
+        strange = max((f.size for f in self.outsiders), default=0.0)
+        return tuple(f for f in self._beside if f.term.effect.listed and f.size >= strange)
 
     @property
     def outsiders(self) -> tuple[Named, ...]:
