@@ -134,7 +134,8 @@ def judged(signal: str, finger: str | None, actuator: str | None, joint: str | N
         station = other
     if station.missing and (not station.believed or elsewhere and station.naming.after.p < ALPHA) and any(s.validate for s in states):
         # what the training recordings cannot tell, a pose that one of the others alone has may tell
-        other = Station(signal, finger, actuator, joint, name_effects(states, tuple(effects), typical=typical, whole=True))
+        lasting = tuple(e for e in effects if e.of_the_hand)  # what one recording had explains no other
+        other = Station(signal, finger, actuator, joint, name_effects(states, lasting, typical=typical, whole=True))
         known = other.believed and other.naming.after.p >= ALPHA and other.wander <= max(station.wander, UNREST)
         station = other if known else station
     if station.forms:
