@@ -11,6 +11,8 @@ from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
 from .mjcf import lugre_friction
 from .path import dahl, jenkins
 
+FULL_SPEED = 100.0  # a range of 100 % in a second
+
 
 class PreslidingFriction(Effect):
     """The declared Coulomb friction builds up over a distance instead of at once: dz/ds = (1 - z sign(ds)) / length, with z + time dz/dt in
@@ -50,8 +52,13 @@ class PreslidingFriction(Effect):
             return out
         z = dahl(state.position, length)
         rate = state.velocity * (1 - z * np.sign(state.velocity)) / length
-        out[:, place] = z + shape.get("bristle_time", 0.0) * rate
+        out[:, place] = z + _time(shape) * rate
         return out
+
+    def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
+                   declared: Mapping[str, float]) -> dict[str, float]:
+        """Length, and damping over stiffness as far as it counts."""
+        return {**shape, "bristle_time": _time(shape)}
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """The way over which friction turns over."""
@@ -62,6 +69,12 @@ class PreslidingFriction(Effect):
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """A passive DC motor's LuGre friction in place of the joint's `frictionloss`."""
         return lugre_friction(root, where, parameters)
+
+
+def _time(shape: Mapping[str, float]) -> float:
+    """Damping over stiffness [s], at most what lets friction turn over at once at full speed: beyond, bristles would give nothing, and it is
+    the estimate of starts that is described."""
+    return min(shape.get("bristle_time", 0.0), shape["bristle_length"] / FULL_SPEED)
 
 
 EFFECT = PreslidingFriction()
