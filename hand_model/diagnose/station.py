@@ -120,7 +120,7 @@ def judged(signal: str, finger: str | None, actuator: str | None, joint: str | N
            typical: Mapping[str, float] | None = None) -> Station:
     """The station of the balance of `states`, named among `effects`. Where a name does not stand, or is another's form, the others are
     heard without it."""
-    left = tuple(effects)
+    left = every = tuple(effects)
     station = Station(signal, finger, actuator, joint, name_effects(states, left, typical=typical))
     elsewhere = _elsewhere(station.naming)
     for _ in range(SECOND_HEARINGS):
@@ -134,7 +134,7 @@ def judged(signal: str, finger: str | None, actuator: str | None, joint: str | N
         station = other
     if station.missing and (not station.believed or elsewhere and station.naming.after.p < ALPHA) and any(s.validate for s in states):
         # what the training recordings cannot tell, a pose that one of the others alone has may tell
-        lasting = tuple(e for e in effects if e.of_the_hand)  # what one recording had explains no other
+        lasting = tuple(e for e in every if e.of_the_hand)  # what one recording had explains no other
         other = Station(signal, finger, actuator, joint, name_effects(states, lasting, typical=typical, whole=True))
         known = other.believed and other.naming.after.p >= ALPHA and other.wander <= max(station.wander, UNREST)
         station = other if known else station
