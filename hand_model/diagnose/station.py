@@ -181,7 +181,8 @@ def outsider_of(station: Station, named: Named) -> dict[str, Any]:
     """The unexplained entry of what no table of effects names, with what it looks like."""
     values = {k: v["value"] for k, v in station.parameters[station.naming.fit.terms.index(named.term)].items()}
     entry = unexplained_of(station, named.share * station.explained)
-    return {**entry, "shape": f"no known effect, but {named.term.effect.statement(entry['where'], values)}"}
+    said = named.term.effect.statement(entry["where"], values).removesuffix(".")
+    return {**entry, "shape": f"no known effect, but {said}"}
 
 
 def unexplained_of(station: Station, share: float) -> dict[str, Any]:
