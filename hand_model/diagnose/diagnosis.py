@@ -102,11 +102,12 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
     found += command_findings(facts, {a: _finger_of(session, a) for a in facts})
     for _, finding in found:
         tell(finding.statement)
-    allowed = _delays_apart(with_lateness(drives, facts))
+    timed = with_lateness(drives, facts)
+    allowed = _delays_apart(timed)
     in_time = [a for a in drives if not allowed[a]]
     if 0 < len(in_time) < len(drives):  # at a reversal a late current looks like a give, an early one like none
-        drives = with_gives(drives, in_time)
-    drives = with_lateness(drives, facts)
+        timed = with_lateness(with_gives(drives, in_time), facts)
+    drives = timed
     alone = {a: Balance(states).fit() for a, states in drives.items()}
     calls = []
     for actuator, states in drives.items():

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..effects.base import DriveState
-from ..effects.path import dahl
+from ..effects.path import dahl, from_rest
 from ..session import Log, Session, Trial
 from .motion import Motion, estimate_motion
 
@@ -183,12 +183,6 @@ def steady(time_s: Array, motion: Motion) -> NDArray[np.bool_]:
     after, before = SETTLE_SAMPLES
     settled = motion.moving & (motion.since_start_s > after * step) & (motion.until_stop_s > before * step)
     return settled & (from_rest(motion.position, motion.moving) > SETTLE_TRAVEL)
-
-
-def from_rest(position: Array, moving: NDArray[np.bool_]) -> Array:
-    """Distance (n,) from where the drive rested last, zero at rest."""
-    begin = np.maximum.accumulate(np.where(~moving, np.arange(len(position)), 0))
-    return np.abs(position - position[begin])
 
 
 def with_coulomb(state: DriveState, give: float, granted: float) -> DriveState:

@@ -35,10 +35,10 @@ def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]
     out = []
     for station in sound:
         rest = [s for s in sound if s is not station]
-        if not any(not s.missing for s in rest):  # a drive of which something is missing accuses no other
+        if all(s.missing for s in rest):  # a drive of which something is missing accuses no other
             continue
         others = [preload[id(s)] for s in rest]
-        usual = float(np.median(others)) if others else 0.0
+        usual = float(np.median(others))
         # Of two that differ the larger is odd, unless one has lost its preload altogether: springs do not push.
         if usual <= 0 or (len(others) == 1 and usual < LOST * preload[id(station)]):
             continue

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..identify.chain import propagate
 from ..identify.likelihood import OUTLIER_LIMIT
+from ..rotation import kabsch
 from .angles import FingerAngles
 from .blocks import Blocks
 from .displacement import NO_HINGE
@@ -123,10 +124,7 @@ def turn(blocks: Blocks, members: Sequence[MarkerEffect], main: MarkerEffect) ->
     mine = blocks.body == main.body
     arm = blocks.position[main.begin or 0 : main.end, mine]
     moved = arm + _shift(members, main)[:, mine]
-    arm, moved = (x - x.mean(1, keepdims=True) for x in (arm, moved))
-    u, _, vt = np.linalg.svd(np.swapaxes(moved, 1, 2) @ arm)
-    straight = np.linalg.det(u @ vt)
-    trace = np.einsum("bij,bji->b", u[..., :2], vt[:, :2]) + straight * np.einsum("bi,bi->b", u[..., 2], vt[:, 2])
+    trace = np.einsum("bii->b", kabsch(arm, moved)[0])
     return float(np.median(np.arccos(np.clip((trace - 1) / 2, -1, 1))))
 
 

@@ -68,6 +68,12 @@ def travelled(position: Array, threshold: float | None = None) -> Array:
     return out
 
 
+def from_rest(position: Array, moving: NDArray[np.bool_]) -> Array:
+    """Distance (n,) from where the drive rested last, zero at rest."""
+    begin = np.maximum.accumulate(np.where(~moving, np.arange(len(position)), 0))
+    return np.abs(position - position[begin])
+
+
 def dahl(position: Array, length: float, start: float = 0.0, threshold: float | None = None) -> Array:
     """Dahl friction state (n,) in [-1, 1]: dz/ds = (1 - z sign(ds)) / length (Dahl 1968, exponent 1).
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..base import Amplitude, Array, DriveState, Shape, figure, position_range
+from ..path import from_rest
 from .outsider import Outsider
 
 
@@ -29,8 +30,7 @@ class DwellFriction(Outsider):
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """sign(v) exp(-s / distance), (n, 1)."""
         moving = state.extra.get("moving", np.ones(len(state.time_s))) > 0
-        rested = np.maximum.accumulate(np.where(~moving, np.arange(len(moving)), 0))
-        return (state.direction * np.exp(-np.abs(state.position - state.position[rested]) / shape["distance"]))[:, None]
+        return (state.direction * np.exp(-from_rest(state.position, moving) / shape["distance"]))[:, None]
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """How much and for how long."""
