@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from .dynamics import INERTIAL, inertial_columns, inertial_parameters
 from .model import RigModel, RigTrial
 from .overrides import body_names, compile_model
-from .states import choose_cutoff, differentiate, fill_gaps, low_pass, uniform_time, velocity_noise
+from .states import PASSED, choose_cutoff, differentiate, fill_gaps, low_pass, uniform_time, velocity_noise
 
 Array = NDArray[np.float64]
 MAX_RATE_HZ = 250.0  # faster recordings are thinned to this: joints move below 50 Hz
@@ -139,17 +139,17 @@ def _back_emf(model: Any, name: str) -> float:
 
 
 def trial_rows(
-    rig: RigModel, trial: RigTrial, columns: tuple[Column, ...], cutoff_hz: float | None = None, ends: bool = False
+    rig: RigModel, trial: RigTrial, columns: tuple[Column, ...], cutoff_hz: float | None = None, trim_s: float | None = None
 ) -> tuple[Rows, ...]:
-    """The balance of every independent joint whose effort is known (or whose drive is absent or open) in one trial; ends:
-    count the samples at its ends as well, where the filter knows one side only."""
+    """The balance of every independent joint whose effort is known (or whose drive is absent or open) in one trial.
+    trim_s [s]: what is left out at each of its ends, where the filter knows one side only; by default what the filter reaches."""
     missing = [j for j in rig.joints if j not in trial.position]
     if missing:
         return ()
     model = compile_model(rig, trial)
     grid = uniform_time(trial.time_s)
     rate = 1.0 / (grid[1] - grid[0])
-    skip = max(1, int(rate / MAX_RATE_HZ)) if cutoff_hz is None or cutoff_hz < 0.3 * MAX_RATE_HZ else 1
+    skip = max(1, int(rate / MAX_RATE_HZ + 1e-6)) if cutoff_hz is None or cutoff_hz < 0.3 * MAX_RATE_HZ else 1
     raw = {
         j: _thinned(np.interp(grid, trial.time_s, fill_gaps(trial.time_s, trial.position[j])), rate, skip)
         for j in rig.joints
@@ -161,9 +161,9 @@ def trial_rows(
     # Columns pass the balance's filter as the effort does; the states they are made of must not lose that band before.
     wide = STATE_CUTOFF * cutoff
     q = np.stack([low_pass(raw[j], rate, wide) for j in rig.joints], 1)
-    v = differentiate(q, rate)
-    a = differentiate(v, rate)
-    rest = np.array([max(3 * velocity_noise(raw[j], rate, min(wide, 0.45 * rate)), 1e-3 * float(np.std(v[:, i])))
+    v = differentiate(q, rate, wide < PASSED * rate)
+    a = differentiate(v, rate, wide < PASSED * rate)
+    rest = np.array([max(3 * velocity_noise(raw[j], rate, min(wide, PASSED * rate)), 1e-3 * float(np.std(v[:, i])))
                      for i, j in enumerate(rig.joints)])  # fmt: skip
     sign = np.clip(v / rest, -1.0, 1.0)
     thin = max(1, int(rate / max(12 * cutoff, 24.0)))
@@ -177,7 +177,7 @@ def trial_rows(
     step = max(1, int(np.ceil(len(grid) / MAX_SAMPLES)), int(rate / (6 * cutoff)))
     external = np.array([c.kind in ("inertial", "spring", "stiffness") for c in columns])
     away = np.minimum(grid - grid[0], grid[-1] - grid)
-    settled = away >= (0.0 if ends else min(1.0 / cutoff, MOST_ENDS * (grid[-1] - grid[0])))
+    settled = away >= (min(1.0 / cutoff, MOST_ENDS * (grid[-1] - grid[0])) if trim_s is None else trim_s)
     rows = []
     for joint in rig.independent:
         jacobian = _jacobian(rig, joint, q)

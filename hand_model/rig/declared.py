@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .balance import MOMENTS, Column, Rows, declared_columns, trial_rows
+from .balance import MOMENTS, STATE_CUTOFF, Column, Rows, declared_columns, trial_rows
 from .dynamics import inertial_parameters
 from .model import RigModel, RigTrial
 from .overrides import compile_model
@@ -21,6 +21,8 @@ CORRELATED = 30.0  # neighbouring samples say the same thing: so many of them we
 NEAR_BEST = 1.1
 ENOUGH_POWER = 1e-4  # share of the effort's power: a hundredth of its amplitude
 CUTOFFS = (2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 35.0, 60.0)
+MOST_NOISE = 0.1  # of the acceleration: a hundredth of its power
+END_S = 2.0 / CUTOFFS[-1]  # at the very ends any filter fails
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,7 @@ class DeclaredFit:
     cutoff_hz: float
     quality: dict[tuple[str, str], float]
     bodies: Array = field(default_factory=lambda: np.zeros((0, 10)))  # declared inertial parameters, in columns' order
-    anchored: bool = False  # no effort is recorded anywhere: only ratios show, and the declared weights are the scale
+    anchored: bool = False  # no effort is recorded anywhere: only ratios show, and the heaviest body's declared weight is the scale
     beside: Mapping[tuple[str, str], Array] = field(default_factory=dict)  # (trial, joint) -> effort (n,) of effects at full rate
 
     def residual(self, row: Rows) -> Array:
@@ -56,7 +58,7 @@ def bounds(columns: Sequence[Column]) -> tuple[Array, Array]:
 
 def prior(columns: Sequence[Column], anchored: bool = False) -> tuple[Array, Array]:
     """Prior mean and weight (P,): a mass may be wrong by as much as itself, friction and springs by a hundred times;
-    weights (masses, first moments) are not wrong at all where they are the scale (anchored)."""
+    the weight (mass, first moments) of the heaviest body is not wrong at all where it is the scale (anchored)."""
     value = np.array([c.value for c in columns])
     moment = {c.name: 0.0 for c in columns if c.kind == "inertial"}
     for c in columns:
@@ -66,7 +68,8 @@ def prior(columns: Sequence[Column], anchored: bool = False) -> tuple[Array, Arr
     value_size = np.maximum(np.abs(value), zero)
     loose = np.array([1.0 if c.kind == "inertial" else 100.0 for c in columns])
     if anchored:
-        loose = np.where([c.part in ("m", *MOMENTS) for c in columns], 1e-6, loose)
+        heaviest = max(moment, key=lambda body: moment[body], default="")
+        loose = np.where([c.name == heaviest and c.part in ("m", *MOMENTS) for c in columns], 1e-6, loose)
     weight = CORRELATED / np.maximum(value_size * loose, 1e-150) ** 2
     return value, np.where(value_size == 0, 1e-12, weight)
 
@@ -114,13 +117,13 @@ def _choose_cutoff(rig: RigModel, columns: tuple[Column, ...], refused: set[tupl
     the residual than to the effort: there is nothing of the motion in it; None where none can be tried."""
     sample, most, shares, last = _sample(rig), 0.0, {}, None
     for cutoff in CUTOFFS:
-        # What a low cut-off spoils at the ends counts against it.
-        rows = [r for t in sample for r in trial_rows(rig, t, columns, cutoff, ends=True) if (r.trial, r.joint) not in refused]
+        # The same samples for all: what a low cut-off spoils near the ends counts against it.
+        rows = [r for t in sample for r in trial_rows(rig, t, columns, cutoff, END_S) if (r.trial, r.joint) not in refused]
         if not rows or cutoff > 0.3 * min(r.rate_hz for r in rows):
             continue
         seen = float(np.mean([r.moving.mean() for r in rows]))
         most = max(most, seen)
-        if seen < 0.9 * most:  # noise hides when the joint moves
+        if seen < 0.9 * most or (shares and _drowns(rows)):  # noise hides when the joint moves, or how it accelerates
             break
         fit = _robust_fit(columns, tuple(rows), cutoff)
         powers = _powers(fit)
@@ -129,6 +132,17 @@ def _choose_cutoff(rig: RigModel, columns: tuple[Column, ...], refused: set[tupl
         shares[cutoff], last = _unexplained(fit), powers
     least = min(shares.values(), default=1.0)
     return max((c for c, share in shares.items() if share <= NEAR_BEST * least), default=None)
+
+
+def _drowns(rows: Sequence[Rows]) -> bool:
+    """Whether noise of the positions is so large a part of the accelerations that a fit would read too small an inertia (errors in
+    variables, Fuller 1987). Within one band white noise leaves sqrt(3 / 5) 2 pi c times as much in them as in velocities."""
+    parts = []
+    for r in rows:
+        velocity = r.rest_speed / 3.0 / STATE_CUTOFF**1.5  # its noise within the balance's own band
+        noise = np.sqrt(0.6) * 2 * np.pi * r.cutoff_hz * velocity
+        parts.append(noise / (float(np.std(r.filtered(r.acceleration))) + 1e-300))
+    return bool(np.median(parts) > MOST_NOISE)
 
 
 def _powers(fit: DeclaredFit) -> Array:
