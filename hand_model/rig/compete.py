@@ -363,8 +363,8 @@ def judge(none: Array, scores: Sequence[Score], problem: Problem) -> tuple[int, 
     if not scores:
         return None
     many = left_out_whole(problem)
-    said = weigh(none, np.array([s.error for s in scores]), [_size(s.term) for s in scores], problem.group, by_chance=many)
-    if said is None or none.sum() - scores[said.best].error.sum() < LEAST_SHARE * none.sum():
+    said = weigh(none, np.array([s.error for s in scores]), [_size(s.term) for s in scores], problem.group, by_chance=many, worth=LEAST_SHARE)
+    if said is None:
         return None
     rivals = tuple((scores[i].term.candidate.key, float(said.wins[i])) for i in np.argsort(-said.wins) if said.wins[i] > 0.005)
     equals = tuple(dict.fromkeys(scores[k].term.candidate.effect for k in said.close))

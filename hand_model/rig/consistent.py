@@ -7,7 +7,8 @@ and Newton steps follow it as it is lowered (Boyd & Vandenberghe 2004, ch. 11).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +65,7 @@ def consistent(columns: Sequence[Column], declared: Array, theta: Array, gram: A
     for i, p in zip(own, declared, strict=True):
         x[i[i >= 0]] = (_well_inside(p, i >= 0) / unit[i])[i >= 0]
     edges = [(k, s, b[k]) for b, s in ((low, 1.0), (high, -1.0)) for k in rest if np.isfinite(b[k])]
-    barrier = _barrier(own, declared, unit, edges)
+    barrier = _Barrier(own, declared, unit, *(np.array([e[k] for e in edges]) for k in range(3)))
     weight_of_barrier = abs(float(g @ x)) + 1e-300
     size = abs(float(g @ np.linalg.solve(h + 1e-13 * np.eye(len(g)), g)))
     while True:
@@ -74,54 +75,68 @@ def consistent(columns: Sequence[Column], declared: Array, theta: Array, gram: A
         weight_of_barrier *= LOWERED
 
 
-def _newton(h: Array, g: Array, share: float, barrier: Callable[[Array], tuple[float, Array, Array]], x: Array) -> Array:
+def _newton(h: Array, g: Array, share: float, barrier: _Barrier, x: Array) -> Array:
     """argmin of x'hx / 2 - g'x + share barrier(x) from x (n,), inside."""
 
     def cost(y: Array) -> float:
-        return float(0.5 * y @ h @ y - g @ y + share * barrier(y)[0])
+        return float(0.5 * y @ h @ y - g @ y + share * barrier.value(y))
 
+    now = cost(x)
     for _ in range(MOST_STEPS):
-        _, slope, bend = barrier(x)
+        slope, bend = barrier.slopes(x)
         gradient = h @ x - g + share * slope
         step = -np.linalg.solve(h + share * bend + 1e-14 * np.eye(len(x)), gradient)
         decrement = -float(gradient @ step)
         if decrement < 1e-3 * share:
             break
-        now, length = cost(x), 1.0
-        while length > 1e-10 and not cost(x + length * step) <= now - ARMIJO * length * decrement:
+        length = 1.0
+        while length > 1e-10 and not (then := cost(x + length * step)) <= now - ARMIJO * length * decrement:
             length *= 0.5
         if length <= 1e-10:
             break
-        x = x + length * step
+        x, now = x + length * step, then
     return x
 
 
-def _barrier(own: Array, declared: Array, unit: Array, edges: Sequence[tuple[int, float, float]]) -> Callable[
-    [Array], tuple[float, Array, Array]
-]:  # fmt: skip
-    """Minus the logarithms of every body's determinant and of the distances from the edges of the box: value (infinite
-    outside), gradient (n,), Hessian (n, n). own (bodies, 10): places of their parameters in x; unit (n,): of x."""
-    at, sign, end = (np.array([e[k] for e in edges]) for k in range(3))
-    at = at.astype(int)
+@dataclass(frozen=True)
+class _Barrier:
+    """Minus the logarithms of every body's determinant and of the distances from the edges of the box.
 
-    def value(x: Array) -> tuple[float, Array, Array]:
-        slope, bend = np.zeros(len(x)), np.zeros((len(x), len(x)))
-        pseudo = np.einsum("bk,kij->bij", np.where(own >= 0, x[own] * unit[own], declared), BASIS)
-        room = sign * (x[at] - end)
-        if np.any(room <= 0) or np.any(np.linalg.eigvalsh(pseudo)[:, 0] <= 0):
-            return np.inf, slope, bend
-        total = -float(np.sum(np.log(room))) - float(np.sum(np.linalg.slogdet(pseudo)[1]))
-        np.add.at(slope, at, -sign / room)
+    own (bodies, 10): places of their parameters in x (-1: as declared (bodies, 10)); unit (n,): of x; at, sign, end (edges,): place
+    in x, side on which there is room, edge.
+    """
+
+    own: Array
+    declared: Array
+    unit: Array
+    at: Array
+    sign: Array
+    end: Array
+
+    def value(self, x: Array) -> float:
+        """At x (n,); infinite outside."""
+        room, level = self._room(x), np.linalg.eigvalsh(self._pseudo(x))
+        if np.any(room <= 0) or np.any(level[:, 0] <= 0):
+            return np.inf
+        return -float(np.sum(np.log(room))) - float(np.sum(np.log(level)))
+
+    def slopes(self, x: Array) -> tuple[Array, Array]:
+        """Gradient (n,) and Hessian (n, n) at x (n,), inside."""
+        slope, bend, at, room = np.zeros(len(x)), np.zeros((len(x), len(x))), self.at.astype(int), self._room(x)
+        np.add.at(slope, at, -self.sign / room)
         np.add.at(bend, (at, at), room**-2)
-        inverse = np.linalg.inv(pseudo)
-        for i, inv in zip(own, inverse, strict=True):
+        for i, inv in zip(self.own, np.linalg.inv(self._pseudo(x)), strict=True):
             free = i[i >= 0]
-            part = (inv @ BASIS)[i >= 0] * unit[free][:, None, None]
+            part = (inv @ BASIS)[i >= 0] * self.unit[free][:, None, None]
             slope[free] -= np.trace(part, axis1=1, axis2=2)
             bend[np.ix_(free, free)] += np.einsum("kij,lji->kl", part, part)
-        return total, slope, bend
+        return slope, bend
 
-    return value
+    def _room(self, x: Array) -> Array:
+        return self.sign * (x[self.at.astype(int)] - self.end)
+
+    def _pseudo(self, x: Array) -> Array:
+        return (np.where(self.own >= 0, x[self.own] * self.unit[self.own], self.declared) @ BASIS.reshape(10, 16)).reshape(-1, 4, 4)
 
 
 def _inside(x: Array, low: Array, high: Array) -> Array:

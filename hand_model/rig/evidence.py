@@ -50,34 +50,42 @@ def multiplicities(group: Array, count: int = RESAMPLES, seed: int = 0) -> Array
     return np.stack([np.bincount(row, minlength=total) for row in drawn]).astype(float)[:, unit]
 
 
-def beyond_chance(gains: Array, flips: int = RESAMPLES, seed: int = 0) -> float:
-    """Probability that the best of several rivals' gains (rivals, units) is no chance: had none of them anything to gain, a
-    unit's gain might as well have had the other sign, of all rivals at once; the largest self-normalised sum is held to
-    its distribution under such flips."""
+def beyond_chance(none: Array, errors: Array, worth: float = 0.0, flips: int = RESAMPLES, seed: int = 0) -> float:
+    """Probability that the best of several rivals' gains is no chance: had none of them anything to gain, a unit's gain might as
+    well have had the other sign, of all rivals at once; the largest self-normalised sum is held to its distribution under
+    such flips. none (units,), errors (rivals, units); worth: share of "nothing" that a rival has to take away to be chosen,
+    here as there."""
+    apart = none - errors
+    gains = apart / (none + errors + 1e-300)  # relative, or the loudest recording would speak for all
     size = np.sqrt(np.sum(gains**2, 1)) + 1e-300
-    signs = np.random.default_rng(seed).choice([-1.0, 1.0], (flips, gains.shape[1]))
-    best = np.max(gains.sum(1) / size, initial=-np.inf)
-    by_chance = np.max(signs @ gains.T / size, 1, initial=-np.inf)
+
+    def largest(signs: Array) -> Array:
+        able = signs @ apart.T >= worth * none.sum()
+        return np.max(np.where(able, signs @ gains.T / size, -np.inf), 1, initial=-np.inf)
+
+    best = largest(np.ones((1, len(none))))[0]
+    by_chance = largest(np.random.default_rng(seed).choice([-1.0, 1.0], (flips, len(none))))
     return float(np.mean(by_chance < best - 1e-9))
 
 
 def weigh(none: Array, errors: Array, sizes: Sequence[int], group: Array,
-          least: float = BEYOND_DOUBT, by_chance: bool = True) -> Verdict | None:  # fmt: skip
+          least: float = BEYOND_DOUBT, by_chance: bool = True, worth: float = 0.0) -> Verdict | None:  # fmt: skip
     """Compare rivals (errors (rivals, blocks), sizes: parameters) with each other and with "nothing" (none (blocks,)); None
     where none of them beats nothing with probability `least`, the choice among them allowed for (by_chance: that they are
-    more than chance is asked here)."""
+    more than chance is asked here), or gains enough (worth: share of the error of "nothing")."""
     draws = multiplicities(group)
     resampled, base, total = errors @ draws.T, draws @ none, errors.sum(1)
     against = np.mean(resampled < base, 1)
     unit = units(group)
     mine, theirs = np.bincount(unit, none), np.stack([np.bincount(unit, e) for e in errors])
-    # Relative, or the loudest recording would speak for all. Of many rivals some win by chance.
-    if by_chance and beyond_chance((mine - theirs) / (mine + theirs + 1e-300)) < least:
+    if by_chance and beyond_chance(mine, theirs, worth) < least:  # of many rivals some win so
         return None
     sure = [k for k in range(len(errors)) if against[k] >= least]
     if not sure:
         return None
     best = min(sure, key=lambda k: total[k])
+    if none.sum() - total[best] < worth * none.sum():
+        return None
     close = [k for k in sure if np.mean(resampled[best] < resampled[k]) < BEYOND_DOUBT]
     close.sort(key=lambda k: total[k])
     spread = [float(np.std(resampled[k] - resampled[best])) for k in range(len(errors))]

@@ -269,8 +269,8 @@ def _judge(
     """Index of the winner and what the round says, or None where nothing beats "none" by a standard error. Which effect it
     is, recordings left out decide; between forms of it that they cannot tell apart, the likelihood: BIC with every
     stretch as one sample (Schwarz 1978). One that has more parameters has to predict what is left out better as well."""
-    said = weigh(none, np.array(scores), [f.free for f in fits], group, ONE_STANDARD_ERROR)
-    if said is None or none.sum() - scores[said.best].sum() < LEAST_GAIN * none.sum():
+    said = weigh(none, np.array(scores), [f.free for f in fits], group, ONE_STANDARD_ERROR, worth=LEAST_GAIN)
+    if said is None:
         return None
     same = tuple(dict.fromkeys(rivals[k].effect for k in said.close))
     wins = tuple((rivals[k].key, float(said.wins[k])) for k in np.argsort(-said.wins) if said.wins[k] > 0.005)
