@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from test_diagnose import PLANTED, drive, planted
+from test_kinematic_stations import MAP, joint
 
 from hand_model.diagnose.assemble import assemble
 from hand_model.diagnose.drive import with_required
@@ -87,3 +88,39 @@ def test_the_share_that_a_ceiling_cuts_is_what_the_motion_requires_beyond_it() -
     required = np.concatenate([np.abs(s.extra["required"][np.isfinite(s.effort)]) for s in states])
     entry = effect("current_saturation").further(states, {"limit": {"value": float(np.quantile(required, 0.8))}})
     assert abs(entry["share_cut"]["value"] - 0.2) < 0.01
+
+
+@pytest.mark.parametrize("hz", [1.7, 5.1])
+def test_a_rhythm_in_time_is_no_ripple(hz: float) -> None:
+    station = heard(indexed(drive(4, lambda s: 6.0 * np.sin(2 * np.pi * hz * s.time_s + 2.0 * float(s.elapsed_s[0])))))
+    assert not station.kept and [f.term.effect.name for f in station.outsiders] == ["vibration"]
+    assert station.outsiders[0].term.shape["frequency"] == pytest.approx(hz, rel=0.01)
+
+
+def indexed(states: tuple[DriveState, ...]) -> tuple[DriveState, ...]:
+    return tuple(replace(s, extra={**s.extra, "trial_index": np.full(len(s.time_s), float(k))}) for k, s in enumerate(states))
+
+
+def test_frames_that_were_lost_are_no_drift_of_a_clock() -> None:
+    def lost(t: np.ndarray, x: np.ndarray, v: np.ndarray) -> np.ndarray:
+        late = 0.12 * (t > 0.2 * t[-1]) - 0.09 * (t > 0.55 * t[-1]) + 0.1 * (t > 0.8 * t[-1])
+        return np.polynomial.Polynomial(MAP)(np.interp(t + late, t, x) / 100) - np.polynomial.Polynomial(MAP)(x / 100)
+
+    station = judged("encoder", "index", "index", "proximal", joint(3, add=lost), [*catalogue("encoder"), *outsiders("encoder")])
+    assert "clock_wander" in {f.term.effect.name for f in station.outsiders}
+    assert "clock_drift" not in {f.term.effect.name for f in station.kept}
+
+
+def test_a_drifting_clock_is_named_beside_outsiders() -> None:
+    station = judged("encoder", "index", "index", "proximal", joint(5, drift=2e-3), [*catalogue("encoder"), *outsiders("encoder")])
+    assert [f.term.effect.name for f in station.kept] == ["clock_drift"] and not station.outsiders
+
+
+def test_a_level_that_wanders_names_no_obstacle() -> None:
+    rng = np.random.default_rng(2)
+
+    def walk(state: DriveState) -> np.ndarray:
+        knots = np.arange(0.0, state.time_s[-1] + 2.0, 2.0)
+        return np.interp(state.time_s, knots, 4.0 * rng.normal(size=len(knots)))
+
+    assert not heard(indexed(drive(6, walk))).kept

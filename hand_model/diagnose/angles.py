@@ -134,11 +134,12 @@ def _poses(markers: ChainData, chain: Chain, noise_m: float) -> tuple[Pose, NDAr
 
 
 def linkage_states(angles: FingerAngles, joint: int = 1, steps: Sequence[tuple[int, float]] = (),
-                   expected: Mapping[str, tuple[Array, Array]] | None = None) -> tuple[DriveState, ...]:
+                   expected: Mapping[str, tuple[Array, Array]] | None = None, logged: bool = True) -> tuple[DriveState, ...]:
     """Balance of a follower: its angle [deg] against a quartic of its driver's angle [deg], one state per recording.
 
     The driver's angle is smoothed (see `_smoothed`): noise in a regressor would bend the map and hide small departures.
-    expected: trial -> times [s] and angles [deg] of the driver as its own station has it (`expected_angles`).
+    expected: trial -> times [s] and angles [deg] of the driver as its own station has it (`expected_angles`). logged: whether the
+    logs' clocks are believed; the markers tell alone otherwise.
     """
     states = []
     name = angles.finger.segments[joint].name
@@ -148,7 +149,7 @@ def linkage_states(angles: FingerAngles, joint: int = 1, steps: Sequence[tuple[i
         if good.sum() < 200:
             continue
         t, q = record.mocap.time_s[good], np.rad2deg(record.angle_rad[good])
-        log = _at_frames(record, t)
+        log = _at_frames(record, t) if logged else None
         driver, velocity, acceleration, sure = _smoothed(t, q[:, joint - 1], log, (expected or {}).get(record.trial.name))
         stepped, more = _stepped(index, t, steps)
         declared = np.concatenate([np.stack([(driver / scale) ** k for k in range(5)], axis=-1), stepped], axis=1)

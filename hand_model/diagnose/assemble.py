@@ -43,7 +43,7 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
         if station.believed:
             unexplained += [outsider_of(station, f) for f in station.outsiders]
             for weight, finding in (finding_of(station, *merged) for merged in _merged(station.kept)):
-                if station.naming.before.p >= ALPHA and _magnitude(finding, stations) < MINUTE:
+                if station.naming.before.p >= ALPHA and _magnitude(finding, stations, _value) < MINUTE:
                     rejected.append({"effect": finding.effect, "where": str(station.finger),
                                      "reason": "no test sees it beside the noise, and it is minute for one of its kind"})
                 else:
@@ -56,7 +56,7 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
                      for name, value in station.naming.rejected[:4] if name in NAMES]
     unexplained += [unrepeated_of(s) for s in stations if _wanders(s, stations)]
     ranked = _without_tilts(_without_shadows(_one_clock(_of_hinges(ranked, unexplained))))
-    sized = [(_magnitude(f, stations), weight, f) for weight, f in ranked]
+    sized = [(_magnitude(f, stations, _sure), weight, f) for weight, f in ranked]
     ranked = sorted(((float(np.sqrt(m * weight)), f) for m, weight, f in sized), key=lambda item: -item[0])
     ranked = _heaviest(ranked, _same_place)
     trifles = _trifles(ranked, {id(f): m for m, _, f in sized})
@@ -75,15 +75,19 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
                     tuple(channel_of(s) for s in stations), tuple(notes))
 
 
-def _magnitude(finding: Finding, stations: Sequence[Station]) -> float:
-    """How large a finding surely is for its kind (by the ends of intervals nearer to zero), measured by the channel in which effects of its
-    kind show."""
+def _magnitude(finding: Finding, stations: Sequence[Station], read: Callable[[Mapping[str, Any]], float | None]) -> float:
+    """How large a finding is for its kind, measured by the channel in which effects of its kind show. read: figure of a parameter."""
     states = next((s.naming.balance.states for s in stations if s.signal == SHOWN_IN.get(finding.effect) and s.finger == finding.where["finger"]), None)
-    values = {name: _sure(entry) for name, entry in finding.parameters.items()}
+    values = {name: read(entry) for name, entry in finding.parameters.items()}
     return magnitude(finding.effect, values, None if states is None else channel_figures(states))
 
 
+def _value(entry: Mapping[str, Any]) -> float | None:
+    return entry["value"]
+
+
 def _sure(entry: Mapping[str, Any]) -> float | None:
+    """The end of its interval nearer to zero."""
     value, interval = entry["value"], entry.get("ci95")
     if value is None or interval is None or None in interval:
         return value
@@ -167,12 +171,11 @@ def _without_shadows(ranked: list[tuple[float, Finding]]) -> list[tuple[float, F
 
 
 def _of_hinges(ranked: list[tuple[float, Finding]], unexplained: Sequence[Mapping[str, Any]]) -> list[tuple[float, Finding]]:
-    """Without what angles tell where no finger's joint is a hinge to the cameras: it is the cameras that bend space, and angles read in
-    it are none."""
+    """Without what angles tell of a finger whose markers leave the hinges' motion by no known way: they are no angles of a hinge. Where
+    no finger's joint is a hinge to the cameras, it is the cameras that bend space."""
     bent = {entry["where"]["finger"] for entry in unexplained if NO_HINGE in entry["shape"]}
-    if len(bent) < 2:
-        return ranked
-    return [item for item in ranked if item[1].where["finger"] not in bent or item[1].effect not in ANGULAR | set(HINGE)]
+    wrong = ANGULAR | set(HINGE) if len(bent) > 1 else ANGULAR
+    return [item for item in ranked if item[1].where["finger"] not in bent or item[1].effect not in wrong]
 
 
 def _without_tilts(ranked: list[tuple[float, Finding]]) -> list[tuple[float, Finding]]:

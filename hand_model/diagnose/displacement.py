@@ -13,6 +13,8 @@ Array = NDArray[np.float64]
 
 BOTH = (True, False)
 NO_HINGE = "no plain hinge"  # a joint whose markers leave the hinge in step with its angle, by none of the known ways
+CREEP = "creep"  # of a marker or support that moves all the time; a slip has a moment
+UNNAMED = (NO_HINGE, CREEP)  # what no table of effects names
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,7 @@ def candidates_of(blocks: Blocks) -> list[Candidate]:
             columns[:, j] = frame
             flat = columns.reshape(b, 3 * m, 3)
             out += [Candidate(name, int(blocks.body[j]), label, flat, True, lasting) for lasting in BOTH]
+            out += _creeping(blocks, int(blocks.body[j]), label, flat)
     for k in range(1, int(blocks.body.max()) + 1):
         mine = np.flatnonzero(blocks.body == k)
         arm = blocks.position[:, mine] - blocks.position[:, mine].mean(1, keepdims=True)
@@ -50,8 +53,20 @@ def candidates_of(blocks: Blocks) -> list[Candidate]:
             columns[:, mine, :, 3:] = turned
             flat = columns.reshape(b, 3 * m, 6)
             out += [Candidate("support_slip", k, None, flat, True, lasting) for lasting in BOTH]
+            out += _creeping(blocks, k, None, flat)
         out += [*_no_hinge(blocks, k), *_any_motion(blocks, k)]
     return out
+
+
+def _creeping(blocks: Blocks, body: int, label: str | None, columns: Array) -> list[Candidate]:
+    """What slips at a moment, moving evenly instead: over all recordings, or over each anew."""
+    within = np.zeros(len(blocks.time_s))
+    for record in np.unique(blocks.record):
+        mine = blocks.record == record
+        t = blocks.time_s[mine]
+        within[mine] = (t - t[0]) / max(t[-1] - t[0], 1e-9)
+    whole = np.arange(len(within)) / max(len(within) - 1, 1)
+    return [Candidate(CREEP, body, label, columns * ramp[:, None, None], False) for ramp in (whole, within)]
 
 
 def _frames(blocks: Blocks, body: int, marker: int) -> list[Array]:

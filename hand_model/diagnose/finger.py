@@ -70,10 +70,12 @@ def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, f
     stations: list[Station] = []
     states = encoder_states(angles, *counts[finger.actuator], moments) if finger.actuator in counts else ()
     if states:
-        stations.append(judged("encoder", finger.name, finger.actuator, finger.segments[0].name, states, catalogue("encoder")))
+        effects = [*catalogue("encoder"), *outsiders("encoder")]
+        stations.append(judged("encoder", finger.name, finger.actuator, finger.segments[0].name, states, effects))
+    parted = any(getattr(f.term.effect, "signal", None) == "log" for s in stations for f in s.outsiders)
     for joint in range(1, len(finger.segments)):
         expected = expected_angles(stations[0].naming) if stations and joint == 1 else {}
-        states = linkage_states(angles, joint, moments, expected)
+        states = linkage_states(angles, joint, moments, expected, not parted)
         if states:
             effects = [*catalogue("linkage"), *outsiders("linkage")]
             stations.append(judged("markers", finger.name, finger.actuator, finger.segments[joint].name, states, effects))

@@ -12,9 +12,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..effects.outside.outsider import UNLIKELY
 from .angles import FingerAngles, refitted
 from .blocks import Blocks, blocks_of, project
-from .displacement import NO_HINGE, Candidate, candidates_of
+from .displacement import CREEP, NO_HINGE, Candidate, candidates_of
 
 Array = NDArray[np.float64]
 
@@ -22,7 +23,7 @@ EVIDENCE_LEAST = 15.0  # log evidence of a marker effect, beyond its parameters 
 MOST = 10  # a slip that is put right between recordings is one a recording
 SKIP_P = 0.3  # lack of fit above which no candidate is tried
 ALPHA = 0.003  # false alarms per finger
-EXPLAINED_LEAST = 0.7  # of the misfit: below, the names are not believed
+EXPLAINED_LEAST = 0.9  # of the misfit: below, the names are not believed
 SPELL = 12  # blocks, about a second, whose mean shows what stays correlated
 HINGE = ("joint_wobble", "moving_centre")
 REACH = 0.06  # m: the other axis of a wobble passes nearer to its joint; farther, its centre travels
@@ -84,23 +85,43 @@ class MarkerNaming:
 
 def name_markers(angles: FingerAngles) -> MarkerNaming:
     """Name slips and hinges that are none in the flexion recordings of one finger, by forward selection."""
-    blocks = blocks_of(angles)
+    return named_in(blocks_of(angles))
+
+
+def named_in(blocks: Blocks) -> MarkerNaming:
+    """The same of its blocks of frames. Slips of one place are a creep where an even motion says as much."""
     y = project(blocks, blocks.residual.reshape(len(blocks.residual), -1, 1))
     shared = project(blocks, blocks.chain_columns)
     sigma = _noise(y, blocks)
-    candidates: list[Candidate] | None = None
+    p_before, excess_before = _lack(_solve(shared, y)[1], blocks)
+    if p_before > SKIP_P:
+        return MarkerNaming(blocks, (), sigma, p_before, p_before, excess_before, excess_before)
+    candidates = candidates_of(blocks)
+    moments = {id(c.columns): _moments(project(blocks, c.columns), shared, y) for c in candidates}
+    chain = _chain_part(shared, y)
+    creeps = [_try(c, blocks, moments[id(c.columns)], chain, sigma) for c in candidates if c.effect == CREEP]
+    found, refused = _selected([c for c in candidates if c.effect != CREEP], blocks, y, shared, moments, sigma)
+    for place in {(e.body, e.label) for e in found if e.begin is not None}:
+        others = [e for e in found if e.begin is None or (e.body, e.label) != place]
+        creep = max((c for c in creeps if (c.body, c.label) == place), key=lambda c: c.gain)
+        if _score([*others, creep], blocks, y, shared, sigma) > _score(found, blocks, y, shared, sigma) + UNLIKELY:
+            found = [creep, *others]
+    coefficients, residual = _solve(_with(shared, found, blocks), y)
+    p, excess = _lack(residual, blocks)
+    start = blocks.chain_columns.shape[-1]
+    done = []
+    for effect in found:
+        width = effect.everywhere.shape[-1]
+        done.append(replace(effect, coefficients=coefficients[start : start + width]))
+        start += width
+    return MarkerNaming(blocks, tuple(done), sigma, p_before, p, excess_before, excess, refused)
+
+
+def _selected(candidates: list[Candidate], blocks: Blocks, y: Array, shared: Array, moments: dict[int, _Moments],
+              sigma: float) -> tuple[list[MarkerEffect], MarkerEffect | None]:
+    """What forward selection finds, and the likeliest further effect, that did not bring enough."""
     found: list[MarkerEffect] = []
-    p_before = excess_before = refused = None
-    for _ in range(MOST + 1):
-        coefficients, residual = _solve(shared, y)
-        p, excess = _lack(residual, blocks)
-        if p_before is None:
-            p_before, excess_before = p, excess
-        if len(found) == MOST or (not found and p > SKIP_P):
-            break
-        if candidates is None:
-            candidates = candidates_of(blocks)
-            moments = {id(c.columns): _moments(project(blocks, c.columns), shared, y) for c in candidates}
+    while len(found) < MOST:
         known = {e.body for e in found if e.effect in HINGE}
         chain = _chain_part(shared, y)
         tried = [_try(c, blocks, moments[id(c.columns)], chain, sigma) for c in candidates if c.effect != NO_HINGE or c.body not in known]
@@ -112,18 +133,22 @@ def name_markers(angles: FingerAngles) -> MarkerNaming:
         # What stays correlated beside the best candidate weighs all of them down.
         best = replace(best, evidence=best.evidence - 0.5 * best.gain * (1 - 1 / _inflation(_solve(wider, y)[1], blocks)))
         if best.evidence < EVIDENCE_LEAST:
-            refused = best
-            break
+            return found, best
         found.append(best)
         shared = wider
         moments = {key: value.with_shared(more) for key, value in moments.items()}
-    start = blocks.chain_columns.shape[-1]
-    done = []
-    for effect in found:
-        width = effect.everywhere.shape[-1]
-        done.append(replace(effect, coefficients=coefficients[start : start + width]))
-        start += width
-    return MarkerNaming(blocks, tuple(done), sigma, 1.0 if p_before is None else p_before, p, excess_before or 0.0, excess, refused)
+    return found, None
+
+
+def _with(shared: Array, found: list[MarkerEffect], blocks: Blocks) -> Array:
+    return np.concatenate([shared, *(project(blocks, e.columns) for e in found)], axis=-1)
+
+
+def _score(found: list[MarkerEffect], blocks: Blocks, y: Array, shared: Array, sigma: float) -> float:
+    """Log likelihood less the penalty of Schwarz (1978); a step has a moment, too."""
+    residual = _solve(_with(shared, found, blocks), y)[1]
+    count = sum(e.everywhere.shape[-1] + (e.begin is not None) for e in found)
+    return -0.5 * float(np.sum(residual**2)) / sigma**2 - 0.5 * count * float(np.log(max((blocks.weight > 0).sum() * 2, 2)))
 
 
 def _choose(tried: list[MarkerEffect]) -> MarkerEffect:

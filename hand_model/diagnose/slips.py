@@ -14,7 +14,7 @@ from ..identify.likelihood import OUTLIER_LIMIT
 from ..rotation import kabsch
 from .angles import FingerAngles
 from .blocks import Blocks
-from .displacement import NO_HINGE
+from .displacement import CREEP, NO_HINGE, UNNAMED
 from .findings import Finding, weighed
 from .markers import ALPHA, HINGE, MarkerEffect, MarkerNaming
 from .wobble import wobble_amplitude
@@ -40,11 +40,9 @@ def marker_findings(angles: FingerAngles, naming: MarkerNaming) -> list[tuple[fl
     groups: dict[tuple[str, int, str | None], list[MarkerEffect]] = {}
     for effect in naming.found:
         groups.setdefault((effect.effect, effect.body, effect.label), []).append(effect)
-    total = sum(e.gain for e in naming.found)
+    least = max([SMALL * sum(e.gain for e in naming.found), *(e.gain for e in naming.found if e.effect == CREEP)])
     for (name, body, label), members in groups.items():
-        if name == NO_HINGE:
-            continue
-        if sum(e.gain for e in members) < SMALL * total:
+        if name in UNNAMED or sum(e.gain for e in members) < least:
             continue  # no more than the form of the large one being another
         readings = max(float(naming.blocks.weight.sum()) * 3, 1.0)
         moved = float(np.sqrt(sum(e.gain for e in members) / readings))  # over the noise of one reading
@@ -67,8 +65,8 @@ def unexplained(angles: FingerAngles, naming: MarkerNaming) -> list[dict[str, An
 
     if naming.believed:
         total = sum(e.gain for e in naming.found)
-        return [entry(angles.finger.segments[e.body - 1].name, e.gain / total, f"{NO_HINGE}: {IN_STEP}")
-                for e in naming.found if e.effect == NO_HINGE]
+        return [entry(angles.finger.segments[e.body - 1].name if e.body > 0 else None, e.gain / total, f"{NO_HINGE}: {IN_STEP}" if e.effect == NO_HINGE else
+                      f"{e.label or 'a support'} moves all the time") for e in naming.found if e.effect in UNNAMED]
     if naming.p_before >= ALPHA:
         return []
     joints = [e.body - 1 for e in (*naming.found, naming.refused) if e is not None and e.effect in (NO_HINGE, *HINGE)]

@@ -21,6 +21,7 @@ ALIKE = 1 / 3  # of the size of a larger effect of the same family: below, no fi
 UNREST = 0.3  # of the noise: wander that every machine is granted; more is no explanation
 WORSE = 1.5  # times the mean square of training recordings
 EXPLAINED_LEAST = 0.7  # of the explainable mismatch: below, the names are not believed
+EXPLAINED_SOME = 1 / 3  # of a mismatch that the lack-of-fit test sees: below, they are not what is missing, whatever is left to see
 
 
 class Station:
@@ -55,9 +56,9 @@ class Station:
 
     @property
     def believed(self) -> bool:
-        """Whether the names stand: the final model passes the test, or takes most of the mismatch away. Names that take nothing of a
-        plain mismatch away do not, however little is left to see, nor where more than the noise does not repeat."""
-        idle = self.explained < SMALL and (self.naming.before.p < ALPHA or self.wander > 1)
+        """Whether the names stand: the final model passes the test, or takes most of the mismatch away. Names that take little of a
+        plain mismatch away do not, however little is left to see, nor names of nothing where more than the noise does not repeat."""
+        idle = self.explained < (EXPLAINED_SOME if self.naming.before.p < ALPHA else SMALL if self.wander > 1 else 0.0)
         return bool(self.proven) and not idle and (self.naming.after.p >= ALPHA or self.explained >= EXPLAINED_LEAST)
 
     @property
@@ -65,7 +66,10 @@ class Station:
         """The effects that stand beside each other: one of a small share may be no more than the form of the large one being
         another, and is left to the unexplained part; so is what is smaller than something that no table names."""
         strange = max((f.size for f in self.outsiders), default=0.0)
-        return tuple(f for f in self._beside if f.term.effect.listed and f.size >= strange)
+        covered = {name for f in self.outsiders for name in f.term.effect.covers}
+        restless = self.wander if self.wander > UNREST else 0.0
+        return tuple(f for f in self._beside if f.term.effect.listed and f.size >= strange and f.term.effect.name not in covered
+                     and (f.size >= restless or not f.term.effect.drifting))
 
     @property
     def outsiders(self) -> tuple[Named, ...]:

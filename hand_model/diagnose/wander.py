@@ -42,13 +42,14 @@ class Wander:
         weight: (n,) that `values` carry, zero for samples that take no part. Exact inverse root of
         I + d^2/inflation * w w' within each while (Woodbury).
         """
-        many = int(self.label.max()) + 1
-        size = np.bincount(self.label, weight**2, many)
+        starts = np.flatnonzero(np.r_[True, np.diff(self.label) != 0])  # whiles follow each other
+        length = np.diff(np.r_[starts, len(self.label)])
+        size = np.add.reduceat(weight**2, starts)
         shrink = 1 - 1 / np.sqrt(1 + self.deviation**2 * size / inflation)
-        rate = np.where(size > 0, shrink / np.where(size > 0, size, 1.0), 0.0)
+        rate = np.repeat(np.where(size > 0, shrink / np.where(size > 0, size, 1.0), 0.0), length) * weight
         columns = values.reshape(len(values), -1)
-        sums = np.stack([np.bincount(self.label, c * weight, many) for c in columns.T], axis=1)
-        return (columns - (weight[:, None] * (rate[:, None] * sums)[self.label])).reshape(values.shape)
+        sums = np.repeat(np.add.reduceat(columns * weight[:, None], starts, axis=0), length, axis=0)
+        return (columns - rate[:, None] * sums).reshape(values.shape)
 
     def log_likelihood(self, residual: Array, weight: Array, inflation: float) -> float:
         """Log likelihood of a weighted residual (n,), normalised to that of white noise of the same weights."""

@@ -20,6 +20,7 @@ class ExternalContact(Effect):
     """
 
     name = "external_contact"
+    drifting = True
     repeats = True  # in another trial
     of_the_hand = False
     unwritten = "an obstacle of one recording is no part of the hand"

@@ -17,6 +17,7 @@ class ViscoelasticSpring(Effect):
     """F = k1 (x - y), dy/dt = (x - y) / tau."""
 
     name = "viscoelastic_spring"
+    drifting = True
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """Relaxation time between five samples and the length of the longest trial."""

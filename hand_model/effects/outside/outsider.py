@@ -16,6 +16,7 @@ class Outsider(Effect):
     """An effect that the table does not name."""
 
     listed: ClassVar[bool] = False
+    covers: ClassVar[tuple[str, ...]] = ()  # effects that are a special case of it: none of them beside it
 
     def log_prior(self, parameters: Mapping[str, float]) -> float:
         """What is known comes first."""

@@ -1,0 +1,44 @@
+"""Two clocks that part and meet: frames that the cameras lost, rows of a log that came in packets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..base import Amplitude, Array, DriveState
+from .outsider import Outsider
+
+RECORDS, WHILES = 4, 8  # recordings that may be looked at, and pieces of each
+
+
+class ClockWander(Outsider):
+    """angle(t) = map(encoder(t - lag)), another lag in each while of each recording."""
+
+    name = "clock_wander"
+    station = "encoder"
+    signal = "log"
+    covers = ("clock_drift",)
+
+    def amplitudes(self) -> tuple[Amplitude, ...]:
+        """A lag for every while; those of recordings that are not there never act."""
+        return tuple((f"lag_{i}_{k}", "s", -np.inf, np.inf) for i in range(RECORDS) for k in range(WHILES))
+
+    def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
+        """Speed of the segment in each while, (n, RECORDS * WHILES)."""
+        out = np.zeros((len(state.time_s), RECORDS, WHILES))
+        record = int(state.extra["trial_index"][0])
+        if record < RECORDS:
+            share = (state.time_s - state.time_s[0]) / max(state.time_s[-1] - state.time_s[0], 1e-9)
+            out[np.arange(len(share)), record, np.minimum((WHILES * share).astype(int), WHILES - 1)] = -state.slope * state.velocity
+        return out.reshape(len(state.time_s), -1)
+
+    def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
+        """How far they part."""
+        lags = [v for name, v in parameters.items() if name.startswith("lag_") and v != 0.0]
+        spread = 1e3 * (max(lags) - min(lags)) if lags else 0.0
+        return f"the clocks of markers and log part and meet again, by up to {spread:.0f} ms: frames or rows are lost"
+
+
+EFFECT = ClockWander()

@@ -1,0 +1,72 @@
+"""Marker station: what is planted in a chain's markers is named, and what has no name is said."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from hand_model.diagnose.blocks import _assembled
+from hand_model.diagnose.displacement import CREEP, NO_HINGE
+from hand_model.diagnose.markers import MarkerNaming, named_in
+from hand_model.diagnose.slips import unexplained
+from hand_model.identify.chain import Chain
+
+BODY = np.repeat([0, 1, 2], 4)
+LABELS = tuple(f"M{i}" for i in range(12))
+COUNT, RECORDS = 240, 2
+
+
+def seen(shift, seed: int = 0) -> MarkerNaming:
+    """The naming of two recordings of a finger of two joints whose markers are displaced by shift(share, turn, arm): (b, 4, 3) [m] of the first
+    segment's markers. share: (b,) of the recording. turn: (b, 3, 3) of that segment. arm: (4, 3) [m] from the support's middle, at rest."""
+    rng = np.random.default_rng(seed)
+    rest = np.concatenate([rng.normal(0, 0.012, (4, 3)) + [0.03 * k + 0.01, 0, 0.01] for k in range(3)])
+    chain = Chain(rest, np.array([[0, 1, 0], [0, 1, 0]], float), np.array([[0.03, 0, 0], [0.06, 0, 0]]))
+    share = np.tile(np.linspace(0, 1, COUNT), RECORDS)
+    angle = (1 - np.cos(2 * np.pi * 4 * share))[:, None] * np.array([0.6, 0.4])
+    residual = rng.normal(0, 3e-5, (COUNT * RECORDS, 12, 3))
+    turn = Rotation.from_rotvec(angle[:, :1] * chain.axis_palm[0]).as_matrix()
+    residual[:, BODY == 1] += shift(share, turn, rest[BODY == 1] - rest[BODY == 1].mean(0))
+    record = np.repeat(np.arange(RECORDS), COUNT)
+    return named_in(_assembled(chain, BODY, LABELS, residual, np.full((len(share), 12), 8.0), angle, record, 30 * share))
+
+
+def slipping(at: float):
+    """The first marker slips by 1.5 mm at that share of each recording."""
+    def shift(share, turn, arm):
+        out = np.zeros((len(share), 4, 3))
+        out[:, 0] = (share >= at)[:, None] * (turn @ np.array([1e-3, -1e-3, 0.5e-3]))
+        return out
+    return shift
+
+
+def creeping(share, turn, arm):
+    turned = np.stack([Rotation.from_rotvec(s * np.array([0.05, 0.02, -0.08])).apply(arm) - arm for s in share])
+    return np.einsum("bij,bmj->bmi", turn, turned)
+
+
+def places(naming: MarkerNaming) -> set[tuple[str, str | None]]:
+    return {(e.effect, e.label) for e in naming.found}
+
+
+def test_healthy_markers_are_consistent() -> None:
+    naming = seen(lambda share, turn, arm: np.zeros((len(share), 4, 3)))
+    assert not naming.found and naming.p_before > 0.003
+
+
+@pytest.mark.parametrize("at", [0.4, 0.7])
+def test_slips_in_every_recording_are_slips(at: float) -> None:
+    naming = seen(slipping(at))
+    assert naming.believed and places(naming) == {("marker_slip", "M4")}
+    assert naming.p_after > 0.003
+
+
+def test_a_support_that_turns_all_the_time_does_not_slip() -> None:
+    naming = seen(creeping)
+    assert naming.believed and places(naming) == {(CREEP, None)}
+    finger = SimpleNamespace(name="index", segments=(SimpleNamespace(name="proximal"), SimpleNamespace(name="distal")))
+    told, = unexplained(SimpleNamespace(finger=finger), naming)
+    assert told["where"]["joint"] == "proximal" and told["shape"] == "a support moves all the time" and NO_HINGE not in told["shape"]
