@@ -237,7 +237,7 @@ def _try(candidate: Candidate, blocks: Blocks, moments: _Moments, chain: tuple[A
     inverse, sy = chain
     width = dd.shape[-1]
     total = np.trace(dd.sum(0)) / width
-    last = np.array([np.flatnonzero(blocks.record == r)[-1] + 1 for r in blocks.record])
+    last = np.searchsorted(blocks.record, blocks.record, side="right")  # records follow each other
     if not candidate.step:
         dd, sd, dy = (v.sum(0, keepdims=True) for v in (dd, sd, dy))
     elif candidate.lasting:

@@ -19,17 +19,17 @@ from .balance import DISCRETE, Balance, Fit, Term
 from .evidence import evidence, gain, rough_evidence, scale_of
 from .grid import Grid
 from .lack_of_fit import lack_of_fit
-from .naming import ALPHA, Named, Naming, Rival
+from .naming import ALPHA, EXPLAINED_LEAST, MOST_TERMS, Named, Naming, Rival
 from .wander import Wander, estimate_wander
 
 Array = NDArray[np.float64]
 
 EVIDENCE_LEAST = 6.0  # log evidence an effect must bring: e^6 against "none", and against the search over shapes
 FAINT = 3.0  # the same of the only one, to be heard: recordings that took no part may bear out the rest
-MOST_TERMS = 5
 MOST_SEARCHES = 3  # each with noise that knows what did not repeat beside the effects of the one before
 REFUTED = 3.0  # standard deviations by which a delay may miss what answers to commands say
 ALONG = 1e-6  # of a column's length: less left beside the design, and it says nothing of its own
+GRAIN = 1.5  # times what the best shape of a grid brings: more no shape between is expected to
 SMALL = 0.07  # share of the explained mismatch: less beside a larger effect may be no more than its form being another
 GROWN = 1.3  # change of that noise, from which another search is worth its time
 
@@ -47,7 +47,7 @@ def name_effects(states: tuple[Any, ...], effects: Iterable[Any], progress: Call
     if naming.before.p < ALPHA and not naming.found and any(s.validate for s in states):
         # What happened in a validation recording only cannot be learned from the others.
         naming = _name(Balance(tuple(states), True, typical), tuple(effects), progress)
-    if naming.after.p < ALPHA and not balance.steady.all():
+    if naming.after.p < ALPHA and not balance.steady.all() and not naming.overwhelmed:
         # Where starts mislead, steady motion may still be explained.
         calm = _name(balance.settled(), tuple(effects), progress)
         return calm if calm.found and calm.after.p >= ALPHA else naming
@@ -60,9 +60,9 @@ def _name(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str], 
         balance = balance.wandering(wander)
         fit, brought, ranked = _search(balance, effects, progress)
         wander = _unrepeated(balance, fit)
-        if _alike(wander, balance.wander):
+        if _alike(wander, balance.wander) or _overwhelmed(balance, fit):
             break
-    calmed = _calmed(balance, fit, ranked)
+    calmed = None if _overwhelmed(balance, fit) else _calmed(balance, fit, ranked)
     if calmed is not None:
         rival, calmer = calmed
         other = balance.wandering(calmer)
@@ -77,6 +77,15 @@ def _name(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str], 
     kept = {t.effect.name for t in fit.terms}
     rejected = tuple(sorted(((n, e) for n, e in brought.items() if n not in kept), key=lambda item: -item[1]))
     return Naming(balance, declared, fit, estimate_wander(balance, fit.prediction), before, after, found, rejected)
+
+
+def _overwhelmed(balance: Balance, fit: Fit) -> bool:
+    """`Naming.overwhelmed`, of a fit."""
+    if len(fit.terms) < MOST_TERMS:
+        return False
+    before = lack_of_fit(balance, balance.fit().prediction, len(balance.names), ALPHA)
+    after = lack_of_fit(balance, fit.prediction, len(balance.names) + fit.size, ALPHA)
+    return after.p < ALPHA and after.excess > (1 - EXPLAINED_LEAST) * before.excess
 
 
 def _calmed(balance: Balance, fit: Fit, ranked: Iterable[Rival]) -> tuple[Rival, Wander | None] | None:
@@ -167,13 +176,14 @@ def _resolved(balance: Balance, term: Term) -> bool:
     return abs(term.shape["delay"]) > 0.75 * step and not refuted
 
 
-def rank(balance: Balance, effects: Iterable[Any], terms: tuple[Term, ...], fit: Fit, refine: int = 6) -> list[Rival]:
-    """Every candidate added to `terms`, its shape optimised from several starts; best evidence first."""
+def rank(balance: Balance, effects: Iterable[Any], terms: tuple[Term, ...], fit: Fit, refine: int = 6, least: float = 0.0) -> list[Rival]:
+    """Every candidate added to `terms`, its shape optimised from several starts; best evidence first. least: log evidence below which
+    none is of interest."""
     rough = []
     for effect in effects:
         if any(t.effect.name == effect.name for t in terms) and not effect.repeats:
             continue
-        best = scan(balance, effect, terms)
+        best = scan(balance, effect, terms, least)
         if best is not None:
             rough.append((rough_evidence(balance, best, fit, scale_of(balance, best)), best))
     rough.sort(key=lambda item: -item[0])
@@ -188,20 +198,21 @@ def rank(balance: Balance, effects: Iterable[Any], terms: tuple[Term, ...], fit:
     return sorted(rivals, key=lambda r: -r.evidence)
 
 
-def scan(balance: Balance, effect: Any, terms: tuple[Term, ...]) -> Fit | None:
-    """Best starting shape of `effect` beside `terms`; columns are projected, anything else is refitted."""
+def scan(balance: Balance, effect: Any, terms: tuple[Term, ...], least: float = 0.0) -> Fit | None:
+    """Best starting shape of `effect` beside `terms`; columns are projected, anything else is refitted. None where no shape could bring
+    a log likelihood near `least`."""
     grid = balance.grid(effect)
     if not grid.shapes:
         return None
     shapes = grid.shapes
     if effect.replaces is None and not effect.warps and not effect.clips:
-        shapes = _project(balance, grid, terms)
+        shapes = _project(balance, grid, terms, 2 * balance.inflation * least / GRAIN)
     fits = [balance.fit((*terms, Term(effect, shape))) for shape in shapes]
     return min(fits, key=lambda f: f.rss) if fits else None
 
 
-def _project(balance: Balance, grid: Grid, terms: tuple[Term, ...]) -> list[dict[str, float]]:
-    """The two best shapes of a grid by the fall of the RSS that its columns, orthogonal to the design, bring."""
+def _project(balance: Balance, grid: Grid, terms: tuple[Term, ...], least: float) -> list[dict[str, float]]:
+    """The two best shapes of a grid by the fall of the RSS, more than `least`, that its columns, orthogonal to the design, bring."""
     q, residual, w = balance.apart(terms)
     columns = balance.grid_columns(grid, w, tuple(t for t in terms if t.effect.warps))
     inside = columns.products(q)
@@ -221,7 +232,7 @@ def _project(balance: Balance, grid: Grid, terms: tuple[Term, ...]) -> list[dict
             gram = columns.gram(mine) - inside[mine] @ inside[mine].T
             gains[i] = float(right[mine] @ np.linalg.lstsq(gram, right[mine], rcond=None)[0])
     order = np.argsort(gains)[::-1]
-    return [grid.shapes[i] for i in order[:2] if gains[i] > 0]
+    return [grid.shapes[i] for i in order[:2] if gains[i] > least]
 
 
 def polish(balance: Balance, fit: Fit, which: int) -> Fit:
@@ -306,7 +317,7 @@ def _swap(balance: Balance, effects: tuple[Any, ...], fit: Fit) -> Fit | None:
         rest = tuple(t for i, t in enumerate(fit.terms) if i != which)
         without = balance.fit(rest)
         own = evidence(balance, fit, without, which, scale_of(balance, fit))
-        ranked = [r for r in rank(balance, effects, rest, without, refine=1) if r.name != fit.terms[which].effect.name]
+        ranked = [r for r in rank(balance, effects, rest, without, 1, own - 10) if r.name != fit.terms[which].effect.name]
         if ranked and ranked[0].evidence > own - 10:
             other = refit(balance, ranked[0].fit)
             scale = min(scale_of(balance, other), scale_of(balance, fit))

@@ -9,6 +9,8 @@ from .lack_of_fit import LackOfFit
 from .wander import Wander
 
 ALPHA = 0.003  # false alarms per channel: 5 % over some fifteen channels of a session
+MOST_TERMS = 5  # effects of one balance
+EXPLAINED_LEAST = 0.7  # of the explainable mismatch: below, the names are not believed
 CLASS_WIDTH = 3.0  # log evidence within which two effects are one class: 20 to 1
 
 
@@ -64,3 +66,9 @@ class Naming:
     def consistent(self) -> bool:
         """True where nothing is missing beyond the noise."""
         return self.before.p >= ALPHA and not self.found
+
+    @property
+    def overwhelmed(self) -> bool:
+        """Whether as many effects as may be named leave a plain mismatch unexplained: whatever else is tried, nothing known is missing."""
+        full = len(self.found) >= MOST_TERMS and self.after.p < ALPHA
+        return full and self.after.excess > (1 - EXPLAINED_LEAST) * self.before.excess

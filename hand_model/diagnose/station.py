@@ -10,7 +10,7 @@ import numpy as np
 from .findings import UNWRITTEN, Finding, weighed
 from .interval import brought_held_out, held_out, parameter_intervals, sized, undisturbed
 from .name import EVIDENCE_LEAST, SMALL, name_effects
-from .naming import ALPHA, Named, Naming
+from .naming import ALPHA, EXPLAINED_LEAST, Named, Naming
 
 # How before and after were computed, said in the findings: no compiled file is involved until one is replayed.
 ENGINE = {"current": "inverse dynamics of the motor's balance, motion as recorded", "encoder": "encoder map, motion as recorded",
@@ -20,7 +20,6 @@ CHANNELS = 20  # of a session: what no test of one sees must stand against as ma
 ALIKE = 1 / 3  # of the size of a larger effect of the same family: below, no finding of its own
 UNREST = 0.3  # of the noise: wander that every machine is granted; more is no explanation
 WORSE = 1.5  # times the mean square of training recordings
-EXPLAINED_LEAST = 0.7  # of the explainable mismatch: below, the names are not believed
 EXPLAINED_SOME = 1 / 3  # of a mismatch that the lack-of-fit test sees: below, they are not what is missing, whatever is left to see
 
 
@@ -32,7 +31,8 @@ class Station:
         places = {id(f): naming.fit.terms.index(f.term) for f in naming.found}
         self.reading = undisturbed(naming)
         least = EVIDENCE_LEAST + (np.log(CHANNELS) if naming.before.p >= ALPHA else 0.0)
-        stand = [places[id(f)] for f in naming.found if _stands(naming, f, places[id(f)], least) and sized(self.reading, places[id(f)])]
+        stand = [places[id(f)] for f in naming.found if _stands(naming, f, places[id(f)], least) and
+                 (sized(self.reading, places[id(f)]) or _plain_at_ends(naming, f, least))]
         self.parameters = {which: parameter_intervals(self.reading, which) for which in stand}
         self.proven = tuple(f for f in naming.found if places[id(f)] in stand)
 
@@ -112,6 +112,12 @@ def _stands(naming: Naming, named: Named, which: int, least: float) -> bool:
     return named.evidence >= least if brought is None else brought > 0 and named.evidence + brought >= least
 
 
+def _plain_at_ends(naming: Naming, named: Named, least: float) -> bool:
+    """Whether the only effect is that plain that it needs no steady motion to be told from zero: some act where motion starts and
+    stops, as a stop of the open hand."""
+    return len(naming.found) == 1 and _stands(naming, named, 0, least + EVIDENCE_LEAST)
+
+
 def _elsewhere(naming: Naming) -> bool:
     """Whether what the training recordings taught fails in those kept out: something happens there that they do not have."""
     balance = naming.balance
@@ -129,14 +135,16 @@ def judged(signal: str, finger: str | None, actuator: str | None, joint: str | N
     elsewhere = _elsewhere(station.naming)
     for _ in range(SECOND_HEARINGS):
         fallen = {f.term.effect.name for f in station.naming.found} - {f.term.effect.name for f in station.proven}
-        if sum(f.share for f in station.naming.found if f.term.effect.name in fallen and f.evidence >= EVIDENCE_LEAST) < DISPLACING:
+        lost = sum(f.share for f in station.naming.found if f.term.effect.name in fallen and f.evidence >= EVIDENCE_LEAST)
+        if lost < DISPLACING or station.naming.overwhelmed:
             break
         left = tuple(e for e in left if e.name not in fallen)
         other = Station(signal, finger, actuator, joint, name_effects(states, left, typical=typical))
         if other.weight <= station.weight:
             break
         station = other
-    if station.missing and (not station.believed or elsewhere and station.naming.after.p < ALPHA) and any(s.validate for s in states):
+    unknown = not station.believed or elsewhere and station.naming.after.p < ALPHA
+    if station.missing and unknown and not station.naming.overwhelmed and any(s.validate for s in states):
         # what the training recordings cannot tell, a pose that one of the others alone has may tell
         lasting = tuple(e for e in every if e.of_the_hand)  # what one recording had explains no other
         other = Station(signal, finger, actuator, joint, name_effects(states, lasting, typical=typical, whole=True))
