@@ -124,3 +124,18 @@ def test_a_level_that_wanders_names_no_obstacle() -> None:
         return np.interp(state.time_s, knots, 4.0 * rng.normal(size=len(knots)))
 
     assert not heard(indexed(drive(6, walk))).kept
+
+
+def test_the_only_effect_needs_no_steady_motion_where_it_is_plain_and_a_faint_one_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hand_model.diagnose.station.sized", lambda *_: False)  # all of it happens at starts and stops
+    plain = heard(drive(3, planted(*PLANTED[0])))
+    assert [f.term.effect.name for f in plain.kept] == [PLANTED[0][0]]
+    faint = replace(plain.naming, found=(plain.naming.found[0],) * 2)
+    assert not Station("current", "index", "index", None, faint).proven
+
+
+@pytest.mark.parametrize(("count", "p", "left", "overwhelmed"), [(5, 1e-9, 0.5, True), (4, 1e-9, 0.5, False), (5, 0.2, 0.5, False), (5, 1e-9, 0.1, False)])
+def test_five_effects_that_leave_most_of_a_plain_mismatch_are_enough(count: int, p: float, left: float, overwhelmed: bool) -> None:
+    naming = heard(drive(3, planted(*PLANTED[0]))).naming
+    before, after = replace(naming.before, p=1e-30, excess=100.0), replace(naming.after, p=p, excess=100.0 * left)
+    assert replace(naming, before=before, after=after, found=naming.found[:1] * count).overwhelmed is overwhelmed
