@@ -39,7 +39,8 @@ def test_a_support_turns_by_the_angle_of_all_its_effects_together() -> None:
 
 @pytest.mark.parametrize(("wave", "amplitude"), [(lambda u: np.sin(2 * np.pi * u + 0.8), 0.04), (lambda u: np.sin(np.pi * u), 0.03)])
 @pytest.mark.parametrize("body", [1, 2])
-def test_a_wobble_is_read_whatever_another_axis_would_explain(wave, amplitude: float, body: int) -> None:
+@pytest.mark.parametrize("with_segment", [False, True])
+def test_a_wobble_is_read_whatever_another_axis_would_explain(wave, amplitude: float, body: int, with_segment: bool) -> None:
     rng, u = np.random.default_rng(1), np.r_[np.linspace(0, 1, 150), np.linspace(1, 0, 150)]
     first, angle, axis = 0.9 * u, 1.3 * u, np.array([0.0, 1.0, 0.0])
     before = np.stack([turned(axis, a + 1e-9) if body == 2 else np.eye(3) for a in first])
@@ -48,7 +49,7 @@ def test_a_wobble_is_read_whatever_another_axis_would_explain(wave, amplitude: f
     position = np.zeros((300, 6, 3))
     position[:, 3:] = np.einsum("bij,mj->bmi", own, arms)
     across = np.array([0.6, 0.0, 0.8])
-    tilt = amplitude * wave(u)[:, None] * (before @ across)  # and what a hinge's axis and the markers' places would do
+    tilt = amplitude * wave(u)[:, None] * ((own if with_segment else before) @ across)  # and what a hinge's axis and the markers' places would do
     tilt = tilt + before @ np.array([0.05, 0.0, -0.02]) + own @ np.array([-0.03, 0.0, 0.04])
     shift = np.zeros_like(position)
     shift[:, 3:] = np.cross(tilt[:, None], position[:, 3:]) + rng.normal(size=3) * 1e-3

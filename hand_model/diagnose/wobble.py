@@ -15,15 +15,16 @@ Array = NDArray[np.float64]
 
 
 def wobble_amplitude(blocks: Blocks, body: int, shift: Array) -> float:
-    """Amplitude [rad] of the wave over the joint's range, about one direction of the segment before it, that describes the tilt best.
+    """Amplitude [rad] of the wave over the joint's range, about one direction of the segment before it or of its own, that describes
+    the tilt best.
 
     body: the segment that the joint carries; shift: (b, m, 3) displacements [m] of all markers, palm frame.
     """
     tilt, angle = _tilt(blocks, body, shift), blocks.angle[:, body - 1]
     low, high = np.quantile(angle, [0.005, 0.995])
     u = (angle - low) / max(high - low, 1e-9)
-    half, full = (_wave(tilt, angle, forms) for forms in ([np.sin(np.pi * u)], [np.sin(2 * np.pi * u), np.cos(2 * np.pi * u)]))
-    return min(half, full)[1]
+    waves = ([np.sin(np.pi * u)], [np.sin(2 * np.pi * u), np.cos(2 * np.pi * u)])
+    return min(_wave(tilt, angle, forms, own) for forms in waves for own in (False, True))[1]
 
 
 def _tilt(blocks: Blocks, body: int, shift: Array) -> Array:
@@ -43,12 +44,14 @@ def _tilt(blocks: Blocks, body: int, shift: Array) -> Array:
     return np.stack([np.einsum("bi,bi->b", turned, d) for d in (first, np.cross(axis, first))], axis=1)
 
 
-def _wave(tilt: Array, angle: Array, forms: list[Array]) -> tuple[float, float]:
-    """Sum of squares left of a tilt (b, 2), and the amplitude, of a wave beside rotations that are constant before and behind the joint."""
+def _wave(tilt: Array, angle: Array, forms: list[Array], own: bool) -> tuple[float, float]:
+    """Sum of squares left of a tilt (b, 2), and the amplitude, of a wave beside rotations that are constant before and behind the joint.
+    own: its direction turns with the segment that the joint carries."""
     none, one = np.zeros(len(angle)), np.ones(len(angle))
     cosine, sine = np.cos(angle), np.sin(angle)
     columns = [np.r_[one, none], np.r_[none, one], np.r_[cosine, sine], np.r_[-sine, cosine]]
-    columns += [np.r_[f, none] for f in forms] + [np.r_[none, f] for f in forms]
+    across = columns[2:] if own else columns[:2]
+    columns += [np.r_[f, f] * direction for direction in across for f in forms]
     matrix, target = np.stack(columns, axis=1), np.r_[tilt[:, 0], tilt[:, 1]]
     found = np.linalg.lstsq(matrix, target, rcond=None)[0]
     along = np.linalg.svd(found[4:].reshape(2, len(forms)))[1][0]
