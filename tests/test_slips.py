@@ -9,7 +9,7 @@ import pytest
 
 from hand_model.diagnose.markers import MarkerEffect
 from hand_model.diagnose.slips import displacement, turn
-from hand_model.diagnose.wobble import wobble_amplitude
+from hand_model.diagnose.wobble import centre_travel, wobble_amplitude
 
 
 @pytest.mark.parametrize(("begin", "end"), [(10, 100), (10, 30), (None, None)])
@@ -56,3 +56,21 @@ def test_a_wobble_is_read_whatever_another_axis_would_explain(wave, amplitude: f
     blocks = SimpleNamespace(body=np.repeat([body - 1, body], 3), position=position, angle=np.stack([first, angle][-body:], axis=1),
                              axes=np.broadcast_to(axis, (300, body, 3)), rotation=np.concatenate([np.repeat(before[:, None], 3, 1), np.repeat(own[:, None], 3, 1)], 1))
     assert wobble_amplitude(blocks, body, shift) == pytest.approx(amplitude, rel=0.02)
+
+
+@pytest.mark.parametrize("course", [lambda u: np.stack([u, 0 * u]), lambda u: np.stack([0 * u, u**2]),
+                                    lambda u: np.stack([np.sin(np.pi * u), 1 - np.cos(np.pi * u)]) / 2])
+@pytest.mark.parametrize("body", [1, 2])
+def test_a_centre_travels_as_far_as_it_does_whatever_another_hinge_would_explain(course, body: int) -> None:
+    u = np.r_[np.linspace(0, 1, 150), np.linspace(1, 0, 150)]
+    first, angle, axis = 0.9 * u, 1.3 * u, np.array([0.0, 1.0, 0.0])
+    before = np.stack([turned(axis, a + 1e-9) if body == 2 else np.eye(3) for a in first])
+    own = before @ np.stack([turned(axis, a + 1e-9) for a in angle])
+    x, z = 2e-3 * course(u)
+    moved = np.einsum("bij,bj->bi", before, np.stack([x, 0 * x, z], axis=1))
+    moved = moved + before @ np.array([1e-3, 0.0, -2e-3]) + own @ np.array([-2e-3, 0.0, 1e-3])  # another centre, other places of the markers
+    shift = np.zeros((300, 6, 3))
+    shift[:, 3:] = moved[:, None]
+    blocks = SimpleNamespace(body=np.repeat([body - 1, body], 3), position=shift, angle=np.stack([first, angle][-body:], axis=1),
+                             axes=np.broadcast_to(axis, (300, body, 3)), rotation=np.concatenate([np.repeat(before[:, None], 3, 1), np.repeat(own[:, None], 3, 1)], 1))
+    assert centre_travel(blocks, body, shift) == pytest.approx(2e-3, rel=0.03)

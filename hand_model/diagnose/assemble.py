@@ -56,7 +56,8 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
                      for name, value in station.naming.rejected[:4] if name in NAMES]
     unexplained += [unrepeated_of(s) for s in stations if _wanders(s, stations)]
     ranked = _without_tilts(_without_shadows(_one_clock(_of_hinges(ranked, unexplained))))
-    sized = [(_magnitude(f, stations, _sure), weight, f) for weight, f in ranked]
+    # how far a hinge that is none moves is told only beside what another hinge would explain: that it is none is sure all the same
+    sized = [(_magnitude(f, stations, _value if f.effect in HINGE else _sure), weight, f) for weight, f in ranked]
     ranked = sorted(((float(np.sqrt(m * weight)), f) for m, weight, f in sized), key=lambda item: -item[0])
     ranked = _heaviest(ranked, _same_place)
     trifles = _trifles(ranked, {id(f): m for m, _, f in sized})

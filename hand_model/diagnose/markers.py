@@ -33,7 +33,7 @@ MOSTLY = 0.7  # share of what any motion in step with the angle explains
 @dataclass(frozen=True)
 class MarkerEffect:
     """A candidate that was chosen. everywhere: (b, 3m, c) unprojected, as if it acted always. begin, end: first block of a
-    step and the one after its last, None where it acts always."""
+    step and the one after its last, None where it acts always. coefficients: (c,) of the columns, covariance: (c, c)."""
 
     effect: str
     body: int
@@ -44,6 +44,7 @@ class MarkerEffect:
     evidence: float
     gain: float
     coefficients: Array = field(default_factory=lambda: np.zeros(0))
+    covariance: Array = field(default_factory=lambda: np.zeros((0, 0)))
     shifts: tuple[bool, ...] = ()
 
     @property
@@ -106,14 +107,17 @@ def named_in(blocks: Blocks) -> MarkerNaming:
         creep = max((c for c in creeps if (c.body, c.label) == place), key=lambda c: c.gain)
         if _score([*others, creep], blocks, y, shared, sigma) > _score(found, blocks, y, shared, sigma) + UNLIKELY:
             found = [creep, *others]
-    coefficients, residual = _solve(_with(shared, found, blocks), y)
+    every = _with(shared, found, blocks)
+    coefficients, residual = _solve(every, y)
+    variance = sigma**2 * _inflation(residual, blocks)
+    covariance = _chain_part(every, y)[0] * variance
     p, excess = _lack(residual, blocks)
     start = blocks.chain_columns.shape[-1]
     done = []
     for effect in found:
-        width = effect.everywhere.shape[-1]
-        done.append(replace(effect, coefficients=coefficients[start : start + width]))
-        start += width
+        own = slice(start, start + effect.everywhere.shape[-1])
+        done.append(replace(effect, coefficients=coefficients[own], covariance=covariance[own, own]))
+        start = own.stop
     return MarkerNaming(blocks, tuple(done), sigma, p_before, p, excess_before, excess, refused)
 
 

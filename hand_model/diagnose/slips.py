@@ -17,7 +17,7 @@ from .blocks import Blocks
 from .displacement import CREEP, NO_HINGE, UNNAMED
 from .findings import Finding, weighed
 from .markers import ALPHA, HINGE, MarkerEffect, MarkerNaming
-from .wobble import wobble_amplitude
+from .wobble import centre_travel, wobble_amplitude
 
 Array = NDArray[np.float64]
 
@@ -29,6 +29,7 @@ CORRECTION = {
 }
 SMALL = 0.03  # share of what the marker station explains
 IN_STEP = "the markers leave the hinge's motion in step with the angle"
+DRAWS = 60  # of coefficients, for an interval
 SWAP_FRAMES = 5  # shorter exchanges are ghosts
 
 
@@ -95,12 +96,12 @@ def _finding(angles: FingerAngles, naming: MarkerNaming, name: str, body: int, l
         parameters["moment"] = {"value": at, "unit": "s"}
         text = f"{label or f'{angles.finger.name} {joint}'}: {name.replace('_', ' ')} of {1e3 * size:.2f} mm at {at:.1f} s of {record.trial.name}."
     elif name == "joint_wobble":
-        tilt = _amount(naming, main)
-        parameters["amplitude"] = {"value": tilt, "unit": "rad"}
+        tilt, interval = _amount(naming, main)
+        parameters["amplitude"] = {"value": tilt, "unit": "rad", "ci95": interval}
         text = f"{angles.finger.name} {joint}: a second rotation of up to {np.rad2deg(tilt):.2f} deg across the axis, as the angle grows."
     else:
-        travel = _amount(naming, main)
-        parameters["travel"] = {"value": travel, "unit": "m"}
+        travel, interval = _amount(naming, main)
+        parameters["travel"] = {"value": travel, "unit": "m", "ci95": interval}
         text = f"{angles.finger.name} {joint}: the centre of rotation travels by up to {1e3 * travel:.2f} mm as the angle grows."
     share = sum(e.gain for e in members) / max(sum(e.gain for e in naming.found), 1e-9)
     where = {"finger": angles.finger.name, "joint": joint, "actuator": None, "signal": "markers", "marker": label,
@@ -132,14 +133,18 @@ def _shift(members: Sequence[MarkerEffect], main: MarkerEffect) -> Array:
     return shift[main.begin or 0 : main.end]
 
 
-def _amount(naming: MarkerNaming, effect: MarkerEffect) -> float:
-    """Amplitude of a joint's second rotation [rad], or the largest travel of its centre [m], over the recorded angles."""
-    blocks = naming.blocks
-    shift = (effect.columns @ effect.coefficients).reshape(len(blocks.residual), -1, 3)
-    if effect.effect != "joint_wobble":
-        first = shift[:, int(np.flatnonzero(blocks.body >= effect.body)[0])]
-        return float(np.linalg.norm(first - first[np.argmin(blocks.angle[:, effect.body - 1])], axis=1).max())
-    return wobble_amplitude(blocks, effect.body, shift)
+def _amount(naming: MarkerNaming, effect: MarkerEffect) -> tuple[float, list[float]]:
+    """Amplitude of a joint's second rotation [rad], or the largest travel of its centre [m], over the recorded angles, with its 95 %
+    interval: of what the fitted coefficients' covariance lets it be (parametric bootstrap, Efron & Tibshirani 1993, ch. 6)."""
+    blocks, read = naming.blocks, wobble_amplitude if effect.effect == "joint_wobble" else centre_travel
+
+    def amount(coefficients: Array) -> float:
+        return read(blocks, effect.body, (effect.columns @ coefficients).reshape(len(blocks.residual), -1, 3))
+
+    rng = np.random.default_rng(0)
+    drawn = rng.multivariate_normal(effect.coefficients, effect.covariance, DRAWS, method="eigh")
+    value, sd = amount(effect.coefficients), float(np.std([amount(c) for c in drawn]))
+    return value, [value - 1.96 * sd, value + 1.96 * sd]
 
 
 def _proof(naming: MarkerNaming) -> dict[str, Any]:

@@ -1,7 +1,7 @@
-"""How far a joint's second rotation swings, read from the displacements that were fitted to its markers.
+"""How far a joint's second rotation swings and its centre travels, read from the displacements that were fitted to its markers.
 
 Another axis of the hinge and other places of the markers on their segment explain part of any displacement: what they could explain is
-free, and a half or a full wave over the range is read beside it.
+free, and a course over the range is read beside it: half or full waves of a tilt; of a centre an even or a growing travel, or an ellipse.
 """
 
 from __future__ import annotations
@@ -20,11 +20,29 @@ def wobble_amplitude(blocks: Blocks, body: int, shift: Array) -> float:
 
     body: the segment that the joint carries; shift: (b, m, 3) displacements [m] of all markers, palm frame.
     """
-    tilt, angle = _tilt(blocks, body, shift), blocks.angle[:, body - 1]
-    low, high = np.quantile(angle, [0.005, 0.995])
-    u = (angle - low) / max(high - low, 1e-9)
+    tilt, angle, u = _tilt(blocks, body, shift), blocks.angle[:, body - 1], _share(blocks, body)
     waves = ([np.sin(np.pi * u)], [np.sin(2 * np.pi * u), np.cos(2 * np.pi * u)])
-    return min(_wave(tilt, angle, forms, own) for forms in waves for own in (False, True))[1]
+    _, along = min((_course(tilt, angle, forms, own) for forms in waves for own in (False, True)), key=lambda found: found[0])
+    return float(np.linalg.svd(along)[1][0])
+
+
+def centre_travel(blocks: Blocks, body: int, shift: Array) -> float:
+    """Farthest distance [m] from where it began, over the joint's range, of the travelling centre that describes the displacement best:
+    proportional to the angle, to its square, or along an ellipse. Arguments as in `wobble_amplitude`."""
+    moved = _across(blocks, body, shift[:, blocks.body == body].mean(1))
+    angle, u = blocks.angle[:, body - 1], _share(blocks, body)
+    at = np.linspace(0, 1, 101)
+    forms = (lambda x: [x], lambda x: [x**2], lambda x: [np.sin(np.pi * x), 1 - np.cos(np.pi * x)])
+    left = [_course(moved, angle, form(u), False) for form in forms]
+    best = min(range(len(forms)), key=lambda i: left[i][0])
+    return float(np.linalg.norm(left[best][1] @ np.array(forms[best](at)), axis=0).max())
+
+
+def _share(blocks: Blocks, body: int) -> Array:
+    """Angle (b,) of the joint before a body over its range."""
+    angle = blocks.angle[:, body - 1]
+    low, high = np.quantile(angle, [0.005, 0.995])
+    return (angle - low) / max(high - low, 1e-9)
 
 
 def _tilt(blocks: Blocks, body: int, shift: Array) -> Array:
@@ -34,6 +52,11 @@ def _tilt(blocks: Blocks, body: int, shift: Array) -> Array:
     inertia = np.einsum("bmi,bmj->bij", arm, arm)
     inertia = np.trace(inertia, axis1=1, axis2=2)[:, None, None] * np.eye(3) - inertia
     turned = np.linalg.solve(inertia, np.cross(arm, shift[:, mine]).sum(1)[..., None])[..., 0]
+    return _across(blocks, body, turned)
+
+
+def _across(blocks: Blocks, body: int, vector: Array) -> Array:
+    """Components (b, 2) of vectors (b, 3) across a joint's axis, along two directions that turn with the segment before it."""
     axis = blocks.axes[:, body - 1]
     helper = np.eye(3)[np.argmin(np.abs(axis[0]))]
     if body > 1:
@@ -41,18 +64,16 @@ def _tilt(blocks: Blocks, body: int, shift: Array) -> Array:
         helper = before @ before[0].T @ helper
     first = np.cross(axis, helper)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
-    return np.stack([np.einsum("bi,bi->b", turned, d) for d in (first, np.cross(axis, first))], axis=1)
+    return np.stack([np.einsum("bi,bi->b", vector, d) for d in (first, np.cross(axis, first))], axis=1)
 
 
-def _wave(tilt: Array, angle: Array, forms: list[Array], own: bool) -> tuple[float, float]:
-    """Sum of squares left of a tilt (b, 2), and the amplitude, of a wave beside rotations that are constant before and behind the joint.
-    own: its direction turns with the segment that the joint carries."""
+def _course(across: Array, angle: Array, forms: list[Array], own: bool) -> tuple[float, Array]:
+    """Sum of squares left of a course (b, 2), and the coefficients (2, forms) along two directions of `forms`, beside what is constant
+    before and behind the joint. own: the directions turn with the segment that the joint carries."""
     none, one = np.zeros(len(angle)), np.ones(len(angle))
     cosine, sine = np.cos(angle), np.sin(angle)
     columns = [np.r_[one, none], np.r_[none, one], np.r_[cosine, sine], np.r_[-sine, cosine]]
-    across = columns[2:] if own else columns[:2]
-    columns += [np.r_[f, f] * direction for direction in across for f in forms]
-    matrix, target = np.stack(columns, axis=1), np.r_[tilt[:, 0], tilt[:, 1]]
+    columns += [np.r_[f, f] * direction for direction in (columns[2:] if own else columns[:2]) for f in forms]
+    matrix, target = np.stack(columns, axis=1), np.r_[across[:, 0], across[:, 1]]
     found = np.linalg.lstsq(matrix, target, rcond=None)[0]
-    along = np.linalg.svd(found[4:].reshape(2, len(forms)))[1][0]
-    return float(np.sum((target - matrix @ found) ** 2)), float(along)
+    return float(np.sum((target - matrix @ found) ** 2)), found[4:].reshape(2, len(forms))
