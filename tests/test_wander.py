@@ -10,7 +10,7 @@ import pytest
 from test_diagnose import drive, planted
 
 from hand_model.diagnose.balance import Balance
-from hand_model.diagnose.drive import echoes_command
+from hand_model.diagnose.drive import echoes_command, rests_on_command
 from hand_model.diagnose.name import name_effects
 from hand_model.diagnose.stamps import stamps
 from hand_model.diagnose.wander import Wander, estimate_wander
@@ -105,6 +105,20 @@ def test_a_position_that_repeats_its_setpoint_is_no_measurement():
     logs = [log_of(s, s.time_s, s.position) for s in states]
     assert not echoes_command(logs)
     assert echoes_command([replace(log, columns={**log.columns, "position": log.columns["setpoint"]}) for log in logs])
+
+
+def test_a_position_that_rests_on_every_setpoint_to_the_count_is_no_measurement():
+    states = drive(12)
+    move = np.arange(len(states[0].time_s)) // 100
+    setpoint = 12000.0 + 3000.0 * (move % 3) + 37.0 * move
+    reference = np.convolve(np.r_[np.full(30, setpoint[0]), setpoint], np.ones(31) / 31, mode="valid").round()  # starts at once, ends there
+    ended = np.random.default_rng(1).normal(0, 5.0, len(setpoint)).round()
+    log = log_of(states[0], states[0].time_s, reference)
+    log = replace(log, columns={**log.columns, "setpoint": setpoint})
+    assert rests_on_command([log]) and not echoes_command([log])
+    assert not rests_on_command([replace(log, columns={**log.columns, "position": reference + ended})])
+    coarse = {**log.columns, "position": 3000.0 * (reference / 3000.0).round()}
+    assert not rests_on_command([replace(log, columns=coarse)])
 
 
 def test_a_ripple_is_not_read_from_starts_and_stops():

@@ -24,6 +24,7 @@ HARMONICS, SAME_PERIOD = 4, 0.02
 SHADOW = 0.5  # of an encoder error's size: less, in the current of the same motor, may be what is left of it
 TILT = 0.2  # the same, of a wobble's or a travelling centre's, in the angles of the finger
 ANGULAR = {e.name for station in ("encoder", "linkage") for e in catalogue(station)} - {"clock_drift"}
+SLIPS = ("marker_slip", "palm_marker_slip", "support_slip")
 REFUSED = "command_as_measurement"  # a channel that tells nothing: no other finding is small beside it
 TRIFLE, SLIGHT = 0.01, 0.25  # of the square of the heaviest weight, and of the magnitude at which an effect is plain
 MINUTE = 0.08  # of that magnitude: less, where the lack-of-fit test sees nothing, is left to the imperfections of reading angles and speeds
@@ -175,7 +176,7 @@ def _of_hinges(ranked: list[tuple[float, Finding]], unexplained: Sequence[Mappin
     """Without what angles tell of a finger whose markers leave the hinges' motion by no known way: they are no angles of a hinge. Where
     no finger's joint is a hinge to the cameras, it is the cameras that bend space."""
     bent = {entry["where"]["finger"] for entry in unexplained if NO_HINGE in entry["shape"]}
-    wrong = ANGULAR | set(HINGE) if len(bent) > 1 else ANGULAR
+    wrong = ANGULAR | {*HINGE, *SLIPS} if len(bent) > 1 else ANGULAR
     return [item for item in ranked if item[1].where["finger"] not in bent or item[1].effect not in wrong]
 
 

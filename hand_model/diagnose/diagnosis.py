@@ -22,7 +22,7 @@ from .balance import Balance
 from .command import CommandFacts, command_facts, command_findings, refused, with_lateness
 from .correct import refuse_output, write_corrected
 from .decoupled import while_driven, without_excursions
-from .drive import drive_states, drive_trials, echoes_command, is_measured, opposes, with_gives
+from .drive import drive_states, drive_trials, echoes_command, is_measured, opposes, rests_on_command, with_gives
 from .evidence import gain, typical_coefficients
 from .findings import FILES, FOLDERS, Finding, Findings
 from .finger import finger_readings
@@ -143,6 +143,8 @@ def _no_measurement(logs: list[Log]) -> str:
     """Why the position of a drive's logs is no measurement, "" where it is one."""
     if echoes_command(logs):
         return "it is at every new setpoint at once"
+    if rests_on_command(logs):
+        return "it rests on every setpoint to the count"
     return "" if any(moves(log.column("position")) for log in logs) else "it never moves"
 
 

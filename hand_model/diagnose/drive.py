@@ -24,6 +24,7 @@ SETTLE_SAMPLES = (14, 13)  # after a start and before a stop: where acceleration
 UNFOLLOWED = 0.25  # of the range: commands that end farther than this from where the motion does are not its own
 ECHO = 0.003  # of the range: a third of what a fast motion covers in one sample
 UNMOVED = 0.95  # of a current's standard deviation: more than this left by the motion, and it measures nothing
+FEWEST_RESTS, FINE = 10, 200  # rests that are looked at, and different readings of an encoder that is no coarse one
 SETTLE_TRAVEL = 4.0  # [%] some six bristle lengths of a healthy drive
 
 
@@ -174,6 +175,21 @@ def echoes_command(logs: Sequence[Log]) -> bool:
         near.append(np.abs(position - setpoint)[changed & np.isfinite(position) & np.isfinite(setpoint)] / span)
     gaps = np.concatenate(near) if near else np.zeros(0)
     return len(gaps) >= 5 and float(np.mean(gaps < ECHO)) > 0.9
+
+
+def rests_on_command(logs: Sequence[Log]) -> bool:
+    """Whether the position column is at the setpoint to the count wherever the next one finds it: no drive with friction ends every
+    move there, nor does an encoder of so many counts read so."""
+    on, seen = [], np.zeros(0)
+    for log in logs:
+        if "setpoint" not in log.columns:
+            return False
+        position, setpoint = log.column("position"), log.column("setpoint")
+        before = np.flatnonzero(np.diff(setpoint) != 0)
+        on.append((position == setpoint)[before][np.isfinite(position[before])])
+        seen = np.r_[seen, position[np.isfinite(position)]]
+    rests = np.concatenate(on) if on else np.zeros(0)
+    return len(rests) >= FEWEST_RESTS and len(np.unique(seen)) >= FINE and float(np.mean(rests)) > 0.9
 
 
 def steady(time_s: Array, motion: Motion) -> NDArray[np.bool_]:

@@ -14,7 +14,7 @@ from ..identify.likelihood import OUTLIER_LIMIT
 from ..rotation import kabsch
 from .angles import FingerAngles
 from .blocks import Blocks
-from .displacement import CREEP, NO_HINGE, UNNAMED
+from .displacement import NO_HINGE, UNNAMED
 from .findings import Finding, weighed
 from .markers import ALPHA, HINGE, MarkerEffect, MarkerNaming
 from .wobble import centre_travel, wobble_amplitude
@@ -41,7 +41,7 @@ def marker_findings(angles: FingerAngles, naming: MarkerNaming) -> list[tuple[fl
     groups: dict[tuple[str, int, str | None], list[MarkerEffect]] = {}
     for effect in naming.found:
         groups.setdefault((effect.effect, effect.body, effect.label), []).append(effect)
-    least = max([SMALL * sum(e.gain for e in naming.found), *(e.gain for e in naming.found if e.effect == CREEP)])
+    least = max([SMALL * sum(e.gain for e in naming.found), *(e.gain for e in naming.found if e.effect in UNNAMED)])
     for (name, body, label), members in groups.items():
         if name in UNNAMED or sum(e.gain for e in members) < least:
             continue  # no more than the form of the large one being another
