@@ -67,6 +67,10 @@ def undisturbed(naming: Naming) -> Reading:
     balance, fit = naming.balance, naming.fit
     count = (balance.train & balance.steady).sum()
     lively = any(t.effect.warps or t.effect.replaces for t in fit.terms)
+    if balance.wander is not None and any(t.effect.family for t in fit.terms):
+        # lost motion is a level of each stroke, which levels by chance would share with it
+        even = balance.wandering(None)
+        return Reading(balance, naming.declared, balance.fit(refit(even, even.fit(fit.terms)).terms))
     if not fit.terms or lively or balance.steady.all() or count < 20 * (len(balance.names) + fit.size):
         return Reading(balance, naming.declared, fit)
     calm = balance.settled()
