@@ -62,7 +62,7 @@ def parameter_intervals(reading: Reading, which: int) -> dict[str, dict[str, Any
 
 def undisturbed(naming: Naming) -> Reading:
     """Where sizes are read: from steady samples alone, for starts and stops are smeared and bend what happens at low speed; as
-    named where an effect acts at starts, and where too few samples are steady. Among the forms of each effect, the one that
+    named where an effect acts at starts, and where too few samples are steady; of lost motion without levels by chance. Among the forms of each effect, the one that
     steady motion likes best."""
     balance, fit = naming.balance, naming.fit
     count = (balance.train & balance.steady).sum()

@@ -102,7 +102,7 @@ def named_in(blocks: Blocks) -> MarkerNaming:
     chain = _chain_part(shared, y)
     creeps = [_try(c, blocks, moments[id(c.columns)], chain, sigma) for c in candidates if c.effect == CREEP]
     found, refused = _selected([c for c in candidates if c.effect != CREEP], blocks, y, shared, moments, sigma)
-    for place in {(e.body, e.label) for e in found if e.begin is not None}:
+    for place in dict.fromkeys((e.body, e.label) for e in found if e.begin is not None):
         others = [e for e in found if e.begin is None or (e.body, e.label) != place]
         creep = max((c for c in creeps if (c.body, c.label) == place), key=lambda c: c.gain)
         if _score([*others, creep], blocks, y, shared, sigma) > _score(found, blocks, y, shared, sigma) + UNLIKELY:

@@ -18,8 +18,8 @@ from ..effects.base import sample_interval
 from .balance import DISCRETE, Balance, Fit, Term
 from .evidence import evidence, gain, rough_evidence, scale_of
 from .grid import Grid
-from .lack_of_fit import lack_of_fit
-from .naming import ALPHA, EXPLAINED_LEAST, MOST_TERMS, Named, Naming, Rival
+from .lack_of_fit import LackOfFit, lack_of_fit
+from .naming import ALPHA, MOST_TERMS, Named, Naming, Rival, overwhelmed
 from .wander import Wander, estimate_wander
 
 Array = NDArray[np.float64]
@@ -60,9 +60,10 @@ def _name(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str], 
         balance = balance.wandering(wander)
         fit, brought, ranked = _search(balance, effects, progress)
         wander = _unrepeated(balance, fit)
-        if _alike(wander, balance.wander) or _overwhelmed(balance, fit):
+        lost = _overwhelmed(balance, fit)
+        if lost or _alike(wander, balance.wander):
             break
-    calmed = None if _overwhelmed(balance, fit) else _calmed(balance, fit, ranked)
+    calmed = None if lost else _calmed(balance, fit, ranked)
     if calmed is not None:
         rival, calmer = calmed
         other = balance.wandering(calmer)
@@ -71,21 +72,20 @@ def _name(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str], 
             balance, brought = other.wandering(_unrepeated(other, further)), {**brought, **more}
             fit = refit(balance, balance.fit(further.terms))
     declared = balance.fit()
-    before = lack_of_fit(balance, declared.prediction, len(balance.names), ALPHA)
-    after = lack_of_fit(balance, fit.prediction, len(balance.names) + fit.size, ALPHA) if fit.terms else before
+    before = _lack(balance, declared)
+    after = _lack(balance, fit) if fit.terms else before
     found = _findings(balance, effects, fit.terms, fit, declared)
     kept = {t.effect.name for t in fit.terms}
     rejected = tuple(sorted(((n, e) for n, e in brought.items() if n not in kept), key=lambda item: -item[1]))
     return Naming(balance, declared, fit, estimate_wander(balance, fit.prediction), before, after, found, rejected)
 
 
+def _lack(balance: Balance, fit: Fit) -> LackOfFit:
+    return lack_of_fit(balance, fit.prediction, len(balance.names) + fit.size, ALPHA)
+
+
 def _overwhelmed(balance: Balance, fit: Fit) -> bool:
-    """`Naming.overwhelmed`, of a fit."""
-    if len(fit.terms) < MOST_TERMS:
-        return False
-    before = lack_of_fit(balance, balance.fit().prediction, len(balance.names), ALPHA)
-    after = lack_of_fit(balance, fit.prediction, len(balance.names) + fit.size, ALPHA)
-    return after.p < ALPHA and after.excess > (1 - EXPLAINED_LEAST) * before.excess
+    return len(fit.terms) >= MOST_TERMS and overwhelmed(len(fit.terms), _lack(balance, balance.fit()), _lack(balance, fit))
 
 
 def _calmed(balance: Balance, fit: Fit, ranked: Iterable[Rival]) -> tuple[Rival, Wander | None] | None:
@@ -232,7 +232,7 @@ def _project(balance: Balance, grid: Grid, terms: tuple[Term, ...], least: float
             gram = columns.gram(mine) - inside[mine] @ inside[mine].T
             gains[i] = float(right[mine] @ np.linalg.lstsq(gram, right[mine], rcond=None)[0])
     order = np.argsort(gains)[::-1]
-    return [grid.shapes[i] for i in order[:2] if gains[i] > least]
+    return [grid.shapes[i] for i in order[:2] if gains[i] > max(least, 0.0)]
 
 
 def polish(balance: Balance, fit: Fit, which: int) -> Fit:

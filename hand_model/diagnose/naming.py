@@ -69,6 +69,10 @@ class Naming:
 
     @property
     def overwhelmed(self) -> bool:
-        """Whether as many effects as may be named leave a plain mismatch unexplained: whatever else is tried, nothing known is missing."""
-        full = len(self.found) >= MOST_TERMS and self.after.p < ALPHA
-        return full and self.after.excess > (1 - EXPLAINED_LEAST) * self.before.excess
+        """Whether the effects are too many to go on."""
+        return overwhelmed(len(self.found), self.before, self.after)
+
+
+def overwhelmed(count: int, before: LackOfFit, after: LackOfFit) -> bool:
+    """Whether as many effects as may be named leave a plain mismatch unexplained: whatever else is tried, nothing known is missing."""
+    return count >= MOST_TERMS and after.p < ALPHA and after.excess > (1 - EXPLAINED_LEAST) * before.excess

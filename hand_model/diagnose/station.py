@@ -55,7 +55,7 @@ class Station:
         return float(np.clip(1 - max(self.naming.after.excess, 0.0) / before, 0, 1))
 
     @property
-    def held(self) -> float:
+    def claimed(self) -> float:
         """Share of the mismatch that the named effects hold together: all of what is only seen along them."""
         return self.explained if self.naming.before.p < ALPHA else 1.0
 
@@ -178,7 +178,7 @@ def finding_of(station: Station, named: Named, share: float, size: float) -> tup
         "marker": None,
         "trials": [s.trial for s in naming.balance.states],
         "region": effect.region(naming.balance.states, named.term.shape),
-        "share_of_mismatch": share * station.held,
+        "share_of_mismatch": share * station.claimed,
     }
     top = named.rivals[0].evidence
     weights = np.exp(np.array([r.evidence for r in named.rivals] + [0.0]) - max(top, 0.0))
@@ -197,7 +197,7 @@ def finding_of(station: Station, named: Named, share: float, size: float) -> tup
 def outsider_of(station: Station, named: Named) -> dict[str, Any]:
     """The unexplained entry of what no table of effects names, with what it looks like."""
     values = {k: v["value"] for k, v in station.parameters[station.naming.fit.terms.index(named.term)].items()}
-    entry = unexplained_of(station, named.share * station.held)
+    entry = unexplained_of(station, named.share * station.claimed)
     said = named.term.effect.statement(entry["where"], values).removesuffix(".")
     return {**entry, "shape": f"no known effect, but {said}"}
 
