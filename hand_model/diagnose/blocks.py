@@ -102,6 +102,13 @@ def _assembled(chain: Chain, body: NDArray[np.int64], labels: tuple[str, ...], r
                   np.stack([c for _, c in joints], 1), angle, record.astype(int), time_s, labels, body)
 
 
+def share_of_range(blocks: Blocks, joint: int) -> Array:
+    """Angle (b,) of a joint over the range that it was recorded in: zero where it begins, one where it ends."""
+    angle = blocks.angle[:, joint]
+    low, high = np.quantile(angle, [0.005, 0.995])
+    return (angle - low) / max(high - low, 1e-9)
+
+
 def project(blocks: Blocks, columns: Array) -> Array:
     """Columns (b, 3m, c), weighted, minus what each block's pose explains."""
     root = np.sqrt(np.repeat(blocks.weight / BLOCK, 3, axis=1))[..., None]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .blocks import Blocks
+from .blocks import Blocks, share_of_range
 
 Array = NDArray[np.float64]
 
@@ -42,7 +42,6 @@ def candidates_of(blocks: Blocks) -> list[Candidate]:
             columns[:, j] = frame
             flat = columns.reshape(b, 3 * m, 3)
             out += [Candidate(name, int(blocks.body[j]), label, flat, True, lasting) for lasting in BOTH]
-            out += _creeping(blocks, int(blocks.body[j]), label, flat)
     for k in range(1, int(blocks.body.max()) + 1):
         mine = np.flatnonzero(blocks.body == k)
         arm = blocks.position[:, mine] - blocks.position[:, mine].mean(1, keepdims=True)
@@ -53,12 +52,11 @@ def candidates_of(blocks: Blocks) -> list[Candidate]:
             columns[:, mine, :, 3:] = turned
             flat = columns.reshape(b, 3 * m, 6)
             out += [Candidate("support_slip", k, None, flat, True, lasting) for lasting in BOTH]
-            out += _creeping(blocks, k, None, flat)
         out += [*_no_hinge(blocks, k), *_any_motion(blocks, k)]
     return out
 
 
-def _creeping(blocks: Blocks, body: int, label: str | None, columns: Array) -> list[Candidate]:
+def creeping(blocks: Blocks, slip: Candidate) -> list[Candidate]:
     """What slips at a moment, moving evenly instead: over all recordings, or over each anew."""
     within = np.zeros(len(blocks.time_s))
     for record in np.unique(blocks.record):
@@ -66,7 +64,7 @@ def _creeping(blocks: Blocks, body: int, label: str | None, columns: Array) -> l
         t = blocks.time_s[mine]
         within[mine] = (t - t[0]) / max(t[-1] - t[0], 1e-9)
     whole = np.arange(len(within)) / max(len(within) - 1, 1)
-    return [Candidate(CREEP, body, label, columns * ramp[:, None, None], False) for ramp in (whole, within)]
+    return [Candidate(CREEP, slip.body, slip.label, slip.columns * ramp[:, None, None], False) for ramp in (whole, within)]
 
 
 def _frames(blocks: Blocks, body: int, marker: int) -> list[Array]:
@@ -80,8 +78,7 @@ def _no_hinge(blocks: Blocks, k: int) -> list[Candidate]:
     """Wobble and moving centre of joint k - 1, each with a few forms over its angle. The other axis of a wobble meets the hinge
     where the centre is taken to be, or passes anywhere: then what it carries is shifted in step with the tilt."""
     b, m = blocks.weight.shape
-    low, high = np.quantile(blocks.angle[:, k - 1], [0.005, 0.995])
-    u = ((blocks.angle[:, k - 1] - low) / max(high - low, 1e-9))[:, None]
+    u = share_of_range(blocks, k - 1)[:, None]
     wave = [np.sin(2 * np.pi * u), np.cos(2 * np.pi * u)]
     forms: list[list[Array]] = [[u**2], [u**2, u**3], wave, [u**2, u**3, *wave]]
     moved = np.flatnonzero(blocks.body >= k)
@@ -111,8 +108,7 @@ def _any_motion(blocks: Blocks, k: int) -> list[Candidate]:
     """Whatever a smooth function of joint k - 1's angle could be: any motion of what it carries as a rigid body, or of each
     marker of its segment (skin, a loose support)."""
     b, m = blocks.weight.shape
-    low, high = np.quantile(blocks.angle[:, k - 1], [0.005, 0.995])
-    u = (blocks.angle[:, k - 1] - low) / max(high - low, 1e-9)
+    u = share_of_range(blocks, k - 1)
     forms = [u, u**2, u**3, np.sin(2 * np.pi * u), np.cos(2 * np.pi * u)]
     moved, mine = np.flatnonzero(blocks.body >= k), np.flatnonzero(blocks.body == k)
     rigid = np.zeros((b, m, 3, 6))

@@ -180,16 +180,16 @@ def echoes_command(logs: Sequence[Log]) -> bool:
 def rests_on_command(logs: Sequence[Log]) -> bool:
     """Whether the position column is at the setpoint to the count wherever the next one finds it: no drive with friction ends every
     move there, nor does an encoder of so many counts read so."""
-    on, seen = [], np.zeros(0)
+    on, seen = [np.zeros(0)], [np.zeros(0)]
     for log in logs:
         if "setpoint" not in log.columns:
             return False
         position, setpoint = log.column("position"), log.column("setpoint")
         before = np.flatnonzero(np.diff(setpoint) != 0)
         on.append((position == setpoint)[before][np.isfinite(position[before])])
-        seen = np.r_[seen, position[np.isfinite(position)]]
-    rests = np.concatenate(on) if on else np.zeros(0)
-    return len(rests) >= FEWEST_RESTS and len(np.unique(seen)) >= FINE and float(np.mean(rests)) > 0.9
+        seen.append(position[np.isfinite(position)])
+    rests = np.concatenate(on)
+    return len(rests) >= FEWEST_RESTS and len(np.unique(np.concatenate(seen))) >= FINE and float(np.mean(rests)) > 0.9
 
 
 def steady(time_s: Array, motion: Motion) -> NDArray[np.bool_]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..effects.outside.outsider import UNLIKELY
 from .angles import FingerAngles, refitted
 from .blocks import Blocks, blocks_of, project
-from .displacement import CREEP, NO_HINGE, Candidate, candidates_of
+from .displacement import NO_HINGE, Candidate, candidates_of, creeping
 
 Array = NDArray[np.float64]
 
@@ -99,18 +99,19 @@ def named_in(blocks: Blocks) -> MarkerNaming:
         return MarkerNaming(blocks, (), sigma, p_before, p_before, excess_before, excess_before)
     candidates = candidates_of(blocks)
     moments = {id(c.columns): _moments(project(blocks, c.columns), shared, y) for c in candidates}
-    chain = _chain_part(shared, y)
-    creeps = [_try(c, blocks, moments[id(c.columns)], chain, sigma) for c in candidates if c.effect == CREEP]
-    found, refused = _selected([c for c in candidates if c.effect != CREEP], blocks, y, shared, moments, sigma)
+    found, refused = _selected(candidates, blocks, y, shared, moments, sigma)
     for place in dict.fromkeys((e.body, e.label) for e in found if e.begin is not None):
         others = [e for e in found if e.begin is None or (e.body, e.label) != place]
-        creep = max((c for c in creeps if (c.body, c.label) == place), key=lambda c: c.gain)
+        slips = [c for c in candidates if c.step and c.lasting and (c.body, c.label) == place]
+        creeps = [_moving(c, blocks, y, shared, sigma) for slip in slips for c in creeping(blocks, slip)]
+        creep = max(creeps, key=lambda c: c.gain)
         if _score([*others, creep], blocks, y, shared, sigma) > _score(found, blocks, y, shared, sigma) + UNLIKELY:
             found = [creep, *others]
     every = _with(shared, found, blocks)
-    coefficients, residual = _solve(every, y)
-    variance = sigma**2 * _inflation(residual, blocks)
-    covariance = _chain_part(every, y)[0] * variance
+    inverse, right = _chain_part(every, y)
+    coefficients = inverse @ right
+    residual = y - every @ coefficients[:, None]
+    covariance = inverse * sigma**2 * _inflation(residual, blocks)
     p, excess = _lack(residual, blocks)
     start = blocks.chain_columns.shape[-1]
     done = []
@@ -142,6 +143,11 @@ def _selected(candidates: list[Candidate], blocks: Blocks, y: Array, shared: Arr
         shared = wider
         moments = {key: value.with_shared(more) for key, value in moments.items()}
     return found, None
+
+
+def _moving(candidate: Candidate, blocks: Blocks, y: Array, shared: Array, sigma: float) -> MarkerEffect:
+    """What a candidate brings beside the chain alone."""
+    return _try(candidate, blocks, _moments(project(blocks, candidate.columns), shared, y), _chain_part(shared, y), sigma)
 
 
 def _with(shared: Array, found: list[MarkerEffect], blocks: Blocks) -> Array:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .blocks import Blocks
+from .blocks import Blocks, share_of_range
 
 Array = NDArray[np.float64]
 
@@ -20,7 +20,7 @@ def wobble_amplitude(blocks: Blocks, body: int, shift: Array) -> float:
 
     body: the segment that the joint carries; shift: (b, m, 3) displacements [m] of all markers, palm frame.
     """
-    tilt, angle, u = _tilt(blocks, body, shift), blocks.angle[:, body - 1], _share(blocks, body)
+    tilt, angle, u = _tilt(blocks, body, shift), blocks.angle[:, body - 1], share_of_range(blocks, body - 1)
     waves = ([np.sin(np.pi * u)], [np.sin(2 * np.pi * u), np.cos(2 * np.pi * u)])
     _, along = min((_course(tilt, angle, forms, own) for forms in waves for own in (False, True)), key=lambda found: found[0])
     return float(np.linalg.svd(along)[1][0])
@@ -30,19 +30,12 @@ def centre_travel(blocks: Blocks, body: int, shift: Array) -> float:
     """Farthest distance [m] from where it began, over the joint's range, of the travelling centre that describes the displacement best:
     proportional to the angle, to its square, or along an ellipse. Arguments as in `wobble_amplitude`."""
     moved = _across(blocks, body, shift[:, blocks.body == body].mean(1))
-    angle, u = blocks.angle[:, body - 1], _share(blocks, body)
+    angle, u = blocks.angle[:, body - 1], share_of_range(blocks, body - 1)
     at = np.linspace(0, 1, 101)
     forms = (lambda x: [x], lambda x: [x**2], lambda x: [np.sin(np.pi * x), 1 - np.cos(np.pi * x)])
     left = [_course(moved, angle, form(u), False) for form in forms]
     best = min(range(len(forms)), key=lambda i: left[i][0])
     return float(np.linalg.norm(left[best][1] @ np.array(forms[best](at)), axis=0).max())
-
-
-def _share(blocks: Blocks, body: int) -> Array:
-    """Angle (b,) of the joint before a body over its range."""
-    angle = blocks.angle[:, body - 1]
-    low, high = np.quantile(angle, [0.005, 0.995])
-    return (angle - low) / max(high - low, 1e-9)
 
 
 def _tilt(blocks: Blocks, body: int, shift: Array) -> Array:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..base import Amplitude, Array, DriveState
-from .outsider import Outsider
+from .outsider import Outsider, of_its_record
 
 RECORDS, WHILES = 4, 8  # recordings that may be looked at, and pieces of each
 
@@ -27,12 +27,9 @@ class ClockWander(Outsider):
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """Speed of the segment in each while, (n, RECORDS * WHILES)."""
-        out = np.zeros((len(state.time_s), RECORDS, WHILES))
-        record = int(state.extra["trial_index"][0])
-        if record < RECORDS:
-            share = (state.time_s - state.time_s[0]) / max(state.time_s[-1] - state.time_s[0], 1e-9)
-            out[np.arange(len(share)), record, np.minimum((WHILES * share).astype(int), WHILES - 1)] = -state.slope * state.velocity
-        return out.reshape(len(state.time_s), -1)
+        share = (state.time_s - state.time_s[0]) / max(state.time_s[-1] - state.time_s[0], 1e-9)
+        inside = np.minimum((WHILES * share).astype(int), WHILES - 1)[:, None] == np.arange(WHILES)
+        return of_its_record(state, np.where(inside, (-state.slope * state.velocity)[:, None], 0.0), RECORDS)
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """How far they part."""

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..base import DriveState, Effect, Shape
+from ..base import Array, DriveState, Effect, Shape
 
 UNLIKELY = 4.0  # log evidence by which an outsider must beat what the table holds: more than the width of a class
 
@@ -21,6 +21,15 @@ class Outsider(Effect):
     def log_prior(self, parameters: Mapping[str, float]) -> float:
         """What is known comes first."""
         return -UNLIKELY
+
+
+def of_its_record(state: DriveState, columns: Array, records: int) -> Array:
+    """Columns (n, k) of one recording among those of the first `records` of a session, (n, records k); zero of any other."""
+    out = np.zeros((len(columns), records, columns.shape[1]))
+    record = int(state.extra["trial_index"][0]) if "trial_index" in state.extra else records
+    if record < records:
+        out[:, record] = columns
+    return out.reshape(len(columns), -1)
 
 
 def moments(states: tuple[DriveState, ...]) -> Shape:

@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from scipy.signal import find_peaks
 
 from ..base import Amplitude, Array, DriveState, Shape, figure, sample_interval
-from .outsider import Outsider
+from .outsider import Outsider, of_its_record
 
 RECORDS = 8  # that may be looked at; each has its own phase
 SLOWEST_HZ, CYCLES = 0.3, 6  # slower, or fewer cycles in a recording, it is a wandering zero
@@ -30,6 +29,8 @@ class Vibration(Outsider):
 
     def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
         """The highest peaks of the periodogram of what the declared model leaves."""
+        from scipy.signal import find_peaks
+
         shape = self.shapes(states)[0]
         step = sample_interval(states)
         count = FINER * max(int((s.time_s[-1] - s.time_s[0]) / step) for s in states)
@@ -50,12 +51,8 @@ class Vibration(Outsider):
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """The wave in its recording, (n, 2 RECORDS)."""
-        out = np.zeros((len(state.time_s), RECORDS, 2))
-        record = int(state.extra["trial_index"][0]) if "trial_index" in state.extra else RECORDS
-        if record < RECORDS:
-            phase = 2 * np.pi * shape["frequency"] * state.time_s
-            out[:, record] = np.stack([np.cos(phase), np.sin(phase)], axis=-1)
-        return out.reshape(len(state.time_s), -1)
+        phase = 2 * np.pi * shape["frequency"] * state.time_s
+        return of_its_record(state, np.stack([np.cos(phase), np.sin(phase)], axis=-1), RECORDS)
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """Its frequency."""
