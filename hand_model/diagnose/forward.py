@@ -83,7 +83,7 @@ def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, pat
         if mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator) == motor:
             model.actuator_gainprm[actuator, 0] = _unit(model, motor)
             model.actuator_biasprm[actuator] = 0.0
-            model.actuator_ctrllimited[actuator] = 0
+            model.actuator_ctrllimited[model.actuator_ctrladr[actuator]] = 0  # passive motors have no control
     address, dof = model.jnt_qposadr[list(held)], model.jnt_dofadr[list(held)]
     model.dof_armature[dof] = HOLD
     mujoco.mj_setConst(model, mujoco.MjData(model))
