@@ -9,7 +9,8 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager
-from typing import Any
+from multiprocessing.connection import Connection
+from typing import Any, Self
 
 WORKERS = 2
 
@@ -24,6 +25,12 @@ def single_threaded() -> Iterator[None]:
         yield
 
 
+def _forks() -> bool:
+    """Whether a process may be forked here: only while no other thread runs (spawning would import the caller's script again)."""
+    return ("fork" in multiprocessing.get_all_start_methods() and threading.active_count() == 1
+            and not multiprocessing.current_process().daemon)
+
+
 class Background:
     """Calls of one function with several argument tuples, under way from construction on."""
 
@@ -31,8 +38,7 @@ class Background:
         self._function, self._arguments = function, tuple(arguments)
         self._pool: ProcessPoolExecutor | None = None
         self._futures: list[Future[Any]] = []
-        # Forking is only safe while no other thread runs; spawning would import the caller's script again.
-        if self._arguments and "fork" in multiprocessing.get_all_start_methods() and threading.active_count() == 1:
+        if self._arguments and _forks():
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", DeprecationWarning)
                 workers = min(WORKERS, len(self._arguments))
@@ -48,3 +54,61 @@ class Background:
             yield from (future.result() for future in self._futures)
         finally:  # a pool that has done its work is waited for: its thread would keep the next one from forking
             self._pool.shutdown(wait=all(f.done() for f in self._futures), cancel_futures=True)
+
+
+class Pair:
+    """This process and one forked from it, which hold the same `state` and each keep what they cache: for many short calls. Where nothing
+    can be forked, this process alone. Also a context manager, which ends the other one."""
+
+    def __init__(self, state: Any) -> None:
+        self.state = state
+        self._process: Any = None
+        if _forks():
+            fork = multiprocessing.get_context("fork")
+            self._pipe, theirs = fork.Pipe()
+            self._process = fork.Process(target=_serve, args=(theirs, self._pipe, state), daemon=True)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", DeprecationWarning)
+                self._process.start()
+            theirs.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._process is not None:
+            self._pipe.close()  # at which the other one ends
+            self._process.join()
+            self._process = None
+
+    def map(self, function: Callable[..., Any], items: Sequence[Any], *rest: Any) -> list[Any]:
+        """`function(state, item, *rest)` of every item, every other one by the other process: the same places by the same process
+        each time. Raises what a call raised."""
+        items = list(items)
+        if self._process is None or len(items) < 2:
+            return [function(self.state, item, *rest) for item in items]
+        self._pipe.send((function, items[1::2], rest))
+        mine, error = [], None
+        try:
+            mine = [function(self.state, item, *rest) for item in items[::2]]
+        except Exception as raised:  # noqa: BLE001, raised again, but only once the other one's answer is read: it would be taken for that of the next call
+            error = raised
+        theirs = self._pipe.recv()
+        if error is not None or isinstance(theirs, Exception):
+            raise error or theirs
+        out: list[Any] = [None] * len(items)
+        out[::2], out[1::2] = mine, theirs
+        return out
+
+
+def _serve(pipe: Connection, inherited: Connection, state: Any) -> None:
+    inherited.close()  # held open here, it would never tell that the other side has ended
+    while True:
+        try:
+            function, items, rest = pipe.recv()
+        except EOFError:
+            return
+        try:
+            pipe.send([function(state, item, *rest) for item in items])
+        except Exception as error:  # noqa: BLE001, raised where it was asked for
+            pipe.send(error)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hand_model.background import Background, single_threaded
+from hand_model.background import Background, Pair, single_threaded
 
 threadpoolctl = pytest.importorskip("threadpoolctl")
 
@@ -22,3 +22,33 @@ def test_blas_has_one_thread_within_and_in_what_is_forked_and_as_many_as_before_
             assert set(_threads(4)) == {1}
             assert all(set(found) == {1} for found in Background(_threads, [(4,), (8,)]).results())
         assert _threads(4) == before
+
+
+def _seen(state: dict[str, int], item: int, factor: int) -> tuple[int, int]:
+    if item < 0:
+        raise ValueError(item)
+    state["calls"] += 1
+    return factor * item, state["calls"]
+
+
+@pytest.mark.parametrize("forks", [True, False])
+def test_two_processes_share_a_list_in_order_and_each_keeps_its_state(forks, monkeypatch):
+    if not forks:
+        monkeypatch.setattr("hand_model.background._forks", lambda: False)
+    with Pair({"calls": 0}) as pair:
+        assert [v for v, _ in pair.map(_seen, range(5), 10)] == [0, 10, 20, 30, 40]
+        count = [n for _, n in pair.map(_seen, range(4), 1)]
+        assert count == ([4, 3, 5, 4] if forks else [6, 7, 8, 9])
+        for items in ([1, -2, 3], [-1, 2, 3]):
+            with pytest.raises(ValueError, match="-"):
+                pair.map(_seen, items, 1)
+        assert [v for v, _ in pair.map(_seen, [7, 8], 1)] == [7, 8]  # no answer of a failed call is left in the way
+
+
+def _paired(size: int) -> list[tuple[int, int]]:
+    with Pair({"calls": 0}) as outer, Pair({"calls": 0}) as inner:
+        return outer.map(_seen, range(size), 1) + inner.map(_seen, range(size), 1)
+
+
+def test_pairs_end_within_each_other_and_within_a_pool():
+    assert all([v for v, _ in found] == [0, 1, 2, 0, 1, 2] for found in Background(_paired, [(3,), (3,)]).results())

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from hand_model.diagnose import Finding, Findings, diagnose
-from hand_model.diagnose.balance import Balance, bounded_least_squares
+from hand_model.diagnose.balance import Balance
 from hand_model.diagnose.interval import held_out, parameter_intervals, undisturbed
+from hand_model.diagnose.least_squares import bounded_least_squares
 from hand_model.diagnose.motion import estimate_motion, local_quadratic
 from hand_model.diagnose.name import name_effects
 from hand_model.diagnose.station import judged

@@ -97,5 +97,5 @@ def test_a_candidate_that_is_always_dropped_again_ends_the_search(monkeypatch) -
 
     monkeypatch.setattr(name, "rank", rank)
     monkeypatch.setattr(name, "settle", lambda *_arguments: ((), balance.fit()))
-    fit, brought, _ = name._search(balance, (kind,), None)
+    fit, brought, _ = name._search(name.Pair(balance), (kind,), None)
     assert fit.terms == () and brought == {kind.name: 50.0}

@@ -152,6 +152,16 @@ def kinematic_state(station: str) -> DriveState:
                       "%" if station == "encoder" else "deg", "deg", extra, tuple(f"power_{k}" for k in range(declared.shape[1])))
 
 
+def _add_passive_motor(root) -> None:
+    """Another finger's friction, a motor without control, ahead of all others: controls and actuators are numbered apart."""
+    other = etree.SubElement(root.find("worldbody"), "body", name="other")
+    etree.SubElement(other, "inertial", pos="0 0 0", mass="0.01", diaginertia="1e-6 1e-6 1e-6")
+    etree.SubElement(other, "joint", name="other", type="hinge", axis="0 1 0", armature="1e-3")
+    friction = etree.Element("dcmotor", name="other_friction", joint="other", input="none", motorconst="0 0", resistance="1",
+                             lugre="1 0.1 0.01 0.01 20")
+    root.find("actuator").insert(0, friction)
+
+
 @pytest.mark.parametrize(("name", "shape", "amplitude"), KINEMATIC, ids=[f"{d[0]}_{i}" for i, d in enumerate(KINEMATIC)])
 def test_written_finger_moves_as_the_effect_predicts(name, shape, amplitude, tmp_path) -> None:
     from hand_model.compile.motor import write_motors
@@ -168,6 +178,7 @@ def test_written_finger_moves_as_the_effect_predicts(name, shape, amplitude, tmp
     hand = Hand("h", "left", {}, {}, (finger,), 1e-4, {}, (motor,), (found,))
     root = etree.fromstring(FINGER)
     write_motors(root, hand)
+    _add_passive_motor(root)
     place = effect(name).write_mjcf(root, where, values)
     assert (place is None) != (effect(name).law(values) is None)
     (tmp_path / "index.xml").write_bytes(etree.tostring(root))

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from ..effects.base import DriveState
 from ..effects.path import strokes
 from .grid import Grid, GridColumns, stacked
+from .least_squares import bounded_least_squares
+from .projection import Projection
 
 if TYPE_CHECKING:
     from .wander import Wander
@@ -226,17 +228,35 @@ class Balance:
                 prediction = term.effect.clip(prediction, term.shape)
         return prediction
 
-    def apart(self, terms: tuple[Term, ...]) -> tuple[Array, Array, Array]:
-        """Orthonormal basis (n, k) of the design, what it leaves of the effort (n,), and the weight (n,), zero where `terms` clip:
-        weighted and whitened. The last one is kept, for every candidate beside the same terms asks for it."""
+    def apart(self, terms: tuple[Term, ...]) -> Projection:
+        """The design of `terms` taken out of the effort, samples that they clip left out. The last one is kept, for every candidate
+        beside the same terms asks for it."""
         if self._apart is None or self._apart[0] != terms:
             w = self.weights(terms) * self.train * self.unclipped(terms)
-            matrix = self.whiten(self.design(terms)[0] * w[:, None], w)
-            norm = np.linalg.norm(matrix, axis=0)
-            q, _ = np.linalg.qr(matrix / np.where(norm > 0, norm, 1.0))
-            effort = self.whiten(self.effort * w, w)
-            self._apart = terms, (q, effort - q @ (q.T @ effort), w)
+            matrix, low, high = self.design(terms)
+            self._apart = terms, Projection.of(self.whiten(matrix * w[:, None], w), self.whiten(self.effort * w, w), w, low, high)
         return self._apart[1]
+
+    def error_beside(self, terms: tuple[Term, ...], effect: Any) -> Callable[[Mapping[str, float]], float]:
+        """The sum of squares (as `Fit.rss`) of `terms` and one more effect, as a function of that effect's shape."""
+        def fitted(shape: Mapping[str, float]) -> float:
+            return self.fit((*terms, Term(effect, shape)), held=False).rss
+
+        if effect.replaces is not None or effect.warps or any(t.effect.clips for t in (*terms, Term(effect, {}))):
+            return fitted
+        rest = self.apart(terms)
+        if not rest.regular:
+            return fitted
+        more = self.vagueness(self.weights(terms)) + self.unanswered(terms)
+        warps = tuple(t for t in terms if t.effect.warps)
+        low, high = (np.array([a[i] for a in effect.amplitudes()]) for i in (2, 3))
+
+        def projected(shape: Mapping[str, float]) -> float:
+            columns = self.columns(effect, shape, warps)
+            rss = rest.rss(self.whiten(columns * rest.weight[:, None], rest.weight), low, high)
+            return fitted(shape) if rss is None else rss + more
+
+        return projected
 
     def weights(self, terms: tuple[Term, ...]) -> Array:
         """1 / standard deviation (n,) beside `terms`: what is not known of rest, starts and stops stays, and is delayed with all else
@@ -293,25 +313,6 @@ class Balance:
         out = coefficients.copy()
         out[columns] += np.linalg.lstsq(matrix[:, columns] * held[:, None], left, rcond=None)[0]
         return np.maximum(out, low)
-
-
-def bounded_least_squares(matrix: Array, target: Array, low: Array, high: Array) -> Array:
-    """min |A x - b| with low <= x <= high, bounds 0 or infinite (active set on the normal equations)."""
-    gram, right = matrix.T @ matrix, matrix.T @ target
-    scale = np.sqrt(np.diag(gram))
-    scale = np.where(scale > 0, scale, 1.0)
-    gram, right = gram / np.outer(scale, scale), right / scale
-    gram = gram + 1e-10 * np.eye(len(gram))
-    free = np.ones(len(low), bool)
-    x = np.zeros(len(low))
-    for _ in range(len(low) + 1):
-        x[:] = 0.0
-        x[free] = np.linalg.solve(gram[np.ix_(free, free)], right[free])
-        wrong = free & ((x < low * scale) | (x > high * scale))
-        if not wrong.any():
-            break
-        free &= ~wrong
-    return x / scale
 
 
 COLOURED = 0.05  # autocorrelation of neighbouring samples from which noise counts as coloured

@@ -29,7 +29,8 @@ def distinguishability(balance: Balance, effects: Iterable[Any]) -> dict[tuple[s
 
     Effects that belong to one recording (events) and those that nothing here shows beside the declared columns are left out.
     """
-    basis, _, weight = balance.apart(())
+    declared = balance.apart(())
+    basis, weight = declared.basis, declared.weight
     rows = np.flatnonzero(weight > 0)
     rows = rows[:: max(1, len(rows) // MOST_ROWS)]
     fit = balance.fit()

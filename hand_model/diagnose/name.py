@@ -8,12 +8,14 @@ recording.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from ..background import Pair
 from ..effects.base import sample_interval
 from .balance import DISCRETE, Balance, Fit, Term
 from .evidence import evidence, gain, rough_evidence, scale_of
@@ -55,10 +57,16 @@ def name_effects(states: tuple[Any, ...], effects: Iterable[Any], progress: Call
 
 
 def _name(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str], None] | None) -> Naming:
+    with ExitStack() as pairs:
+        return _named(balance, lambda b: pairs.enter_context(Pair(b)), effects, progress)
+
+
+def _named(balance: Balance, paired: Callable[[Balance], Pair], effects: tuple[Any, ...], progress: Callable[[str], None] | None) -> Naming:
     wander = estimate_wander(balance, balance.fit().prediction)
     for _ in range(MOST_SEARCHES):
         balance = balance.wandering(wander)
-        fit, brought, ranked = _search(balance, effects, progress)
+        pair = paired(balance)
+        fit, brought, ranked = _search(pair, effects, progress)
         wander = _unrepeated(balance, fit)
         lost = _overwhelmed(balance, fit)
         if lost or _alike(wander, balance.wander):
@@ -67,14 +75,15 @@ def _name(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str], 
     if calmed is not None:
         rival, calmer = calmed
         other = balance.wandering(calmer)
-        further, more, _ = _search(other, effects, progress, rival.fit.terms)
+        further, more, _ = _search(paired(other), effects, progress, rival.fit.terms)
         if rival.name in _names(further):
             balance, brought = other.wandering(_unrepeated(other, further)), {**brought, **more}
+            pair = paired(balance)
             fit = refit(balance, balance.fit(further.terms))
     declared = balance.fit()
     before = _lack(balance, declared)
     after = _lack(balance, fit) if fit.terms else before
-    found = _findings(balance, effects, fit.terms, fit, declared)
+    found = _findings(pair, effects, fit.terms, fit, declared)
     kept = {t.effect.name for t in fit.terms}
     rejected = tuple(sorted(((n, e) for n, e in brought.items() if n not in kept), key=lambda item: -item[1]))
     return Naming(balance, declared, fit, estimate_wander(balance, fit.prediction), before, after, found, rejected)
@@ -103,20 +112,21 @@ def _calmed(balance: Balance, fit: Fit, ranked: Iterable[Rival]) -> tuple[Rival,
     return best
 
 
-def _search(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str], None] | None,
+def _search(pair: Pair, effects: tuple[Any, ...], progress: Callable[[str], None] | None,
             start: tuple[Term, ...] = ()) -> tuple[Fit, dict[str, float], list[Rival]]:
     """The fit to which no effect adds evidence, what every candidate brought at its best moment, and the last ones refused. start:
     terms to begin with."""
-    fit, brought, ranked = settle(balance, effects, start)[1] if start else balance.fit(), {}, list[Rival]()
+    balance = pair.state
+    fit, brought, ranked = settle(pair, effects, start)[1] if start else balance.fit(), {}, list[Rival]()
     been, refused = {_names(fit)}, set[str]()
     while len(fit.terms) < MOST_TERMS:
-        ranked = rank(balance, effects, fit.terms, fit)
+        ranked = rank(pair, effects, fit.terms, fit)
         for rival in ranked:
             brought[rival.name] = max(brought.get(rival.name, -np.inf), rival.evidence)
         best = next((r for r in ranked if r.evidence >= _least(balance, len(fit.terms)) and r.name not in refused), None)
         if best is None:
             break
-        _, settled = settle(balance, effects, best.fit.terms)
+        _, settled = settle(pair, effects, best.fit.terms)
         if _names(settled) in been:  # it went again beside the others: round and round from here
             refused.add(best.name)
             fit = min(fit, settled, key=lambda f: f.rss) if _names(settled) == _names(fit) else fit
@@ -176,26 +186,37 @@ def _resolved(balance: Balance, term: Term) -> bool:
     return abs(term.shape["delay"]) > 0.75 * step and not refuted
 
 
-def rank(balance: Balance, effects: Iterable[Any], terms: tuple[Term, ...], fit: Fit, refine: int = 6, least: float = 0.0) -> list[Rival]:
+def rank(pair: Pair, effects: Iterable[Any], terms: tuple[Term, ...], fit: Fit, refine: int = 6, least: float = 0.0) -> list[Rival]:
     """Every candidate added to `terms`, its shape optimised from several starts; best evidence first. least: log evidence below which
     none is of interest."""
-    rough = []
-    for effect in effects:
-        if any(t.effect.name == effect.name for t in terms) and not effect.repeats:
-            continue
-        best = scan(balance, effect, terms, least)
-        if best is not None:
-            rough.append((rough_evidence(balance, best, fit, scale_of(balance, best)), best))
+    balance, taken = pair.state, {t.effect.name for t in terms}
+    places = [e if e.name not in taken or e.repeats else None for e in effects]
+    rough = [r for r in pair.map(_rough, places, terms, fit, least) if r is not None]
     rough.sort(key=lambda item: -item[0])
-    out = []
-    for position, (_, start) in enumerate(rough):
-        best = polish(balance, start, len(terms)) if position < refine else start
-        needs = best.terms[-1].effect.needs
-        if _resolved(balance, best.terms[-1]) and best.declared.get(needs, 1.0) > 0:
-            out.append((best, evidence if position < refine else rough_evidence))
+    starts = [start for _, start in rough]
+    polished = pair.map(_polished, starts[:refine], len(terms))
+    out = [(f, i < refine) for i, f in enumerate([*polished, *starts[refine:]]) if _possible(balance, f)]
     scale = min((scale_of(balance, f) for f, _ in out), default=1.0)
-    rivals = [Rival(f.terms[-1].effect.name, weigh(balance, f, fit, scale=scale), f) for f, weigh in out]
+    weights = pair.map(_weight, out, fit, scale)
+    rivals = [Rival(f.terms[-1].effect.name, w, f) for (f, _), w in zip(out, weights, strict=True)]
     return sorted(rivals, key=lambda r: -r.evidence)
+
+
+def _rough(balance: Balance, effect: Any, terms: tuple[Term, ...], fit: Fit, least: float) -> tuple[float, Fit] | None:
+    best = None if effect is None else scan(balance, effect, terms, least)
+    return None if best is None else (rough_evidence(balance, best, fit, scale_of(balance, best)), best)
+
+
+def _polished(balance: Balance, start: Fit, which: int) -> Fit:
+    return polish(balance, start, which)
+
+
+def _weight(balance: Balance, candidate: tuple[Fit, bool], fit: Fit, scale: float) -> float:
+    return (evidence if candidate[1] else rough_evidence)(balance, candidate[0], fit, scale=scale)
+
+
+def _possible(balance: Balance, fit: Fit) -> bool:
+    return _resolved(balance, fit.terms[-1]) and fit.declared.get(fit.terms[-1].effect.needs, 1.0) > 0
 
 
 def scan(balance: Balance, effect: Any, terms: tuple[Term, ...], least: float = 0.0) -> Fit | None:
@@ -207,17 +228,17 @@ def scan(balance: Balance, effect: Any, terms: tuple[Term, ...], least: float = 
     shapes = grid.shapes
     if effect.replaces is None and not effect.warps and not effect.clips:
         shapes = _project(balance, grid, terms, 2 * balance.inflation * least / GRAIN)
-    fits = [balance.fit((*terms, Term(effect, shape))) for shape in shapes]
-    return min(fits, key=lambda f: f.rss) if fits else None
+    fits = [balance.fit((*terms, Term(effect, shape)), held=False) for shape in shapes]
+    return balance.fit(min(fits, key=lambda f: f.rss).terms) if fits else None
 
 
 def _project(balance: Balance, grid: Grid, terms: tuple[Term, ...], least: float) -> list[dict[str, float]]:
     """The two best shapes of a grid by the fall of the RSS, more than `least`, that its columns, orthogonal to the design, bring."""
-    q, residual, w = balance.apart(terms)
-    columns = balance.grid_columns(grid, w, tuple(t for t in terms if t.effect.warps))
-    inside = columns.products(q)
+    rest = balance.apart(terms)
+    columns = balance.grid_columns(grid, rest.weight, tuple(t for t in terms if t.effect.warps))
+    inside = columns.products(rest.basis)
     left = np.sqrt(np.maximum(columns.length**2 - np.sum(inside**2, axis=1), 0.0))
-    right = columns.products(residual)
+    right = columns.products(rest.left)
     bounds = grid.effect.amplitudes()
     gains = np.zeros(len(grid.shapes))
     for i in range(len(grid.shapes)):
@@ -243,12 +264,10 @@ def polish(balance: Balance, fit: Fit, which: int) -> Fit:
         return fit
     span = np.array([s.high - s.low for s in shapes])
     start = np.array([term.shape[s.name] for s in shapes])
+    error = balance.error_beside(tuple(t for i, t in enumerate(fit.terms) if i != which), term.effect)
 
-    def at(u: Array, held: bool = False) -> Fit:
-        values = {s.name: float(np.clip(v, s.low, s.high)) for s, v in zip(shapes, start + u * span, strict=True)}
-        terms = list(fit.terms)
-        terms[which] = Term(term.effect, {**term.shape, **values})
-        return balance.fit(tuple(terms), held)
+    def shaped(u: Array) -> dict[str, float]:
+        return {**term.shape, **{s.name: float(np.clip(v, s.low, s.high)) for s, v in zip(shapes, start + u * span, strict=True)}}
 
     step = [np.zeros(len(shapes))]
     for i, s in enumerate(shapes):
@@ -256,22 +275,25 @@ def polish(balance: Balance, fit: Fit, which: int) -> Fit:
         near = [abs(v - start[i]) for v in s.starts if v != start[i]]
         corner[i] = 0.4 * (min(near) if near else 0.1 * span[i]) / span[i]
         step.append(corner)
-    result = minimize(lambda u: at(u).rss, np.zeros(len(shapes)), method="Nelder-Mead",
+    result = minimize(lambda u: error(shaped(u)), np.zeros(len(shapes)), method="Nelder-Mead",
                       options={"initial_simplex": np.array(step), "maxfev": 30 + 25 * len(shapes), "fatol": 0.02,
                                "xatol": 1e-4})
-    best = at(result.x, held=True)
+    terms = list(fit.terms)
+    terms[which] = Term(term.effect, shaped(result.x))
+    best = balance.fit(tuple(terms))
     return best if best.rss < fit.rss else fit
 
 
-def settle(balance: Balance, effects: tuple[Any, ...], terms: tuple[Term, ...]) -> tuple[tuple[Term, ...], Fit]:
+def settle(pair: Pair, effects: tuple[Any, ...], terms: tuple[Term, ...]) -> tuple[tuple[Term, ...], Fit]:
     """Joint refit; terms that no longer pay leave; a term that another effect replaces better is exchanged."""
+    balance = pair.state
     fit = reform(balance, refit(balance, balance.fit(terms)), len(terms) - 1)
     for _ in range(3):
         dropped = _drop(balance, fit)
         if dropped is not None:
             fit = dropped
             continue
-        swapped = _swap(balance, effects, fit) if len(fit.terms) > 1 else None
+        swapped = _swap(pair, effects, fit) if len(fit.terms) > 1 else None
         if swapped is None:
             break
         fit = swapped
@@ -311,13 +333,14 @@ def _drop(balance: Balance, fit: Fit) -> Fit | None:
     return None
 
 
-def _swap(balance: Balance, effects: tuple[Any, ...], fit: Fit) -> Fit | None:
+def _swap(pair: Pair, effects: tuple[Any, ...], fit: Fit) -> Fit | None:
     """The best exchange of one term for another effect, where it raises the evidence; else None."""
+    balance = pair.state
     for which in range(len(fit.terms)):
         rest = tuple(t for i, t in enumerate(fit.terms) if i != which)
         without = balance.fit(rest)
         own = evidence(balance, fit, without, which, scale_of(balance, fit))
-        ranked = [r for r in rank(balance, effects, rest, without, 1, own - 10) if r.name != fit.terms[which].effect.name]
+        ranked = [r for r in rank(pair, effects, rest, without, 1, own - 10) if r.name != fit.terms[which].effect.name]
         if ranked and ranked[0].evidence > own - 10:
             other = refit(balance, ranked[0].fit)
             scale = min(scale_of(balance, other), scale_of(balance, fit))
@@ -326,10 +349,10 @@ def _swap(balance: Balance, effects: tuple[Any, ...], fit: Fit) -> Fit | None:
     return None
 
 
-def _findings(balance: Balance, effects: tuple[Any, ...], terms: tuple[Term, ...], fit: Fit, declared: Fit) -> tuple[Named, ...]:
+def _findings(pair: Pair, effects: tuple[Any, ...], terms: tuple[Term, ...], fit: Fit, declared: Fit) -> tuple[Named, ...]:
     """Each term with its rivals (every candidate in its place, small terms aside that may stand for one of them), its share and
     its probability; largest share first."""
-    found = []
+    balance, found = pair.state, []
     explained = max(declared.rss - fit.rss, 1e-12)
     losses = [max(balance.fit(tuple(t for i, t in enumerate(terms) if i != which)).rss - fit.rss, 0.0)
               for which in range(len(terms))]
@@ -339,7 +362,7 @@ def _findings(balance: Balance, effects: tuple[Any, ...], terms: tuple[Term, ...
         rest = tuple(terms[i] for i in others)
         without, beside = balance.fit(rest), fit if len(others) == len(terms) - 1 else balance.fit((*rest, term))
         place = which if beside is fit else len(rest)
-        ranked = rank(balance, effects, rest, without, refine=3)
+        ranked = rank(pair, effects, rest, without, refine=3)
         own = evidence(balance, beside, without, place, scale_of(balance, beside))
         rivals = [r for r in ranked if r.name != term.effect.name]
         rivals.append(Rival(term.effect.name, max([own, *[r.evidence for r in ranked if r.name == term.effect.name]]), fit))
@@ -354,7 +377,7 @@ def _findings(balance: Balance, effects: tuple[Any, ...], terms: tuple[Term, ...
 
 def _size(balance: Balance, fit: Fit, which: int) -> float:
     """Root mean square over the noise of what a term adds beyond what the declared columns could, all coefficients as they are."""
-    basis, _, w = balance.apart(())
-    added = balance.whiten((fit.prediction - balance.removed(fit, which)) * w, w)
-    added = added - basis @ (basis.T @ added)
+    declared = balance.apart(())
+    added = balance.whiten((fit.prediction - balance.removed(fit, which)) * declared.weight, declared.weight)
+    added = added - declared.basis @ (declared.basis.T @ added)
     return float(np.sqrt(added @ added / max(balance.train.sum(), 1)))

@@ -137,6 +137,13 @@ class Effect:
     listed: ClassVar[bool] = True  # False of an outsider: no row of the table of effects, told as unexplained
     repeats: ClassVar[bool] = False  # may be named more than once in one balance, with other shapes
 
+    def __eq__(self, other: object) -> bool:
+        """Effects of one class are one, in whichever process they are."""
+        return type(self) is type(other) and vars(self) == vars(other)
+
+    def __hash__(self) -> int:
+        return hash(type(self))
+
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """No nonlinear parameter."""
         return ()

@@ -5,6 +5,7 @@ Every one runs over strokes (between turning points), in closed form inside a st
 
 from __future__ import annotations
 
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -45,9 +46,14 @@ def default_threshold(position: Array) -> float:
 
 def strokes(position: Array, threshold: float | None = None) -> list[tuple[int, int, int]]:
     """(start, stop, direction) of every stroke; samples start..stop-1, direction -1, 0 (no motion) or 1."""
-    x = np.asarray(position, float)
+    return list(_strokes(np.asarray(position, float).tobytes(), threshold))
+
+
+@lru_cache(256)  # operators of many shapes run along the same few paths
+def _strokes(position: bytes, threshold: float | None) -> tuple[tuple[int, int, int], ...]:
+    x = np.frombuffer(position)
     if len(x) < 2:
-        return [(0, len(x), 0)]
+        return ((0, len(x), 0),)
     t = default_threshold(x) if threshold is None else threshold
     turns = turning_points(x, t)
     out = []
@@ -55,7 +61,7 @@ def strokes(position: Array, threshold: float | None = None) -> list[tuple[int, 
         moved = x[b] - x[a]
         out.append((a, b, int(np.sign(moved)) if abs(moved) > t else 0))
     out[-1] = (out[-1][0], len(x), out[-1][2])
-    return [s for s in out if s[1] > s[0]]
+    return tuple(s for s in out if s[1] > s[0])
 
 
 def travelled(position: Array, threshold: float | None = None) -> Array:
