@@ -80,3 +80,20 @@ def test_page_of_a_consistent_session_has_no_findings() -> None:
     assert "Nothing is missing" in page
     assert "no palm markers" in page
     assert "error before" not in page
+
+
+def test_a_model_that_holds_an_effect_already_gets_it_once() -> None:
+    from types import SimpleNamespace
+
+    from hand_model.diagnose.improve import with_effects, without_effects
+    from hand_model.hand import Effect, Estimate, Hand
+
+    def held(actuator: str, centre: float) -> Effect:
+        return Effect("detent_load", {"finger": actuator, "joint": None, "actuator": actuator}, {"centre": Estimate(centre, None, "%", "earlier")})
+
+    fingers = tuple(SimpleNamespace(name=n) for n in ("index", "little"))
+    hand = Hand("h", "left", {}, {}, fingers, 1e-4, {}, (), (held("index", 38.0), held("little", 60.0)))
+    before = without_effects(hand, [_finding()])
+    after = with_effects(before, [_finding()])
+    assert [e.where["actuator"] for e in before.effects] == ["little"]
+    assert [(e.where["actuator"], e.parameters["centre"].value) for e in after.effects] == [("little", 60.0), ("index", 40.0)]

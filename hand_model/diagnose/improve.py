@@ -89,6 +89,16 @@ def _with_coupling(finger: Finger, station: Any, declared: Mapping[str, float]) 
     return replace(finger, couplings=tuple(couplings))
 
 
+def without_effects(hand: Hand, findings: Sequence[Finding]) -> Hand:
+    """The hand without the effects that the findings name anew: its declared coefficients are fitted as if it had none."""
+    named = {_seat(f.effect, f.where) for f in findings}
+    return replace(hand, effects=tuple(e for e in hand.effects if _seat(e.effect, e.where) not in named))
+
+
+def _seat(effect_name: str, where: Mapping[str, Any]) -> tuple[Any, ...]:
+    return effect_name, *(where.get(key) for key in ("finger", "joint", "actuator"))
+
+
 def with_effects(hand: Hand, findings: Sequence[Finding]) -> Hand:
     """The hand with the findings that are physics of its fingers."""
     physics = [f for f in findings if f.correction is None and f.where.get("finger") in {x.name for x in hand.fingers}]
@@ -131,6 +141,7 @@ def write_improved(hand: Hand, findings: Sequence[Finding], stations: Sequence[A
     """
     from ..compile import compile
 
+    hand = without_effects(hand, findings)
     known = {f.name for f in hand.fingers}
     touched = [s for s in stations if s.finger in known and any(_of(f, s) for f in findings if f.correction is None)]
     before = as_fitted(hand, touched, counts, lambda source: source.declared)
