@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..background import Background, single_threaded
+from ..background import Background, Pair, single_threaded
 from ..effects import catalogue, outsiders
 from ..effects.base import DriveState
 from ..errors import HandModelError, SessionError
@@ -130,8 +130,8 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
         replays: tuple[Replay, ...] = ()
         forget(output, FOLDERS, FILES[0])
         if model is not False:
-            findings, replays = _modelled(findings, session, hand, stations, Path(output), tell)
-            write_corrected(session, findings.findings, _counts_corrected(session, stations), Path(output))
+            with Pair((findings, session, hand, stations, Path(output), tell)) as pair:
+                (findings, replays), _ = pair.map(_written, ("model", "corrected"))
         write_page(findings, stations, replays, session.path.name, Path(output))
         findings.save(output)
     if progress is not None:
@@ -170,6 +170,14 @@ def _counts_corrected(session: Session, stations: list[Station]) -> dict[str, Ca
 
     counts = ranges_of_counts(session)
     return {a: of(correct, *counts[a]) for a, correct in _encoder_corrections(stations).items()}
+
+
+def _written(results: tuple[Any, ...], what: str) -> Any:
+    """What of a diagnosis goes into folders of its own."""
+    if what == "model":
+        return _modelled(*results)
+    findings, session, _, stations, output, _ = results
+    return write_corrected(session, findings.findings, _counts_corrected(session, stations), output)
 
 
 def _modelled(findings: Findings, session: Session, hand: Hand | None, stations: list[Station], output: Path,

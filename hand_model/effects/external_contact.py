@@ -10,13 +10,13 @@ import numpy as np
 from .base import Amplitude, Array, DriveState, Effect, Shape, figure, position_range
 
 WHILES = ((0.0, 1.0), (0.2, 1.0), (0.35, 1.0), (0.5, 1.0), (0.65, 1.0), (0.8, 1.0), (0.0, 0.5), (0.2, 0.5), (0.4, 0.7))
-ALL = -1.0  # instead of the number of a trial: the while is one of the whole session
+ALL, EACH = -1.0, -2.0  # instead of the number of a trial: the while is one of the whole session; it is the same one of every trial
 MOST_VALIDATION = 4  # validation recordings in which an obstacle can still be told
 
 
 class ExternalContact(Effect):
-    """F = k max(0, x - x0) (form 0) or k max(0, x - x0)^2 (form 1) for a while of one trial or of the session: an elastic obstacle that was not
-    always there, met after some free motion. Whether it is there in validation recordings is for each of those to say.
+    """F = k max(0, x - x0) (form 0) or k max(0, x - x0)^2 (form 1) for a while of one trial, of every trial or of the session: an
+    elastic obstacle that was not always there, met after some free motion. Whether it is there in validation recordings is for each of those to say.
     """
 
     name = "external_contact"
@@ -26,12 +26,13 @@ class ExternalContact(Effect):
     unwritten = "an obstacle of one recording is no part of the hand"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """Which trial (index into the states; ALL of them), from and until which share of it, form, and where the contact begins."""
+        """Which trial (index into the states; ALL of them as one, EACH of them), from and until which share of it, form, and where the
+        contact begins."""
         low, high = position_range(states)
         span = high - low
         trials = tuple(float(i) for i, s in enumerate(states) if not s.validate)
-        every = (ALL,) if len(trials) > 1 and all("session_s" in s.extra for s in states) else ()
-        return (Shape("trial", "1", ALL, len(states) - 1.0, (*trials, *every)),
+        every = () if len(trials) < 2 else (EACH, ALL) if all("session_s" in s.extra for s in states) else (EACH,)
+        return (Shape("trial", "1", EACH, len(states) - 1.0, (*trials, *every)),
                 Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),
                 Shape("since", "1", 0.0, 0.9, tuple(sorted({a for a, _ in WHILES}))),
                 Shape("until", "1", 0.1, 1.0, tuple(sorted({b for _, b in WHILES}))),
@@ -41,7 +42,7 @@ class ExternalContact(Effect):
     def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
         """Every start of trial, form and place, in some whiles of the trial; what is there all along is no obstacle but a stop."""
         return [point for point in super().grid(states)
-                if (point["since"], point["until"]) in WHILES and (point["trial"] != ALL or (point["since"], point["until"]) != (0.0, 1.0))]
+                if (point["since"], point["until"]) in WHILES and (point["trial"] >= 0 or (point["since"], point["until"]) != (0.0, 1.0))]
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Stiffness of the contact in that trial, and in each validation recording; never negative."""
@@ -52,13 +53,14 @@ class ExternalContact(Effect):
         """Depth into the contact in that trial and in each validation recording, (n, 1 + MOST_VALIDATION)."""
         out = np.zeros((len(state.time_s), 1 + MOST_VALIDATION))
         index = state.extra.get("trial_index", np.zeros(len(state.time_s)))[0]
-        every, mine = shape["trial"] == ALL, index == round(shape["trial"])
+        every, mine = shape["trial"] < 0, index == round(shape["trial"])
         if not (every or mine or state.validate):
             return out
         depth = np.maximum(state.position - shape["begin"], 0.0)
         if shape["form"] > 0.5:
             depth = depth**2 / 10.0
-        share = state.elapsed_s / state.extra["session_s"] if every else (state.time_s - state.time_s[0]) / max(float(np.ptp(state.time_s)), 1e-9)
+        own = (state.time_s - state.time_s[0]) / max(float(np.ptp(state.time_s)), 1e-9)
+        share = state.elapsed_s / state.extra["session_s"] if shape["trial"] == ALL else own
         within = depth * ((share >= shape["since"]) & (share <= shape["until"]))
         if mine or (every and not state.validate):
             out[:, 0] = within
@@ -76,7 +78,8 @@ class ExternalContact(Effect):
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """When, from where on, and the load a tenth of the range further (of either form the same)."""
         trials, index = where.get("trials") or (), round(parameters["trial"])
-        name = "the session" if parameters["trial"] == ALL else trials[index] if 0 <= index < len(trials) else "one recording"
+        several = {ALL: "the session", EACH: "every recording"}
+        name = several.get(parameters["trial"]) or (trials[index] if 0 <= index < len(trials) else "one recording")
         since, until = (round(100 * parameters[k]) for k in ("since", "until"))
         part = "" if since <= 0 and until >= 100 else f", {since} to {until} % of the way through"
         return (f"in {name}{part}, the finger meets an elastic obstacle at {parameters['begin']:.1f} %: "
