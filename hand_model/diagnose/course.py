@@ -7,7 +7,7 @@ no recording tells. The station's names decide which joint gets what; nothing is
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +18,7 @@ from ..identify.chain import Chain, ChainData, Pose, jacobians, propagate
 from ..identify.likelihood import free_directions
 from ..rotation import perpendicular_basis
 from .angles import FingerAngles
-from .blocks import BLOCK, Blocks
+from .blocks import BLOCK
 from .markers import HINGE, MarkerNaming, shift_at_frames
 
 Array = NDArray[np.float64]
@@ -58,7 +58,7 @@ class Form:
     def columns(self, chain: Chain, body: NDArray[np.int64], angle: Array) -> Array:
         """Derivatives (b, m, 3, size) of the markers by z, extra joints taken as small."""
         x, rotations, joints = propagate(chain, body, angle)
-        axis, centre = joints[self.k]
+        centre = joints[self.k][1]
         carrier = rotations[:, self.k + 1 if self.turning else self.k]
         moved = np.flatnonzero(body > self.k)
         t = angle[:, self.k] / self.scale
@@ -81,6 +81,16 @@ class FingerCourses:
     coursed: Chain
     joints: tuple[int, ...]
     data: tuple[ChainData, ...]
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """(m,) of its markers, those of the palm first."""
+        return self.data[0].labels
+
+    @property
+    def body(self) -> NDArray[np.int64]:
+        """(m,) segment of each marker, as in `ChainData`."""
+        return self.data[0].body
 
 
 @dataclass(frozen=True)
@@ -107,14 +117,17 @@ class _Solved:
     square: float
 
 
-def finger_courses(angles: FingerAngles, naming: MarkerNaming) -> FingerCourses | None:
-    """Courses of the joints that the marker station names as no plain hinge; None where it names none."""
-    if not naming.believed or not any(e.effect in HINGE for e in naming.found):
+def finger_courses(angles: FingerAngles, naming: MarkerNaming, named: Collection[tuple[str, str]]) -> FingerCourses | None:
+    """Courses of the joints that the marker station names as no plain hinge; None where it names none. named: (effect, joint) of its
+    findings."""
+    segments = [s.name for s in angles.finger.segments]
+    crooked = [e for e in naming.found if e.effect in HINGE and (e.effect, segments[e.body - 1]) in named]
+    if not crooked:
         return None
     observed = _observed(angles, naming)
     forms: list[Form] = []
-    for body in sorted({e.body for e in naming.found if e.effect in HINGE}):
-        mine = [e for e in naming.found if e.body == body and e.effect in HINGE]
+    for body in sorted({e.body for e in crooked}):
+        mine = [e for e in crooked if e.body == body]
         tilts = any(e.effect == "joint_wobble" for e in mine)
         slides = any(e.effect == "moving_centre" or any(e.shifts) for e in mine)
         forms.append(_chosen(angles.chain, observed, forms, body - 1, tilts, slides))
