@@ -169,6 +169,13 @@ def test_a_moving_drive_keeps_the_extra_joints_on_their_course(tmp_path) -> None
         wanted = engine.on_linkages(mj, data.qpos)
         worst = max(worst, *(abs(wanted[mj.jnt_qposadr[j]] - data.qpos[mj.jnt_qposadr[j]]) for j in model.courses))
     assert not engine.raised(data) and worst < 1e-4  # rad, m
+    pushed = 0.0
+    for _ in range(300):
+        data.xfrc_applied[mj.body("index_s1_link").id, :3] = 1.0, 0.0, -1.0  # N
+        mujoco.mj_step(mj, data)
+        wanted = engine.on_linkages(mj, data.qpos)
+        pushed = max(pushed, *(abs(wanted[mj.jnt_qposadr[j]] - data.qpos[mj.jnt_qposadr[j]]) for j in model.courses))
+    assert pushed < 3e-4 and not engine.raised(data)
     course = two().finger("index").joints[0].course
     assert all(low < high for low, high in ranges(course, 0.0, 1.0))
 

@@ -6,6 +6,7 @@ URDF has no such tie (its mimic is linear, and the linear part of a course is mo
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,11 +19,14 @@ from ..hand import Finger, Hand, Joint
 from ..kinematics import displace, finger_angles
 from .coupling import ORDER, SAMPLES, limits, source_of
 from .names import WORDS, Names
-from .xml import child, vector
+from .xml import child, document, number, vector
 
 Array = NDArray[np.float64]
 
 ROOM = 0.05  # of an extra joint's reach, beyond it on both sides: its limits hold nothing back while it is on its course
+MASS = 0.1  # kg of a slide beside what it carries: what holds a few grams at this step gives too much
+TIME_S = 0.003  # time constant of a slide's tie: stable at steps of two milliseconds, too
+MARGIN = 2.0  # by which the tie is left softer than that, for inertias that the pose or a user changes
 LEAST = {"hinge": 1e-4, "slide": 1e-6}  # the same at least [rad, m]
 
 
@@ -70,7 +74,35 @@ def tied(finger: Finger, joint: Joint, names: Names) -> tuple[Tied, ...]:
 def write_joints(body: Any, extras: tuple[Tied, ...]) -> None:
     """The extra joints' elements of a segment's body, where they are due."""
     for extra in extras:
-        child(body, "joint", name=extra.name, type=extra.kind, pos=(0, 0, 0), axis=extra.axis, range=extra.range, ref="0")
+        joint = child(body, "joint", name=extra.name, type=extra.kind, pos=(0, 0, 0), axis=extra.axis, range=extra.range, ref="0")
+        if extra.kind == "slide":
+            joint.set("armature", number(MASS))
+
+
+def stiffen(root: Any, ties: dict[str, tuple[Tied, ...]]) -> None:
+    """Make the ties of slides as stiff as those of hinges. ties: hinge -> its extra joints.
+
+    MuJoCo scales a constraint's softness by the sum of the inverse inertias of both joints, here of a light hinge [1/(kg m^2)] and of a slide [1/kg], so
+    that a slide gives a thousand times more than its share; stiffness and damping are raised by as much (MuJoCo's "Solver parameters").
+    """
+    import mujoco
+
+    if not any(e.kind == "slide" for extras in ties.values() for e in extras):
+        return
+    bare = copy.deepcopy(root)
+    for tag in ("asset", "contact", "keyframe", "sensor", "actuator", "tendon", "equality"):
+        for element in bare.findall(tag):
+            bare.remove(element)
+    for geom in list(bare.find("worldbody").iter("geom")):
+        geom.getparent().remove(geom)
+    model = mujoco.MjModel.from_xml_string(document(bare).decode())
+    weight = {name: float(model.dof_invweight0[model.joint(name).dofadr[0]]) for name in (model.joint(i).name for i in range(model.njnt))}
+    for hinge, extras in ties.items():
+        for extra in (e for e in extras if e.kind == "slide"):
+            equality = next(e for e in root.iterfind("equality/joint") if e.get("name") == extra.equality)
+            impedance = float(equality.get("solimp").split()[1])
+            softer = 1 + (1 - impedance) / impedance * (weight[hinge] + weight[extra.name]) / weight[extra.name] / MARGIN
+            equality.set("solref", vector((-softer / (impedance * TIME_S) ** 2, -2 * softer / (impedance * TIME_S))))
 
 
 def complete_courses(root: Any, ties: dict[str, tuple[Tied, ...]]) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..effects import effect
 from ..hand import Hand
-from .course import complete_courses, write_joints
+from .course import Tied, complete_courses, stiffen, write_joints
 from .drive import Drive, nominal_drives
 from .motor import complete_keyframes, write_motors
 from .plan import Link, Plan, in_file_names
@@ -43,6 +43,7 @@ def mjcf(plan: Plan, newton_metre_per_unit: float | None = None) -> Any:
     _actuators(root, plan, drives)
     _physics(root, in_file_names(plan), newton_metre_per_unit)
     _keyframes(root, plan)
+    stiffen(root, _ties(plan))
     return root
 
 
@@ -163,4 +164,9 @@ def _keyframes(root: Any, plan: Plan) -> None:
                 "ctrl", vector([angles.get(a.get("joint"), 0.0) if a.tag == "position" else 0.0 for a in actuators])
             )
     complete_keyframes(root, in_file_names(plan))
-    complete_courses(root, {link.joint: link.extras for link in plan.links if link.extras})
+    complete_courses(root, _ties(plan))
+
+
+def _ties(plan: Plan) -> dict[str, tuple[Tied, ...]]:
+    """Hinge -> its extra joints."""
+    return {link.joint: link.extras for link in plan.links if link.joint is not None and link.extras}

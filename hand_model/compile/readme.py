@@ -149,6 +149,9 @@ def _courses(hand: Hand) -> str:
         tilt, tip = lost_in_urdf(finger, joint)
         kinds = ", ".join(e.kind for e in joint.course.joints)
         rows.append(f"| {finger.name} | {joint.name} | {kinds} | {np.degrees(tilt):.2f} | {tip * 1e3:.2f} |")
+    if any(e.kind == "slide" for _, joint in crooked for e in joint.course.joints):
+        rows.append("\nThe ties of slides have an absolute stiffness (`solref` below zero), right for this file's inertias: whoever makes their")
+        rows.append("finger much heavier gives them MuJoCo's own (`solref=\"0.002 1\"`).")
     return "\n".join(rows) + "\n"
 
 
