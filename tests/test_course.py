@@ -207,6 +207,8 @@ def test_a_planted_course_is_recovered_at_the_tip_through_the_compiled_file(tmp_
     hand = _true_hand(truth, finger)
     stated = written_courses(hand, (SimpleNamespace(effect=effect, where={"finger": "index"}),), {"index": courses})
     assert stated
+    elsewhere = replace(hand, palm_markers_palm={label: 1.2 * p for label, p in hand.palm_markers_palm.items()})
+    assert not written_courses(elsewhere, (SimpleNamespace(effect=effect, where={"finger": "index"}),), {"index": courses})
     driver = np.linspace(0, float(finger.proximal_rad.sum()), 60)
     bent = np.stack([driver, np.polynomial.polynomial.polyval(driver, finger.distal_rad)], axis=1)
     wanted = _true_tip(truth, finger, hidden, plan, bent)
