@@ -36,12 +36,35 @@ class Estimate:
 
 
 @dataclass(frozen=True)
+class ExtraJoint:
+    """A joint that an angle moves. kind: "hinge" (through the centre) or "slide". axis_palm: (3,) unit, at rest.
+
+    coefficients: (2 to 5,) of its coordinate [rad or m] over powers of that angle [rad]; the first is zero, so that rest stays rest.
+    """
+
+    kind: str
+    axis_palm: Array
+    coefficients: Array
+
+
+@dataclass(frozen=True)
+class Course:
+    """What the joint of a segment does beside turning about its hinge: extra joints in step with its angle, slides first.
+
+    turning: whether their axes turn with the segment that the joint carries (else they stay with the one before it).
+    """
+
+    joints: tuple[ExtraJoint, ...]
+    turning: bool
+
+
+@dataclass(frozen=True)
 class Joint:
     """A hinge and the segment that it carries (both under the segment's name).
 
     axis_palm: (3,) unit, flexion positive. centre_palm: (3,) [m]. covariance: (6, 6) of (axis [-], centre [m]).
     range_rad: recorded (min, max) [rad]. markers_palm: label -> (3,) [m]. tip_palm: (3,) [m] on the last segment.
-    degenerate: the recorded arc does not determine axis or centre; the covariance says how little.
+    degenerate: the recorded arc does not determine axis or centre; the covariance says how little. course: where it is no plain hinge.
     """
 
     name: str
@@ -52,6 +75,7 @@ class Joint:
     markers_palm: Mapping[str, Array]
     tip_palm: Array | None = None
     degenerate: bool = False
+    course: Course | None = field(default=None, metadata={"if_known": True})
 
 
 @dataclass(frozen=True)
@@ -176,7 +200,8 @@ def load_hand(path: str | Path) -> Hand:
 
 def _encode(value: Any) -> Any:
     if dataclasses.is_dataclass(value):
-        return {f.name: _encode(getattr(value, f.name)) for f in dataclasses.fields(value)}
+        known = [f for f in dataclasses.fields(value) if not f.metadata.get("if_known") or getattr(value, f.name) is not None]
+        return {f.name: _encode(getattr(value, f.name)) for f in known}
     if isinstance(value, np.ndarray):
         return value.tolist()
     if isinstance(value, np.generic):

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .course import motion
 from .errors import HandModelError
 from .hand import Finger, Hand
 from .rotation import rotation_about
@@ -25,13 +26,16 @@ class Displacement:
     """Motion of each segment of a finger away from rest, in the palm frame: x -> rotation x + translation.
 
     rotation: (n, k, 3, 3). translation: (n, k, 3) [m]. axis_palm, centre_palm: (n, k, 3) of every joint as it is
-    carried by the segments before it [-], [m].
+    carried by the segments before it [-], [m]. spin_palm (n, k, 3) [rad/rad], drift_palm (n, k, 3) [m/rad]: how what a
+    joint carries turns, and how its centre moves, per angle: the axis and zero, but for a joint with a course.
     """
 
     rotation: Array
     translation: Array
     axis_palm: Array
     centre_palm: Array
+    spin_palm: Array
+    drift_palm: Array
 
     def points(self, segment: int, rest_palm: ArrayLike) -> Array:
         """Positions (n, m, 3) [m] of points that are at rest_palm (m, 3) [m] on one segment of the open hand."""
@@ -42,13 +46,13 @@ class Displacement:
         """Derivative (n, m, 3, k) [m/rad] of `points` by the k joint angles; columns of joints further out are zero."""
         position = self.points(segment, rest_palm)
         lever = position[:, :, None] - self.centre_palm[:, None]
-        columns = np.cross(self.axis_palm[:, None], lever)
+        columns = np.cross(self.spin_palm[:, None], lever) + self.drift_palm[:, None]
         columns[:, :, segment + 1 :] = 0.0
         return columns.swapaxes(-1, -2)
 
     def rotation_jacobian(self, segment: int) -> Array:
         """Angular velocity (n, 3, k) [rad/rad] in the palm frame of one segment per joint rate."""
-        columns = self.axis_palm.copy()
+        columns = self.spin_palm.copy()
         columns[:, segment + 1 :] = 0.0
         return columns.swapaxes(-1, -2)
 
@@ -66,16 +70,23 @@ def displace(finger: Finger, angles_rad: ArrayLike) -> Displacement:
         )
     n = len(angles)
     rotation, translation = np.broadcast_to(np.eye(3), (n, 3, 3)), np.zeros((n, 3))
-    parts: tuple[list[Array], ...] = ([], [], [], [])
+    parts: tuple[list[Array], ...] = ([], [], [], [], [], [])
     for joint, angle in zip(finger.joints, angles.T, strict=True):
         axis, centre = unit(joint.axis_palm), np.asarray(joint.centre_palm, float)
-        parts[2].append(rotation @ axis)
-        parts[3].append(rotation @ centre + translation)
-        turn = rotation_about(axis, angle)
-        translation = (rotation @ (centre - turn @ centre)[..., None])[..., 0] + translation
+        if joint.course is None:
+            turn = rotation_about(axis, angle)
+            shift = centre - turn @ centre
+            carried = [rotation @ axis, rotation @ centre + translation, rotation @ axis, np.zeros((n, 3))]
+        else:
+            own = motion(axis, centre, joint.course, angle)
+            turn, shift = own.rotation, own.translation
+            moved = (rotation @ own.centre[..., None])[..., 0] + translation
+            carried = [(rotation @ v[..., None])[..., 0] for v in (own.axis, own.centre, own.spin, own.drift)]
+            carried[1] = moved
+        translation = (rotation @ shift[..., None])[..., 0] + translation
         rotation = rotation @ turn
-        parts[0].append(rotation)
-        parts[1].append(translation)
+        for part, values in zip(parts, [rotation, translation, *carried], strict=True):
+            part.append(values)
     return Displacement(*(np.stack(part, axis=1) for part in parts))
 
 

@@ -7,7 +7,7 @@ simulation in which only the proximal joint is driven and the equalities move th
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .background import Background
+from .compile.course import without_courses
 from .description import Description, Model, read_description
 from .errors import DescriptionError, IdentificationError, SessionError
 from .hand import Finger, Hand
@@ -138,10 +139,12 @@ def engine_agreement(description: Description, poses: int = AGREEMENT_POSES, see
             for finger in reference_model.hand.fingers
             for joint in finger.joints
         }
-        reference = own.positions(reference_model, angles)
+        exact = own.positions(reference_model, angles)
+        plain = own.positions(own.of_hand(without_courses(reference_model.hand)), angles)  # a URDF holds no course
         for engine, file in (("mujoco", model.mjcf), ("mujoco (URDF)", model.urdf), ("pinocchio", model.urdf), ("yourdfpy", model.urdf)):
             module = importlib.import_module(f"hand_model.engines.{engine.split()[0]}")
             found = module.positions(module.load(file), angles)
+            reference = plain if file == model.urdf else exact
             off = max(float(np.abs(found[point] - reference[point]).max()) for point in reference if point in found)
             worst[engine] = max(worst.get(engine, 0.0), off)
     return worst
@@ -152,14 +155,21 @@ def hand_chain(hand: Hand, finger: Finger, recorded: RecordedFinger, palm_labels
 
     Raises DescriptionError where the hand does not know a marker of the session.
     """
+    return chain_of(hand, finger.name, (*palm_labels, *recorded.labels))
+
+
+def chain_of(hand: Hand, name: str, labels: Sequence[str]) -> Chain:
+    """A finger as a chain with the markers `labels`, those of the palm first; raises DescriptionError where the hand lacks one."""
+    finger = hand.finger(name)
     markers = dict(hand.palm_markers_palm)
     for joint in finger.joints:
         markers.update(joint.markers_palm)
-    for label in (*palm_labels, *recorded.labels):
+    for label in labels:
         if label not in markers:
-            raise DescriptionError(f'finger "{finger.name}": the model has no marker "{label}"; it was identified with other markers')
-    position = np.stack([markers[label] for label in (*palm_labels, *recorded.labels)])
-    return Chain(position, np.stack([j.axis_palm for j in finger.joints]), np.stack([j.centre_palm for j in finger.joints]))
+            raise DescriptionError(f'finger "{name}": the model has no marker "{label}"; it was identified with other markers')
+    courses = tuple(j.course for j in finger.joints)
+    axes, centres = (np.stack([getattr(j, key) for j in finger.joints]) for key in ("axis_palm", "centre_palm"))
+    return Chain(np.stack([markers[label] for label in labels]), axes, centres, courses if any(courses) else ())
 
 
 def measure(hand: Hand, session: Session, recorded: RecordedFinger, trial: Trial) -> tuple[ChainData, Pose, Array]:

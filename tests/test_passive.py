@@ -285,10 +285,10 @@ def test_delays_and_clipping_are_what_mujoco_does() -> None:
 
 
 @pytest.mark.parametrize(("name", "said"), [("command_delay", "| yes | not needed |"), ("detent_load", "| no | yes |"), 
-                                            ("joint_wobble", "| no: its size"), ("quadratic_damping", "| yes | not needed |")])
+                                            ("joint_wobble", "| no: over which course"), ("quadratic_damping", "| yes | not needed |")])
 def test_the_readme_says_where_an_effect_is(name, said) -> None:
     from hand_model.compile.readme import _effects
 
     values = {"detent_load": {"centre": 40.0, "width": 5.0, "load": 20.0, "form": 0.0}}.get(name, {})
     found = Effect(name, {"finger": "index", "actuator": "index"}, {k: Estimate(v, None, "1", "test") for k, v in values.items()})
-    assert f"| {name} | index {said}" in _effects(SimpleNamespace(effects=(found,)))
+    assert f"| {name} | index {said}" in _effects(SimpleNamespace(effects=(found,), fingers=()))

@@ -74,6 +74,12 @@ def _exact(ours: Ours) -> dict[tuple[str, str], Array]:
             out.update({("position", names.marker[finger.name, k]): p - origin for k, p in joint.markers_palm.items()})
             if joint.tip_palm is not None:
                 out["position", names.tip[finger.name]] = joint.tip_palm - origin
+            for extra, (joint_name, equality) in zip(
+                joint.course.joints if joint.course else (), names.course.get(key, ()), strict=True
+            ):
+                padded = np.zeros(5)
+                padded[: len(extra.coefficients)] = extra.coefficients
+                out["axis", joint_name], out["polynomial", equality] = extra.axis_palm, padded
         for coupling in finger.couplings:
             padded = np.zeros(5)
             padded[: len(coupling.coefficients)] = coupling.coefficients

@@ -62,7 +62,8 @@ def names(description: Description, model: Model) -> Finding:
         *expected.marker.values(),
         *expected.tip.values(),
     ]
-    only = [*expected.linkage.values(), *expected.actuator.values(), "open", "close"]
+    only = [name for pairs in expected.course.values() for pair in pairs for name in pair]
+    only += [*expected.linkage.values(), *expected.actuator.values(), "open", "close"]
     problems += [f'no "{name}" in {model.mjcf.name}' for name in (*common, *only) if name not in used]
     problems += [f'no "{name}" in {model.urdf.name}' for name in common if name not in linked]
     said = (

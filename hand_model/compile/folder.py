@@ -16,6 +16,7 @@ from ..description import Description, read_description
 from ..errors import DescriptionError, HandFileError
 from ..hand import Hand
 from .contact import settled
+from .course import lost_in_urdf, with_courses
 from .mesh import link_meshes, stl
 from .mjcf import mjcf
 from .names import sanitised
@@ -121,6 +122,7 @@ def _table(hand: Hand, plans: tuple[Plan, ...]) -> Mapping[str, Any]:
                     }
                     for name, (finger, k) in plan.linkages.items()
                 },
+                **_courses(plan),
                 "keyframes": {name: dict(reached) for name, reached in plan.reached.items()},
                 "excludes": [list(e) for e in plan.excludes],
                 "mass_kg": plan.mass,
@@ -130,6 +132,24 @@ def _table(hand: Hand, plans: tuple[Plan, ...]) -> Mapping[str, Any]:
         "guessed_tips": {f: how for plan in plans for f, how in plan.guessed_tips.items()},
         "inertia": {"origin": "fallback: capsules of uniform density, nothing measured", "density_kg_m3": DENSITY, **_probed(plans)},
     }
+
+
+def _courses(plan: Plan) -> Mapping[str, Any]:
+    """Extra joints (coordinates in rad or m), if there are any, and what a URDF loses without them."""
+    own = {(f.name, j.name): lost_in_urdf(f, j) for f, j in with_courses(plan.hand)}
+    table = {
+        extra.name: {
+            "hinge": link.joint,
+            "kind": extra.kind,
+            "equality": extra.equality,
+            "polynomial": extra.polynomial.tolist(),
+            "urdf_loss_deg": float(np.degrees(own[link.finger, link.segment][0])),
+            "urdf_loss_tip_m": own[link.finger, link.segment][1],
+        }
+        for link in plan.links
+        for extra in link.extras
+    }
+    return {"courses": table} if table else {}
 
 
 def _probed(plans: tuple[Plan, ...]) -> Mapping[str, Any]:

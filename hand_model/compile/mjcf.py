@@ -8,6 +8,7 @@ import numpy as np
 
 from ..effects import effect
 from ..hand import Hand
+from .course import Tied, complete_courses, stiffen, write_joints
 from .drive import Drive, nominal_drives
 from .motor import complete_keyframes, write_motors
 from .plan import Link, Plan, in_file_names
@@ -42,6 +43,7 @@ def mjcf(plan: Plan, newton_metre_per_unit: float | None = None) -> Any:
     _actuators(root, plan, drives)
     _physics(root, in_file_names(plan), newton_metre_per_unit)
     _keyframes(root, plan)
+    stiffen(root, _ties(plan))
     return root
 
 
@@ -72,6 +74,7 @@ def _body(parent: Any, asset: Any, link: Link, drives: dict[str, Drive]) -> Any:
     child(body, "inertial", pos=inertia.centre, mass=inertia.mass, fullinertia=full)
     if link.joint is not None:
         drive = drives.get(link.joint)
+        write_joints(body, () if link.turning else link.extras)
         joint = child(
             body, "joint", name=link.joint, type="hinge", pos=(0, 0, 0), axis=link.axis, range=link.range_rad, ref="0"
         )
@@ -79,6 +82,7 @@ def _body(parent: Any, asset: Any, link: Link, drives: dict[str, Drive]) -> Any:
             joint.set("damping", number(drive.damping))
             if drive.armature:
                 joint.set("armature", number(drive.armature))
+        write_joints(body, link.extras if link.turning else ())
     child(asset, "mesh", name=f"{link.name}_visual", file=f"{link.mesh}.stl")
     child(body, "geom", class_="visual", type="mesh", mesh=f"{link.name}_visual")
     for i in range(len(link.parts)):
@@ -95,7 +99,7 @@ def _body(parent: Any, asset: Any, link: Link, drives: dict[str, Drive]) -> Any:
 
 
 def _equalities(root: Any, plan: Plan) -> None:
-    if not plan.linkages:
+    if not plan.linkages and not any(link.extras for link in plan.links):
         return
     equality = child(root, "equality")
     for name, (finger, linkage) in plan.linkages.items():
@@ -111,6 +115,10 @@ def _equalities(root: Any, plan: Plan) -> None:
             solref=SOLREF,
             solimp=SOLIMP,
         )
+    for link in plan.links:
+        for extra in link.extras:
+            ends = {"joint1": extra.name, "joint2": link.joint, "polycoef": extra.polynomial}
+            child(equality, "joint", name=extra.equality, **ends, solref=SOLREF, solimp=SOLIMP)
 
 
 def _actuators(root: Any, plan: Plan, drives: dict[str, Drive]) -> None:
@@ -156,3 +164,9 @@ def _keyframes(root: Any, plan: Plan) -> None:
                 "ctrl", vector([angles.get(a.get("joint"), 0.0) if a.tag == "position" else 0.0 for a in actuators])
             )
     complete_keyframes(root, in_file_names(plan))
+    complete_courses(root, _ties(plan))
+
+
+def _ties(plan: Plan) -> dict[str, tuple[Tied, ...]]:
+    """Hinge -> its extra joints."""
+    return {link.joint: link.extras for link in plan.links if link.joint is not None and link.extras}

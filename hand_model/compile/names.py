@@ -6,9 +6,11 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from ..hand import Hand
+
+WORDS = {"hinge": "wobble", "slide": "travel"}  # what a segment's extra joints do
 
 
 @dataclass(frozen=True)
@@ -17,6 +19,7 @@ class Names:
 
     joint, link: (finger, joint) -> name. marker: (finger, label) -> site, finger "" for the palm. tip, collision:
     finger -> name. linkage: (finger, follower joint) -> equality. actuator: finger -> name, for fingers that have one.
+    course: (finger, joint) -> (joint, equality) of each of its extra joints, for joints that are no plain hinges.
     """
 
     joint: Mapping[tuple[str, str], str]
@@ -25,6 +28,7 @@ class Names:
     tip: Mapping[str, str]
     linkage: Mapping[tuple[str, str], str]
     actuator: Mapping[str, str]
+    course: Mapping[tuple[str, str], tuple[tuple[str, str], ...]] = field(default_factory=dict)
 
 
 def sanitised(name: str) -> str:
@@ -62,7 +66,13 @@ def named(hand: Hand) -> Names:
     labels = [("", label) for label in hand.palm_markers_palm]
     labels += [(f.name, label) for f in hand.fingers for j in f.joints for label in j.markers_palm]
     marker = {key: claim("marker_" + label_part(key[1])) for key in labels}
-    return Names(joint, link, marker, tip, linkage, actuator)
+    course: dict[tuple[str, str], tuple[tuple[str, str], ...]] = {}
+    for finger in hand.fingers:
+        for own in (j for j in finger.joints if j.course is not None):
+            key = (finger.name, own.name)
+            extra = [claim(f"{joint[key]}_{WORDS.get(e.kind, e.kind)}") for e in own.course.joints]
+            course[key] = tuple((name, claim(f"{name}_course")) for name in extra)
+    return Names(joint, link, marker, tip, linkage, actuator, course)
 
 
 def label_part(label: str) -> str:

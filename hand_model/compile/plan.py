@@ -14,6 +14,7 @@ from ..hand import Hand
 from ..kinematics import unit
 from .clearance import PALM, Key, cleared
 from .coupling import Linkage, checked, limits, linkages
+from .course import Tied, checked_course, tied
 from .names import Names, named, sanitised
 from .posture import finger_posture, grips_of, known_grip_fingers, posture
 from .shape import Capsule, Inertia, capsule_inertia, combined, finger_capsules, palm_capsules, with_tips
@@ -30,7 +31,7 @@ class Link:
     position_parent, axis: (3,) [m], [-]. range_rad: (low, high). solid: nominal shape, which the
     inertia and the visual mesh (file stem `mesh`) come from; shapes: what collides. sites: name -> (3,) [m].
     surface: the probed surface that takes the nominal shape's place as visual, and as origin of the inertia if watertight.
-    parts: its convex parts, which collide in place of `shapes`.
+    parts: its convex parts, which collide in place of `shapes`. extras: joints beside its hinge, turning with it or standing before it.
     """
 
     name: str
@@ -48,6 +49,8 @@ class Link:
     mesh: str
     surface: Surface | None = None
     parts: tuple[Surface, ...] = ()
+    extras: tuple[Tied, ...] = ()
+    turning: bool = False
 
 
 @dataclass(frozen=True)
@@ -132,6 +135,7 @@ def complete(hand: Hand) -> tuple[Hand, Mapping[str, str]]:
                 raise HandFileError(
                     f'finger "{finger.name}", joint "{joint.name}": axis, centre, range or a marker is not finite'
                 )
+            checked_course(finger, joint)
         joints = tuple(replace(j, axis_palm=unit(j.axis_palm)) for j in finger.joints)
         fingers.append(checked(replace(finger, joints=joints)))
     return with_tips(replace(hand, fingers=tuple(fingers)))
@@ -233,6 +237,7 @@ def _finger_links(
         inertia = combined(tuple(capsule_inertia(c) for c in full))
         position, axis, link = centre - origin, np.asarray(joint.axis_palm, float), names.link[key]
         where = (link, name, joint.name, parent, names.joint[key], position, axis, bounds[joint.name])
-        links.append(Link(*where, full, local, inertia, sites, link))
+        turning = joint.course is not None and joint.course.turning
+        links.append(Link(*where, full, local, inertia, sites, link, extras=tied(finger, joint, names), turning=turning))
         parent, origin = link, centre
     return links

@@ -8,6 +8,7 @@ from ..effects import effect
 from ..effects.base import Effect
 from ..hand import Hand
 from .clearance import SHARE_A_JOINT
+from .course import lost_in_urdf, with_courses
 from .plan import Plan
 from .shape import DENSITY
 
@@ -39,6 +40,7 @@ def readme(hand: Hand, plans: tuple[Plan, ...]) -> str:
         _derivation(hand, plans),
         _joints(hand),
         _linkages(plans),
+        _courses(hand),
         _motors(hand),
         _effects(hand),
         _surfaces(plans),
@@ -135,6 +137,24 @@ def _linkages(plans: tuple[Plan, ...]) -> str:
     return "\n".join(rows) + "\n"
 
 
+def _courses(hand: Hand) -> str:
+    crooked = with_courses(hand)
+    if not crooked:
+        return ""
+    rows = ["## Joints that are no plain hinges\n"]
+    rows.append("In the MJCF their segments have extra joints, tied to the hinge's angle by equalities (`polycoef`). The URDF has the")
+    rows.append("hinge alone; what that loses, at worst over the range:\n")
+    rows += ["| finger | joint | extra joints | tilt, deg | tip, mm |", "| --- | --- | --- | --- | --- |"]
+    for finger, joint in crooked:
+        tilt, tip = lost_in_urdf(finger, joint)
+        kinds = ", ".join(e.kind for e in joint.course.joints)
+        rows.append(f"| {finger.name} | {joint.name} | {kinds} | {np.degrees(tilt):.2f} | {tip * 1e3:.2f} |")
+    if any(e.kind == "slide" for _, joint in crooked for e in joint.course.joints):
+        rows.append("\nThe ties of slides have an absolute stiffness (`solref` below zero), right for this file's inertias: whoever makes their")
+        rows.append("finger much heavier gives them MuJoCo's own (`solref=\"0.002 1\"`).")
+    return "\n".join(rows) + "\n"
+
+
 def _motors(hand: Hand) -> str:
     if not hand.motors and not hand.effects:
         return ""
@@ -157,12 +177,13 @@ def _effects(hand: Hand) -> str:
     if not hand.effects:
         return ""
     rows = ["## Where the effects are\n", "| effect | of | MJCF | callback | URDF |", "| --- | --- | --- | --- | --- |"]
-    called = False
+    called, crooked = False, {(f.name, j.name) for f, j in with_courses(hand)}
     for found in hand.effects:
         kind = effect(found.effect)
         law = kind.law({name: e.value for name, e in found.parameters.items()}) is not None
         place = " ".join(str(found.where[k]) for k in ("finger", "joint") if found.where.get(k))
-        native = not law and type(kind).write_mjcf is not Effect.write_mjcf
+        native = not law and type(kind).write_mjcf is not Effect.write_mjcf and (
+            kind.station != "markers" or (found.where.get("finger"), found.where.get("joint")) in crooked)
         held = "yes" if native else f"no: {kind.unwritten}" if kind.unwritten and not law else "no"
         rows.append(f"| {found.effect} | {place} | {held} | {'yes' if law else 'not needed' if native else 'no'} | no: hand.json |")
         called |= law

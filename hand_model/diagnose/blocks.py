@@ -53,8 +53,8 @@ def blocks_of(angles: FingerAngles) -> Blocks:
         residual = record.pose.to_palm(observed) - propagate(chain, body, record.pose.angle_rad)[0]
         size = np.linalg.norm(residual, axis=-1)
         sound = np.isfinite(record.angle_rad).all(1)
-        far = ~(size < FARTHEST_M) | _passing(size > OUTLIER_LIMIT * angles.noise_m, record.mocap.time_s)
-        good = np.flatnonzero(~record.ghost & (sound | (~far.any(1) & ~_passing(~sound, record.mocap.time_s))))
+        far = ~(size < FARTHEST_M) | passing(size > OUTLIER_LIMIT * angles.noise_m, record.mocap.time_s)
+        good = np.flatnonzero(~record.ghost & (sound | (~far.any(1) & ~passing(~sound, record.mocap.time_s))))
         count = len(good) // BLOCK
         if count < 20:
             continue
@@ -80,7 +80,7 @@ def _calm(scatter: Array) -> Array:
     return np.where(share < LOUD, share, 1.0)
 
 
-def _passing(flag: NDArray[np.bool_], time_s: Array) -> NDArray[np.bool_]:
+def passing(flag: NDArray[np.bool_], time_s: Array) -> NDArray[np.bool_]:
     """Where a flag (n,) or (n, m) is up for a moment only: a ghost passes, a slip lasts."""
     width = max(int(LASTING_S / float(np.median(np.diff(time_s)))), 1)
     up = uniform_filter1d(flag.astype(float), width, axis=0, mode="nearest")

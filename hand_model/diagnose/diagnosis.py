@@ -21,6 +21,7 @@ from .assemble import assemble
 from .balance import Balance
 from .command import CommandFacts, command_facts, command_findings, refused, with_lateness
 from .correct import refuse_output, write_corrected
+from .course import FingerCourses
 from .decoupled import while_driven, without_excursions
 from .drive import drive_states, drive_trials, echoes_command, is_measured, opposes, rests_on_command, with_gives
 from .evidence import gain, typical_coefficients
@@ -69,6 +70,7 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
     notes = list(check_session(session, dead=True))
     found: list[tuple[float, Finding]] = []
     fingers: dict[str, FingerAngles] = {}
+    courses: dict[str, FingerCourses] = {}
     stations: list[Station] = []
     unexplained: list[dict[str, Any]] = []
     distrusted = _distrusted(session)
@@ -86,6 +88,8 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
         notes += reading.notes
         if reading.angles is not None:
             fingers[reading.finger] = reading.angles
+        if reading.courses is not None:
+            courses[reading.finger] = reading.courses
     drives = {a: with_gravity(session, fingers, states)
               for a, states in drive_states(session, _encoder_corrections(stations), unread).items()}
     for station in (s for s in stations if s.believed and s.actuator in drives):
@@ -130,7 +134,7 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
         replays: tuple[Replay, ...] = ()
         forget(output, FOLDERS, FILES[0])
         if model is not False:
-            with Pair((findings, session, hand, stations, Path(output), tell)) as pair:
+            with Pair((findings, session, hand, stations, courses, Path(output), tell)) as pair:
                 (findings, replays), _ = pair.map(_written, ("model", "corrected"))
         write_page(findings, stations, replays, session.path.name, Path(output))
         findings.save(output)
@@ -176,12 +180,12 @@ def _written(results: tuple[Any, ...], what: str) -> Any:
     """What of a diagnosis goes into folders of its own."""
     if what == "model":
         return _modelled(*results)
-    findings, session, _, stations, output, _ = results
+    findings, session, _, stations, _, output, _ = results
     return write_corrected(session, findings.findings, _counts_corrected(session, stations), output)
 
 
-def _modelled(findings: Findings, session: Session, hand: Hand | None, stations: list[Station], output: Path,
-              tell: Callable[[str], None]) -> tuple[Findings, tuple[Replay, ...]]:
+def _modelled(findings: Findings, session: Session, hand: Hand | None, stations: list[Station], courses: dict[str, FingerCourses],
+              output: Path, tell: Callable[[str], None]) -> tuple[Findings, tuple[Replay, ...]]:
     """The findings with the model that holds them written, and its replays; without a `hand` the session's own is identified."""
     from ..identify import identify
     from .angles import ranges_of_counts
@@ -191,7 +195,7 @@ def _modelled(findings: Findings, session: Session, hand: Hand | None, stations:
     try:
         hand = identify(session) if hand is None else hand
         tell(f"writing {output / 'model'}")
-        named, replays = write_improved(hand, findings.findings, stations, ranges_of_counts(session), output)
+        named, replays = write_improved(hand, findings.findings, stations, ranges_of_counts(session), output, courses)
     except HandModelError as error:
         return replace(findings, notes=(*findings.notes, f"no model was written: {error}")), ()
     return replace(findings, findings=named), replays

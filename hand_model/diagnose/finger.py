@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ..background import Background
@@ -11,8 +11,10 @@ from ..effects import catalogue, outsiders
 from ..errors import IdentificationError
 from ..session import Finger, Session
 from .angles import FingerAngles, encoder_states, expected_angles, finger_angles, linkage_states, ranges_of_counts
+from .course import FingerCourses, finger_courses
 from .findings import Finding
-from .markers import corrected_angles, name_markers
+from .markers import HINGE, corrected_angles, name_markers
+from .prove_markers import OWN, marker_fit, of_chain
 from .slips import marker_findings, steps
 from .slips import unexplained as unexplained_of
 from .station import Station, judged
@@ -21,7 +23,7 @@ from .station import Station, judged
 @dataclass(frozen=True)
 class FingerReading:
     """One finger seen by the cameras. stations: encoder and linkages, in this order. found: of its markers, each with its weight.
-    angles: None where nothing could be read, and notes say why. lines: for a progress display."""
+    angles: None where nothing could be read, and notes say why. lines: for a progress display. courses: of joints that are no plain hinges."""
 
     finger: str
     angles: FingerAngles | None = None
@@ -30,6 +32,7 @@ class FingerReading:
     unexplained: tuple[dict[str, Any], ...] = ()
     notes: tuple[str, ...] = ()
     lines: tuple[str, ...] = ()
+    courses: FingerCourses | None = None
 
 
 def finger_readings(session: Session, unread: tuple[str, ...] = ()) -> Iterator[FingerReading]:
@@ -64,6 +67,10 @@ def _reading(session: Session, finger: Finger, shape: Any, counts: dict[str, tup
 def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, float]]) -> FingerReading:
     markers = name_markers(seen)
     found = tuple(marker_findings(seen, markers))
+    courses = finger_courses(seen, markers, {(f.effect, f.where["joint"]) for _, f in found if f.effect in HINGE})
+    if courses is not None:
+        fit = marker_fit(courses, of_chain(courses.plain, courses.body), of_chain(courses.coursed, courses.body), OWN)
+        found = tuple((w, replace(f, fit=fit) if f.effect in HINGE else f) for w, f in found)
     names = ", ".join(f.effect for _, f in found) or "consistent"
     lines = [f"{finger.name} markers: {names} (p {markers.p_before:.2g} -> {markers.p_after:.2g})"]
     angles, moments = corrected_angles(seen, markers), steps(seen, markers)
@@ -80,4 +87,4 @@ def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, f
             effects = [*catalogue("linkage"), *outsiders("linkage")]
             stations.append(judged("markers", finger.name, finger.actuator, finger.segments[joint].name, states, effects))
     lines += [s.line() for s in stations]
-    return FingerReading(finger.name, seen, tuple(stations), found, tuple(unexplained_of(seen, markers)), (), tuple(lines))
+    return FingerReading(finger.name, seen, tuple(stations), found, tuple(unexplained_of(seen, markers)), (), tuple(lines), courses)

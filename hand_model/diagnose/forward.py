@@ -87,6 +87,8 @@ def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, pat
     address, dof = model.jnt_qposadr[list(held)], model.jnt_dofadr[list(held)]
     model.dof_armature[dof] = HOLD
     mujoco.mj_setConst(model, mujoco.MjData(model))
+    absolute = model.eq_solref[:, 0] < 0  # ties of slides, stiff for the inertias as they were and for the file's own step
+    model.eq_solref[absolute] = 2 * STEP_S, 1.0
     at, rate = model.jnt_qposadr[driver], model.jnt_dofadr[driver]
     time_s = SLOWER * state.time_s
     spline = PchipInterpolator(time_s, path)

@@ -14,12 +14,17 @@ from ..effects import effect
 from ..errors import HandFileError
 from ..hand import Coupling, Effect, EncoderMap, Estimate, Finger, Hand, Motor, load_hand
 from ..session import Session
+from .course import FingerCourses
 from .findings import Finding
+from .markers import HINGE
 from .prove import Replay, errors_along, proved, untouched
+from .prove_markers import COMPILED, marker_fit, of_folder
+from .write_course import with_chains, written_courses
 
 MOTOR = {"inertia": ("inertia", "raw s^2/%"), "viscous": ("viscous", "raw s/%"), "coulomb": ("coulomb", "raw"),
          "spring": ("stiffness", "raw/%"), "preload": ("preload", "raw")}
 LEAST = {"stiffness": 1e-6, "inertia": 2e-3}  # [raw, %]: a preload needs a spring; bristles without inertia cannot be simulated
+OTHER_MARKERS = "the model's palm markers are not this session's, or elsewhere: nothing tells where its joints are"
 DRIVE_KEPT = ("gain", "damping")  # of an identified motor, beside what the balance fits
 
 
@@ -112,8 +117,9 @@ def _estimate(entry: Mapping[str, Any]) -> Estimate:
     return Estimate(float(entry["value"]), None if ci is None else (float(ci[0]), float(ci[1])), str(entry["unit"]), "diagnosis")
 
 
-def written(before: Path, finding: Finding) -> dict[str, Any]:
-    """`model` of a finding, {"native", "mjcf", "urdf", "callback"}: where the files of the folder `before`, which hold no effect, get it."""
+def written(before: Path, after: Path, finding: Finding) -> dict[str, Any]:
+    """`model` of a finding, {"native", "mjcf", "urdf", "callback"}: where the files of the folder `before`, which hold no effect, get it, or
+    where those of `after` have what comes from hand.json (a course)."""
     from lxml import etree
 
     values = {k: v["value"] for k, v in finding.parameters.items()}
@@ -124,7 +130,8 @@ def written(before: Path, finding: Finding) -> dict[str, Any]:
     if kind.law(values) is not None:
         call = "hand_model.effects_on(model, folder)"
         return {"native": False, "mjcf": None, "urdf": urdf, "callback": call}
-    for file in sorted(f for f in before.glob("*.xml") if not f.name.startswith("scene")):
+    folder = after if kind.station == "markers" else before
+    for file in sorted(f for f in folder.glob("*.xml") if not f.name.startswith("scene")):
         place = kind.write_mjcf(etree.parse(str(file)).getroot(), finding.where, values)
         if place is not None:
             return {"native": True, "mjcf": place, "urdf": urdf, "callback": None}
@@ -133,9 +140,10 @@ def written(before: Path, finding: Finding) -> dict[str, Any]:
 
 
 def write_improved(hand: Hand, findings: Sequence[Finding], stations: Sequence[Any], counts: Mapping[str, tuple[float, float]],
-                   output: Path) -> tuple[tuple[Finding, ...], tuple[Replay, ...]]:
+                   output: Path,
+                   courses: Mapping[str, FingerCourses] | None = None) -> tuple[tuple[Finding, ...], tuple[Replay, ...]]:
     """Compile the hand as declared into `output`/model_before and with its effects into `output`/model; the findings, saying
-    where each is written and what replaying the two says, and the replays.
+    where each is written and what replaying the two says, and the replays. courses: finger -> those of its joints.
 
     Raises HandModelError where the hand cannot be compiled. Nothing is written where no finding is physics of the hand.
     """
@@ -144,19 +152,28 @@ def write_improved(hand: Hand, findings: Sequence[Finding], stations: Sequence[A
     hand = without_effects(hand, findings)
     known = {f.name for f in hand.fingers}
     touched = [s for s in stations if s.finger in known and any(_of(f, s) for f in findings if f.correction is None)]
-    before = as_fitted(hand, touched, counts, lambda source: source.declared)
-    after = with_effects(as_fitted(hand, touched, counts, lambda source: source.fit), findings)
+    crooked = written_courses(hand, findings, courses or {})
+    # other chains, other angles: what maps them is as this session has it, too
+    maps = [s for s in stations if s.finger in crooked and s.signal != "current" and s not in touched]
+    hand = as_fitted(hand, maps, counts, lambda source: source.declared)
+    before = with_chains(as_fitted(hand, touched, counts, lambda source: source.declared), crooked, lambda c: c.plain)
+    after = with_chains(as_fitted(hand, touched, counts, lambda source: source.fit), crooked, lambda c: c.coursed)
+    after = with_effects(after, findings)
     if not any(f.correction is None for f in findings):
         return tuple(findings), ()
     compile(before, output / "model_before")
     compile(after, output / "model")
     named = [(f, next((s for s in stations if _of(f, s)), None)) for f in findings]
     errors = errors_along([(s, untouched(f, s)) for f, s in named if f.correction is None], output / "model_before", output / "model")
+    files = output / "model_before", output / "model"
+    fits = {name: marker_fit(c, *(of_folder(f, name, c.labels) for f in files), COMPILED) for name, c in crooked.items()}
     out, replays = [], []
     for finding, station in named:
         if finding.correction is None:
-            finding = replace(finding, model=written(output / "model_before", finding))
+            finding = replace(finding, model=written(output / "model_before", output / "model", finding))
             fit, replay = proved(finding, station, errors)
+            if finding.effect in HINGE:
+                fit = fits.get(finding.where["finger"], {**finding.fit, "note": OTHER_MARKERS})
             finding = replace(finding, fit=fit)
             replays += [] if replay is None else [replace(replay, finding=finding)]
         out.append(finding)

@@ -306,13 +306,13 @@ def corrected_angles(angles: FingerAngles, naming: MarkerNaming) -> FingerAngles
         return angles
     right = []
     for index, record in enumerate(angles.records):
-        shift = _at_frames(naming, index, record.mocap.time_s)
+        shift = shift_at_frames(naming, index, record.mocap.time_s)
         world = np.einsum("nij,nmj->nmi", record.pose.rotation, shift)
         right.append(replace(record.data, position_world=record.data.position_world - world))
     return refitted(angles, right)
 
 
-def _at_frames(naming: MarkerNaming, record: int, time_s: Array) -> Array:
+def shift_at_frames(naming: MarkerNaming, record: int, time_s: Array) -> Array:
     """Displacement (n, m, 3) [m], palm frame, of all named effects at the frames of one record."""
     blocks = naming.blocks
     mine = np.flatnonzero(blocks.record == record)

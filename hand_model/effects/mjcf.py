@@ -118,6 +118,13 @@ def motor_sensor(root: Any, where: Mapping[str, Any], kind: str) -> Any:
     return sensor
 
 
+def extra_joint(root: Any, where: Mapping[str, Any], word: str) -> str | None:
+    """Path of the first extra joint ("wobble", "travel") of the place's segment; None where the file has none."""
+    name = f"{where.get('finger')}_{where.get('joint')}_{word}"
+    found = any(j.get("name") == name for j in root.find("worldbody").iter("joint"))
+    return f"worldbody//joint[@name='{name}']" if found else None
+
+
 def delay(root: Any, element: Any, delay_s: float) -> str:
     """Give an actuator or a sensor a delay [s], and as many remembered samples as it takes; its path."""
     option = root.find("option")

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from .base import Amplitude, Effect
+from .mjcf import extra_joint
 
 
 class MovingCentre(Effect):
@@ -13,7 +14,7 @@ class MovingCentre(Effect):
 
     name = "moving_centre"
     station = "markers"
-    unwritten = "its size is kept in hand.json; over which course of the angle it travels is not, so no joint is written"
+    unwritten = "over which course of the angle it travels is not known, so no joint is written"
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """None: no balance holds it."""
@@ -23,6 +24,10 @@ class MovingCentre(Effect):
         """The longest way."""
         joint = f"the {where['joint']} joint" if where.get("joint") else "a joint"
         return f"the centre of rotation of {joint} travels by up to {1e3 * parameters['travel']:.2f} mm as the angle grows"
+
+    def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
+        """Its joints are the segment's own, from the course in hand.json: where they are; None in a file without them."""
+        return extra_joint(root, where, "travel")
 
 
 EFFECT = MovingCentre()

@@ -24,13 +24,15 @@ HOLD = 1.0  # kg m^2 of armature on a prescribed joint: some 1e5 times a finger,
 
 @dataclass(frozen=True)
 class Model:
-    """A MuJoCo model. joints: its hinges and slides. points: sites and bodies without joints, by name."""
+    """A MuJoCo model. joints: its hinges and slides. points: sites and bodies without joints, by name. courses: joint id -> (driver's
+    id, polycoef (5,)) of those that an equality ties to another one of their body: where they are not given, they follow it."""
 
     mj: Any
     joints: tuple[str, ...]
     addresses: NDArray[np.int64]
     points: Mapping[str, tuple[str, int]]
     bodies: Mapping[str, int]
+    courses: Mapping[int, tuple[int, Array]]
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,7 @@ def wrap(mj: Any) -> Model:
     import mujoco
 
     kinds = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
+    courses = {j: tie for j, tie in followers(mj).items() if mj.jnt_bodyid[j] == mj.jnt_bodyid[tie[0]]}
     moving = [i for i in range(mj.njnt) if mj.jnt_type[i] in kinds]
     bodies = {mj.body(i).name: i for i in range(1, mj.nbody)}
     points = {mj.site(i).name: ("site", i) for i in range(mj.nsite)}
@@ -70,12 +73,12 @@ def wrap(mj: Any) -> Model:
         for name, i in bodies.items()
         if mj.body_jntnum[i] == 0 and name != "palm" and name not in points
     }
-    return Model(mj, tuple(mj.joint(i).name for i in moving), mj.jnt_qposadr[moving], points, bodies)
+    return Model(mj, tuple(mj.joint(i).name for i in moving), mj.jnt_qposadr[moving], points, bodies, courses)
 
 
 def positions(model: Model, joint_angles: Mapping[str, ArrayLike]) -> Mapping[str, Array]:
     """Positions (n, 3) [m] of sites and of bodies without joints; joint_angles: joint -> (n,) [rad]."""
-    return _kinematics(model, columns(model.joints, joint_angles), rotations=False)[1]
+    return _kinematics(model, _coordinates(model, joint_angles), rotations=False)[1]
 
 
 def poses(model: Model, joint_angles: Mapping[str, ArrayLike]) -> Mapping[str, Array]:
@@ -85,7 +88,19 @@ def poses(model: Model, joint_angles: Mapping[str, ArrayLike]) -> Mapping[str, A
 
 def kinematics(model: Model, joint_angles: Mapping[str, ArrayLike]) -> tuple[dict[str, Array], dict[str, Array]]:
     """Body poses (n, 4, 4) and positions (n, 3) [m]; joint_angles: joint -> (n,) [rad]."""
-    return _kinematics(model, columns(model.joints, joint_angles), rotations=True)
+    return _kinematics(model, _coordinates(model, joint_angles), rotations=True)
+
+
+def _coordinates(model: Model, joint_angles: Mapping[str, ArrayLike]) -> Array:
+    """Coordinates (n, joints) [rad or m], those of courses where their driver wants them."""
+    out = columns(model.joints, joint_angles)
+    place = {int(a): i for i, a in enumerate(model.addresses)}
+    for joint, (driver, coefficients) in model.courses.items():
+        if model.mj.joint(joint).name not in joint_angles:
+            a, b = int(model.mj.jnt_qposadr[joint]), int(model.mj.jnt_qposadr[driver])
+            moved = np.polynomial.polynomial.polyval(out[:, place[b]] - model.mj.qpos0[b], coefficients)
+            out[:, place[a]] = model.mj.qpos0[a] + moved
+    return out
 
 
 def _kinematics(model: Model, angles: Array, rotations: bool) -> tuple[dict[str, Array], dict[str, Array]]:

@@ -1,5 +1,9 @@
 """Pinocchio: kinematics of a URDF or MJCF. Mimic is not left to it: every joint's angle is passed (it refuses chains of
-mimics)."""
+mimics).
+
+Its MJCF parser makes one composite joint of the joints of a body, under the first one's name, and drops the equalities: names and ties
+(those of a course, between joints of one body) are read from the file beside it.
+"""
 
 from __future__ import annotations
 
@@ -16,17 +20,22 @@ from .common import ROOT, columns, homogeneous, relative
 
 Array = NDArray[np.float64]
 
+COMPOSITE = "Composite_"  # what its parser puts before the name of a body's first joint, where there are several
+
 
 @dataclass(frozen=True)
 class Model:
-    """A Pinocchio model. joints: those with one angle. frames: name -> (parent joint id, placement (4, 4)); links:
-    names of bodies, points: names of sites and of links without a joint of their own."""
+    """A Pinocchio model. joints: those with one angle, and the parts of composite ones; address: their places in q. frames: name ->
+    (parent joint id, placement (4, 4)); links: names of bodies, points: names of sites and of links without a joint of their own.
+    courses: joint -> (driver, polycoef (5,)) of those that follow another one of their body."""
 
     pin: Any
     joints: tuple[str, ...]
+    address: tuple[int, ...]
     frames: Mapping[str, tuple[int, Array]]
     links: tuple[str, ...]
     points: tuple[str, ...]
+    courses: Mapping[str, tuple[str, Array]]
 
 
 def load(file: str | Path) -> Model:
@@ -52,8 +61,29 @@ def load(file: str | Path) -> Model:
     points = tuple(
         f.name for f in model.frames if f.type == pin.FrameType.OP_FRAME or (f in bodies and f.name not in own)
     )
-    joints = tuple(name for i, name in enumerate(model.names) if i and model.joints[i].nq == 1)
-    return Model(model, joints, frames, tuple(f.name for f in bodies), points)
+    together, courses = ({}, {}) if path.suffix == ".urdf" else _of_one_body(path)
+    address: dict[str, int] = {}
+    for i, name in enumerate(model.names):
+        parts = together.get(name.removeprefix(COMPOSITE), ()) if name.startswith(COMPOSITE) else (name,)
+        if i and len(parts) == model.joints[i].nq:
+            address |= {part: model.joints[i].idx_q + k for k, part in enumerate(parts)}
+    return Model(model, tuple(address), tuple(address.values()), frames, tuple(f.name for f in bodies), points, courses)
+
+
+def _of_one_body(path: Path) -> tuple[dict[str, tuple[str, ...]], dict[str, tuple[str, Array]]]:
+    """First joint -> all joints of each body of an MJCF that has several, and the ties between them."""
+    from lxml import etree
+
+    root = etree.parse(str(path)).getroot()
+    bodies = [tuple(j.get("name") or "" for j in body.findall("joint")) for body in root.iter("body")]
+    together = {names[0]: names for names in bodies if len(names) > 1}
+    body = {name: first for first, names in together.items() for name in names}
+    ties = {}
+    for e in root.iterfind("equality/joint"):
+        one, two = e.get("joint1"), e.get("joint2")
+        if one in body and body[one] == body.get(two):
+            ties[one] = two, np.array([float(v) for v in (e.get("polycoef") or "0 1 0 0 0").split()])
+    return together, ties
 
 
 def _first(bodies: list[Any], frame: Any) -> bool:
@@ -63,7 +93,7 @@ def _first(bodies: list[Any], frame: Any) -> bool:
 
 def positions(model: Model, joint_angles: Mapping[str, ArrayLike]) -> Mapping[str, Array]:
     """Positions (n, 3) [m] of sites and of links on fixed joints; joint_angles: joint -> (n,) [rad]."""
-    carried = _joint_poses(model, columns(model.joints, joint_angles))
+    carried = _joint_poses(model, _coordinates(model, joint_angles))
     return relative(_frames(model, carried, [name for name in model.links if name == ROOT]), _points(model, carried))[1]
 
 
@@ -74,8 +104,18 @@ def poses(model: Model, joint_angles: Mapping[str, ArrayLike]) -> Mapping[str, A
 
 def kinematics(model: Model, joint_angles: Mapping[str, ArrayLike]) -> tuple[dict[str, Array], dict[str, Array]]:
     """Link poses (n, 4, 4) and positions (n, 3) [m]; joint_angles: joint -> (n,) [rad]."""
-    carried = _joint_poses(model, columns(model.joints, joint_angles))
+    carried = _joint_poses(model, _coordinates(model, joint_angles))
     return relative(_frames(model, carried, model.links), _points(model, carried))
+
+
+def _coordinates(model: Model, joint_angles: Mapping[str, ArrayLike]) -> Array:
+    """Coordinates (n, joints) [rad or m], those of courses where their driver wants them."""
+    out = columns(model.joints, joint_angles)
+    for joint, (driver, coefficients) in model.courses.items():
+        if joint not in joint_angles:
+            along = out[:, model.joints.index(driver)]
+            out[:, model.joints.index(joint)] = np.polynomial.polynomial.polyval(along, coefficients)
+    return out
 
 
 def _frames(model: Model, carried: list[Array], names: Iterable[str]) -> dict[str, Array]:
@@ -95,8 +135,7 @@ def _joint_poses(model: Model, angles: Array) -> list[Array]:
     import pinocchio as pin
 
     data = model.pin.createData()
-    ids = [model.pin.getJointId(name) for name in model.joints]
-    address = [model.pin.joints[i].idx_q for i in ids]
+    address = list(model.address)
     neutral = pin.neutral(model.pin)
     n, count = len(angles), len(model.pin.names)
     rotation, translation = np.empty((count, n, 3, 3)), np.empty((count, n, 3))

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..course import motion
+from ..hand import Course
 from ..rotation import kabsch, perpendicular_basis, rotation_about, rotation_from_vector, skew
 from ..session import Finger
 
@@ -45,11 +47,13 @@ class ChainData:
 
 @dataclass(frozen=True)
 class Chain:
-    """What all frames share, at rest. marker_palm: (m, 3) [m]. axis_palm: (k, 3) unit. centre_palm: (k, 3) [m]."""
+    """What all frames share, at rest. marker_palm: (m, 3) [m]. axis_palm: (k, 3) unit. centre_palm: (k, 3) [m]. courses: (k,) of joints that
+    are no plain hinges; empty where all are."""
 
     marker_palm: Array
     axis_palm: Array
     centre_palm: Array
+    courses: tuple[Course | None, ...] = ()
 
     @property
     def tangent(self) -> Array:
@@ -68,10 +72,14 @@ class Chain:
         tilt = np.einsum("ki,kij->kj", joint[:, :2], self.tangent)
         shift = np.einsum("ki,kij->kj", joint[:, 2:], self.tangent)
         axis = np.einsum("kij,kj->ki", rotation_from_vector(np.cross(self.axis_palm, tilt)), self.axis_palm)
-        return Chain(self.marker_palm + step[: 3 * m].reshape(m, 3), axis, self.centre_palm + shift)
+        return Chain(self.marker_palm + step[: 3 * m].reshape(m, 3), axis, self.centre_palm + shift, self.courses)
+
+    def course(self, k: int) -> Course | None:
+        """What joint k does beside turning about its hinge."""
+        return self.courses[k] if self.courses else None
 
     def at(self, angle_rad: Array, body: Array) -> Chain:
-        """The chain with its zero moved to the joint angles (k,) [rad]: the same mechanism, that pose called rest."""
+        """The chain (of plain hinges) with its zero moved to the joint angles (k,) [rad]: the same mechanism, that pose called rest."""
         x, _, joints = propagate(self, body, np.asarray(angle_rad, float)[None])
         return Chain(x[0], np.stack([a[0] for a, _ in joints]), np.stack([c[0] for _, c in joints]))
 
@@ -119,11 +127,18 @@ def propagate(chain: Chain, body: Array, angle_rad: Array) -> tuple[Array, Array
     joints = []
     for k in range(len(chain.axis_palm) + 1):
         if k > 0:
-            outer, centre = rotations[-1], chain.centre_palm[k - 1]
-            moved_centre = offset + outer @ centre
-            joints.append((outer @ chain.axis_palm[k - 1], moved_centre))
-            rotations.append(outer @ rotation_about(chain.axis_palm[k - 1], angle_rad[:, k - 1]))
-            offset = moved_centre - rotations[-1] @ centre
+            outer, centre, course = rotations[-1], chain.centre_palm[k - 1], chain.course(k - 1)
+            if course is None:
+                moved_centre = offset + outer @ centre
+                joints.append((outer @ chain.axis_palm[k - 1], moved_centre))
+                rotations.append(outer @ rotation_about(chain.axis_palm[k - 1], angle_rad[:, k - 1]))
+                offset = moved_centre - rotations[-1] @ centre
+            else:
+                own = motion(chain.axis_palm[k - 1], centre, course, angle_rad[:, k - 1])
+                axis, at, shift = ((outer @ v[..., None])[..., 0] for v in (own.axis, own.centre, own.translation))
+                joints.append((axis, offset + at))
+                rotations.append(outer @ own.rotation)
+                offset = offset + shift
         columns = np.flatnonzero(body == k)
         x[:, columns] = offset[:, None] + np.einsum("nij,mj->nmi", rotations[-1], chain.marker_palm[columns])
     return x, np.stack(rotations, axis=1), joints
@@ -133,7 +148,7 @@ def jacobians(chain: Chain, body: Array, angle_rad: Array) -> tuple[Array, Array
     """Positions and their derivatives.
 
     Returns x (n, m, 3) [m]; by frame unknowns (n, m, 3, 6 + k) as in `Pose.moved`; by marker (n, m, 3, 3): the rotation of
-    its body; by joint unknowns (n, m, 3, 4 k) as in `Chain.moved`.
+    its body; by joint unknowns (n, m, 3, 4 k) as in `Chain.moved`, those of a plain hinge (a course is small).
     """
     x, rotations, joints = propagate(chain, body, angle_rad)
     n, m, n_joints = len(x), len(body), angle_rad.shape[1]
@@ -149,6 +164,10 @@ def jacobians(chain: Chain, body: Array, angle_rad: Array) -> tuple[Array, Array
         arm = x[:, moved] - centre[:, None]
         arm_rest = np.einsum("nji,nmj->nmi", inner, arm)
         by_frame[..., 6 + k][:, moved] = np.cross(axis[:, None], arm)
+        if chain.course(k) is not None:
+            own = motion(chain.axis_palm[k], chain.centre_palm[k], chain.course(k), angle_rad[:, k])
+            spin, drift = ((outer @ v[..., None])[:, None, :, 0] for v in (own.spin, own.drift))
+            by_frame[..., 6 + k][:, moved] = np.cross(spin, arm) + drift
         for i in range(2):
             turn = np.cross(chain.axis_palm[k], tangent[k, i])  # tilting the axis along the tangent = turning it about this
             tilt_after = np.cross((outer @ turn)[:, None], arm)
