@@ -1,4 +1,4 @@
-"""`python -m hand_model.diagnose SESSION OUTPUT [SESSION OUTPUT ...]`: findings of sessions, in a process of its own."""
+"""`python -m hand_model.diagnose SESSION OUTPUT [SESSION OUTPUT ...]`: sessions diagnosed in a process of its own, models written and proved."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def main(arguments: list[str]) -> int:
     for session, output in zip(arguments[::2], arguments[1::2], strict=True):
         begin = time.perf_counter()
         try:
-            diagnose(session, model=False, output=output)
+            diagnose(session, output=output)
         except HandModelError as error:
             Findings("unexplained", {}, {}, notes=(str(error),)).save(output)
         print(f"{session} {time.perf_counter() - begin:.1f} s", flush=True)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from ..effects.base import DriveState
@@ -99,6 +100,21 @@ class Balance:
         other = copy(self)
         other._kept, other._apart = {}, None
         other.wander = wander if wander is not None and wander.real else None
+        return other
+
+    def remapped(self, fit: Fit) -> Balance:
+        """The same balance with the slope of its map as it is in a fit, for what yields moves along that; of a balance without one, itself."""
+        powers = [v for k, v in fit.declared.items() if k.startswith("power_")]
+        if len(powers) < 2:
+            return self
+
+        def with_slope(state: DriveState) -> DriveState:
+            scale = state.extra["scale"]
+            return replace(state, extra={**state.extra, "slope": Polynomial(powers).deriv()(state.position / scale) / scale})
+
+        other = copy(self)
+        other._kept, other._apart, other._last = {}, None, OrderedDict()
+        other.states = tuple(with_slope(s) for s in self.states)
         return other
 
     def settled(self) -> Balance:

@@ -33,6 +33,7 @@ from .name import polish, scan
 from .page import write_page
 from .preload import preload_findings
 from .prove import Replay
+from .reread import reread
 from .stamps import Stamps, stamps
 from .station import Station, judged
 
@@ -130,11 +131,13 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
     # a reading that clips says little of the load, on which a sag is judged
     found = [i for i in found if i[1].effect != "drive_sag" or i[1].where["actuator"] not in clipped]
     findings = assemble(stations, found, notes, unexplained)
+    listed, written = reread(findings.findings, stations)
+    findings = replace(findings, findings=listed)
     if output is not None:
         replays: tuple[Replay, ...] = ()
         forget(output, FOLDERS, FILES[0])
         if model is not False:
-            with Pair((findings, session, hand, stations, courses, Path(output), tell)) as pair:
+            with Pair((findings, session, hand, written, courses, Path(output), tell)) as pair:
                 (findings, replays), _ = pair.map(_written, ("model", "corrected"))
         write_page(findings, stations, replays, session.path.name, Path(output))
         findings.save(output)

@@ -151,7 +151,7 @@ def write_improved(hand: Hand, findings: Sequence[Finding], stations: Sequence[A
 
     hand = without_effects(hand, findings)
     known = {f.name for f in hand.fingers}
-    touched = [s for s in stations if s.finger in known and any(_of(f, s) for f in findings if f.correction is None)]
+    touched = [s for s in stations if s.finger in known and any(s.names(f) for f in findings if f.correction is None)]
     crooked = written_courses(hand, findings, courses or {})
     # other chains, other angles: what maps them is as this session has it, too
     maps = [s for s in stations if s.finger in crooked and s.signal != "current" and s not in touched]
@@ -163,7 +163,7 @@ def write_improved(hand: Hand, findings: Sequence[Finding], stations: Sequence[A
         return tuple(findings), ()
     compile(before, output / "model_before")
     compile(after, output / "model")
-    named = [(f, next((s for s in stations if _of(f, s)), None)) for f in findings]
+    named = [(f, next((s for s in stations if s.names(f)), None)) for f in findings]
     errors = errors_along([(s, untouched(f, s)) for f, s in named if f.correction is None], output / "model_before", output / "model")
     files = output / "model_before", output / "model"
     fits = {name: marker_fit(c, *(of_folder(f, name, c.labels) for f in files), COMPILED) for name, c in crooked.items()}
@@ -178,12 +178,3 @@ def write_improved(hand: Hand, findings: Sequence[Finding], stations: Sequence[A
             replays += [] if replay is None else [replace(replay, finding=finding)]
         out.append(finding)
     return tuple(out), tuple(replays)
-
-
-def _of(finding: Finding, station: Any) -> bool:
-    """Whether a finding was named at a station."""
-    named = {f.term.effect.name for f in station.naming.found}
-    return finding.effect in named and finding.where.get("finger") == station.finger and (
-        station.signal != "markers" or finding.where.get("joint") == station.joint)
-
-

@@ -33,6 +33,7 @@ REFUTED = 3.0  # standard deviations by which a delay may miss what answers to c
 ALONG = 1e-6  # of a column's length: less left beside the design, and it says nothing of its own
 GRAIN = 1.5  # times what the best shape of a grid brings: more no shape between is expected to
 SMALL = 0.07  # share of the explained mismatch: less beside a larger effect may be no more than its form being another
+LOST_MOTION, BENT = "lost motion", 0.01  # a family, and the change of its map's slope from which another search is worth its time
 GROWN = 1.3  # change of that noise, from which another search is worth its time
 
 
@@ -62,14 +63,15 @@ def _name(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str], 
 
 
 def _named(balance: Balance, paired: Callable[[Balance], Pair], effects: tuple[Any, ...], progress: Callable[[str], None] | None) -> Naming:
-    wander = estimate_wander(balance, balance.fit().prediction)
+    wander, mapped = estimate_wander(balance, balance.fit().prediction), balance
     for _ in range(MOST_SEARCHES):
-        balance = balance.wandering(wander)
+        balance = mapped.wandering(wander)
         pair = paired(balance)
         fit, brought, ranked = _search(pair, effects, progress)
         wander = _unrepeated(balance, fit)
         lost = _overwhelmed(balance, fit)
-        if lost or _alike(wander, balance.wander):
+        mapped = _remapped(balance, fit)
+        if lost or (_alike(wander, balance.wander) and mapped is balance):
             break
     calmed = None if lost else _calmed(balance, fit, ranked)
     if calmed is not None:
@@ -87,6 +89,15 @@ def _named(balance: Balance, paired: Callable[[Balance], Pair], effects: tuple[A
     kept = {t.effect.name for t in fit.terms}
     rejected = tuple(sorted(((n, e) for n, e in brought.items() if n not in kept), key=lambda item: -item[1]))
     return Naming(balance, declared, fit, estimate_wander(balance, fit.prediction), before, after, found, rejected)
+
+
+def _remapped(balance: Balance, fit: Fit) -> Balance:
+    """The balance with the map that it has beside its lost motion, where that is another: the first map took the mean of the give up."""
+    if not any(t.effect.family == LOST_MOTION for t in fit.terms):
+        return balance
+    other = balance.remapped(fit)
+    before, after = (b.gather(lambda s: s.slope)[b.train] for b in (balance, other))
+    return other if np.sqrt(np.mean((after - before) ** 2)) > BENT * np.sqrt(np.mean(before**2)) else balance
 
 
 def _lack(balance: Balance, fit: Fit) -> LackOfFit:

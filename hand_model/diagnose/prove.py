@@ -15,6 +15,7 @@ from ..effects import effect
 from ..effects.base import DriveState
 from ..effects.path import strokes
 from .findings import Finding
+from .reread import of_recording
 
 Array = NDArray[np.float64]
 Place = tuple[str, str | None, str | None, str | None]  # signal, finger, joint, actuator of a station
@@ -55,7 +56,7 @@ def errors_along(wanted: Sequence[tuple[Any, Sequence[DriveState]]], before: Pat
     wanted: stations and recordings, each of which is replayed once, however many effects are named there.
     """
     once = {(_place(station), s.trial): (station, s) for station, states in wanted for s in states}
-    calls = [(_place(station), folder, fit.declared, state) for station, state in once.values()
+    calls = [(_place(station), folder, of_recording(fit, state), state) for station, state in once.values()
              for folder, fit in ((before, station.reading.declared), (after, station.reading.fit))]
     errors = list(Background(_error, calls).results())
     return {key: (errors[2 * i], errors[2 * i + 1]) for i, key in enumerate(once)}
@@ -90,23 +91,22 @@ def _place(station: Any) -> Place:
     return station.signal, station.finger, station.joint, station.actuator
 
 
-def _error(place: Place, folder: Path, declared: Mapping[str, float], state: DriveState) -> Array | None:
-    """Recorded minus replayed (n,): current [raw] of the compiled motor, or angle [deg] of the compiled joint less what belongs to the recording
-    itself, its clock's offset and steps of slipped markers. None where no file has the motor or the joint."""
+def _error(place: Place, folder: Path, own: Array, state: DriveState) -> Array | None:
+    """Recorded minus replayed (n,): current [raw] of the compiled motor, or angle [deg] of the compiled joint; less what belongs to the
+    recording itself, `own` (n,). None where no file has the motor or the joint."""
     signal, finger, joint, actuator = place
     if signal == "current":
         from .inverse import current_along, read_motor
 
         motor = read_motor(folder, str(actuator))
-        return None if motor is None else state.effort - current_along(motor, state)
+        return None if motor is None else state.effort - own - current_along(motor, state)
     from .forward import follower_along
 
     where = {"finger": finger, "joint": joint, "actuator": actuator}
     moved = follower_along(folder, state, where, "encoder" if signal == "encoder" else "linkage")
     if moved is None:
         return None
-    own = [i for i, name in enumerate(state.declared_names) if not name.startswith("power_")]
-    return state.effort - state.declared[:, own] @ np.array([declared[state.declared_names[i]] for i in own]) - np.rad2deg(moved)
+    return state.effort - own - np.rad2deg(moved)
 
 
 def kept_out(states: Sequence[DriveState]) -> tuple[DriveState, ...]:

@@ -36,6 +36,12 @@ class Station:
         self.parameters = {which: parameter_intervals(self.reading, which) for which in stand}
         self.proven = tuple(f for f in naming.found if places[id(f)] in stand)
 
+    def names(self, finding: Finding) -> bool:
+        """Whether a finding was named here."""
+        named = {f.term.effect.name for f in self.naming.found}
+        return finding.effect in named and finding.where.get("finger") == self.finger and (
+            self.signal != "markers" or finding.where.get("joint") == self.joint)
+
     @property
     def missing(self) -> bool:
         """Whether the lack-of-fit test says that something is missing, or an effect that it overlooked holds out: along the

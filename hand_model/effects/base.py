@@ -131,6 +131,7 @@ class Effect:
     clips: ClassVar[bool] = False
     needs: ClassVar[str | None] = None  # declared column without which the effect is none (a ratio to a friction of zero)
     of_the_hand: ClassVar[bool] = True  # False of what only one recording had, such as an obstacle
+    recorded: ClassVar[bool] = False  # of the recording, not of the machine: the machine is compared with what is left without it
     drifting: ClassVar[bool] = False  # seen as a level that changes slowly or with the recording, as a zero that wanders is
     unwritten: ClassVar[str | None] = None  # why no file can hold it or no replay show it, where that is so
     family: ClassVar[str | None] = None  # effects of one family move alike: a small one beside a large one may be its form

@@ -16,6 +16,7 @@ class ClockDrift(Effect):
     name = "clock_drift"
     station = "encoder"
     signal = "log"
+    recorded = True
     joint = None
     correction = "log time mapped to the mocap clock with the estimated rate"
 

@@ -16,6 +16,7 @@ class EncoderPeriodicError(Sinusoid):
 
     name = "encoder_periodic_error"
     station = "encoder"
+    recorded = True
     unwritten = "the reading of the encoder is not what a simulation moves: kept in hand.json, the log is corrected in a copy"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:

@@ -23,6 +23,7 @@ class ExternalContact(Effect):
     drifting = True
     repeats = True  # in another trial
     of_the_hand = False
+    recorded = True
     unwritten = "an obstacle of one recording is no part of the hand"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:

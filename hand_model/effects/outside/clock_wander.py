@@ -19,6 +19,7 @@ class ClockWander(Outsider):
     name = "clock_wander"
     station = "encoder"
     signal = "log"
+    recorded = True
     covers = ("clock_drift",)
 
     def amplitudes(self) -> tuple[Amplitude, ...]:

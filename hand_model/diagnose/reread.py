@@ -1,0 +1,77 @@
+"""Findings as they are written: each station read once more with its findings and nothing else of the machine.
+
+What is left out of the list of findings (the form of another, a trifle, what no table names) is not in the model either: sizes beside it
+would not be those of the model. What belongs to the recording stays in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..effects.base import DriveState
+from .balance import Balance, Fit
+from .findings import Finding
+from .interval import Reading, parameter_intervals, undisturbed
+from .name import refit
+from .station import Station, finding_of
+
+Array = NDArray[np.float64]
+
+
+def reread(findings: Sequence[Finding], stations: Sequence[Station]) -> tuple[tuple[Finding, ...], list[Station]]:
+    """Findings with the sizes that they have among themselves, and the stations so read. `declared` of those is beside what belongs to
+    the recording."""
+    written = [_written(s, {f.effect for f in findings if s.names(f)}) for s in stations]
+    changed = [(old, new) for old, new in zip(stations, written, strict=True) if len(new.naming.found) < len(old.naming.found)]
+    out = []
+    for finding in findings:
+        new = next((new for old, new in changed if old.names(finding)), None)
+        named = None if new is None else next((f for f in new.proven if f.term.effect.name == finding.effect), None)
+        if new is not None and named is not None:
+            _, again = finding_of(new, named, 0.0, 0.0)
+            where = {**finding.where, "region": again.where["region"]}
+            finding = replace(finding, where=where, statement=again.statement, parameters=again.parameters, fit=again.fit)
+        out.append(finding)
+    return tuple(out), written
+
+
+def _written(station: Station, names: set[str]) -> Station:
+    """The station with the terms of these names and of the recording; as it was read where there are no others."""
+    naming, out = station.naming, copy(station)
+    kept = [i for i, t in enumerate(naming.fit.terms) if t.effect.name in names or t.effect.recorded]
+    if names and len(kept) < len(naming.fit.terms):
+        fit = refit(naming.balance, naming.balance.fit(tuple(naming.fit.terms[i] for i in kept)))
+        balance = naming.balance.remapped(fit)
+        fit = refit(balance, balance.fit(fit.terms))
+        place = {i: k for k, i in enumerate(kept)}
+        again = {id(f): replace(f, term=fit.terms[k], amplitudes=dict(fit.amplitudes[k]))
+                 for f in naming.found if (k := place.get(naming.fit.terms.index(f.term))) is not None}
+        out.naming = replace(naming, balance=balance, fit=fit, found=tuple(again.values()))
+        out.proven = tuple(again[id(f)] for f in station.proven if id(f) in again)
+        out.reading = undisturbed(out.naming)
+        out.parameters = {which: parameter_intervals(out.reading, which) for which in range(len(fit.terms))}
+    out.naming = replace(out.naming, declared=_recorded(out.naming.balance, out.naming.fit))
+    out.reading = Reading(out.reading.balance, _recorded(out.reading.balance, out.reading.fit), out.reading.fit)
+    return out
+
+
+def _recorded(balance: Balance, fit: Fit) -> Fit:
+    return balance.fit(tuple(t for t in fit.terms if t.effect.recorded))
+
+
+def of_recording(fit: Fit, state: DriveState) -> Array:
+    """Effort (n,) along a recording that belongs to the recording itself: effects that are none of the machine, and, of an angle, its
+    clock's offset and steps of slipped markers."""
+    out = np.zeros(len(state.time_s))
+    if any(name.startswith("power_") for name in state.declared_names):
+        own = [i for i, name in enumerate(state.declared_names) if not name.startswith("power_")]
+        out = out + state.declared[:, own] @ np.array([fit.declared[state.declared_names[i]] for i in own])
+    for term, amplitudes in zip(fit.terms, fit.amplitudes, strict=True):
+        if term.effect.recorded:
+            out = out + term.effect.columns(state, term.shape) @ np.array(list(amplitudes.values()))
+    return out
