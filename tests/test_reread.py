@@ -1,0 +1,91 @@
+"""Findings among themselves: sizes without what is no finding, maps beside lost motion, what belongs to the recording."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_diagnose import drive, planted
+from test_kinematic_stations import MAP, joint
+
+from hand_model.diagnose.balance import Balance, Term
+from hand_model.diagnose.name import name_effects, polish
+from hand_model.diagnose.reread import of_recording, reread
+from hand_model.diagnose.station import finding_of, judged
+from hand_model.effects import catalogue, effect
+
+COMPLIANCE = 0.04  # % per raw
+
+
+def yielding(states):
+    """The same recordings behind a give at the driver's end, whose slope was read from angles that hold the give already."""
+    out = []
+    for state in states:
+        polynomial = np.polynomial.Polynomial(MAP)
+        give = COMPLIANCE * state.extra["load"]
+        x = state.position
+        angle = state.effort + polynomial((x - give) / 100) - polynomial(x / 100)
+        bent = np.polynomial.Polynomial.fit(x, angle, 3).deriv()(x)
+        out.append(replace(state, effort=angle, extra={**state.extra, "slope": bent}))
+    return tuple(out)
+
+
+def test_the_map_beside_a_give_has_its_own_slope() -> None:
+    states = yielding(joint(4, noise=0.2))
+    naming = name_effects(states, (effect("series_elasticity"),))
+    assert [f.term.effect.name for f in naming.found] == ["series_elasticity"]
+    for state in naming.balance.states:
+        true = np.polynomial.Polynomial(MAP).deriv()(state.position / 100) / 100
+        before = next(s for s in states if s.trial == state.trial).extra["slope"]
+        assert np.abs(state.slope - true).max() < 0.25 * np.abs(before - true).max()
+    assert naming.found[0].amplitudes["compliance"] == pytest.approx(COMPLIANCE, rel=0.03)
+
+
+def test_a_balance_without_a_map_is_as_it_was() -> None:
+    balance = Balance(drive(1))
+    assert balance.remapped(balance.fit()) is balance
+
+
+def test_what_is_no_finding_is_not_in_the_sizes_of_the_others() -> None:
+    def add(state):
+        return planted("stribeck_friction", {"form": 0.0, "stribeck_speed": 20.0}, [18.0])(state) + planted(
+            "detent_load", {"form": 0.0, "centre": 60.0, "width": 6.0}, [-10.0])(state)
+
+    station = judged("current", "index", "index", None, drive(3, add), catalogue("drive"))
+    assert {f.term.effect.name for f in station.kept} == {"stribeck_friction", "detent_load"}
+    both = tuple(finding_of(station, f, 0.5, f.size)[1] for f in station.kept)
+    same, (whole,) = reread(both, [station])
+    assert [f.parameters for f in same] == [f.parameters for f in both]
+    assert whole.reading.fit is station.reading.fit
+    alone = tuple(f for f in both if f.effect == "stribeck_friction")
+    (found,), (written,) = reread(alone, [station])
+    assert [t.effect.name for t in written.reading.fit.terms] == ["stribeck_friction"]
+    figures = written.reading.fit.terms[0].effect.parameters(
+        written.reading.fit.terms[0].shape, written.reading.fit.amplitudes[0], written.reading.fit.declared)
+    assert found.parameters["stribeck_speed"]["value"] == pytest.approx(figures["stribeck_speed"])
+    assert found.parameters != alone[0].parameters
+    assert found.where["share_of_mismatch"] == alone[0].where["share_of_mismatch"]
+    assert found.fit["after"] > alone[0].fit["after"]  # the detent is nobody's now
+
+
+def test_what_belongs_to_the_recording_stays_with_it() -> None:
+    states = joint(5, add=lambda t, x, v: 1.2 * np.sin(2 * np.pi * x / 12.0), noise=0.3)
+    balance = Balance(states)
+    fit = polish(balance, balance.fit((Term(effect("encoder_periodic_error"), {"period": 12.1}),)), 0)
+    for state in states:
+        own = of_recording(fit, state)
+        np.testing.assert_allclose(own, 1.2 * np.sin(2 * np.pi * state.position / 12.0), atol=0.15)
+
+
+@pytest.mark.parametrize(("name", "shape", "start"), [("detent_load", {"form": 0.0, "width": 6.0}, {"centre": 55.0}),
+                                                      ("torque_ripple", {}, {"period": 9.02})])
+def test_a_shape_polished_beside_a_projection_is_that_of_full_fits(name, shape, start) -> None:
+    amplitude = [12.0] if name == "detent_load" else [4.0, 3.0]
+    balance = Balance(drive(7, planted(name, {**shape, "centre": 57.0, "period": 9.0}, amplitude), trials=3))
+    others = (Term(effect("stribeck_friction"), {"form": 0.0, "stribeck_speed": 20.0}), Term(effect("nonlinear_spring"), {"form": 0.0}))
+    error = balance.error_beside(others, effect(name))
+    for step in (0.0, 0.3, 0.7):
+        moved = {**shape, **{k: v + step for k, v in start.items()}}
+        whole = balance.fit((*others, Term(effect(name), moved))).rss
+        assert error(moved) == pytest.approx(whole, rel=1e-9)
