@@ -89,3 +89,35 @@ def test_a_shape_polished_beside_a_projection_is_that_of_full_fits(name, shape, 
         moved = {**shape, **{k: v + step for k, v in start.items()}}
         whole = balance.fit((*others, Term(effect(name), moved))).rss
         assert error(moved) == pytest.approx(whole, rel=1e-9)
+
+
+def test_where_lost_motion_lay_before_the_first_motion_is_not_asked() -> None:
+    from hand_model.diagnose.angles import _begun
+
+    driver = np.r_[np.full(100, 3.0), np.linspace(3.0, 80.0, 200), np.linspace(80.0, 2.0, 200)] + np.random.default_rng(0).normal(0, 0.1, 500)
+    begun = _begun(driver)
+    first = int(np.argmax(begun))
+    assert 105 <= first <= 115 and not begun[:first].any() and begun[first:].all()
+
+
+def test_a_sag_is_read_from_what_is_asked_beside_it() -> None:
+    """The first estimate of what is asked is the declared model's, which bends less than a drive that sags by a third."""
+    from hand_model.diagnose.drive import with_required
+
+    def sagging(state):
+        truth = state.declared @ np.array([0.012, 0.15, 45.0, 0.35, 9.0])
+        asked = (1 - np.sqrt(1 - 4 * 0.3 / 100 * np.abs(truth))) / (2 * 0.3 / 100) * np.sign(truth)  # u (1 - 0.3 |u| / 100) = truth
+        return replace(state, effort=np.where(np.isfinite(state.effort), asked + np.random.default_rng(9).normal(0, 4, len(asked)), np.nan))
+
+    states = with_required(tuple(sagging(s) for s in drive(6)))
+    station = judged("current", "index", "index", None, states, catalogue("drive"))
+    assert [f.term.effect.name for f in station.kept] == ["drive_sag"]
+    (found,), _ = reread((finding_of(station, station.kept[0], 1.0, 1.0)[1],), [station])
+    assert found.parameters["form"]["value"] == 0.0
+    assert found.parameters["torque_loss"]["value"] == pytest.approx(0.3, rel=0.07)
+    values = {k: v["value"] for k, v in found.parameters.items()}
+    asked = np.linspace(-130.0, 130.0, 53)
+    law, sag = effect("drive_sag").law(values), effect("drive_sag")
+    delivered = asked - np.array([law(type("Now", (), {"load": u})) for u in asked])
+    assert np.all(np.diff(delivered) > 0)
+    np.testing.assert_allclose(sag.reading(delivered, asked, values), asked, atol=1e-6)

@@ -29,6 +29,7 @@ from .naming import Naming
 Array = NDArray[np.float64]
 
 LEARN_FRAMES = 1500  # of each recording, evenly spaced: enough for a chain, all frames are posed with it
+FIRST_SAMPLES, BEGUN = 5, 0.05  # of a recording, and the share of the range from which lost motion is closed
 FARTHEST_M = 6e-3  # a residual beyond is a ghost or a wrong label, no slip
 MOMENT_S = 0.2  # within which a step's moment is known
 LOAD_S = 0.05  # bandwidth of a smoothed current
@@ -153,7 +154,7 @@ def linkage_states(angles: FingerAngles, joint: int = 1, steps: Sequence[tuple[i
         driver, velocity, acceleration, sure = _smoothed(t, q[:, joint - 1], log, (expected or {}).get(record.trial.name))
         stepped, more = _stepped(index, t, steps)
         declared = np.concatenate([np.stack([(driver / scale) ** k for k in range(5)], axis=-1), stepped], axis=1)
-        follower = np.where(sure & ~_near(index, t, steps), q[:, joint], np.nan)
+        follower = np.where(sure & _begun(driver) & ~_near(index, t, steps), q[:, joint], np.nan)
         extra = {"trial_index": np.full(len(t), float(index)), "load": None if log is None else log.load,
                  "scale": np.full(len(t), scale), "slope": _slope(driver, driver, q[:, joint], sure, 4)}
         states.append(DriveState(record.trial.name, f"{angles.finger.name}/{name}", t, driver, velocity, acceleration, follower,
@@ -185,7 +186,7 @@ def encoder_states(
         declared = np.concatenate([np.stack([(x / 100) ** k for k in range(4)], axis=-1), offsets, stepped], axis=1)
         extra = {"trial_index": np.full(len(t), float(index)), "load": log.load, "scale": np.full(len(t), 100.0), "slope": slope}
         states.append(DriveState(record.trial.name, angles.finger.name, t, x, velocity, 100 * log.acceleration / (high - low),
-                                 np.where(log.inside & ~_near(index, t, steps), q, np.nan), declared, "%", "deg", _known(extra),
+                                 np.where(log.inside & _begun(x) & ~_near(index, t, steps), q, np.nan), declared, "%", "deg", _known(extra),
                                  (*_names(3), *(f"offset_{i}" for i in range(len(records))), *more), record.trial.validate))
     return with_excursions(states)
 
@@ -286,6 +287,12 @@ def _stepped(record: int, time_s: Array, steps: Sequence[tuple[int, float]]) -> 
     columns = [np.full(len(time_s), float(record > r)) if record != r else (time_s >= at).astype(float) for r, at in steps]
     names = tuple(f"step_{i}" for i in range(len(steps)))
     return np.stack(columns, axis=-1) if columns else np.zeros((len(time_s), 0)), names
+
+
+def _begun(driver: Array) -> NDArray[np.bool_]:
+    """Samples (n,) from the first motion on: nobody knows on which side lost motion lay before, or whether it lay between."""
+    moved = np.abs(driver - np.nanmedian(driver[:FIRST_SAMPLES])) > BEGUN * np.ptp(driver[np.isfinite(driver)])
+    return np.maximum.accumulate(moved)
 
 
 def _near(record: int, time_s: Array, steps: Sequence[tuple[int, float]]) -> NDArray[np.bool_]:

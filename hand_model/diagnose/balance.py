@@ -117,6 +117,19 @@ class Balance:
         other.states = tuple(with_slope(s) for s in self.states)
         return other
 
+    def required(self, fit: Fit) -> Balance:
+        """The same balance with what is "required" of the drive as a fit has it, its effects included."""
+        def asked(state: DriveState) -> DriveState:
+            effort = state.declared @ np.array(list(fit.declared.values()))
+            for term, amplitudes in zip(fit.terms, fit.amplitudes, strict=True):
+                effort = effort + term.effect.columns(state, term.shape) @ np.array(list(amplitudes.values()))
+            return replace(state, extra={**state.extra, "required": effort})
+
+        other = copy(self)
+        other._kept, other._apart, other._last = {}, None, OrderedDict()
+        other.states = tuple(asked(s) for s in self.states)
+        return other
+
     def settled(self) -> Balance:
         """The same balance with next to no weight on starts and stops."""
         other = copy(self)

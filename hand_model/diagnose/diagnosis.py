@@ -68,82 +68,111 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
     step()
     if output is not None:
         refuse_output(Path(output))
-    notes = list(check_session(session, dead=True))
-    found: list[tuple[float, Finding]] = []
-    fingers: dict[str, FingerAngles] = {}
-    courses: dict[str, FingerCourses] = {}
-    stations: list[Station] = []
-    unexplained: list[dict[str, Any]] = []
-    distrusted = _distrusted(session)
-    unexplained += [_false_stamps(session, a, s) for a, s in distrusted.items()]
-    unmeasured = {a: why for a, trials in drive_trials(session).items() if (why := _no_measurement([t.log() for t in trials]))}
-    found += [refused(a, _finger_of(session, a), tuple(t.name for t in drive_trials(session)[a]), "position", why) for a, why in unmeasured.items()]
-    unread = (*distrusted, *unmeasured)
-    for reading in finger_readings(session, unread):
-        step()
-        for line in reading.lines:
-            tell(line)
-        stations += reading.stations
-        found += reading.found
-        unexplained += reading.unexplained
-        notes += reading.notes
-        if reading.angles is not None:
-            fingers[reading.finger] = reading.angles
-        if reading.courses is not None:
-            courses[reading.finger] = reading.courses
-    drives = {a: with_gravity(session, fingers, states)
-              for a, states in drive_states(session, _encoder_corrections(stations), unread).items()}
-    for station in (s for s in stations if s.believed and s.actuator in drives):
-        for term in (f.term for f in station.kept if f.term.effect.name == "spring_decoupling"):
-            states = drives[station.actuator]
-            drives[station.actuator] = (while_driven(states, term.shape["below"]) if term.shape["form"] > 0.5 else
-                                        without_excursions(states, station.naming.balance.states, fingers[station.finger]))
-    for actuator in [a for a, states in drives.items() if not is_measured(states)]:
-        found.append(refused(actuator, _finger_of(session, actuator), tuple(s.trial for s in drives.pop(actuator))))
-    for actuator in (a for a, states in drives.items() if opposes(states)):
-        raise SessionError(f'{session.path}: actuator "{actuator}": friction would drive the motion; `position` must increase with flexion and '
-                           "positive `current` drive flexion, and one of them has the other sign")
+    heard = _Heard(session, tell, step)
+    heard.listen_to_fingers()
+    drives = heard.drives()
     facts = _command(session, drives)
-    found += command_findings(facts, {a: _finger_of(session, a) for a in facts})
-    for _, finding in found:
+    heard.found += command_findings(facts, {a: _finger_of(session, a) for a in facts})
+    for _, finding in heard.found:
         tell(finding.statement)
-    timed = with_lateness(drives, facts)
-    allowed = _delays_apart(timed)
-    in_time = [a for a in drives if not allowed[a]]
-    if 0 < len(in_time) < len(drives):  # at a reversal a late current looks like a give, an early one like none
-        timed = with_lateness(with_gives(drives, in_time), facts)
-    drives = timed
-    alone = {a: Balance(states).fit() for a, states in drives.items()}
-    calls = []
-    for actuator, states in drives.items():
-        effects = [*(e for e in catalogue("drive") if not e.warps or allowed[actuator]), *outsiders("drive")]
-        typical = typical_coefficients([fit for a, fit in alone.items() if a != actuator])
-        calls.append(("current", _finger_of(session, actuator), actuator, None, states, effects, typical))
-    for station in Background(judged, calls).results():
-        step()
-        stations.append(station)
-        tell(station.line())
-    odd = preload_findings(stations)
-    for _, finding in odd:
-        tell(finding.statement)
-    found += odd
-    clipped = {s.actuator for s in stations if s.believed for f in s.kept if f.term.effect.clips}
-    # a reading that clips says little of the load, on which a sag is judged
-    found = [i for i in found if i[1].effect != "drive_sag" or i[1].where["actuator"] not in clipped]
-    findings = assemble(stations, found, notes, unexplained)
+    heard.listen_to_drives(*_timed(drives, facts))
+    stations = heard.stations
+    findings = assemble(stations, heard.found, heard.notes, heard.unexplained)
     listed, written = reread(findings.findings, stations)
     findings = replace(findings, findings=listed)
     if output is not None:
         replays: tuple[Replay, ...] = ()
         forget(output, FOLDERS, FILES[0])
         if model is not False:
-            with Pair((findings, session, hand, written, courses, Path(output), tell)) as pair:
+            with Pair((findings, session, hand, written, heard.courses, Path(output), tell)) as pair:
                 (findings, replays), _ = pair.map(_written, ("model", "corrected"))
         write_page(findings, stations, replays, session.path.name, Path(output))
         findings.save(output)
     if progress is not None:
         progress(1.0)
     return findings
+
+
+class _Heard:
+    """What a session has said so far. found: findings with their weight. tell: called with a line per result; step: with nothing, after each."""
+
+    def __init__(self, session: Session, tell: Callable[[str], None], step: Callable[[], None]) -> None:
+        self.session, self.tell, self.step = session, tell, step
+        self.notes = list(check_session(session, dead=True))
+        self.fingers: dict[str, FingerAngles] = {}
+        self.courses: dict[str, FingerCourses] = {}
+        self.stations: list[Station] = []
+        distrusted = _distrusted(session)
+        self.unexplained = [_false_stamps(session, a, s) for a, s in distrusted.items()]
+        unmeasured = {a: why for a, trials in drive_trials(session).items() if (why := _no_measurement([t.log() for t in trials]))}
+        self.found: list[tuple[float, Finding]] = [
+            refused(a, _finger_of(session, a), tuple(t.name for t in drive_trials(session)[a]), "position", why) for a, why in unmeasured.items()]
+        self.unread = (*distrusted, *unmeasured)  # actuators whose log is not believed
+
+    def listen_to_fingers(self) -> None:
+        """What the cameras say of each finger."""
+        for reading in finger_readings(self.session, self.unread):
+            self.step()
+            for line in reading.lines:
+                self.tell(line)
+            self.stations += reading.stations
+            self.found += reading.found
+            self.unexplained += reading.unexplained
+            self.notes += reading.notes
+            if reading.angles is not None:
+                self.fingers[reading.finger] = reading.angles
+            if reading.courses is not None:
+                self.courses[reading.finger] = reading.courses
+
+    def drives(self) -> dict[str, tuple[DriveState, ...]]:
+        """The drives' balances while they carry their fingers, encoders put right; those whose current is no measurement are refused.
+
+        Raises SessionError where a drive's signs contradict each other.
+        """
+        session = self.session
+        drives = {a: with_gravity(session, self.fingers, states)
+                  for a, states in drive_states(session, _encoder_corrections(self.stations), self.unread).items()}
+        for station in (s for s in self.stations if s.believed and s.actuator in drives):
+            for term in (f.term for f in station.kept if f.term.effect.name == "spring_decoupling"):
+                states = drives[station.actuator]
+                drives[station.actuator] = (while_driven(states, term.shape["below"]) if term.shape["form"] > 0.5 else
+                                            without_excursions(states, station.naming.balance.states, self.fingers[station.finger]))
+        for actuator in [a for a, states in drives.items() if not is_measured(states)]:
+            self.found.append(refused(actuator, _finger_of(session, actuator), tuple(s.trial for s in drives.pop(actuator))))
+        for actuator in (a for a, states in drives.items() if opposes(states)):
+            raise SessionError(f'{session.path}: actuator "{actuator}": friction would drive the motion; `position` must increase with flexion and '
+                               "positive `current` drive flexion, and one of them has the other sign")
+        return drives
+
+    def listen_to_drives(self, drives: dict[str, tuple[DriveState, ...]], late: dict[str, bool]) -> None:
+        """What the motors' currents say. late: whether each drive's current may be."""
+        alone = {a: Balance(states).fit() for a, states in drives.items()}
+        calls = []
+        for actuator, states in drives.items():
+            effects = [*(e for e in catalogue("drive") if not e.warps or late[actuator]), *outsiders("drive")]
+            typical = typical_coefficients([fit for a, fit in alone.items() if a != actuator])
+            calls.append(("current", _finger_of(self.session, actuator), actuator, None, states, effects, typical))
+        for station in Background(judged, calls).results():
+            self.step()
+            self.stations.append(station)
+            self.tell(station.line())
+        odd = preload_findings(self.stations)
+        for _, finding in odd:
+            self.tell(finding.statement)
+        clipped = {s.actuator for s in self.stations if s.believed for f in s.kept if f.term.effect.clips}
+        # a reading that clips says little of the load, on which a sag is judged
+        self.found = [i for i in (*self.found, *odd) if i[1].effect != "drive_sag" or i[1].where["actuator"] not in clipped]
+
+
+def _timed(drives: dict[str, tuple[DriveState, ...]],
+           facts: dict[str, CommandFacts]) -> tuple[dict[str, tuple[DriveState, ...]], dict[str, bool]]:
+    """The drives with what is known of their current's lateness, and whether each may be late."""
+    timed = with_lateness(drives, facts)
+    late = _delays_apart(timed)
+    in_time = [a for a in drives if not late[a]]
+    if 0 < len(in_time) < len(drives):  # at a reversal a late current looks like a give, an early one like none
+        timed = with_lateness(with_gives(drives, in_time), facts)
+    return timed, late
 
 
 def _no_measurement(logs: list[Log]) -> str:

@@ -23,6 +23,7 @@ from ..passive import effects_on
 Array = NDArray[np.float64]
 
 STEP_S = 0.002
+COASTING_S = 0.002  # after which a part that nothing drives stands: whatever rubs in its play, nobody has measured
 SLOWER = 3.0  # the replay's time over the recording's: the spring that holds a finger on its lever is nominal, not what is tested
 
 
@@ -40,7 +41,7 @@ def follower_along(folder: Path, state: DriveState, where: Mapping[str, Any], st
         driver = _driver(model, str(where["actuator"]), follower, station)
         if driver is not None:
             path = state.position if station == "encoder" else np.deg2rad(state.position)
-            return _roll(model, load_hand(folder / "hand.json"), state, str(where["actuator"]), driver, path, follower)
+            return _roll(model, load_hand(folder / "hand.json"), state, str(where["actuator"]), driver, path, follower, station == "linkage")
     return None
 
 
@@ -68,7 +69,7 @@ def _behind_inputs(model: Any, joint: int) -> int:
     return joint
 
 
-def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, path: Array, follower: int) -> Array:
+def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, path: Array, follower: int, behind: bool) -> Array:
     import mujoco
     from scipy.interpolate import PchipInterpolator
 
@@ -76,6 +77,9 @@ def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, pat
     model.opt.gravity[:] = 0
     model.opt.tolerance = 1e-16  # of forces on inertias a millionth of the held one
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    if behind:
+        loose = model.jnt_dofadr[follower]
+        model.dof_damping[loose] = model.dof_M0[loose] / COASTING_S
     held = {driver}
     for actuator in range(len(model.actuator_trnid)):
         joint = int(model.actuator_trnid[actuator, 0])

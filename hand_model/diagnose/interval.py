@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .balance import DISCRETE, Balance, Fit, Term
 from .evidence import gain, oddity
-from .name import refit
+from .name import likeliest, refit
 from .naming import Naming
 
 Array = NDArray[np.float64]
@@ -82,7 +82,7 @@ def undisturbed(naming: Naming) -> Reading:
             if form != term.shape["form"]:
                 other = Term(term.effect, {**best.terms[which].shape, "form": form})
                 fits.append(refit(calm, calm.fit((*best.terms[:which], other, *best.terms[which + 1:]))))
-        best = min(fits, key=lambda found: 0.5 * found.rss / calm.inflation + oddity(calm, found))
+        best = likeliest(calm, fits, which, lambda found: 0.5 * found.rss / calm.inflation + oddity(calm, found))
     held = balance.steady & ~balance.train
     errors = [float(np.mean((balance.effort - f.prediction)[held] ** 2)) for f in (fit, best)] if held.any() else [1.0, 1.0]
     if errors[1] > REFUTED * errors[0]:  # slow moves that the training recordings did not have

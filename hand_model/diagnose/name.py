@@ -240,7 +240,7 @@ def scan(balance: Balance, effect: Any, terms: tuple[Term, ...], least: float = 
     if effect.replaces is None and not effect.warps and not effect.clips:
         shapes = _project(balance, grid, terms, 2 * balance.inflation * least / GRAIN)
     fits = [balance.fit((*terms, Term(effect, shape)), held=False) for shape in shapes]
-    return balance.fit(min(fits, key=lambda f: f.rss).terms) if fits else None
+    return balance.fit(likeliest(balance, fits, -1).terms) if fits else None
 
 
 def _project(balance: Balance, grid: Grid, terms: tuple[Term, ...], least: float) -> list[dict[str, float]]:
@@ -332,7 +332,16 @@ def reform(balance: Balance, fit: Fit, which: int) -> Fit:
             terms = list(fit.terms)
             terms[which] = Term(term.effect, {**term.shape, "form": form})
             fits.append(polish(balance, balance.fit(tuple(terms)), which))
-    return min(fits, key=lambda f: f.rss)
+    return likeliest(balance, fits, which)
+
+
+def likeliest(balance: Balance, fits: Iterable[Fit], which: int, cost: Callable[[Fit], float] = lambda f: f.rss) -> Fit:
+    """The fit of the smallest cost, of those whose term `which` a machine may have where there are any."""
+    def key(fit: Fit) -> tuple[bool, float]:
+        term, amplitudes = fit.terms[which], fit.amplitudes[which]
+        return not term.effect.possible(balance.states, term.effect.parameters(term.shape, amplitudes, fit.declared)), cost(fit)
+
+    return min(fits, key=key)
 
 
 def _drop(balance: Balance, fit: Fit) -> Fit | None:

@@ -14,20 +14,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..effects.base import DriveState
-from .balance import Balance, Fit
+from .balance import Balance, Fit, Term
 from .findings import Finding
 from .interval import Reading, parameter_intervals, undisturbed
-from .name import refit
+from .name import refit, reform
 from .station import Station, finding_of
 
 Array = NDArray[np.float64]
+
+ROUNDS = 10  # until what is asked of a drive is what its loss lets it ask
 
 
 def reread(findings: Sequence[Finding], stations: Sequence[Station]) -> tuple[tuple[Finding, ...], list[Station]]:
     """Findings with the sizes that they have among themselves, and the stations so read. `declared` of those is beside what belongs to
     the recording."""
     written = [_written(s, {f.effect for f in findings if s.names(f)}) for s in stations]
-    changed = [(old, new) for old, new in zip(stations, written, strict=True) if len(new.naming.found) < len(old.naming.found)]
+    changed = [(old, new) for old, new in zip(stations, written, strict=True) if new.reading.fit.terms != old.reading.fit.terms]
     out = []
     for finding in findings:
         new = next((new for old, new in changed if old.names(finding)), None)
@@ -44,10 +46,9 @@ def _written(station: Station, names: set[str]) -> Station:
     """The station with the terms of these names and of the recording; as it was read where there are no others."""
     naming, out = station.naming, copy(station)
     kept = [i for i, t in enumerate(naming.fit.terms) if t.effect.name in names or t.effect.recorded]
-    if names and len(kept) < len(naming.fit.terms):
-        fit = refit(naming.balance, naming.balance.fit(tuple(naming.fit.terms[i] for i in kept)))
-        balance = naming.balance.remapped(fit)
-        fit = refit(balance, balance.fit(fit.terms))
+    asking = any(naming.fit.terms[i].effect.asks for i in kept)
+    if names and (asking or len(kept) < len(naming.fit.terms)):
+        balance, fit = _settled(naming.balance, tuple(naming.fit.terms[i] for i in kept), ROUNDS if asking else 1)
         place = {i: k for k, i in enumerate(kept)}
         again = {id(f): replace(f, term=fit.terms[k], amplitudes=dict(fit.amplitudes[k]))
                  for f in naming.found if (k := place.get(naming.fit.terms.index(f.term))) is not None}
@@ -58,6 +59,19 @@ def _written(station: Station, names: set[str]) -> Station:
     out.naming = replace(out.naming, declared=_recorded(out.naming.balance, out.naming.fit))
     out.reading = Reading(out.reading.balance, _recorded(out.reading.balance, out.reading.fit), out.reading.fit)
     return out
+
+
+def _settled(balance: Balance, terms: tuple[Term, ...], rounds: int) -> tuple[Balance, Fit]:
+    """The balance and the fit of the terms, each with maps and required efforts as they are beside the others."""
+    fit = refit(balance, balance.fit(terms))
+    for _ in range(rounds):
+        balance = balance.remapped(fit)
+        if any(t.effect.asks for t in fit.terms):
+            balance = balance.required(fit)
+        fit = refit(balance, balance.fit(fit.terms))
+        for which, term in enumerate(fit.terms):
+            fit = reform(balance, fit, which) if term.effect.asks else fit
+    return balance, fit
 
 
 def _recorded(balance: Balance, fit: Fit) -> Fit:

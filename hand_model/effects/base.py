@@ -128,6 +128,7 @@ class Effect:
     station: ClassVar[str] = "drive"
     replaces: ClassVar[str | None] = None  # name of the declared column that `declared` changes
     warps: ClassVar[bool] = False
+    asks: ClassVar[bool] = False  # its columns are of what is asked of a drive, "required" in `extra`, which it changes itself
     clips: ClassVar[bool] = False
     needs: ClassVar[str | None] = None  # declared column without which the effect is none (a ratio to a friction of zero)
     of_the_hand: ClassVar[bool] = True  # False of what only one recording had, such as an obstacle
@@ -188,6 +189,10 @@ class Effect:
     def units(self, shape: Mapping[str, float]) -> Mapping[str, str]:
         """Units of what `parameters` makes of shapes and amplitudes, with "effort" and "position" for those of the state."""
         return {}
+
+    def possible(self, states: tuple[DriveState, ...], parameters: Mapping[str, float]) -> bool:
+        """Whether a machine with these parameters could have moved as it did: any can."""
+        return True
 
     def log_prior(self, parameters: Mapping[str, float]) -> float:
         """Log density of the parameters over that of ordinary ones: negative where machines rarely are like that."""

@@ -11,8 +11,8 @@ from .base import Amplitude, Array, DriveState, Effect, Shape, figure
 from .law import Law
 
 ASKED = 100.0  # [raw]
-MOST = 0.5  # share of the effort that a drive can lose
-ROUNDS = 30  # of a contraction by at least a half
+LEAST_RISE = 0.1  # effort delivered per further current, however much is asked for already
+ROUNDS = 12
 
 
 class DriveSag(Effect):
@@ -21,6 +21,7 @@ class DriveSag(Effect):
     """
 
     name = "drive_sag"
+    asks = True
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Share of the effort that is lost where 100 raw are asked for, never negative."""
@@ -39,6 +40,11 @@ class DriveSag(Effect):
         """None where it is not known what the motion requires."""
         return super().grid(states) if all("required" in s.extra for s in states) else []
 
+    def possible(self, states: tuple[DriveState, ...], parameters: Mapping[str, float]) -> bool:
+        """Whether the drive still had more to give where most was asked of it: no controller holds a speed beyond."""
+        most = max((float(np.nanquantile(np.abs(s.effort), 0.99)) for s in states if np.isfinite(s.effort).any()), default=0.0)
+        return bool(_rise(most, parameters) > LEAST_RISE)
+
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """Speed, or effort, lost per load."""
         if "torque_loss" in parameters:
@@ -56,15 +62,30 @@ class DriveSag(Effect):
         """The current that is asked for where this effort is needed."""
         if "torque_loss" not in parameters:
             return effort
-        asked = effort
-        for _ in range(ROUNDS):
-            asked = effort / (1 - _lost(np.abs(asked), parameters))
-        return asked
+        asked = np.abs(effort)
+        for _ in range(ROUNDS):  # Newton on a concave rise: from the left, and never beyond
+            lost = asked * _lost(asked, parameters)
+            asked = asked + (np.abs(effort) - asked + lost) / _rise(asked, parameters)
+        return np.sign(effort) * asked
+
+
+def _bend(parameters: Mapping[str, float]) -> float:
+    """Current [raw] from which on more of it brings next to nothing."""
+    power = 1 + parameters.get("form", 0.0)
+    return float(ASKED * ((1 - LEAST_RISE) / ((1 + power) * max(parameters["torque_loss"], 1e-9))) ** (1 / power))
+
+
+def _rise(asked: Any, parameters: Mapping[str, float]) -> Any:
+    """Effort delivered per further current, where a current of that size [raw] is asked for."""
+    power = 1 + parameters.get("form", 0.0)
+    return np.maximum(1 - (1 + power) * parameters["torque_loss"] * (asked / ASKED) ** power, LEAST_RISE)
 
 
 def _lost(asked: Any, parameters: Mapping[str, float]) -> Any:
-    """Share of the effort that is lost, where a current of that size [raw] is asked for."""
-    return np.minimum(parameters["torque_loss"] * (asked / ASKED) ** (1 + parameters.get("form", 0.0)), MOST)
+    """Share of the effort that is lost, where a current of that size [raw] is asked for; what is delivered never falls."""
+    power, within = 1 + parameters.get("form", 0.0), np.minimum(asked, _bend(parameters))
+    delivered = within * (1 - parameters["torque_loss"] * (within / ASKED) ** power) + LEAST_RISE * (asked - within)
+    return 1 - delivered / np.maximum(asked, 1e-9)
 
 
 EFFECT = DriveSag()
