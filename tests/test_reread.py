@@ -105,7 +105,7 @@ def test_a_sag_is_read_from_what_is_asked_beside_it() -> None:
     from hand_model.diagnose.drive import with_required
 
     def sagging(state):
-        truth = state.declared @ np.array([0.012, 0.15, 45.0, 0.35, 9.0])
+        truth = state.declared @ np.array([0.012, 0.1, 38.0, 0.2, 9.0])
         asked = (1 - np.sqrt(1 - 4 * 0.3 / 100 * np.abs(truth))) / (2 * 0.3 / 100) * np.sign(truth)  # u (1 - 0.3 |u| / 100) = truth
         return replace(state, effort=np.where(np.isfinite(state.effort), asked + np.random.default_rng(9).normal(0, 4, len(asked)), np.nan))
 
