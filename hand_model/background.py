@@ -93,7 +93,11 @@ class Pair:
             mine = [function(self.state, item, *rest) for item in items[::2]]
         except Exception as raised:  # noqa: BLE001, raised again, but only once the other one's answer is read: it would be taken for that of the next call
             error = raised
-        theirs = self._pipe.recv()
+        try:
+            theirs = self._pipe.recv()
+        except EOFError:  # ended by the system, which may lack memory
+            self._process = None
+            theirs = [function(self.state, item, *rest) for item in items[1::2]] if error is None else []
         if error is not None or isinstance(theirs, Exception):
             raise error or theirs
         out: list[Any] = [None] * len(items)

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import os
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -52,3 +56,15 @@ def _paired(size: int) -> list[tuple[int, int]]:
 
 def test_pairs_end_within_each_other_and_within_a_pool():
     assert all([v for v, _ in found] == [0, 1, 2, 0, 1, 2] for found in Background(_paired, [(3,), (3,)]).results())
+
+
+def _ended(state: Any, item: int) -> int:
+    if item == 2 and multiprocessing.parent_process() is not None:
+        os._exit(1)
+    return item
+
+
+def test_a_pair_whose_other_process_is_ended_goes_on_alone():
+    with Pair(None) as pair:
+        assert pair.map(_ended, [1, 2, 3]) == [1, 2, 3]
+        assert pair.map(_ended, [4, 2]) == [4, 2]

@@ -205,7 +205,7 @@ def rank(pair: Pair, effects: Iterable[Any], terms: tuple[Term, ...], fit: Fit, 
     rough = [r for r in pair.map(_rough, places, terms, fit, least) if r is not None]
     rough.sort(key=lambda item: -item[0])
     starts = [start for _, start in rough]
-    polished = pair.map(_polished, starts[:refine], len(terms))
+    polished = pair.map(polish, starts[:refine], len(terms))
     out = [(f, i < refine) for i, f in enumerate([*polished, *starts[refine:]]) if _possible(balance, f)]
     scale = min((scale_of(balance, f) for f, _ in out), default=1.0)
     weights = pair.map(_weight, out, fit, scale)
@@ -216,10 +216,6 @@ def rank(pair: Pair, effects: Iterable[Any], terms: tuple[Term, ...], fit: Fit, 
 def _rough(balance: Balance, effect: Any, terms: tuple[Term, ...], fit: Fit, least: float) -> tuple[float, Fit] | None:
     best = None if effect is None else scan(balance, effect, terms, least)
     return None if best is None else (rough_evidence(balance, best, fit, scale_of(balance, best)), best)
-
-
-def _polished(balance: Balance, start: Fit, which: int) -> Fit:
-    return polish(balance, start, which)
 
 
 def _weight(balance: Balance, candidate: tuple[Fit, bool], fit: Fit, scale: float) -> float:
