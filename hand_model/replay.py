@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .background import Background
-from .compile.course import without_courses
+from .compile.course import with_courses, without_courses
 from .description import Description, Model, read_description
 from .errors import DescriptionError, IdentificationError, SessionError
 from .hand import Finger, Hand
@@ -140,7 +140,8 @@ def engine_agreement(description: Description, poses: int = AGREEMENT_POSES, see
             for joint in finger.joints
         }
         exact = own.positions(reference_model, angles)
-        plain = own.positions(own.of_hand(without_courses(reference_model.hand)), angles)  # a URDF holds no course
+        hand = reference_model.hand
+        plain = own.positions(own.of_hand(without_courses(hand)), angles) if with_courses(hand) else exact  # a URDF holds no course
         for engine, file in (("mujoco", model.mjcf), ("mujoco (URDF)", model.urdf), ("pinocchio", model.urdf), ("yourdfpy", model.urdf)):
             module = importlib.import_module(f"hand_model.engines.{engine.split()[0]}")
             found = module.positions(module.load(file), angles)

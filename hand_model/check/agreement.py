@@ -25,7 +25,7 @@ def agreement(description: Description, model: Model) -> Finding:
     random = np.random.default_rng(0)
     angles = {joint: random.uniform(-1.5, 1.5, POSES) for joint in own.joints}
     exact = ours.kinematics(own, angles)
-    plain = ours.kinematics(ours.of_hand(without_courses(own.hand)), angles)
+    plain = ours.kinematics(ours.of_hand(without_courses(own.hand)), angles) if with_courses(own.hand) else exact
     engines = (
         (mujoco, model.mjcf),
         (mujoco, model.scene),

@@ -15,7 +15,7 @@ from .distinguishability import protocol_pairs
 from .findings import Finding, Findings
 from .interval import variance_ratio
 from .magnitude import channel_figures, magnitude
-from .markers import HINGE
+from .markers import HINGE, SLIPS
 from .naming import ALPHA, Named
 from .station import UNREST, Station, channel_of, finding_of, outsider_of, unexplained_of, unrepeated_of
 
@@ -24,7 +24,6 @@ HARMONICS, SAME_PERIOD = 4, 0.02
 SHADOW = 0.5  # of an encoder error's size: less, in the current of the same motor, may be what is left of it
 TILT = 0.2  # the same, of a wobble's or a travelling centre's, in the angles of the finger
 ANGULAR = {e.name for station in ("encoder", "linkage") for e in catalogue(station)} - {"clock_drift"}
-SLIPS = ("marker_slip", "palm_marker_slip", "support_slip")
 REFUSED = "command_as_measurement"  # a channel that tells nothing: no other finding is small beside it
 TRIFLE, SLIGHT = 0.01, 0.25  # of the square of the heaviest weight, and of the magnitude at which an effect is plain
 MINUTE = 0.08  # of that magnitude: less, where the lack-of-fit test sees nothing, is left to the imperfections of reading angles and speeds

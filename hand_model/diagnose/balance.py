@@ -55,6 +55,11 @@ class Fit:
     rss: float
     size: int
 
+    def added(self, which: int, state: DriveState) -> Array:
+        """What the columns of one term add to the effort (n,) along a recording."""
+        term = self.terms[which]
+        return term.effect.columns(state, term.shape) @ np.array(list(self.amplitudes[which].values()))
+
 
 def _key(shape: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
     return tuple(sorted((k, float(v)) for k, v in shape.items()))
@@ -97,10 +102,7 @@ class Balance:
 
     def wandering(self, wander: Wander | None) -> Balance:
         """The same balance with a random level per while in its noise, where that is real."""
-        other = copy(self)
-        other._kept, other._apart = {}, None
-        other.wander = wander if wander is not None and wander.real else None
-        return other
+        return self._with(wander=wander if wander is not None and wander.real else None)
 
     def remapped(self, fit: Fit) -> Balance:
         """The same balance with the slope of its map as it is in a fit, for what yields moves along that; of a balance without one, itself."""
@@ -112,29 +114,27 @@ class Balance:
             scale = state.extra["scale"]
             return replace(state, extra={**state.extra, "slope": Polynomial(powers).deriv()(state.position / scale) / scale})
 
-        other = copy(self)
-        other._kept, other._apart, other._last = {}, None, OrderedDict()
-        other.states = tuple(with_slope(s) for s in self.states)
-        return other
+        return self._with(states=tuple(with_slope(s) for s in self.states), _last=OrderedDict())
 
     def required(self, fit: Fit) -> Balance:
         """The same balance with what is "required" of the drive as a fit has it, its effects included."""
         def asked(state: DriveState) -> DriveState:
             effort = state.declared @ np.array(list(fit.declared.values()))
-            for term, amplitudes in zip(fit.terms, fit.amplitudes, strict=True):
-                effort = effort + term.effect.columns(state, term.shape) @ np.array(list(amplitudes.values()))
+            for which in range(len(fit.terms)):
+                effort = effort + fit.added(which, state)
             return replace(state, extra={**state.extra, "required": effort})
 
-        other = copy(self)
-        other._kept, other._apart, other._last = {}, None, OrderedDict()
-        other.states = tuple(asked(s) for s in self.states)
-        return other
+        return self._with(states=tuple(asked(s) for s in self.states), _last=OrderedDict())
 
     def settled(self) -> Balance:
         """The same balance with next to no weight on starts and stops."""
+        return self._with(weight=np.where(self.steady, self.weight, UNSETTLED * self.weight))
+
+    def _with(self, **changes: Any) -> Balance:
+        """The same balance with other attributes, what is kept of weighted columns thrown away."""
         other = copy(self)
-        other._kept, other._apart = {}, None
-        other.weight = np.where(self.steady, self.weight, UNSETTLED * self.weight)
+        for name, value in {"_kept": {}, "_apart": None, **changes}.items():
+            setattr(other, name, value)
         return other
 
     def whiten(self, values: Array, weight: Array) -> Array:

@@ -16,11 +16,10 @@ from ..output import refuse_file
 from ..session import Mocap, Session, Trial
 from .angles import FingerAngles, finger_angles
 from .findings import FILES, FOLDERS, Finding
-from .markers import MarkerNaming, name_markers
+from .markers import SLIPS, MarkerNaming, name_markers
 
 Array = NDArray[np.float64]
 
-SLIPS = ("marker_slip", "palm_marker_slip", "support_slip")
 FOLDER = "corrected"
 
 

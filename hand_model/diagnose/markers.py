@@ -26,6 +26,7 @@ ALPHA = 0.003  # false alarms per finger
 EXPLAINED_LEAST = 0.9  # of the misfit: below, the names are not believed
 SPELL = 12  # blocks, about a second, whose mean shows what stays correlated
 HINGE = ("joint_wobble", "moving_centre")
+SLIPS = ("marker_slip", "palm_marker_slip", "support_slip")
 REACH = 0.06  # m: the other axis of a wobble passes nearer to its joint; farther, its centre travels
 MOSTLY = 0.7  # share of what any motion in step with the angle explains
 

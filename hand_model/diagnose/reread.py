@@ -85,7 +85,7 @@ def of_recording(fit: Fit, state: DriveState) -> Array:
     if any(name.startswith("power_") for name in state.declared_names):
         own = [i for i, name in enumerate(state.declared_names) if not name.startswith("power_")]
         out = out + state.declared[:, own] @ np.array([fit.declared[state.declared_names[i]] for i in own])
-    for term, amplitudes in zip(fit.terms, fit.amplitudes, strict=True):
+    for which, term in enumerate(fit.terms):
         if term.effect.recorded:
-            out = out + term.effect.columns(state, term.shape) @ np.array(list(amplitudes.values()))
+            out = out + fit.added(which, state)
     return out
