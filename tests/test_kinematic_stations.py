@@ -151,6 +151,20 @@ def test_nothing_runs_ahead_in_noise() -> None:
     assert all((s.extra["ahead"] == 0).all() for seed in range(6) for s in joint(seed))
 
 
+@pytest.mark.parametrize("covered", [0.0, 2.0])
+def test_a_driver_is_as_quiet_as_its_encoder_where_nothing_is_expected_yet(covered: float) -> None:
+    """The encoder's station does not tell of the rest before a first motion; what it expects later is no jump."""
+    from hand_model.diagnose.angles import _Log, _smoothed
+
+    x, v = strokes((45.0, 27.0), rest_s=2.0)
+    t = np.arange(len(x)) / 100.0
+    truth = np.polynomial.Polynomial(MAP)(x / 100) + 0.8 * np.sin(x / 20)  # no cubic
+    log = _Log(x, v, 0 * v, None, np.ones(len(x), bool))
+    told = (t >= covered) & (x > 0.05 * np.ptp(x) * (covered > 0))
+    driver, *_ = _smoothed(t, truth + np.random.default_rng(4).normal(0, 1.0, len(x)), log, (t[told], truth[told]))
+    assert np.std((driver - truth)[t > 2.5]) < 0.1  # of 1 deg a frame
+
+
 def test_clock_drift_is_named_with_its_rate() -> None:
     found = named(joint(5, drift=2e-3), "encoder")
     assert list(found) == ["clock_drift"]

@@ -259,7 +259,10 @@ def _smoothed(time_s: Array, angle: Array, log: _Log | None,
     u = (log.counts - middle) / half
     fitted = np.polynomial.Polynomial.fit(u[use], angle[use], 3)
     slope = fitted.deriv()(u) / half
-    base = fitted(u) if expected is None else np.interp(time_s, *expected)
+    base = fitted(u)
+    if expected is not None:  # of what it does not cover, a recording's rest at first, the cubic tells how the angle goes on
+        at, foreseen = expected
+        base = base + np.interp(time_s, at, foreseen - np.interp(at, time_s, base))
     departure, rate = _least_error(time_s, angle - base)
     return base + departure, slope * log.speed + rate, slope * log.acceleration, use
 

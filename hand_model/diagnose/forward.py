@@ -23,7 +23,8 @@ from ..passive import effects_on
 Array = NDArray[np.float64]
 
 STEP_S = 0.002
-COASTING_S = 0.002  # after which a part that nothing drives stands: whatever rubs in its play, nobody has measured
+COASTING_S = 0.002  # after which a part that nothing drives stands: whatever rubs in its play, nobody has measured; it rubs
+# where the play is, for on the segment it would strain the spring of a give between the two
 SLOWER = 3.0  # the replay's time over the recording's: the spring that holds a finger on its lever is nominal, not what is tested
 
 
@@ -56,17 +57,21 @@ def _driver(model: Any, actuator_name: str, follower: int, station: str) -> int 
         joint = int(model.actuator_trnid[actuator, 0]) if actuator >= 0 else -1
         # a nominal actuator acts on the finger itself: such a file has no motor
         return joint if joint >= 0 and joint != follower else None
+    chain = _linkage(model, follower)
+    return chain[-1] if len(chain) > 1 else None
+
+
+def _linkage(model: Any, follower: int) -> list[int]:
+    """A joint and what it follows: by its equality, and over any number of inputs down to the driver."""
+    import mujoco
+
     rows = np.flatnonzero((model.eq_obj1id == follower) & (model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)))
-    return _behind_inputs(model, int(model.eq_obj2id[rows[0]])) if len(rows) else None
-
-
-def _behind_inputs(model: Any, joint: int) -> int:
-    """The joint that an input joint follows, over any number of inputs."""
-    while SUFFIX in model.joint(joint).name:
-        tendon = next(t for t in range(model.ntendon) if model.wrap_objid[model.tendon_adr[t] + 1] == joint
+    chain = [follower, *(int(model.eq_obj2id[row]) for row in rows[:1])]
+    while SUFFIX in model.joint(chain[-1]).name:
+        tendon = next(t for t in range(model.ntendon) if model.wrap_objid[model.tendon_adr[t] + 1] == chain[-1]
                       and model.tendon_num[t] == 2)
-        joint = int(model.wrap_objid[model.tendon_adr[tendon]])
-    return joint
+        chain.append(int(model.wrap_objid[model.tendon_adr[tendon]]))
+    return chain
 
 
 def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, path: Array, follower: int, behind: bool) -> Array:
@@ -78,8 +83,8 @@ def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, pat
     model.opt.tolerance = 1e-16  # of forces on inertias a millionth of the held one
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
     if behind:
-        loose = model.jnt_dofadr[follower]
-        model.dof_damping[loose] = model.dof_M0[loose] / COASTING_S
+        loose = model.jnt_dofadr[_linkage(model, follower)[-2]]
+        model.dof_damping[loose] = model.dof_M0[model.jnt_dofadr[follower]] / COASTING_S
     held = {driver}
     for actuator in range(len(model.actuator_trnid)):
         joint = int(model.actuator_trnid[actuator, 0])
@@ -125,7 +130,7 @@ def _started(model: Any, qpos: Array, driver: int) -> Array:
     """qpos (nq,) with inputs at the end of their tendons' ranges that a first stroke finds closed, followers on their maps."""
     out = on_linkages(model, qpos)
     for joint in range(model.njnt):
-        if SUFFIX in model.joint(joint).name and _behind_inputs(model, joint) == driver:
+        if SUFFIX in model.joint(joint).name and _linkage(model, joint)[-1] == driver:
             out[model.jnt_qposadr[joint]] = _within(model, out, joint, driver)
     out = on_linkages(model, out)
     return _pushed(model, out)
