@@ -162,36 +162,64 @@ def _add_passive_motor(root) -> None:
     root.find("actuator").insert(0, friction)
 
 
-@pytest.mark.parametrize(("name", "shape", "amplitude"), KINEMATIC, ids=[f"{d[0]}_{i}" for i, d in enumerate(KINEMATIC)])
-def test_written_finger_moves_as_the_effect_predicts(name, shape, amplitude, tmp_path) -> None:
+def replayed(folder, now: DriveState, station: str, *written: tuple[str, dict, dict]) -> np.ndarray:
+    """Angle [deg] of a compiled finger's joint with effects written into its file, its driver moved as in `now`."""
     from hand_model.compile.motor import write_motors
     from hand_model.diagnose.forward import follower_along
 
-    station, now = effect(name).station, kinematic_state(effect(name).station)
-    joint = "proximal" if station == "encoder" else "distal"
-    where = {"finger": "index", "joint": joint, "actuator": "index"}
-    values = effect(name).parameters(shape, amplitude, {})
-    found = Effect(name, where, {k: Estimate(v, None, "", "") for k, v in values.items()})
     motor = Motor("index", 0.0, 100.0, {MOTOR_NAMES[k]: Estimate(v, None, "", "") for k, v in DECLARED.items()}, 1.0, ())
     hinge = Joint("proximal", np.array([0, 1.0, 0]), np.zeros(3), np.zeros((6, 6)), (0.0, 1.4), {})
     finger = Finger("index", "index", (hinge, replace(hinge, name="distal")), (EncoderMap(0.0, 100.0, ENCODER, {}, {}),))
-    hand = Hand("h", "left", {}, {}, (finger,), 1e-4, {}, (motor,), (found,))
+    at = {s: {"finger": "index", "joint": "proximal" if s == "encoder" else "distal", "actuator": "index"} for s in ("encoder", "linkage")}
+    values = {name: effect(name).parameters(shape, amplitude, {}) for name, shape, amplitude in written}
+    found = tuple(Effect(name, at[effect(name).station], {k: Estimate(v, None, "", "") for k, v in value.items()}) for name, value in values.items())
+    hand = Hand("h", "left", {}, {}, (finger,), 1e-4, {}, (motor,), found)
     root = etree.fromstring(FINGER)
     write_motors(root, hand)
     _add_passive_motor(root)
-    place = effect(name).write_mjcf(root, where, values)
-    assert (place is None) != (effect(name).law(values) is None)
-    (tmp_path / "index.xml").write_bytes(etree.tostring(root))
-    hand.save(tmp_path / "hand.json")
-    moved = np.rad2deg(follower_along(tmp_path, now, where, station))
+    for name, value in values.items():
+        place = effect(name).write_mjcf(root, at[effect(name).station], value)
+        assert (place is None) != (effect(name).law(value) is None)
+    (folder / "index.xml").write_bytes(etree.tostring(root))
+    hand.save(folder / "hand.json")
+    return np.rad2deg(follower_along(folder, now, at[station], station))
+
+
+def powers(now: DriveState, station: str) -> np.ndarray:
+    """What the columns of a state's declared map are multiplied by [deg]."""
     per = np.array([now.extra["scale"][0] ** k for k in range(now.declared.shape[1])])
     unit = 0.01 if station == "encoder" else np.deg2rad(1.0)
-    powers = np.rad2deg(ENCODER if station == "encoder" else LINKAGE) * per * unit ** np.arange(len(per))
+    return np.rad2deg(ENCODER if station == "encoder" else LINKAGE) * per * unit ** np.arange(len(per))
+
+
+@pytest.mark.parametrize(("name", "shape", "amplitude"), KINEMATIC, ids=[f"{d[0]}_{i}" for i, d in enumerate(KINEMATIC)])
+def test_written_finger_moves_as_the_effect_predicts(name, shape, amplitude, tmp_path) -> None:
+    station = effect(name).station
+    now = kinematic_state(station)
+    moved = replayed(tmp_path, now, station, (name, shape, amplitude))
     columns = effect(name).columns(now, shape)
-    wanted = effect(name).declared(now, shape) @ powers + columns @ np.array(list(amplitude.values()) if columns.shape[1] else [])
+    wanted = effect(name).declared(now, shape) @ powers(now, station) + columns @ np.array(list(amplitude.values()) if columns.shape[1] else [])
     size = np.abs(wanted - now.effort).max()
     assert size > 0.5
     assert np.quantile(np.abs(moved - wanted), 0.98) < 0.05 * size + 0.03
+
+
+@pytest.mark.parametrize("bound", [("coupling_deadband", {"until": 15.0, "corner": 0.1}, {}), ("distal_stop", {"from": 50.0, "passing": 0.0}, {})])
+def test_a_distal_segment_held_back_does_not_lift_the_finger_off_its_lever(bound, tmp_path) -> None:
+    now = kinematic_state("encoder")
+    held, free = (replayed(folder, now, "encoder", *written) for folder, written in ((tmp_path, (bound,)), (tmp_path, ())))
+    assert np.abs(held - free).max() < 0.5  # of a segment held back by 15 to 20 deg
+
+
+def test_a_play_before_a_stop_is_replayed_as_both_predict(tmp_path) -> None:
+    play, stop = ("linkage_backlash", {"gap": 2.0, "form": 0.0}, {}), ("distal_stop", {"from": 50.0, "passing": 0.0}, {})
+    now = kinematic_state("linkage")
+    moved = replayed(tmp_path, now, "linkage", play, stop)
+    by_play = effect(play[0]).declared(now, play[1])[:, 1] * now.extra["scale"][0]
+    x = np.minimum(by_play, 50.0)
+    wanted = np.stack([(x / now.extra["scale"][0]) ** k for k in range(now.declared.shape[1])], axis=-1) @ powers(now, "linkage")
+    begun = np.maximum.accumulate(np.abs(now.position - now.position[0]) > 4.0)  # on which side it lay before is not asked
+    assert np.quantile(np.abs(moved - wanted)[begun], 0.98) < 0.1
 
 
 def test_every_effect_of_a_force_or_a_map_is_replayed() -> None:

@@ -7,7 +7,7 @@ plays and stops do not mind, and nothing of the file that was not measured is te
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +23,7 @@ from ..passive import effects_on
 Array = NDArray[np.float64]
 
 STEP_S = 0.002
-COASTING_S = 0.002  # after which a part that nothing drives stands: whatever rubs in its play, nobody has measured; it rubs
-# where the play is, for on the segment it would strain the spring of a give between the two
+COASTING_S = 0.002  # in which a part that nothing drives stands: whatever rubs in its play, nobody has measured
 SLOWER = 3.0  # the replay's time over the recording's: the spring that holds a finger on its lever is nominal, not what is tested
 
 
@@ -42,7 +41,7 @@ def follower_along(folder: Path, state: DriveState, where: Mapping[str, Any], st
         driver = _driver(model, str(where["actuator"]), follower, station)
         if driver is not None:
             path = state.position if station == "encoder" else np.deg2rad(state.position)
-            return _roll(model, load_hand(folder / "hand.json"), state, str(where["actuator"]), driver, path, follower, station == "linkage")
+            return _roll(model, load_hand(folder / "hand.json"), state, str(where["actuator"]), driver, path, follower)
     return None
 
 
@@ -57,24 +56,27 @@ def _driver(model: Any, actuator_name: str, follower: int, station: str) -> int 
         joint = int(model.actuator_trnid[actuator, 0]) if actuator >= 0 else -1
         # a nominal actuator acts on the finger itself: such a file has no motor
         return joint if joint >= 0 and joint != follower else None
-    chain = _linkage(model, follower)
-    return chain[-1] if len(chain) > 1 else None
-
-
-def _linkage(model: Any, follower: int) -> list[int]:
-    """A joint and what it follows: by its equality, and over any number of inputs down to the driver."""
-    import mujoco
-
     rows = np.flatnonzero((model.eq_obj1id == follower) & (model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)))
-    chain = [follower, *(int(model.eq_obj2id[row]) for row in rows[:1])]
-    while SUFFIX in model.joint(chain[-1]).name:
-        tendon = next(t for t in range(model.ntendon) if model.wrap_objid[model.tendon_adr[t] + 1] == chain[-1]
+    return _behind_inputs(model, int(model.eq_obj2id[rows[0]])) if len(rows) else None
+
+
+def _behind_inputs(model: Any, joint: int) -> int:
+    """The joint that an input joint follows, over any number of inputs."""
+    for _, tendon in _inputs(model, joint):
+        joint = int(model.wrap_objid[model.tendon_adr[tendon]])
+    return joint
+
+
+def _inputs(model: Any, joint: int) -> Iterator[tuple[int, int]]:
+    """Inputs from a joint on, towards the driver, each with the tendon by which it follows the next."""
+    while SUFFIX in model.joint(joint).name:
+        tendon = next(t for t in range(model.ntendon) if model.wrap_objid[model.tendon_adr[t] + 1] == joint
                       and model.tendon_num[t] == 2)
-        chain.append(int(model.wrap_objid[model.tendon_adr[tendon]]))
-    return chain
+        yield joint, tendon
+        joint = int(model.wrap_objid[model.tendon_adr[tendon]])
 
 
-def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, path: Array, follower: int, behind: bool) -> Array:
+def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, path: Array, follower: int) -> Array:
     import mujoco
     from scipy.interpolate import PchipInterpolator
 
@@ -82,9 +84,7 @@ def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, pat
     model.opt.gravity[:] = 0
     model.opt.tolerance = 1e-16  # of forces on inertias a millionth of the held one
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
-    if behind:
-        loose = model.jnt_dofadr[_linkage(model, follower)[-2]]
-        model.dof_damping[loose] = model.dof_M0[model.jnt_dofadr[follower]] / COASTING_S
+    _rub(model, driver, float(model.dof_M0[model.jnt_dofadr[follower]]), float(np.abs(np.gradient(path, state.time_s)).max()) / SLOWER)
     held = {driver}
     for actuator in range(len(model.actuator_trnid)):
         joint = int(model.actuator_trnid[actuator, 0])
@@ -95,6 +95,7 @@ def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, pat
             model.actuator_ctrllimited[model.actuator_ctrladr[actuator]] = 0  # passive motors have no control
     address, dof = model.jnt_qposadr[list(held)], model.jnt_dofadr[list(held)]
     model.dof_armature[dof] = HOLD
+    model.jnt_limited[list(held)] = 0  # a path a little beyond its range would be braked, and throw what it carries
     mujoco.mj_setConst(model, mujoco.MjData(model))
     absolute = model.eq_solref[:, 0] < 0  # ties of slides, stiff for the inertias as they were and for the file's own step
     model.eq_solref[absolute] = 2 * STEP_S, 1.0
@@ -118,6 +119,18 @@ def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, pat
     return np.interp(time_s, grid, out)
 
 
+def _rub(model: Any, driver: int, inertia: float, fastest: float) -> None:
+    """Let inputs that lie loose in a play behind a driver stand within `COASTING_S`, as friction, which the gap's ends push without lag
+    and no spring has to bear. inertia: of the joint that is moved [kg m^2]; fastest: of the driver, its unit per second."""
+    import mujoco
+
+    for row in np.flatnonzero(model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)):
+        last = int(model.eq_obj2id[row])
+        if _behind_inputs(model, last) == driver:
+            loose = [model.jnt_dofadr[joint] for joint, tendon in _inputs(model, last) if not model.tendon_stiffness[tendon]]
+            model.dof_frictionloss[loose] = inertia * model.eq_data[row, 1] ** 2 * fastest / COASTING_S
+
+
 def _unit(model: Any, motor: str) -> float:
     """Effort per raw unit of current of a motor."""
     import mujoco
@@ -130,7 +143,7 @@ def _started(model: Any, qpos: Array, driver: int) -> Array:
     """qpos (nq,) with inputs at the end of their tendons' ranges that a first stroke finds closed, followers on their maps."""
     out = on_linkages(model, qpos)
     for joint in range(model.njnt):
-        if SUFFIX in model.joint(joint).name and _linkage(model, joint)[-1] == driver:
+        if SUFFIX in model.joint(joint).name and _behind_inputs(model, joint) == driver:
             out[model.jnt_qposadr[joint]] = _within(model, out, joint, driver)
     out = on_linkages(model, out)
     return _pushed(model, out)
@@ -145,6 +158,8 @@ def _within(model: Any, qpos: Array, joint: int, driver: int) -> float:
         if joint not in joints or not model.tendon_limited[t]:
             continue
         own = coefficients[joints.index(joint)]
+        if own == 0:  # a stop beyond which nothing of this one passes
+            continue
         rest = sum(c * qpos[model.jnt_qposadr[j]] for j, c in zip(joints, coefficients, strict=True) if j != joint)
         ends = sorted((model.tendon_range[t] - rest) / own)
         low, high = max(low, ends[0]), min(high, ends[1])

@@ -14,6 +14,7 @@ class ClockDrift(Effect):
     """angle(t) = map(encoder(t + drift (t - middle))): a column of velocity times time from the middle of the recording."""
 
     name = "clock_drift"
+    drifting = True
     station = "encoder"
     signal = "log"
     recorded = True

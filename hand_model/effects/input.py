@@ -16,6 +16,7 @@ from .mjcf import fixed_tendon, free_name, motor_joint
 HOLD = 2e-4  # friction that keeps a loose part where it is [N m per unit of the driver]; the weight of a finger may move it
 INERTIA = 1e-7  # of an input joint, that of a compiled lever
 YIELD_RATE = 150.0  # rad/s: of a follower on the spring that lets a stop hold it back, as of a finger on its actuator
+FIRM_RATE = 400.0  # rad/s: of a finger on its lever then; what is tied to it by springs or rubs would lift it off otherwise
 HARD = {"solreflimit": (0.002, 1.0), "solimplimit": (0.9999, 0.9999, 0.001, 0.5, 2.0)}
 FRICTION = {"solreffriction": "0.004 1", "solimpfriction": "0.9999 0.9999 0.001 0.5 2"}
 SUFFIX = "_input"
@@ -46,6 +47,7 @@ def _put_between(root: Any, equality: Any) -> tuple[str, str]:
     from lxml import etree
 
     driver = equality.get("joint2")
+    _hold_firmly(root, equality.get("joint1"), source(root, driver))
     name = free_name(root, f"{equality.get('name')}{SUFFIX}")
     palm = root.find("worldbody").find("body")
     body = etree.SubElement(palm, "body", name=free_name(root, f"{name}_link"))
@@ -54,6 +56,22 @@ def _put_between(root: Any, equality: Any) -> tuple[str, str]:
                      armature=repr(INERTIA))
     equality.set("joint2", name)
     return driver, name
+
+
+def _hold_firmly(root: Any, follower: str, driver: str) -> None:
+    """Make the spring that holds a finger on its lever as fast as `FIRM_RATE`, where a tendon has one at either joint; a lever that
+    is to follow a play as heavy as its finger, or the gap's ends would be too soft for both."""
+    for tendon in root.iterfind("tendon/fixed"):
+        finger, *lever = (j.get("joint") for j in tendon.findall("joint"))
+        if not tendon.get("name", "").endswith("_push") or not {follower, driver} & {finger, *lever}:
+            continue
+        stiffness, damping = float(tendon.get("stiffness")), float(tendon.get("damping"))
+        rate = 2 * stiffness / damping  # critically damped
+        if follower in lever:
+            next(j for j in root.find("worldbody").iter("joint") if j.get("name") == follower).set("armature", repr(stiffness / rate**2))
+        more = max(FIRM_RATE / rate, 1.0)
+        tendon.set("stiffness", repr(stiffness * more**2))
+        tendon.set("damping", repr(damping * more))
 
 
 def write_play(root: Any, equality: Any, gap: float) -> str:

@@ -204,6 +204,7 @@ def _roll(mj: Any, prescribed: list[int], grid: Array, spline: Any) -> tuple[Arr
     address, dof = mj.jnt_qposadr[prescribed], mj.jnt_dofadr[prescribed]
     mj.dof_armature[dof] = HOLD
     mj.dof_frictionloss[dof] = 0.0
+    mj.jnt_limited[prescribed] = 0  # a path a little beyond its range would be braked, and throw what it carries
     data = mujoco.MjData(mj)
     path, speed, push = spline(grid), spline(grid, 1), HOLD * spline(grid, 2)
     data.qpos[address] = path[0]
