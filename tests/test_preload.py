@@ -38,6 +38,12 @@ def test_of_two_that_differ_the_heavier_is_odd_unless_one_has_lost_its_preload()
     assert [f.where["finger"] for _, f in preload_findings(hand(-12.0, 0.0))] == ["finger_0"]
 
 
+def test_of_two_either_may_be_the_odd_one_and_the_probability_says_so() -> None:
+    two, three = (next(f for _, f in preload_findings(hand(*halves))).probability for halves in ((25.0, 0.0), (25.0, 0.0, 0.5)))
+    assert 0.5 < two < three
+    assert three > 0.95
+
+
 def test_a_motor_that_does_not_repeat_itself_is_not_compared() -> None:
     def shaken(state):
         return 12.0 + 15.0 * np.sin(2 * np.pi * 0.37 * state.elapsed_s)

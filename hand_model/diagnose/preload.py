@@ -45,7 +45,9 @@ def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]
         own, error = preload[id(station)], _standard_error(station)
         p = max(_by_chance(own, error, other) for other in others)  # unlike every other
         if p < ODD_P and (len(others) > 1 or own > usual or own < LOST * usual):
-            out.append(_finding(station, own - usual, error, usual, p))
+            # Of two either may be odd: the odds are those of the sizes, where a usual preload may have any scale (Jeffreys 1946).
+            larger = own / (own + usual) if len(others) == 1 and own > usual else 1.0
+            out.append(_finding(station, own - usual, error, usual, (1 - p) * larger))
     return out
 
 
@@ -76,7 +78,7 @@ def _standard_error(station: Station) -> float:
     return float(np.sqrt(np.linalg.pinv(matrix.T @ matrix)[at, at] * balance.inflation))
 
 
-def _finding(station: Station, half_difference: float, error: float, usual: float, p: float) -> tuple[float, Finding]:
+def _finding(station: Station, half_difference: float, error: float, usual: float, probability: float) -> tuple[float, Finding]:
     doubt = 2 * float(np.hypot(error, SPREAD * np.sqrt(2) * usual))
     unit = station.naming.balance.states[0].effort_unit
     parameters = {"half_difference": {"value": half_difference, "unit": unit, "ci95": [half_difference - doubt, half_difference + doubt]}}
@@ -87,4 +89,4 @@ def _finding(station: Station, half_difference: float, error: float, usual: floa
            "ci95_reduction": None, "held_out": [], "engine": "comparison of the hand's motors"}
     model = {"native": True, "mjcf": f"joint[@name='{station.actuator}']/@springref", "urdf": "kept in hand.json"}
     sure = max(abs(half_difference) - doubt, SURE_LEAST * abs(half_difference))
-    return weighed(sure / station.naming.balance.sigma, station.contrast), Finding(CLASS[0], CLASS, 1 - p, (), where, text, parameters, fit, model)
+    return weighed(sure / station.naming.balance.sigma, station.contrast), Finding(CLASS[0], CLASS, probability, (), where, text, parameters, fit, model)
