@@ -159,9 +159,9 @@ class _Heard:
         odd = preload_findings(self.stations)
         for _, finding in odd:
             self.tell(finding.statement)
-        clipped = {s.actuator for s in self.stations if s.believed for f in s.kept if f.term.effect.clips}
-        # a reading that clips says little of the load, on which a sag is judged
-        self.found = [i for i in (*self.found, *odd) if i[1].effect != "drive_sag" or i[1].where["actuator"] not in clipped]
+        # A reading that clips says little of the load, on which a sag of speed is judged; one that the current shows, too, is named there, with a law to write.
+        settled = {s.actuator for s in self.stations if s.believed for f in s.kept if f.term.effect.clips or f.term.effect.name == "drive_sag"}
+        self.found = [i for i in (*self.found, *odd) if i[1].effect != "drive_sag" or i[1].where["actuator"] not in settled]
 
 
 def _timed(drives: dict[str, tuple[DriveState, ...]],
