@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from hand_model.diagnose.assemble import _of_hinges, _shared, _without_shadows, _without_tilts, assemble
-from hand_model.diagnose.displacement import NO_HINGE
 from hand_model.diagnose.findings import Finding, weighed
+from hand_model.diagnose.locate.displacement import NO_HINGE
 
 
 def periodic(effect: str, actuator: str, period: float) -> tuple[float, Finding]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hand_model.diagnose.answers import Answers, lateness
-from hand_model.diagnose.command import command_facts, command_findings
+from hand_model.diagnose.locate.answers import Answers, lateness
+from hand_model.diagnose.locate.command import command_facts, command_findings
 from hand_model.effects.base import DriveState
 
 STEP_S, VISCOUS, LIMIT = 0.018, 0.15, 66.0

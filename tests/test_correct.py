@@ -10,8 +10,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hand_model.diagnose.correct import corrected_markers, refuse_output, write_corrected, write_csv, write_tsv
 from hand_model.diagnose.findings import Finding
+from hand_model.diagnose.prove.correct import corrected_markers, refuse_output, write_corrected, write_csv, write_tsv
 from hand_model.errors import HandModelError
 from hand_model.output import forget
 from hand_model.session import Mocap, read_session

@@ -17,11 +17,11 @@ from hand_model.check import check
 from hand_model.compile import compile
 from hand_model.compile.course import without_courses
 from hand_model.course import ranges, value
-from hand_model.diagnose.angles import finger_angles
-from hand_model.diagnose.course import _chosen, _Observed, _solve, finger_courses
-from hand_model.diagnose.markers import name_markers
-from hand_model.diagnose.prove_markers import OWN, marker_fit, of_chain
-from hand_model.diagnose.write_course import with_chains, written_courses
+from hand_model.diagnose.locate.angles import finger_angles
+from hand_model.diagnose.locate.course import _chosen, _Observed, _solve, finger_courses
+from hand_model.diagnose.locate.markers import name_markers
+from hand_model.diagnose.prove.markers import OWN, marker_fit, of_chain
+from hand_model.diagnose.prove.write_course import with_chains, written_courses
 from hand_model.engines import mujoco as engine
 from hand_model.errors import HandFileError
 from hand_model.hand import Course, ExtraJoint, Finger, Hand, Joint, load_hand

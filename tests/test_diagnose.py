@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from hand_model.diagnose import Finding, Findings, diagnose
-from hand_model.diagnose.balance import Balance
-from hand_model.diagnose.interval import held_out, parameter_intervals, undisturbed
-from hand_model.diagnose.least_squares import bounded_least_squares
-from hand_model.diagnose.motion import estimate_motion, local_quadratic
-from hand_model.diagnose.name import name_effects
-from hand_model.diagnose.station import judged
+from hand_model.diagnose.locate.motion import estimate_motion, local_quadratic
+from hand_model.diagnose.name.balance import Balance
+from hand_model.diagnose.name.interval import held_out, parameter_intervals, undisturbed
+from hand_model.diagnose.name.least_squares import bounded_least_squares
+from hand_model.diagnose.name.selection import name_effects
+from hand_model.diagnose.name.station import judged
 from hand_model.effects import catalogue, effect
 from hand_model.effects.base import DriveState
 
@@ -188,7 +188,7 @@ def test_shown_sessions(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("burst", [False, True], ids=["coloured", "bursts"])
 def test_lack_of_fit_keeps_its_level_on_dirty_healthy_drives(burst: bool) -> None:
     """Coloured noise that differs over the range, strokes that do not repeat, bursts of outliers: 24 drives, nominal 5 %."""
-    from hand_model.diagnose.lack_of_fit import lack_of_fit
+    from hand_model.diagnose.name.lack_of_fit import lack_of_fit
 
     alarms = 0
     for seed in range(24):
@@ -207,7 +207,7 @@ def test_lack_of_fit_keeps_its_level_on_dirty_healthy_drives(burst: bool) -> Non
 
 
 def test_lack_of_fit_sees_what_repeats_from_stroke_to_stroke() -> None:
-    from hand_model.diagnose.lack_of_fit import lack_of_fit
+    from hand_model.diagnose.name.lack_of_fit import lack_of_fit
 
     bump = planted("detent_load", {"form": 0.0, "centre": 60.0, "width": 6.0}, [-8.0])
     balance = Balance(drive(2, bump, colour=0.4, trials=3))

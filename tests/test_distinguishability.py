@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from test_diagnose import drive
 
-from hand_model.diagnose.balance import Balance
-from hand_model.diagnose.distinguishability import distinguishability, protocol_pairs
+from hand_model.diagnose.name.balance import Balance
+from hand_model.diagnose.name.distinguishability import distinguishability, protocol_pairs
 from hand_model.effects import effect
 
 SPEED_LAWS = [effect("stribeck_friction"), effect("quadratic_damping")]

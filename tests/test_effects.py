@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hand_model.diagnose.drive import bouts
+from hand_model.diagnose.locate.drive import bouts
 from hand_model.effects import catalogue, effect
 from hand_model.effects.base import DriveState, Effect
 from hand_model.effects.path import dahl, jenkins, lowpass, strokes, travelled

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hand_model.diagnose.ghosts import ghosts
+from hand_model.diagnose.locate.ghosts import ghosts
 from hand_model.identify.chain import ChainData
 
 TIME_S = np.arange(0, 40, 0.01)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from test_diagnose import drive, planted
 
-from hand_model.diagnose.balance import Balance, Term
-from hand_model.diagnose.grid import stacked
-from hand_model.diagnose.name import scan
+from hand_model.diagnose.name.balance import Balance, Term
+from hand_model.diagnose.name.grid import stacked
+from hand_model.diagnose.name.selection import scan
 from hand_model.effects import effect
 
 
@@ -83,7 +83,7 @@ def test_without_a_delay_weights_stay_and_wider_errors_cost() -> None:
 
 
 def test_a_candidate_that_is_always_dropped_again_ends_the_search(monkeypatch) -> None:
-    from hand_model.diagnose import name
+    from hand_model.diagnose.name import selection
 
     balance = Balance(drive(7, planted("detent_load", {"form": 0.0, "centre": 50.0, "width": 6.0}, [12.0]), trials=3))
     kind = effect("torque_ripple")
@@ -93,9 +93,9 @@ def test_a_candidate_that_is_always_dropped_again_ends_the_search(monkeypatch) -
     def rank(*_arguments):
         tried.append(kind.name)
         assert len(tried) < 10
-        return [name.Rival(kind.name, 50.0, offered)]
+        return [selection.Rival(kind.name, 50.0, offered)]
 
-    monkeypatch.setattr(name, "rank", rank)
-    monkeypatch.setattr(name, "settle", lambda *_arguments: ((), balance.fit()))
-    fit, brought, _ = name._search(name.Pair(balance), (kind,), None)
+    monkeypatch.setattr(selection, "rank", rank)
+    monkeypatch.setattr(selection, "settle", lambda *_arguments: ((), balance.fit()))
+    fit, brought, _ = selection._search(selection.Pair(balance), (kind,), None)
     assert fit.terms == () and brought == {kind.name: 50.0}

@@ -8,10 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hand_model.diagnose.excursions import with_excursions
-from hand_model.diagnose.name import name_effects
-from hand_model.diagnose.slips import _swaps
-from hand_model.diagnose.station import Station, judged
+from hand_model.diagnose.locate.excursions import with_excursions
+from hand_model.diagnose.locate.slips import _swaps
+from hand_model.diagnose.name.selection import name_effects
+from hand_model.diagnose.name.station import Station, judged
 from hand_model.effects import catalogue, effect
 from hand_model.effects.base import DriveState
 from hand_model.effects.driven import driven, play, soft_play
@@ -154,7 +154,7 @@ def test_nothing_runs_ahead_in_noise() -> None:
 @pytest.mark.parametrize("covered", [0.0, 2.0])
 def test_a_driver_is_as_quiet_as_its_encoder_where_nothing_is_expected_yet(covered: float) -> None:
     """The encoder's station does not tell of the rest before a first motion; what it expects later is no jump."""
-    from hand_model.diagnose.angles import _Log, _smoothed
+    from hand_model.diagnose.locate.angles import _Log, _smoothed
 
     x, v = strokes((45.0, 27.0), rest_s=2.0)
     t = np.arange(len(x)) / 100.0
@@ -201,7 +201,7 @@ def test_labels_that_flicker_are_no_exchange() -> None:
 def test_the_current_of_whiles_in_which_the_finger_has_left_its_drive_is_not_judged() -> None:
     from types import SimpleNamespace
 
-    from hand_model.diagnose.decoupled import without_excursions
+    from hand_model.diagnose.locate.decoupled import without_excursions
     from hand_model.effects.base import DriveState
 
     t = np.arange(0, 40, 0.01)

@@ -12,7 +12,7 @@ from session_writers import write_log, write_session
 
 from hand_model.diagnose import diagnose
 from hand_model.diagnose.diagnosis import _current_at, _no_measurement
-from hand_model.diagnose.drive import _held, count_range, drive_states, opposes
+from hand_model.diagnose.locate.drive import _held, count_range, drive_states, opposes
 from hand_model.errors import HandFileError, SessionError
 from hand_model.identify.clock import align
 from hand_model.session import Log, read_session
@@ -89,7 +89,7 @@ def test_a_current_of_the_other_sign_is_told_from_the_friction(tmp_path: Path) -
 
 
 def test_a_model_of_another_hand_is_refused() -> None:
-    from hand_model.diagnose.improve import refuse_other
+    from hand_model.diagnose.prove.improve import refuse_other
 
     def hand(side: str, *fingers: str) -> SimpleNamespace:
         return SimpleNamespace(side=side, fingers=[SimpleNamespace(name=f) for f in fingers])

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from hand_model.diagnose.blocks import _assembled
-from hand_model.diagnose.displacement import CREEP, NO_HINGE
-from hand_model.diagnose.markers import MarkerNaming, named_in
-from hand_model.diagnose.slips import unexplained
+from hand_model.diagnose.locate.blocks import _assembled
+from hand_model.diagnose.locate.displacement import CREEP, NO_HINGE
+from hand_model.diagnose.locate.markers import MarkerNaming, named_in
+from hand_model.diagnose.locate.slips import unexplained
 from hand_model.identify.chain import Chain
 
 BODY = np.repeat([0, 1, 2], 4)

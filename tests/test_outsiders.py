@@ -10,8 +10,8 @@ from test_diagnose import PLANTED, drive, planted
 from test_kinematic_stations import MAP, joint
 
 from hand_model.diagnose.assemble import assemble
-from hand_model.diagnose.drive import with_required
-from hand_model.diagnose.station import Station, judged
+from hand_model.diagnose.locate.drive import with_required
+from hand_model.diagnose.name.station import Station, judged
 from hand_model.effects import catalogue, effect, outsiders
 from hand_model.effects.base import DriveState
 
@@ -127,7 +127,7 @@ def test_a_level_that_wanders_names_no_obstacle() -> None:
 
 
 def test_the_only_effect_needs_no_steady_motion_where_it_is_plain_and_a_faint_one_does(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("hand_model.diagnose.station.sized", lambda *_: False)  # all of it happens at starts and stops
+    monkeypatch.setattr("hand_model.diagnose.name.station.sized", lambda *_: False)  # all of it happens at starts and stops
     plain = heard(drive(3, planted(*PLANTED[0])))
     assert [f.term.effect.name for f in plain.kept] == [PLANTED[0][0]]
     faint = replace(plain.naming, found=(plain.naming.found[0],) * 2)

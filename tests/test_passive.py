@@ -88,7 +88,7 @@ def predicted(name: str, shape: dict[str, float], amplitude: dict[str, float], n
 
 def motor_with(name: str, shape: dict[str, float], amplitude: dict[str, float]):
     """The compiled motor with the effect written into it, and its hand."""
-    from hand_model.diagnose.inverse import CompiledMotor
+    from hand_model.diagnose.prove.inverse import CompiledMotor
 
     values = effect(name).parameters(shape, every(effect(name), amplitude), DECLARED)
     root = etree.fromstring(MOTOR)
@@ -102,7 +102,7 @@ def motor_with(name: str, shape: dict[str, float], amplitude: dict[str, float]):
 
 @pytest.mark.parametrize(("name", "shape", "amplitude", "tolerance"), DRIVE, ids=[f"{d[0]}_{i}" for i, d in enumerate(DRIVE)])
 def test_written_and_replayed_effect_is_the_effects_own_column(name, shape, amplitude, tolerance) -> None:
-    from hand_model.diagnose.inverse import current_along
+    from hand_model.diagnose.prove.inverse import current_along
 
     now = state()
     replayed = current_along(motor_with(name, shape, amplitude), now)
@@ -165,7 +165,7 @@ def _add_passive_motor(root) -> None:
 def replayed(folder, now: DriveState, station: str, *written: tuple[str, dict, dict]) -> np.ndarray:
     """Angle [deg] of a compiled finger's joint with effects written into its file, its driver moved as in `now`."""
     from hand_model.compile.motor import write_motors
-    from hand_model.diagnose.forward import follower_along
+    from hand_model.diagnose.prove.forward import follower_along
 
     motor = Motor("index", 0.0, 100.0, {MOTOR_NAMES[k]: Estimate(v, None, "", "") for k, v in DECLARED.items()}, 1.0, ())
     hinge = Joint("proximal", np.array([0, 1.0, 0]), np.zeros(3), np.zeros((6, 6)), (0.0, 1.4), {})

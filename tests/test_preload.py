@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from test_diagnose import drive
 
-from hand_model.diagnose.preload import preload_findings
-from hand_model.diagnose.station import judged
+from hand_model.diagnose.locate.preload import preload_findings
+from hand_model.diagnose.name.station import judged
 from hand_model.effects import effect
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from hand_model.diagnose.findings import Finding, Findings
 from hand_model.diagnose.page import render
-from hand_model.diagnose.prove import Replay, reduction
+from hand_model.diagnose.prove.replays import Replay, reduction
 
 
 def test_reduction_holds_the_truth_and_knows_blocks() -> None:
@@ -85,7 +85,7 @@ def test_page_of_a_consistent_session_has_no_findings() -> None:
 def test_a_model_that_holds_an_effect_already_gets_it_once() -> None:
     from types import SimpleNamespace
 
-    from hand_model.diagnose.improve import with_effects, without_effects
+    from hand_model.diagnose.prove.improve import with_effects, without_effects
     from hand_model.hand import Effect, Estimate, Hand
 
     def held(actuator: str, centre: float) -> Effect:

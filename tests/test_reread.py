@@ -9,10 +9,10 @@ import pytest
 from test_diagnose import drive, planted
 from test_kinematic_stations import MAP, joint
 
-from hand_model.diagnose.balance import Balance, Term
-from hand_model.diagnose.name import name_effects, polish
-from hand_model.diagnose.reread import of_recording, reread
-from hand_model.diagnose.station import finding_of, judged
+from hand_model.diagnose.name.balance import Balance, Term
+from hand_model.diagnose.name.reread import of_recording, reread
+from hand_model.diagnose.name.selection import name_effects, polish
+from hand_model.diagnose.name.station import finding_of, judged
 from hand_model.effects import catalogue, effect
 
 COMPLIANCE = 0.04  # % per raw
@@ -92,7 +92,7 @@ def test_a_shape_polished_beside_a_projection_is_that_of_full_fits(name, shape, 
 
 
 def test_where_lost_motion_lay_before_the_first_motion_is_not_asked() -> None:
-    from hand_model.diagnose.angles import _begun
+    from hand_model.diagnose.locate.angles import _begun
 
     driver = np.r_[np.full(100, 3.0), np.linspace(3.0, 80.0, 200), np.linspace(80.0, 2.0, 200)] + np.random.default_rng(0).normal(0, 0.1, 500)
     begun = _begun(driver)
@@ -102,7 +102,7 @@ def test_where_lost_motion_lay_before_the_first_motion_is_not_asked() -> None:
 
 def test_a_sag_is_read_from_what_is_asked_beside_it() -> None:
     """The first estimate of what is asked is the declared model's, which bends less than a drive that sags by a third."""
-    from hand_model.diagnose.drive import with_required
+    from hand_model.diagnose.locate.drive import with_required
 
     def sagging(state):
         truth = state.declared @ np.array([0.012, 0.1, 38.0, 0.2, 9.0])

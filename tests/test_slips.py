@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hand_model.diagnose.markers import MarkerEffect
-from hand_model.diagnose.slips import displacement, turn
-from hand_model.diagnose.wobble import centre_travel, wobble_amplitude
+from hand_model.diagnose.locate.markers import MarkerEffect
+from hand_model.diagnose.locate.slips import displacement, turn
+from hand_model.diagnose.locate.wobble import centre_travel, wobble_amplitude
 
 
 @pytest.mark.parametrize(("begin", "end"), [(10, 100), (10, 30), (None, None)])

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from test_diagnose import drive, planted
 
-from hand_model.diagnose.balance import Balance
-from hand_model.diagnose.drive import echoes_command, rests_on_command
-from hand_model.diagnose.name import name_effects
-from hand_model.diagnose.stamps import stamps
-from hand_model.diagnose.wander import Wander, estimate_wander
+from hand_model.diagnose.locate.drive import echoes_command, rests_on_command
+from hand_model.diagnose.locate.stamps import stamps
+from hand_model.diagnose.name.balance import Balance
+from hand_model.diagnose.name.selection import name_effects
+from hand_model.diagnose.name.wander import Wander, estimate_wander
 from hand_model.effects import catalogue, effect
 from hand_model.session import Log
 
@@ -131,7 +131,7 @@ def test_a_ripple_is_not_read_from_starts_and_stops():
 
 
 def test_a_loud_moment_counts_for_less_and_a_quiet_recording_for_all():
-    from hand_model.diagnose.blocks import _calm
+    from hand_model.diagnose.locate.blocks import _calm
 
     scatter = np.random.default_rng(3).normal(0, 3e-4, (200, 8, 9, 3))
     assert np.all(_calm(scatter) == 1)

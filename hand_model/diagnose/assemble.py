@@ -10,14 +10,14 @@ import numpy as np
 
 from ..effects import catalogue
 from ..effects.base import sample_interval
-from .displacement import NO_HINGE
-from .distinguishability import protocol_pairs
 from .findings import Finding, Findings
-from .interval import variance_ratio
+from .locate.displacement import NO_HINGE
+from .locate.markers import HINGE, SLIPS
 from .magnitude import channel_figures, magnitude
-from .markers import HINGE, SLIPS
-from .naming import ALPHA, Named
-from .station import UNREST, Station, channel_of, finding_of, outsider_of, unexplained_of, unrepeated_of
+from .name.distinguishability import protocol_pairs
+from .name.interval import variance_ratio
+from .name.naming import ALPHA, Named
+from .name.station import UNREST, Station, channel_of, finding_of, outsider_of, unexplained_of, unrepeated_of
 
 UNLIKE_OTHERS = 2.0  # times the wander of the calmest finger
 HARMONICS, SAME_PERIOD = 4, 0.02

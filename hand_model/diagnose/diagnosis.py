@@ -16,26 +16,26 @@ from ..errors import HandModelError, SessionError
 from ..hand import Hand
 from ..output import forget
 from ..session import Log, Session, check_session, moves, read_session
-from .angles import FingerAngles
 from .assemble import assemble
-from .balance import Balance
-from .command import CommandFacts, command_facts, command_findings, refused, with_lateness
-from .correct import refuse_output, write_corrected
-from .course import FingerCourses
-from .decoupled import while_driven, without_excursions
-from .drive import drive_states, drive_trials, echoes_command, is_measured, opposes, rests_on_command, with_gives
-from .evidence import gain, typical_coefficients
 from .findings import FILES, FOLDERS, Finding, Findings
 from .finger import finger_readings
-from .gravity import with_gravity
-from .improve import read_model, refuse_other, write_improved
-from .name import polish, scan
+from .locate.angles import FingerAngles
+from .locate.command import CommandFacts, command_facts, command_findings, refused, with_lateness
+from .locate.course import FingerCourses
+from .locate.decoupled import while_driven, without_excursions
+from .locate.drive import drive_states, drive_trials, echoes_command, is_measured, opposes, rests_on_command, with_gives
+from .locate.gravity import with_gravity
+from .locate.preload import preload_findings
+from .locate.stamps import Stamps, stamps
+from .name.balance import Balance
+from .name.evidence import gain, typical_coefficients
+from .name.reread import reread
+from .name.selection import polish, scan
+from .name.station import Station, judged
 from .page import write_page
-from .preload import preload_findings
-from .prove import Replay
-from .reread import reread
-from .stamps import Stamps, stamps
-from .station import Station, judged
+from .prove.correct import refuse_output, write_corrected
+from .prove.improve import read_model, refuse_other, write_improved
+from .prove.replays import Replay
 
 EARLY = 3.0  # standard deviations by which answers that come before the command say so for sure
 DELAY_TOLD = 2.0  # log likelihood that a shift of a drive's current must bring: less, and its drive tells none (two standard deviations)
@@ -199,7 +199,7 @@ def _false_stamps(session: Session, actuator: str, judged: Stamps) -> dict[str, 
 
 def _counts_corrected(session: Session, stations: list[Station]) -> dict[str, Callable[[Any], Any]]:
     """Actuator -> correction of its encoder's counts."""
-    from .angles import ranges_of_counts
+    from .locate.angles import ranges_of_counts
 
     def of(correct: Callable[[Any], Any], low: float, high: float) -> Callable[[Any], Any]:
         return lambda counts: low + (high - low) * correct(100 * (counts - low) / (high - low)) / 100
@@ -220,7 +220,7 @@ def _modelled(findings: Findings, session: Session, hand: Hand | None, stations:
               output: Path, tell: Callable[[str], None]) -> tuple[Findings, tuple[Replay, ...]]:
     """The findings with the model that holds them written, and its replays; without a `hand` the session's own is identified."""
     from ..identify import identify
-    from .angles import ranges_of_counts
+    from .locate.angles import ranges_of_counts
 
     if not any(f.correction is None for f in findings.findings):
         return findings, ()

@@ -10,14 +10,21 @@ from ..background import Background
 from ..effects import catalogue, outsiders
 from ..errors import IdentificationError
 from ..session import Finger, Session
-from .angles import FingerAngles, encoder_states, expected_angles, finger_angles, linkage_states, ranges_of_counts
-from .course import FingerCourses, finger_courses
 from .findings import Finding
-from .markers import HINGE, corrected_angles, name_markers
-from .prove_markers import OWN, marker_fit, of_chain
-from .slips import marker_findings, steps
-from .slips import unexplained as unexplained_of
-from .station import Station, judged
+from .locate.angles import (
+    FingerAngles,
+    encoder_states,
+    expected_angles,
+    finger_angles,
+    linkage_states,
+    ranges_of_counts,
+)
+from .locate.course import FingerCourses, finger_courses
+from .locate.markers import HINGE, corrected_angles, name_markers
+from .locate.slips import marker_findings, steps
+from .locate.slips import unexplained as unexplained_of
+from .name.station import Station, judged
+from .prove.markers import OWN, marker_fit, of_chain
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..report.page import Cell, Section, figures, key, listing, note, page, table
 from ..report.style import INK, MUTED, SERIES, drawing
 from .findings import Finding, Findings
-from .prove import Replay
+from .prove.replays import Replay
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from .base import Effect
 
 class AsymmetricFriction(Effect):
     """What lopsided friction adds to the current is constant, as a preload is: the declared preload takes it up, and only other
-    motors tell that it is unlike them (`diagnose.preload`)."""
+    motors tell that it is unlike them (`diagnose.locate.preload`)."""
 
     name = "asymmetric_friction"
     station = "motors"

@@ -1,4 +1,4 @@
-"""Joint wobble: a second, smaller rotation about another axis; seen in the markers by `diagnose.markers`."""
+"""Joint wobble: a second, smaller rotation about another axis; seen in the markers by `diagnose.locate.markers`."""
 
 from __future__ import annotations
 

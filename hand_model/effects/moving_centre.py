@@ -1,4 +1,4 @@
-"""Moving centre: the centre of rotation travels with the angle; seen in the markers by `diagnose.markers`."""
+"""Moving centre: the centre of rotation travels with the angle; seen in the markers by `diagnose.locate.markers`."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ..diagnose.balance import DISCRETE
+from ..diagnose.name.balance import DISCRETE
 from .balance import Rows
 from .candidates import Candidate
 from .consistent import consistent

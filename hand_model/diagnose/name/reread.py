@@ -13,11 +13,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects.base import DriveState
+from ...effects.base import DriveState
+from ..findings import Finding
 from .balance import Balance, Fit, Term
-from .findings import Finding
 from .interval import Reading, parameter_intervals, undisturbed
-from .name import refit, reform
+from .selection import refit, reform
 from .station import Station, finding_of
 
 Array = NDArray[np.float64]

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..effects.base import DriveState
-from ..effects.spring_decoupling import spans
-from ..identify.clock import align
+from ...effects.base import DriveState
+from ...effects.spring_decoupling import spans
+from ...identify.clock import align
 from .angles import FingerAngles
 
 BESIDE = 0.4  # of an excursion's length, on either side: it is seen from where it stands out

@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import HandModelError
-from ..output import refuse_file
-from ..session import Mocap, Session, Trial
-from .angles import FingerAngles, finger_angles
-from .findings import FILES, FOLDERS, Finding
-from .markers import SLIPS, MarkerNaming, name_markers
+from ...errors import HandModelError
+from ...output import refuse_file
+from ...session import Mocap, Session, Trial
+from ..findings import FILES, FOLDERS, Finding
+from ..locate.angles import FingerAngles, finger_angles
+from ..locate.markers import SLIPS, MarkerNaming, name_markers
 
 Array = NDArray[np.float64]
 
@@ -68,7 +68,7 @@ def _logs_of(session: Session, finding: Finding) -> set[str]:
 
 def _corrected_files(session: Session, markers: Mapping[str, set[str]]) -> dict[Path, Mocap]:
     """Marker file -> what it should have held; one file may hold several fingers. markers: finger -> effects to put right."""
-    from ..identify.identification import palm_shape
+    from ...identify.identification import palm_shape
 
     out: dict[Path, Mocap] = {}
     for finger in (f for f in session.fingers if markers[f.name]):

@@ -12,19 +12,19 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects.base import DriveState
-from ..errors import IdentificationError
-from ..identify.chain import Chain, ChainData, Pose
-from ..identify.finger import REST_S, observations, sound_frames
-from ..identify.likelihood import OUTLIER_LIMIT, fit_chain, fit_poses
-from ..identify.repair import Swap
-from ..identify.start import start_chain
-from ..session import Finger, Mocap, Session, Trial
+from ...effects.base import DriveState
+from ...errors import IdentificationError
+from ...identify.chain import Chain, ChainData, Pose
+from ...identify.finger import REST_S, observations, sound_frames
+from ...identify.likelihood import OUTLIER_LIMIT, fit_chain, fit_poses
+from ...identify.repair import Swap
+from ...identify.start import start_chain
+from ...session import Finger, Mocap, Session, Trial
+from ..name.naming import Naming
 from .drive import count_range
 from .excursions import with_excursions
 from .ghosts import ghosts
 from .motion import Motion, estimate_motion, local_quadratic
-from .naming import Naming
 
 Array = NDArray[np.float64]
 
@@ -204,7 +204,7 @@ class _Log:
 
 def _at_frames(record: FlexionAngles, time_s: Array, drifting: bool = True) -> _Log | None:
     """The log of a recording at mocap times (n,) [s]; None without a log. drifting: with the clock's own rate, where it has one."""
-    from ..identify.clock import align
+    from ...identify.clock import align
 
     if record.trial.log_path is None:
         return None

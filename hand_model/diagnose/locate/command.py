@@ -9,9 +9,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects.base import DriveState
+from ...effects.base import DriveState
+from ..findings import UNWRITTEN, Finding, weighed
 from .answers import Answers, answers_of, lateness
-from .findings import UNWRITTEN, Finding, weighed
 
 Array = NDArray[np.float64]
 

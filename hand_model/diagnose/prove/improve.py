@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from ..effects import effect
-from ..errors import HandFileError
-from ..hand import Coupling, Effect, EncoderMap, Estimate, Finger, Hand, Motor, load_hand
-from ..session import Session
-from .course import FingerCourses
-from .findings import Finding
-from .markers import HINGE
-from .prove import Replay, errors_along, proved, untouched
-from .prove_markers import COMPILED, marker_fit, of_folder
+from ...effects import effect
+from ...errors import HandFileError
+from ...hand import Coupling, Effect, EncoderMap, Estimate, Finger, Hand, Motor, load_hand
+from ...session import Session
+from ..findings import Finding
+from ..locate.course import FingerCourses
+from ..locate.markers import HINGE
+from .markers import COMPILED, marker_fit, of_folder
+from .replays import Replay, errors_along, proved, untouched
 from .write_course import with_chains, written_courses
 
 MOTOR = {"inertia": ("inertia", "raw s^2/%"), "viscous": ("viscous", "raw s/%"), "coulomb": ("coulomb", "raw"),
@@ -147,7 +147,7 @@ def write_improved(hand: Hand, findings: Sequence[Finding], stations: Sequence[A
 
     Raises HandModelError where the hand cannot be compiled. Nothing is written where no finding is physics of the hand.
     """
-    from ..compile import compile
+    from ...compile import compile
 
     hand = without_effects(hand, findings)
     known = {f.name for f in hand.fingers}

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from ..effects import effect
-from .findings import Finding, weighed
-from .station import Station
+from ...effects import effect
+from ..findings import Finding, weighed
+from ..name.station import Station
 
 SPREAD = 0.15  # mean absolute deviation of the logarithm of a drive's preload within one hand
 ODD_P = 0.03  # of two drives that differ as much by chance; beyond, one of them is odd

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..identify.chain import Chain, ChainData, propagate
-from ..identify.likelihood import OUTLIER_LIMIT, fit_poses
-from .angles import FARTHEST_M
-from .blocks import BLOCK, passing
-from .course import FingerCourses
-from .prove import reduction
+from ...identify.chain import Chain, ChainData, propagate
+from ...identify.likelihood import OUTLIER_LIMIT, fit_poses
+from ..locate.angles import FARTHEST_M
+from ..locate.blocks import BLOCK, passing
+from ..locate.course import FingerCourses
+from .replays import reduction
 
 Array = NDArray[np.float64]
 
@@ -44,9 +44,9 @@ def of_chain(chain: Chain, body: NDArray[np.int64]) -> Replayed:
 
 def of_folder(folder: Path, finger: str, labels: Sequence[str]) -> Replayed:
     """A compiled finger by MuJoCo's kinematics of its file; raises DescriptionError where it lacks one of the markers."""
-    from ..description import read_description
-    from ..engines import mujoco, ours
-    from ..replay import chain_of
+    from ...description import read_description
+    from ...engines import mujoco, ours
+    from ...replay import chain_of
 
     description = read_description(folder)
     model = next(m for m in description.models if finger in m.fingers)

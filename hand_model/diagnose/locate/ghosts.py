@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, label, uniform_filter1d
 
-from ..identify.chain import ChainData
+from ...identify.chain import ChainData
 
 Array = NDArray[np.float64]
 

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from ..background import Pair
-from ..effects.base import sample_interval
+from ...background import Pair
+from ...effects.base import sample_interval
 from .balance import DISCRETE, Balance, Fit, Term
 from .evidence import evidence, gain, rough_evidence, scale_of
 from .grid import Grid

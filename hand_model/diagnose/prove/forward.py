@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects.base import DriveState
-from ..effects.input import SUFFIX
-from ..engines.mujoco import HOLD, divergence, on_linkages
-from ..hand import load_hand
-from ..passive import effects_on
+from ...effects.base import DriveState
+from ...effects.input import SUFFIX
+from ...engines.mujoco import HOLD, divergence, on_linkages
+from ...hand import load_hand
+from ...passive import effects_on
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..session import Log
+from ...session import Log
 
 REACH = 12  # samples on either side over which a cruise is judged
 CRUISE = 0.3  # of the fastest speed; and of the speed: how far the halves of a cruise may differ

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from .balance import DISCRETE, Balance, Fit, Term
 from .evidence import gain, oddity
-from .name import likeliest, refit
 from .naming import Naming
+from .selection import likeliest, refit
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..effects.base import Shape
+from ...effects.base import Shape
 from .balance import DISCRETE, Balance, Fit, Term
 
 SPREAD = 0.3  # mean absolute deviation of the logarithm of a motor's coefficients within one hand

@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..hand import Course, ExtraJoint
-from ..identify.chain import Chain, ChainData, Pose, jacobians, propagate
-from ..identify.likelihood import free_directions
-from ..rotation import perpendicular_basis
+from ...hand import Course, ExtraJoint
+from ...identify.chain import Chain, ChainData, Pose, jacobians, propagate
+from ...identify.likelihood import free_directions
+from ...rotation import perpendicular_basis
 from .angles import FingerAngles
 from .blocks import BLOCK
 from .markers import HINGE, MarkerNaming, shift_at_frames

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects import effect
-from ..effects.base import DriveState
-from ..effects.mjcf import motor_joint
-from ..engines.mujoco import HOLD, divergence
-from ..hand import Estimate, Hand, load_hand
-from ..passive import effects_on
+from ...effects import effect
+from ...effects.base import DriveState
+from ...effects.mjcf import motor_joint
+from ...engines.mujoco import HOLD, divergence
+from ...hand import Estimate, Hand, load_hand
+from ...passive import effects_on
 
 Array = NDArray[np.float64]
 

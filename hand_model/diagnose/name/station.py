@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from .findings import UNWRITTEN, Finding, weighed
+from ..findings import UNWRITTEN, Finding, weighed
 from .interval import brought_held_out, held_out, parameter_intervals, sized, undisturbed
-from .name import EVIDENCE_LEAST, SMALL, name_effects
 from .naming import ALPHA, EXPLAINED_LEAST, Named, Naming
+from .selection import EVIDENCE_LEAST, SMALL, name_effects
 
 # How before and after were computed, said in the findings: no compiled file is involved until one is replayed.
 ENGINE = {"current": "inverse dynamics of the motor's balance, motion as recorded", "encoder": "encoder map, motion as recorded",

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..background import Background
-from ..effects import effect
-from ..effects.base import DriveState
-from ..effects.path import strokes
-from .findings import Finding
-from .reread import of_recording
+from ...background import Background
+from ...effects import effect
+from ...effects.base import DriveState
+from ...effects.path import strokes
+from ..findings import Finding
+from ..name.reread import of_recording
 
 Array = NDArray[np.float64]
 Place = tuple[str, str | None, str | None, str | None]  # signal, finger, joint, actuator of a station

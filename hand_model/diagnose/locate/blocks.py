@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from ..identify.chain import Chain, jacobians, propagate
-from ..identify.likelihood import OUTLIER_LIMIT
+from ...identify.chain import Chain, jacobians, propagate
+from ...identify.likelihood import OUTLIER_LIMIT
 from .angles import FARTHEST_M, FingerAngles
 
 Array = NDArray[np.float64]

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
-from ..effects.base import DriveState
-from ..effects.path import strokes
+from ...effects.base import DriveState
+from ...effects.path import strokes
 from .grid import Grid, GridColumns, stacked
 from .least_squares import bounded_least_squares
 from .projection import Projection

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects.outside.outsider import UNLIKELY
+from ...effects.outside.outsider import UNLIKELY
 from .angles import FingerAngles, refitted
 from .blocks import Blocks, blocks_of, project
 from .displacement import NO_HINGE, Candidate, candidates_of, creeping

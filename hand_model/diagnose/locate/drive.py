@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects.base import DriveState
-from ..effects.path import dahl, from_rest
-from ..session import Log, Session, Trial
+from ...effects.base import DriveState
+from ...effects.path import dahl, from_rest
+from ...session import Log, Session, Trial
 from .motion import Motion, estimate_motion
 
 Array = NDArray[np.float64]

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..identify.chain import propagate
-from ..identify.likelihood import OUTLIER_LIMIT
-from ..rotation import kabsch
+from ...identify.chain import propagate
+from ...identify.likelihood import OUTLIER_LIMIT
+from ...rotation import kabsch
+from ..findings import Finding, weighed
 from .angles import FingerAngles
 from .blocks import Blocks
 from .displacement import NO_HINGE, UNNAMED
-from .findings import Finding, weighed
 from .markers import ALPHA, HINGE, MarkerEffect, MarkerNaming
 from .wobble import centre_travel, wobble_amplitude
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects import effect
-from ..effects.base import DriveState
-from .balance import Balance, Term
+from ...effects import effect
+from ...effects.base import DriveState
+from ..name.balance import Balance, Term
 from .motion import local_quadratic
 
 Array = NDArray[np.float64]

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..hand import Course, Finger, Hand
-from ..identify.chain import Chain
-from ..rotation import kabsch
-from .course import FingerCourses
-from .findings import Finding
-from .markers import HINGE
+from ...hand import Course, Finger, Hand
+from ...identify.chain import Chain
+from ...rotation import kabsch
+from ..findings import Finding
+from ..locate.course import FingerCourses
+from ..locate.markers import HINGE
 
 Array = NDArray[np.float64]
 

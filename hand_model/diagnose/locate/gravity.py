@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects.base import DriveState
-from ..errors import IdentificationError, SessionError
-from ..identify.chain import Chain, palm_pose
-from ..identify.clock import align
-from ..identify.finger import observations
-from ..session import Session, Trial
+from ...effects.base import DriveState
+from ...errors import IdentificationError, SessionError
+from ...identify.chain import Chain, palm_pose
+from ...identify.clock import align
+from ...identify.finger import observations
+from ...session import Session, Trial
 from .angles import FingerAngles
 from .motion import local_quadratic
 

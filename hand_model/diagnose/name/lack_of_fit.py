@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects.path import travelled
+from ...effects.path import travelled
 from .balance import Balance
 
 Array = NDArray[np.float64]

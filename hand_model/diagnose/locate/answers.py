@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects.base import DriveState, sample_interval
+from ...effects.base import DriveState, sample_interval
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,1 @@
+"""Locate: what the three stations show. Markers against rigid segments, counts against segment angles, current against motion."""

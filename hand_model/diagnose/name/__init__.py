@@ -1,0 +1,1 @@
+"""Name: whether a balance lacks anything, which effects those are, how sure that is and what cannot be told apart."""
