@@ -185,17 +185,34 @@ def test_exchanged_labels_of_a_symmetrical_cluster_are_put_right() -> None:
     np.testing.assert_array_equal(untouched.position_world, truth)
 
 
-def test_labels_that_flicker_are_no_exchange() -> None:
-    def record(swaps):
-        data = SimpleNamespace(labels=("a", "b", "c"))
-        return SimpleNamespace(mocap=SimpleNamespace(time_s=np.arange(500) / 100), swaps=swaps, trial=SimpleNamespace(name="t"), data=data)
+def exchanging(*swaps_of_recordings: tuple[Swap, ...]) -> SimpleNamespace:
+    """A finger of three markers, all of which are seen, in recordings of 5 s with these exchanges."""
+
+    def record(number: int, swaps: tuple[Swap, ...]) -> SimpleNamespace:
+        data = SimpleNamespace(labels=("a", "b", "c"), position_world=np.zeros((500, 3, 3)))
+        return SimpleNamespace(mocap=SimpleNamespace(time_s=np.arange(500) / 100), swaps=swaps, trial=SimpleNamespace(name=f"t{number}"), data=data)
 
     segment = SimpleNamespace(name="distal", markers=("a", "b", "c"))
-    finger = SimpleNamespace(name="index", segments=(segment,))
+    records = tuple(record(i, swaps) for i, swaps in enumerate(swaps_of_recordings))
+    return SimpleNamespace(records=records, finger=SimpleNamespace(name="index", segments=(segment,)), noise_m=1e-4)
+
+
+def test_labels_that_flicker_are_no_exchange() -> None:
     lasting = Swap(("a", "b"), 100, 140)
     flicker = tuple(Swap(("a", "b"), f, f + 1) for f in range(200, 300, 5))
     for swaps, count in (((lasting,), 1), ((lasting, *flicker), 0)):
-        assert len(_swaps(SimpleNamespace(records=(record(swaps),), finger=finger, noise_m=1e-4))) == count
+        assert len(_swaps(exchanging(swaps))) == count
+
+
+def test_an_exchange_is_told_by_its_own_recording_and_while() -> None:
+    angles = exchanging((Swap(("a", "b"), 40, 60),), (Swap(("a", "b"), 300, 420), Swap(("a", "b"), 460, 480)))
+    (_, finding), = _swaps(angles)
+    read = {name: entry["value"] for name, entry in finding.parameters.items()}
+    assert read == pytest.approx({"begin": 3.0, "end": 4.2, "lasting": 0.2 + 1.2 + 0.2})
+    assert finding.where["trials"] == ["t0", "t1"] and all(text in finding.statement for text in ("0.4 to 0.6 s of t0", "3.0 to 4.2 s of t1", "4.6 to 4.8 s of t1"))
+    angles.records[1].data.position_world[421:460, 0] = np.nan  # between the two a marker is lost: one while
+    (_, finding), = _swaps(angles)
+    assert finding.parameters["end"]["value"] == pytest.approx(4.8)
 
 
 def test_the_current_of_whiles_in_which_the_finger_has_left_its_drive_is_not_judged() -> None:

@@ -114,5 +114,5 @@ PLAIN: Mapping[str, Rule] = {
     "marker_slip": lambda p, _: p["distance"] / 0.002,
     "palm_marker_slip": lambda p, _: p["distance"] / 0.0025,
     "support_slip": lambda p, _: p["turn"] / 0.07,
-    "marker_swap": lambda p, _: (p["end"] - p["begin"]) / 4.0,
+    "marker_swap": lambda p, _: p["lasting"] / 4.0,
 }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -155,33 +154,45 @@ def _proof(naming: MarkerNaming) -> dict[str, Any]:
 
 
 def _swaps(angles: FingerAngles) -> list[tuple[float, Finding]]:
-    found: dict[frozenset[str], list[tuple[str, float, float]]] = {}
-    flickers: Counter[frozenset[str]] = Counter()
-    for record in angles.records:
-        time_s = record.mocap.time_s
-        for swap in record.swaps:
-            if swap.stop - swap.start + 1 >= SWAP_FRAMES:
-                found.setdefault(frozenset(swap.labels), []).append(
-                    (record.trial.name, float(time_s[swap.start]), float(time_s[swap.stop])))
-            else:
-                flickers[frozenset(swap.labels)] += 1
-    # Labels that come and go all the time are a marker's noise that reaches its neighbour.
-    found = {labels: spans for labels, spans in found.items() if len(spans) > flickers[labels]}
-    if not found:
+    whiles = {labels: found for labels in {frozenset(s.labels) for r in angles.records for s in r.swaps} if (found := _exchanged(angles, labels))}
+    if not whiles:
         return []
-    # Pieces of one exchange, interrupted by gaps, are one finding: the labels exchanged for the longest time.
-    labels, spans = max(found.items(), key=lambda item: sum(b - a for _, a, b in item[1]))
+    lasting = {labels: sum(end - begin for _, begin, end in found) for labels, found in whiles.items()}
+    labels = max(sorted(whiles, key=sorted), key=lambda names: lasting[names])
     joint = next((s.name for s in angles.finger.segments if labels & set(s.markers)), None)
-    trial, begin, end = spans[0][0], min(s[1] for s in spans), max(s[2] for s in spans)
-    names = sorted(labels)
+    _, begin, end = max(whiles[labels], key=lambda w: w[2] - w[1])
+    names, trials = sorted(labels), sorted({trial for trial, _, _ in whiles[labels]})
     where = {"finger": angles.finger.name, "joint": joint, "actuator": None, "signal": "markers", "marker": names[0],
-             "markers": names, "trials": sorted({s[0] for s in spans}), "region": {"time": [begin, end], "unit": "s"},
-             "share_of_mismatch": 1.0}
-    parameters = {"begin": {"value": begin, "unit": "s"}, "end": {"value": end, "unit": "s"}}
+             "markers": names, "trials": trials, "region": {"time": [begin, end], "unit": "s"}, "share_of_mismatch": 1.0}
+    parameters = {name: {"value": value, "unit": "s"} for name, value in (("begin", begin), ("end", end), ("lasting", sum(lasting.values())))}
     fit = {"metric": "marker_rmse", "unit": "m", "before": None, "after": None, "noise_floor": angles.noise_m,
            "ci95_reduction": None, "held_out": [], "engine": "chain fitted to the markers, in-sample"}
-    text = f"{' and '.join(names)} are exchanged from {begin:.1f} to {end:.1f} s of {trial}."
-    return [(_displaced(angles, names, sum(b - a for _, a, b in spans)), Finding("marker_swap", ("marker_swap",), 1.0, (), where, text, parameters, fit, None, CORRECTION["marker_swap"]))]
+    order = sorted(whiles, key=lambda names: (-lasting[names], sorted(names)))
+    text = "; ".join(f"{' and '.join(sorted(pair))} are exchanged {_spans(whiles[pair])}" for pair in order) + "."
+    weight = _displaced(angles, names, sum(lasting.values()))
+    return [(weight, Finding("marker_swap", ("marker_swap",), 1.0, (), where, text, parameters, fit, None, CORRECTION["marker_swap"]))]
+
+
+def _exchanged(angles: FingerAngles, labels: frozenset[str]) -> list[tuple[str, float, float]]:
+    """Recording, begin and end [s, of that recording] of each while in which `labels` are exchanged; pieces of one while, between which
+    they are hardly seen, are one. None where labels come and go all the time: that is a marker's noise that reaches its neighbour."""
+    out, flickers = [], 0
+    for record in angles.records:
+        seen = np.isfinite(record.data.position_world[:, [record.data.labels.index(name) for name in sorted(labels)], 0]).all(1)
+        pieces = [s for s in record.swaps if frozenset(s.labels) == labels]
+        lasting = [s for s in pieces if s.stop - s.start + 1 >= SWAP_FRAMES]
+        flickers += len(pieces) - len(lasting)
+        joined: list[tuple[int, int]] = []
+        for piece in lasting:
+            apart = not joined or seen[joined[-1][1] + 1 : piece.start].sum() >= SWAP_FRAMES
+            joined = [*joined, (piece.start, piece.stop)] if apart else [*joined[:-1], (joined[-1][0], piece.stop)]
+        out += [(record.trial.name, float(record.mocap.time_s[a]), float(record.mocap.time_s[b])) for a, b in joined]
+    return out if len(out) > flickers else []
+
+
+def _spans(whiles: Sequence[tuple[str, float, float]], most: int = 3) -> str:
+    spans = [f"from {begin:.1f} to {end:.1f} s of {trial}" for trial, begin, end in whiles[:most]]
+    return ", ".join(spans) + (f" and {len(whiles) - most} times more" if len(whiles) > most else "")
 
 
 def _displaced(angles: FingerAngles, labels: list[str], lasting_s: float) -> float:
