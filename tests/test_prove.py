@@ -97,3 +97,29 @@ def test_a_model_that_holds_an_effect_already_gets_it_once() -> None:
     after = with_effects(before, [_finding()])
     assert [e.where["actuator"] for e in before.effects] == ["little"]
     assert [(e.where["actuator"], e.parameters["centre"].value) for e in after.effects] == [("little", 60.0), ("index", 40.0)]
+
+
+def test_joints_go_where_newly_fitted_maps_take_them() -> None:
+    from types import SimpleNamespace
+
+    from hand_model.diagnose.prove.improve import as_fitted
+    from hand_model.hand import Coupling, EncoderMap, Finger, Hand, Joint
+
+    def joint(name: str, high: float) -> Joint:
+        return Joint(name, np.array([0.0, 1.0, 0.0]), np.zeros(3), np.zeros((6, 6)), (0.0, high), {})
+
+    linkage = Coupling("proximal", "distal", np.array([0.0, 0.8]), {}, {})
+    maps = tuple(EncoderMap(0.0, 4000.0, np.array([0.0, high]), {}, {}) for high in (1.2, 0.96))
+    finger = Finger("index", "index", (joint("proximal", 1.2), joint("distal", 0.96)), maps, (linkage,))
+    declared = {"power_0": 0.0, "power_1": 80.0, "offset_0": 0.1}
+    recorded = (SimpleNamespace(position=np.array([0.0, 40.0, np.nan, 96.0])),)
+    fitted = SimpleNamespace(declared=declared)
+    station = SimpleNamespace(signal="encoder", finger="index", actuator="index", joint="proximal", reading=fitted,
+                              naming=SimpleNamespace(balance=SimpleNamespace(states=recorded)))
+    hand = Hand("h", "left", {}, {}, (finger,), 1e-4, {}, (), ())
+    out, = as_fitted(hand, [station], {"index": (0.0, 4000.0)}, lambda source: source).fingers
+    reached = np.deg2rad(80.0 * 0.96)
+    assert [j.range_rad for j in out.joints] == [pytest.approx((0.0, reached)), pytest.approx((0.0, 0.8 * reached))]
+    declared["power_1"] = 60.0  # a model may know more of a joint than this session does
+    out, = as_fitted(hand, [station], {"index": (0.0, 4000.0)}, lambda source: source).fingers
+    assert [j.range_rad[1] for j in out.joints] == [1.2, 0.96]

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
+from numpy.typing import NDArray
 
 from ...effects import effect
 from ...errors import HandFileError
-from ...hand import Coupling, Effect, EncoderMap, Estimate, Finger, Hand, Motor, load_hand
+from ...hand import Coupling, Effect, EncoderMap, Estimate, Finger, Hand, Joint, Motor, load_hand
 from ...session import Session
 from ..findings import Finding
 from ..locate.course import FingerCourses
@@ -25,6 +26,7 @@ MOTOR = {"inertia": ("inertia", "raw s^2/%"), "viscous": ("viscous", "raw s/%"),
          "spring": ("stiffness", "raw/%"), "preload": ("preload", "raw")}
 LEAST = {"stiffness": 1e-6, "inertia": 2e-3}  # [raw, %]: a preload needs a spring; bristles without inertia cannot be simulated
 OTHER_MARKERS = "the model's palm markers are not this session's, or elsewhere: nothing tells where its joints are"
+REACHED = 200  # places over a driver's range
 DRIVE_KEPT = ("gain", "damping")  # of an identified motor, beside what the balance fits
 
 
@@ -60,7 +62,7 @@ def as_fitted(hand: Hand, stations: Sequence[Any], counts: Mapping[str, tuple[fl
             declared["inertia"] = fit(station.naming).declared["inertia"]  # told by starts and stops alone
             motors[station.actuator] = _motor(station, declared, counts[station.actuator], motors.get(station.actuator))
         elif station.signal == "encoder":
-            fingers[station.finger] = _with_map(fingers[station.finger], declared, counts[station.actuator])
+            fingers[station.finger] = _with_map(fingers[station.finger], station, declared, counts[station.actuator])
         elif station.joint is not None:
             fingers[station.finger] = _with_coupling(fingers[station.finger], station, declared)
     return replace(hand, motors=tuple(motors.values()), fingers=tuple(fingers.values()))
@@ -78,10 +80,30 @@ def _motor(station: Any, declared: Mapping[str, float], counts: tuple[float, flo
     return Motor(station.actuator, *counts, values, station.naming.balance.sigma, tuple(s.trial for s in states))
 
 
-def _with_map(finger: Finger, declared: Mapping[str, float], counts: tuple[float, float]) -> Finger:
-    """The encoder map of the proximal joint: proximal angle [deg] over the share of the range becomes radians."""
+def _with_map(finger: Finger, station: Any, declared: Mapping[str, float], counts: tuple[float, float]) -> Finger:
+    """The encoder map of the proximal joint: proximal angle [deg] over the share of the range becomes radians. Its range holds what the map
+    gives over the positions of the recordings, and so do those of the joints that follow."""
     coefficients = np.deg2rad([v for k, v in declared.items() if k.startswith("power_")])
-    return replace(finger, encoder_maps=(EncoderMap(*counts, coefficients, {}, {}), *finger.encoder_maps[1:]))
+    positions = np.concatenate([s.position[np.isfinite(s.position)] for s in station.naming.balance.states]) / 100
+    angles = Polynomial(coefficients)(np.linspace(positions.min(), positions.max(), REACHED))
+    finger = replace(finger, encoder_maps=(EncoderMap(*counts, coefficients, {}, {}), *finger.encoder_maps[1:]),
+                     joints=(_ranging(finger.joints[0], angles), *finger.joints[1:]))
+    return _following(finger)
+
+
+def _following(finger: Finger) -> Finger:
+    """The finger whose joints behind a coupling can go where their driver's range takes them."""
+    joints = {j.name: j for j in finger.joints}
+    for link in finger.couplings:
+        driver_rad = np.linspace(*joints[link.driver].range_rad, REACHED)
+        joints[link.follower] = _ranging(joints[link.follower], link.follower_rad(driver_rad))
+    return replace(finger, joints=tuple(joints.values()))
+
+
+def _ranging(joint: Joint, angle_rad: NDArray[np.float64]) -> Joint:
+    """The joint whose range holds these angles too: a model may know more of it than this session."""
+    low, high = joint.range_rad
+    return replace(joint, range_rad=(min(low, float(angle_rad.min())), max(high, float(angle_rad.max()))))
 
 
 def _with_coupling(finger: Finger, station: Any, declared: Mapping[str, float]) -> Finger:
@@ -91,7 +113,7 @@ def _with_coupling(finger: Finger, station: Any, declared: Mapping[str, float]) 
     coefficients = Polynomial(np.deg2rad(powers))(Polynomial([0.0, np.rad2deg(1.0) / scale])).coef
     couplings = [c if c.follower != station.joint else Coupling(c.driver, c.follower, coefficients, {}, {})
                  for c in finger.couplings]
-    return replace(finger, couplings=tuple(couplings))
+    return _following(replace(finger, couplings=tuple(couplings)))
 
 
 def without_effects(hand: Hand, findings: Sequence[Finding]) -> Hand:
