@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from typing import TYPE_CHECKING
 
 from .progress import Progress
+
+if TYPE_CHECKING:
+    from ..diagnose import Finding
 
 SUMMARY = "say what physics is missing: where recording and declared model differ, what was left out, how sure that is"
 
@@ -36,10 +40,27 @@ def run(options: Namespace, say: Progress) -> int:
     print(f"verdict: {findings.verdict}")
     for finding in findings.findings:
         print(f"- {finding.statement}")
+        if session.rig is None:  # a rig's statement ends with its proof
+            print(f"  {_proof(finding)}")
     for entry in findings.unexplained:
         place = " ".join(str(entry["where"][k]) for k in ("finger", "joint", "signal") if entry["where"].get(k))
         print(f"- unexplained: {place + ': ' if place else ''}{entry['shape']}")
     for note in findings.notes:
         print(f"note: {note}")
+    if findings.next_experiment:
+        print(f"next: {findings.next_experiment}")
     print(f"\n{options.output}/findings.json")
     return 0
+
+
+def _proof(finding: Finding) -> str:
+    """Probability, what cannot be told from it, and the error before and after on recordings kept out."""
+    fit, others = finding.fit, [name for name in finding.members if name != finding.effect]
+    scale, unit = (1e3, "mm") if fit.get("unit") == "m" else (1.0, str(fit.get("unit")))
+    words = [f"probability {finding.probability:.2f}"]
+    if others:
+        words.append(f"not told here from {', '.join(others)}")
+    if fit.get("before") is not None and fit.get("after") is not None:
+        where = "of recordings kept out" if fit["held_out"] else "of the same recordings"
+        words.append(f"error {where} {scale * fit['before']:.3g} -> {scale * fit['after']:.3g} {unit} (noise {scale * fit['noise_floor']:.3g})")
+    return "; ".join(words)
