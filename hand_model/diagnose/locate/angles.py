@@ -24,7 +24,7 @@ from ..name.naming import Naming
 from .drive import count_range
 from .excursions import with_excursions
 from .ghosts import ghosts
-from .motion import Motion, estimate_motion, local_quadratic
+from .motion import Motion, estimate_motion, local_quadratic, position_at, sure_acceleration
 
 Array = NDArray[np.float64]
 
@@ -193,7 +193,7 @@ def encoder_states(
 
 @dataclass(frozen=True)
 class _Log:
-    """A log at mocap frames: counts, speed, acceleration [counts, s], load [raw] or None, inside: where it was running. (n,)."""
+    """A log at mocap frames: counts, speed, acceleration (where it is sure) [counts, s], load [raw] or None, inside: where it was running. (n,)."""
 
     counts: Array
     speed: Array
@@ -222,8 +222,8 @@ def _at_frames(record: FlexionAngles, time_s: Array, drifting: bool = True) -> _
     if current is not None and np.isfinite(current[seen]).sum() > 20:
         known = np.isfinite(current[seen])
         load = np.interp(then, at, _transmitted(at, np.interp(at, at[known], current[seen][known]), motion))
-    x, v, a = (np.interp(then, at, y) for y in (motion.position, motion.velocity, motion.acceleration))
-    return _Log(x, v, a, load, (then > at[0]) & (then < at[-1]))
+    v, a = (np.interp(then, at, y) for y in (motion.velocity, sure_acceleration(motion, at)))
+    return _Log(position_at(motion, at, then), v, a, load, (then > at[0]) & (then < at[-1]))
 
 
 def _transmitted(time_s: Array, current: Array, motion: Motion) -> Array:

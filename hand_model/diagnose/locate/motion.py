@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+SURE = 3.0  # standard deviations
+
 
 @dataclass(frozen=True)
 class Motion:
@@ -66,6 +68,25 @@ def estimate_motion(time_s: Array, position: Array, bandwidth_s: float | None = 
     moving = np.abs(v) > max(5 * velocity_noise, 0.03 * fastest)
     moving = _drop_short(moving, 3)
     return Motion(x, v, a, noise, h, moving, _since(time_s, moving), _since(-time_s[::-1], moving[::-1])[::-1])
+
+
+def position_at(motion: Motion, time_s: Array, then: Array) -> Array:
+    """Position (m,) at times (m,) of a motion estimated at (n,) [s]: what the kernel takes off a curve's corners is put back, as much as
+    it takes off once more ("twicing"; Stuetzle & Mittal 1979), and between samples the position goes with its velocity (Hermite)."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    again = local_quadratic(time_s, motion.position, motion.bandwidth_s)
+    spline = CubicHermiteSpline(time_s, 2 * motion.position - again[0], 2 * motion.velocity - again[1])
+    return spline(np.clip(then, time_s[0], time_s[-1]))
+
+
+def sure_acceleration(motion: Motion, time_s: Array) -> Array:
+    """Acceleration (n,) without what may be noise of the position: that would be found again, with the other sign, in whatever the
+    position is held against. The noise is that of the kernel's second derivative, step / h^5 int ((u^2 - 1) phi)^2 du = 0.2116 step / h^5."""
+    step = float(np.median(np.diff(time_s)))
+    noise = motion.noise * np.sqrt(0.2116 * step / motion.bandwidth_s**5)
+    share = (SURE * noise / np.where(motion.acceleration == 0, 1.0, motion.acceleration)) ** 2
+    return motion.acceleration * np.clip(1 - share, 0.0, None)
 
 
 def _drop_short(flag: NDArray[np.bool_], shortest: int) -> NDArray[np.bool_]:

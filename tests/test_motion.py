@@ -1,0 +1,48 @@
+"""A drive's motion between the samples of its log."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hand_model.diagnose.locate.motion import estimate_motion, position_at, sure_acceleration
+
+
+def strokes(time_s: np.ndarray, acceleration: float = 900.0, speed: float = 110.0) -> np.ndarray:
+    """Position [%] that goes there and back in trapezoids of velocity, a rest before and after each."""
+    fine = np.arange(0.0, time_s[-1] + 1e-3, 1e-3)
+    wanted = speed * (((fine % 4.0) > 1.0) & ((fine % 4.0) < 1.8)) - speed * (((fine % 4.0) > 2.8) & ((fine % 4.0) < 3.6))
+    velocity = np.zeros_like(fine)
+    for i in range(1, len(fine)):
+        velocity[i] = velocity[i - 1] + np.clip(wanted[i] - velocity[i - 1], -acceleration * 1e-3, acceleration * 1e-3)
+    return np.interp(time_s, fine, np.cumsum(velocity) * 1e-3)
+
+
+def stamps(seed: int, step_s: float = 0.028, until_s: float = 60.0) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    return np.cumsum(step_s * rng.uniform(0.6, 1.4, int(until_s / step_s)))
+
+
+def test_a_slow_log_is_not_taken_for_a_segment_that_swings() -> None:
+    at = stamps(1)
+    then = np.arange(at[0], at[-1], 1 / 120)
+    motion = estimate_motion(at, strokes(at))
+    acceleration = np.interp(then, at, motion.acceleration)
+    off = strokes(then) - position_at(motion, at, then), strokes(then) - np.interp(then, at, motion.position)
+    following, smeared = (abs(np.polyfit(acceleration, e, 1)[0]) for e in off)
+    assert following < 0.15 * smeared
+    assert np.abs(off[0]).max() < 0.6 * np.abs(off[1]).max()
+
+
+def test_noise_of_the_position_is_not_found_again_with_the_acceleration() -> None:
+    at = stamps(2)
+    rng = np.random.default_rng(3)
+    noise = rng.normal(0, 0.08, len(at))
+    motion = estimate_motion(at, strokes(at, 300.0) + noise)
+    sure = sure_acceleration(motion, at)
+    wrong = position_at(motion, at, at) - strokes(at, 300.0)
+    steady = np.abs(np.gradient(np.gradient(strokes(at, 300.0), at), at)) < 1.0
+    assert np.corrcoef(wrong[steady], motion.acceleration[steady])[0, 1] < -0.25  # else this test tells nothing
+    assert np.mean(sure[steady] == 0) > 0.95
+    fast = np.abs(motion.acceleration) > 200.0
+    assert fast.sum() > 20
+    assert np.all(np.abs(sure[fast]) > 0.75 * np.abs(motion.acceleration[fast]))
