@@ -19,7 +19,7 @@ from hand_model.compile.course import without_courses
 from hand_model.course import ranges, value
 from hand_model.diagnose.locate.angles import finger_angles
 from hand_model.diagnose.locate.course import _chosen, _Observed, _solve, finger_courses
-from hand_model.diagnose.locate.markers import name_markers
+from hand_model.diagnose.locate.markers import corrected_angles, name_markers
 from hand_model.diagnose.prove.markers import OWN, marker_fit, of_chain
 from hand_model.diagnose.prove.write_course import with_chains, written_courses
 from hand_model.engines import mujoco as engine
@@ -196,6 +196,8 @@ def test_a_planted_course_is_recovered_at_the_tip_through_the_compiled_file(tmp_
     angles = finger_angles(session, session.fingers[0], palm_shape(session))
     naming = name_markers(angles)
     assert {e.effect for e in naming.found} == {effect}
+    left = name_markers(corrected_angles(angles, naming))  # what is named is taken out, and hinges are left
+    assert left.excess_before < naming.excess_after + 0.005 * naming.excess_before, (left.excess_before, naming.excess_after, naming.excess_before)
     segment = session.fingers[0].segments[joint].name
     courses = finger_courses(angles, naming, {(effect, segment)})
     assert courses.joints == (joint,)
