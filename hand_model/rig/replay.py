@@ -15,7 +15,7 @@ from .laws import Now, law
 from .mjcf import read_effects
 from .model import RigModel, RigTrial, load_rig
 from .overrides import compile_model
-from .states import fill_gaps, uniform_time
+from .states import fill_gaps
 from .states import recorded_states as joint_states
 from .supply import supply_deviation
 

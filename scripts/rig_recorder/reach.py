@@ -20,7 +20,7 @@ from .steps import Drive, one_joint
 Array = NDArray[np.float64]
 Log = dict[str, Array]
 WIDE = 3.0  # states are filtered so much wider than the balance
-SLOW = 0.03  # of the greatest speed: below, friction is not known
+SLOW = 0.01  # of the greatest speed: below, friction is not known
 
 
 def logs(folder: Path) -> list[tuple[Log, bool, Mapping[str, Any]]]:
@@ -43,7 +43,7 @@ def balance(folder: Path, answer: Mapping[str, Any], cutoff_hz: float) -> list[f
     for joint in (0, 1) if answer["machine"] == "arm" else (0,):
         mine = [e for e in effects if answer["machine"] != "arm" or answer["extra"]["joint"] == joint]
         rows = [(_states(log, answer, joint, cutoff_hz), held, own) for log, held, own in every]
-        for some in ((), *((e,) for e in effects), tuple(effects)):
+        for some in dict.fromkeys(((), *((e,) for e in effects), tuple(effects))):
             known = tuple(e for e in some if e in mine)
             squares.setdefault(some, []).append(_error(rows, answer["machine"], law, answer, known) ** 2)
     base = np.array(squares[()])
