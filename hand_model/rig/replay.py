@@ -15,7 +15,8 @@ from .laws import Now, law
 from .mjcf import read_effects
 from .model import RigModel, RigTrial, load_rig
 from .overrides import compile_model
-from .states import fill_gaps, local_states, uniform_time
+from .states import fill_gaps
+from .states import recorded_states as joint_states
 from .supply import supply_deviation
 
 Array = NDArray[np.float64]
@@ -195,11 +196,8 @@ def can_simulate(rig: RigModel, trial: RigTrial) -> bool:
 
 def recorded_states(rig: RigModel, trial: RigTrial) -> States:
     """Recorded position and velocity, both smoothed: (n,) [s], (n, joints) each."""
-    grid = uniform_time(trial.time_s)
-    rate = 1.0 / (grid[1] - grid[0])
-    raw = (np.interp(grid, trial.time_s, fill_gaps(trial.time_s, trial.position[j])) for j in rig.joints)
-    smooth = [local_states(values, rate) for values in raw]
-    return grid, np.stack([q for q, _ in smooth], 1), np.stack([v for _, v in smooth], 1)
+    smooth = [joint_states(trial.time_s, trial.position[j]) for j in rig.joints]
+    return smooth[0][0], np.stack([q for _, q, _ in smooth], 1), np.stack([v for _, _, v in smooth], 1)
 
 
 def _states_at(recorded: States, at_s: Array) -> tuple[Array, Array]:

@@ -142,13 +142,21 @@ def velocity_noise(position: Array, rate_hz: float, cutoff_hz: float) -> float:
     return noise_std(position) * np.sqrt(2.0 / rate_hz * (2 * np.pi) ** 2 * cutoff_hz**3 / 3.0)
 
 
-def local_states(values: Array, rate_hz: float) -> tuple[Array, Array]:
+def recorded_states(time_s: Array, values: Array) -> tuple[Array, Array, Array]:
+    """Even times (m,) [s] of a recording (n,) at time_s (gaps: nan), with position and velocity (m,) there. Its noise is that of what was
+    recorded: on a line between two samples there is less, and rounding no longer shows."""
+    filled, grid = fill_gaps(time_s, values), uniform_time(time_s)
+    sigma = noise_std(filled, time_s) if np.ptp(filled) > 0 else None
+    return grid, *local_states(np.interp(grid, time_s, filled), 1.0 / (grid[1] - grid[0]), sigma)
+
+
+def local_states(values: Array, rate_hz: float, sigma: float | None = None) -> tuple[Array, Array]:
     """Position and velocity (n,) at every sample of an even recording (n,), ends included: local cubics (Savitzky & Golay
     1964), each over the longest window on which shorter ones do not contradict it (intersection of confidence intervals,
-    Katkovnik 1999)."""
+    Katkovnik 1999). sigma: standard deviation of the noise, where it is known."""
     from scipy.signal import savgol_filter
 
-    sigma, n = noise_std(values), len(values)
+    sigma, n = noise_std(values) if sigma is None else sigma, len(values)
     if n < WINDOWS[0]:
         return values, np.gradient(values, 1.0 / rate_hz)
     position, velocity = values.copy(), np.zeros(n)

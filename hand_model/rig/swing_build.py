@@ -12,7 +12,7 @@ from .declared import DeclaredFit
 from .dynamics import inertial_columns, inertial_parameters
 from .model import RigModel, RigTrial
 from .overrides import compile_model
-from .states import fill_gaps, local_states, uniform_time
+from .states import fill_gaps, recorded_states
 from .supply import supply_deviation
 from .swing import STEP_S, Lane, Swing
 
@@ -107,10 +107,7 @@ def _stretches(rig: RigModel, trial: RigTrial, step_s: float, longest_s: float) 
     joint = rig.joints[0]
     if not _lane_known(rig, trial):
         return []
-    grid = uniform_time(trial.time_s)
-    rate = 1.0 / (grid[1] - grid[0])
-    raw = np.interp(grid, trial.time_s, fill_gaps(trial.time_s, trial.position[joint]))
-    smooth, velocity = local_states(raw, rate)
+    grid, smooth, velocity = recorded_states(trial.time_s, trial.position[joint])
     fine = np.arange(0.0, grid[-1], step_s)
     position = np.interp(fine, trial.time_s, fill_gaps(trial.time_s, trial.position[joint]))
     voltage = trial.voltage.get(joint)
