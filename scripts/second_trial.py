@@ -1,6 +1,6 @@
 """A blind trial on a second recorder's sessions, which shares no code with the twin nor with the diagnosis (`second_recorder/`).
 
-    python scripts/second_trial.py FOLDER [--seed 1] [--single 36] [--none 4] [--pair 10] [--weak 10] [--messy 10] [--outside 10]
+    python scripts/second_trial.py FOLDER [--seed 1] [--single 36] [--none 4] [--pair 10] [--weak 10] [--messy 10] [--outside 10] [--anywhere]
 
 FOLDER must be new. It gets sessions, answers.json (its SHA-256 is printed before any diagnosis starts), findings; the score is printed.
 """
@@ -79,11 +79,12 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2, help="sessions at a time")
     for kind, count in COUNTS.items():
         parser.add_argument(f"--{kind}", type=int, default=count, help=f"number of {kind} sessions")
+    parser.add_argument("--anywhere", action="store_true", help="each session in a laboratory of its own: rates, noise, speeds")
     options = parser.parse_args()
     if options.folder.exists():
         sys.exit(f"{options.folder} exists; a new folder is needed")
     sessions = options.folder / "sessions"
-    make_set(sessions, options.seed, {kind: getattr(options, kind) for kind in COUNTS}, None)
+    make_set(sessions, options.seed, {kind: getattr(options, kind) for kind in COUNTS}, None, options.anywhere)
     apart = sessions.with_name("sessions.answers")
     made = json.loads((apart / "answers.json").read_text())
     answers = {a["case"]: {"case": a["kind"], "effects": a["effects"], "settings": a["settings"]} for a in made}

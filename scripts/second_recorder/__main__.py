@@ -18,10 +18,11 @@ def main() -> None:
     for kind in KINDS:
         parser.add_argument(f"--{kind}", type=int, default=0, help=f"number of {kind} sessions")
     parser.add_argument("--only", choices=sorted(EFFECTS), help="use this effect alone")
+    parser.add_argument("--anywhere", action="store_true", help="each session in a laboratory of its own: rates, noise, speeds")
     arguments = parser.parse_args()
     if arguments.out.exists() and any(arguments.out.iterdir()):
         parser.error(f"{arguments.out} is not empty")
-    make_set(arguments.out, arguments.seed, {kind: getattr(arguments, kind) for kind in KINDS}, arguments.only)
+    make_set(arguments.out, arguments.seed, {kind: getattr(arguments, kind) for kind in KINDS}, arguments.only, arguments.anywhere)
 
 
 if __name__ == "__main__":

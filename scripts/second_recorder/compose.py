@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from .effects import EFFECTS, Settings
 from .hand import SEGMENTS, Finger, describe, draw_hand
+from .laboratory import Laboratory, draw_laboratory
 from .outside import OUTSIDE
 from .session import Recorder
 
@@ -72,8 +73,9 @@ def plan_cases(rng: np.random.Generator, counts: dict[str, int], only: str | Non
     return cases
 
 
-def make_case(case: Case, folder: Path, seed: int) -> dict[str, Any]:
-    """Record one session and return its answer."""
+def make_case(case: Case, folder: Path, seed: int, anywhere: bool = False) -> dict[str, Any]:
+    """Record one session and return its answer; anywhere: in a laboratory of its own."""
+    laboratory = draw_laboratory(np.random.default_rng([seed, 1])) if anywhere else Laboratory()
     rng = np.random.default_rng(seed)
     hand = draw_hand(rng)
     target = hand.fingers[int(rng.random() < 0.25)]
@@ -94,7 +96,8 @@ def make_case(case: Case, folder: Path, seed: int) -> dict[str, Any]:
         if "skew" in settings[finger.name].get("rec", {}):
             for each in settings.values():
                 each.setdefault("rec", {})["skew"] = settings[finger.name]["rec"]["skew"]
-    Recorder(folder, hand, settings, rng, noise=1.5 if case.kind == "weak" else 1.0, short=case.kind == "weak").write()
+    Recorder(folder, hand, settings, rng, noise=1.5 if case.kind == "weak" else 1.0, short=case.kind == "weak",
+             laboratory=laboratory).write()
     if not entries:
         entries = [{"effect": "none", "finger": target.name, "joint": None, "signal": "current"}]
     flat: Settings = {}
@@ -102,14 +105,14 @@ def make_case(case: Case, folder: Path, seed: int) -> dict[str, Any]:
         merge(flat, settings[finger.name])
     answer: dict[str, Any] = {
         "case": folder.name, "seed": seed, "kind": case.kind, "background": case.kind == "messy", "effects": entries,
-        "settings": flat, "settings_by_finger": settings,
+        "laboratory": asdict(laboratory), "settings": flat, "settings_by_finger": settings,
     }
     answer.update(describe(hand, settings))
     return answer
 
 
-def make_set(out: Path, seed: int, counts: dict[str, int], only: str | None) -> None:
-    """Record a set into `out` and its answers into `out`.answers."""
+def make_set(out: Path, seed: int, counts: dict[str, int], only: str | None, anywhere: bool = False) -> None:
+    """Record a set into `out` and its answers into `out`.answers; anywhere: each session in a laboratory of its own."""
     rng = np.random.default_rng(seed)
     cases = plan_cases(rng, counts, only)
     order = rng.permutation(len(cases))
@@ -118,7 +121,7 @@ def make_set(out: Path, seed: int, counts: dict[str, int], only: str | None) -> 
     for i, index in enumerate(order):
         folder = out / f"case_{i:03d}"
         began = time.perf_counter()
-        answer = make_case(cases[index], folder, seed * 10000 + int(index))
+        answer = make_case(cases[index], folder, seed * 10000 + int(index), anywhere)
         target = answers_folder / folder.name
         target.mkdir(parents=True)
         (target / "answer.json").write_text(json.dumps(answer, indent=1) + "\n")

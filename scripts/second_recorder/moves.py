@@ -6,11 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .laboratory import Laboratory
+
 Array = NDArray[np.float64]
-SPEED_MAX = 115.0   # %/s
-ACCELERATION = 900.0  # %/s^2
-REST = 1.2   # s before the first move
-HOLD = 0.35  # s after each move
 STEP = 0.001  # s of the simulation
 
 FLEXION_SPEEDS = (1.0, 0.45, 0.15, 0.7, 0.27, 1.0, 0.45, 0.15)
@@ -42,24 +40,25 @@ class Program:
         return len(self.reference) * STEP
 
 
-def build(moves: list[Move]) -> Program:
+def build(moves: list[Move], laboratory: Laboratory) -> Program:
     """Trapezoidal reference through the moves."""
-    reference, rate = [np.zeros(round(REST / STEP))], [np.zeros(round(REST / STEP))]
-    change, position, time = [0.0], 0.0, REST
+    most, rest = laboratory.acceleration, laboratory.rest
+    reference, rate = [np.zeros(round(rest / STEP))], [np.zeros(round(rest / STEP))]
+    change, position, time = [0.0], 0.0, rest
     for target, speed in moves:
-        distance, top = abs(target - position), SPEED_MAX * speed
+        distance, top = abs(target - position), laboratory.speed_max * speed
         change.append(time)
-        time += distance / top + top / ACCELERATION + HOLD
+        time += distance / top + top / most + laboratory.hold
         count = round(time / STEP) - sum(len(part) for part in reference)
         t = np.arange(1, count + 1) * STEP
-        ramp = top / ACCELERATION
+        ramp = top / most
         end = distance / top + ramp
         left = np.clip(end - t, 0.0, None)
-        covered = np.where(t < ramp, 0.5 * ACCELERATION * t**2,
-                           np.where(t < end - ramp, top * (t - 0.5 * ramp), distance - 0.5 * ACCELERATION * left**2))
+        covered = np.where(t < ramp, 0.5 * most * t**2,
+                           np.where(t < end - ramp, top * (t - 0.5 * ramp), distance - 0.5 * most * left**2))
         sign = np.sign(target - position)
         reference.append(position + sign * covered)
-        rate.append(sign * np.minimum(np.minimum(ACCELERATION * t, top), ACCELERATION * left))
+        rate.append(sign * np.minimum(np.minimum(most * t, top), most * left))
         position = target
     return Program(np.concatenate(reference), np.concatenate(rate), np.array(change),
                    np.array([0.0] + [move[0] for move in moves]), np.array([1.0] + [move[1] for move in moves]))

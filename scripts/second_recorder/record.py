@@ -8,22 +8,20 @@ import ezc3d
 import numpy as np
 
 from .hand import Array, Finger
+from .laboratory import Laboratory
 from .motor import Trace
 from .moves import Program
 
-LOG_STEP, LOG_JITTER, LOG_LOSS = 0.018, 0.35, 0.003
-POSITION_NOISE, CURRENT_NOISE = 4.0, 5.0       # counts, raw
-MOCAP_RATE, MARKER_NOISE = 100.0, 0.00015      # Hz, m
-GAP_RATE, GAP_FRAMES = 0.027, (4, 20)          # per marker and second; frames
+GAP_FRAMES = (4, 20)
 
 
 def log_rows(rng: np.random.Generator, finger: Finger, rec: dict[str, Any], program: Program, trace: Trace,
-             clock: float, session_time: float, noise: float, other: Array | None) -> list[str]:
+             clock: float, session_time: float, noise: float, other: Array | None, laboratory: Laboratory) -> list[str]:
     """Lines of an actuator log."""
-    steps = LOG_STEP * rng.uniform(1 - LOG_JITTER, 1 + LOG_JITTER, int(program.duration / LOG_STEP * 1.6))
+    steps = laboratory.log_step * rng.uniform(1 - laboratory.log_jitter, 1 + laboratory.log_jitter, int(program.duration / laboratory.log_step * 1.6))
     times = np.cumsum(steps)
     times = times[times < program.duration]
-    times = times[rng.random(len(times)) >= LOG_LOSS]
+    times = times[rng.random(len(times)) >= laboratory.log_loss]
     empty, full = finger.counts
     span = (full - empty) / 100.0
     position = empty + span * np.interp(times, trace.time, trace.position)
@@ -38,8 +36,8 @@ def log_rows(rng: np.random.Generator, finger: Finger, rec: dict[str, Any], prog
         current = current + rec["supply_amp"] * np.sin(2 * np.pi * rec["supply_hz"] * times + rec["supply_phase"])
     if "crosstalk" in rec and other is not None:
         current = current + rec["crosstalk"] * np.interp(times + 0.7, np.arange(1, len(other) + 1) * 0.001, other)
-    position = np.round(position + rng.normal(0.0, POSITION_NOISE * noise, len(times)))
-    current = current + rng.normal(0.0, CURRENT_NOISE * noise, len(times))
+    position = np.round(position + rng.normal(0.0, laboratory.position_noise * noise, len(times)))
+    current = current + rng.normal(0.0, laboratory.current_noise * noise, len(times))
     if "clip" in rec:
         current = np.clip(current, -rec["clip"], rec["clip"])
     which = np.searchsorted(program.change_time, times, side="right") - 1
@@ -60,21 +58,21 @@ def log_rows(rng: np.random.Generator, finger: Finger, rec: dict[str, Any], prog
 
 
 def corrupt_markers(rng: np.random.Generator, labels: list[str], points: Array, rec: dict[str, Any], marker: dict[str, Any],
-                    noise: float, gaps: bool) -> Array:
+                    noise: float, gaps: bool, laboratory: Laboratory) -> Array:
     """Noise, gaps, swapped labels, lens and lost frames on world positions (n, k, 3) [m]."""
     points = points.copy()
     count = len(points)
     if "lens" in rec:
         away = points - np.array(rec["lens_centre"])
         points = points + rec["lens"] * np.sum(away**2, axis=2, keepdims=True) * away
-    points = points + rng.normal(0.0, MARKER_NOISE * noise, points.shape)
+    points = points + rng.normal(0.0, laboratory.marker_noise * noise, points.shape)
     for first, second, start, frames in marker.get("swaps", []):
         if first in labels and second in labels:
             i, j, k = labels.index(first), labels.index(second), int(start * count)
             points[k:k + frames, [i, j]] = points[k:k + frames, [j, i]]
     if gaps:
         for i in range(len(labels)):
-            for _ in range(rng.poisson(GAP_RATE * count / MOCAP_RATE)):
+            for _ in range(rng.poisson(laboratory.gap_rate * count / laboratory.mocap_rate)):
                 k = int(rng.integers(0, count))
                 points[k:k + int(rng.integers(*GAP_FRAMES)), i] = np.nan
     keep = np.ones(count, dtype=bool)
@@ -83,10 +81,10 @@ def corrupt_markers(rng: np.random.Generator, labels: list[str], points: Array, 
     return points[keep]
 
 
-def write_c3d(path: Path, labels: list[str], points: Array) -> None:
-    """Points (n, k, 3) [m] to a C3D in millimetres."""
+def write_c3d(path: Path, labels: list[str], points: Array, rate: float) -> None:
+    """Points (n, k, 3) [m] at a rate [Hz] to a C3D in millimetres."""
     c3d = ezc3d.c3d()
-    c3d["parameters"]["POINT"]["RATE"]["value"] = [MOCAP_RATE]
+    c3d["parameters"]["POINT"]["RATE"]["value"] = [rate]
     c3d["parameters"]["POINT"]["LABELS"]["value"] = labels
     c3d["parameters"]["POINT"]["UNITS"]["value"] = ["mm"]
     data = np.ones((4, len(labels), len(points)))

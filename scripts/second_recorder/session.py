@@ -10,10 +10,11 @@ import numpy as np
 from .effects import Settings
 from .hand import PROBE, SEGMENTS, Array, Finger, Hand, finger_frame
 from .kinematics import finger_markers
+from .laboratory import Laboratory
 from .motor import Trace, simulate
 from .moves import EXCITATION, FLEXION_B_SPEEDS, FLEXION_SPEEDS, Move, Program, build, flexion
 from .pose import draw_base, gravity_in_finger, palm_motion, probe_markers, to_world, turn_by
-from .record import MOCAP_RATE, corrupt_markers, log_rows, write_c3d
+from .record import corrupt_markers, log_rows, write_c3d
 
 PALM_LABELS = ["PO", "PM", "PL"]
 
@@ -81,10 +82,10 @@ class Recorder:
     """Writes one session; `settings` maps finger names to what is hidden in them."""
 
     def __init__(self, folder: Path, hand: Hand, settings: dict[str, Settings], rng: np.random.Generator,
-                 noise: float, short: bool) -> None:
+                 noise: float, short: bool, laboratory: Laboratory) -> None:
         """Make the folders and place the hand; `noise` scales all noise, `short` leaves out moves and trials."""
         self.folder, self.hand, self.settings, self.rng = folder, hand, settings, rng
-        self.noise, self.short = noise, short
+        self.noise, self.short, self.laboratory = noise, short, laboratory
         self.base = draw_base(rng)
         self.lines = manifest_head(hand)
         self.busy: Array | None = None
@@ -99,13 +100,13 @@ class Recorder:
         (self.folder / "session.toml").write_text("\n".join(self.lines) + "\n")
 
     def _probe(self, name: str, tip: Array, frames: int) -> None:
-        times = np.arange(frames) / MOCAP_RATE
+        times = np.arange(frames) / self.laboratory.mocap_rate
         turns, places = palm_motion(self.rng, self.base, times)
         points = np.concatenate([palm_points(self.hand, {}, times, None), probe_markers(self.rng, tip, times)], axis=1)
         world = to_world(turns, places, points)
         labels = PALM_LABELS + list(PROBE)
-        world = corrupt_markers(self.rng, labels, world, self._lens_only(), {}, self.noise, gaps=False)
-        write_c3d(self.folder / "mocap" / name, labels, world)
+        world = corrupt_markers(self.rng, labels, world, self._lens_only(), {}, self.noise, gaps=False, laboratory=self.laboratory)
+        write_c3d(self.folder / "mocap" / name, labels, world, self.laboratory.mocap_rate)
 
     def _lens_only(self) -> dict[str, Any]:
         for settings in self.settings.values():
@@ -139,12 +140,12 @@ class Recorder:
             base = self.base
             if plan.suffix == "_b" and "turn_between_trials" in rec:
                 base = (turn_by(np.array(rec["turn_between_trials"])) @ base[0], base[1])
-            program = build(list(plan.moves))
+            program = build(list(plan.moves), self.laboratory)
             trace = simulate(finger.motor, dyn, program, plan.start, gravity_in_finger(base[0], frame))
             stem = f"{plan.kind}_{finger.name}{plan.suffix}"
             entries = {"kind": plan.kind, "finger": finger.name, "log": f"log/{stem}.csv"}
             rows = log_rows(self.rng, finger, rec, program, trace, 1000.0 + plan.start + self.rng.uniform(-3.0, 3.0),
-                            plan.start, self.noise, self._neighbour(finger, rec, program, plan))
+                            plan.start, self.noise, self._neighbour(finger, rec, program, plan), self.laboratory)
             (self.folder / "log" / f"{stem}.csv").write_text("\n".join(rows) + "\n")
             if plan.mocap:
                 entries["mocap"] = f"mocap/{stem}.c3d"
@@ -159,14 +160,14 @@ class Recorder:
             return None
         other = next(one for one in self.hand.fingers if one.name != finger.name)
         speeds = tuple(float(speed) for speed in self.rng.choice([0.8, 0.6, 0.35, 0.2], 12))
-        return simulate(other.motor, {}, build(flexion(speeds)), plan.start, (0.0, 0.0)).current
+        return simulate(other.motor, {}, build(flexion(speeds), self.laboratory), plan.start, (0.0, 0.0)).current
 
     def _film(self, finger: Finger, kin: dict[str, Any], marker: dict[str, Any], rec: dict[str, Any],
               base: tuple[Array, Array], program: Program, trace: Trace, name: str) -> None:
-        times = np.arange(round(program.duration * MOCAP_RATE)) / MOCAP_RATE
+        times = np.arange(round(program.duration * self.laboratory.mocap_rate)) / self.laboratory.mocap_rate
         turns, places = palm_motion(self.rng, base, times)
         points = np.concatenate([palm_points(self.hand, marker, times, trace),
                                  finger_markers(finger, kin, marker, trace, times)], axis=1)
         labels = PALM_LABELS + finger.labels
-        world = corrupt_markers(self.rng, labels, to_world(turns, places, points), rec, marker, self.noise, gaps=True)
-        write_c3d(self.folder / "mocap" / name, labels, world)
+        world = corrupt_markers(self.rng, labels, to_world(turns, places, points), rec, marker, self.noise, gaps=True, laboratory=self.laboratory)
+        write_c3d(self.folder / "mocap" / name, labels, world, self.laboratory.mocap_rate)
