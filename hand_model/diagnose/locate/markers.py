@@ -26,7 +26,7 @@ ALPHA = 0.003  # false alarms per finger
 EXPLAINED_LEAST = 0.9  # of the misfit: below, the names are not believed
 SPELL = 12  # blocks, about a second, whose mean shows what stays correlated
 HINGE = ("joint_wobble", "moving_centre")
-IN_STEP = (*HINGE, NO_HINGE)  # with the angle
+UNHINGED = (*HINGE, NO_HINGE)  # of joints that are no hinges: in step with the angle
 SLIPS = ("marker_slip", "palm_marker_slip", "support_slip")
 REACH = 0.06  # m: the other axis of a wobble passes nearer to its joint; farther, its centre travels
 MOSTLY = 0.7  # share of what any motion in step with the angle explains
@@ -306,7 +306,7 @@ def corrected_angles(angles: FingerAngles, naming: MarkerNaming) -> FingerAngles
     """The angles with the named effects' displacement taken out of the markers, chain and poses fitted anew."""
     if not naming.believed:
         return angles
-    course = _least_course(naming) if any(e.effect in IN_STEP for e in naming.found) else None
+    course = _least_course(naming) if any(e.effect in UNHINGED for e in naming.found) else None
     right = []
     for index, record in enumerate(angles.records):
         shift = shift_at_frames(naming, index, record.mocap.time_s, course)
@@ -320,7 +320,7 @@ def _least_course(naming: MarkerNaming) -> Array:
     that leaves hinges. Their tilts are nearly another axis, and what is linear in both would else go far both ways."""
     blocks = naming.blocks
     course = np.zeros(blocks.residual.reshape(len(blocks.residual), -1).shape)
-    for effect in (e for e in naming.found if e.effect in IN_STEP):
+    for effect in (e for e in naming.found if e.effect in UNHINGED):
         course += effect.everywhere @ effect.coefficients
     chain, _ = _solve(project(blocks, blocks.chain_columns), project(blocks, course[..., None]))
     return course - blocks.chain_columns @ chain
@@ -338,11 +338,11 @@ def shift_at_frames(naming: MarkerNaming, record: int, time_s: Array, course: Ar
     low = np.minimum(at.astype(int), max(len(mine) - 2, 0))
     share = (at - low)[:, None]
 
-    def between(course: Array) -> Array:
-        return (1 - share) * course[low] + share * course[np.minimum(low + 1, len(mine) - 1)]
+    def between(blockwise: Array) -> Array:
+        return (1 - share) * blockwise[low] + share * blockwise[np.minimum(low + 1, len(mine) - 1)]
 
     for effect in naming.found:
-        if course is None or effect.effect not in IN_STEP:
+        if course is None or effect.effect not in UNHINGED:
             now = between(effect.everywhere[mine] @ effect.coefficients)
             out += (now * effect.acts(blocks, record, time_s)[:, None]).reshape(out.shape)
     return out if course is None else out + between(course[mine]).reshape(out.shape)

@@ -15,7 +15,7 @@ from ..findings import Finding, weighed
 from .angles import FingerAngles
 from .blocks import Blocks
 from .displacement import NO_HINGE, UNNAMED
-from .markers import ALPHA, HINGE, MarkerEffect, MarkerNaming
+from .markers import ALPHA, UNHINGED, MarkerEffect, MarkerNaming
 from .wobble import centre_travel, wobble_amplitude
 
 Array = NDArray[np.float64]
@@ -69,7 +69,7 @@ def unexplained(angles: FingerAngles, naming: MarkerNaming) -> list[dict[str, An
                       f"{e.label or 'a support'} moves all the time") for e in naming.found if e.effect in UNNAMED]
     if naming.p_before >= ALPHA:
         return []
-    joints = [e.body - 1 for e in (*naming.found, naming.refused) if e is not None and e.effect in (NO_HINGE, *HINGE)]
+    joints = [e.body - 1 for e in (*naming.found, naming.refused) if e is not None and e.effect in UNHINGED]
     if joints:
         return [entry(angles.finger.segments[joints[0]].name, 1.0, f"{NO_HINGE}: {IN_STEP}")]
     return [entry(None, 1.0, "markers leave their rigid segments, by no effect known here")]
@@ -158,7 +158,8 @@ def _swaps(angles: FingerAngles) -> list[tuple[float, Finding]]:
     if not whiles:
         return []
     lasting = {labels: sum(end - begin for _, begin, end in found) for labels, found in whiles.items()}
-    labels = max(sorted(whiles, key=sorted), key=lambda names: lasting[names])
+    order = sorted(whiles, key=lambda names: (-lasting[names], sorted(names)))
+    labels = order[0]
     joint = next((s.name for s in angles.finger.segments if labels & set(s.markers)), None)
     _, begin, end = max(whiles[labels], key=lambda w: w[2] - w[1])
     names, trials = sorted(labels), sorted({trial for trial, _, _ in whiles[labels]})
@@ -167,7 +168,6 @@ def _swaps(angles: FingerAngles) -> list[tuple[float, Finding]]:
     parameters = {name: {"value": value, "unit": "s"} for name, value in (("begin", begin), ("end", end), ("lasting", sum(lasting.values())))}
     fit = {"metric": "marker_rmse", "unit": "m", "before": None, "after": None, "noise_floor": angles.noise_m,
            "ci95_reduction": None, "held_out": [], "engine": "chain fitted to the markers, in-sample"}
-    order = sorted(whiles, key=lambda names: (-lasting[names], sorted(names)))
     text = "; ".join(f"{' and '.join(sorted(pair))} are exchanged {_spans(whiles[pair])}" for pair in order) + "."
     weight = _displaced(angles, names, sum(lasting.values()))
     return [(weight, Finding("marker_swap", ("marker_swap",), 1.0, (), where, text, parameters, fit, None, CORRECTION["marker_swap"]))]
