@@ -81,28 +81,38 @@ class Pair:
             self._process.join()
             self._process = None
 
-    def map(self, function: Callable[..., Any], items: Sequence[Any], *rest: Any) -> list[Any]:
-        """`function(state, item, *rest)` of every item, every other one by the other process: the same places by the same process
-        each time. Raises what a call raised."""
+    def map(self, function: Callable[..., Any], items: Sequence[Any], *rest: Any, costs: Sequence[float] | None = None) -> list[Any]:
+        """`function(state, item, *rest)` of every item, some by the other process: the same places by the same process each time. costs:
+        how long each may take, against each other. Raises what a call raised."""
         items = list(items)
         if self._process is None or len(items) < 2:
             return [function(self.state, item, *rest) for item in items]
-        self._pipe.send((function, items[1::2], rest))
+        here, there = _shared_out(costs or [1.0] * len(items))
+        self._pipe.send((function, [items[i] for i in there], rest))
         mine, error = [], None
         try:
-            mine = [function(self.state, item, *rest) for item in items[::2]]
+            mine = [function(self.state, items[i], *rest) for i in here]
         except Exception as raised:  # noqa: BLE001, raised again, but only once the other one's answer is read: it would be taken for that of the next call
             error = raised
         try:
             theirs = self._pipe.recv()
         except EOFError:  # ended by the system, which may lack memory
             self._process = None
-            theirs = [function(self.state, item, *rest) for item in items[1::2]] if error is None else []
+            theirs = [function(self.state, items[i], *rest) for i in there] if error is None else []
         if error is not None or isinstance(theirs, Exception):
             raise error or theirs
-        out: list[Any] = [None] * len(items)
-        out[::2], out[1::2] = mine, theirs
-        return out
+        done = dict(zip((*here, *there), (*mine, *theirs), strict=True))
+        return [done[i] for i in range(len(items))]
+
+
+def _shared_out(costs: Sequence[float]) -> tuple[list[int], list[int]]:
+    """The places of two shares that cost alike: the dearest first, each to whom has less (Graham 1969)."""
+    shares, sums = ([], []), [0.0, 0.0]
+    for place in sorted(range(len(costs)), key=lambda i: -costs[i]):
+        less = int(sums[1] < sums[0])
+        shares[less].append(place)
+        sums[less] += costs[place]
+    return shares
 
 
 def _serve(pipe: Connection, inherited: Connection, state: Any) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hand_model.background import Background, Pair, single_threaded
+from hand_model.background import Background, Pair, _shared_out, single_threaded
 
 threadpoolctl = pytest.importorskip("threadpoolctl")
 
@@ -28,6 +28,11 @@ def test_blas_has_one_thread_within_and_in_what_is_forked_and_as_many_as_before_
         assert _threads(4) == before
 
 
+def test_what_costs_most_is_shared_out_first_and_always_alike():
+    assert _shared_out([1.0, 5.0, 3.0, 1.0, 0.0]) == ([1, 4], [2, 0, 3])
+    assert _shared_out([1.0, 1.0, 1.0]) == ([0, 2], [1])
+
+
 def _seen(state: dict[str, int], item: int, factor: int) -> tuple[int, int]:
     if item < 0:
         raise ValueError(item)
@@ -43,6 +48,7 @@ def test_two_processes_share_a_list_in_order_and_each_keeps_its_state(forks, mon
         assert [v for v, _ in pair.map(_seen, range(5), 10)] == [0, 10, 20, 30, 40]
         count = [n for _, n in pair.map(_seen, range(4), 1)]
         assert count == ([4, 3, 5, 4] if forks else [6, 7, 8, 9])
+        assert [v for v, _ in pair.map(_seen, range(4), 1, costs=[1.0, 1.0, 9.0, 1.0])] == [0, 1, 2, 3]
         for items in ([1, -2, 3], [-1, 2, 3]):
             with pytest.raises(ValueError, match="-"):
                 pair.map(_seen, items, 1)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 from test_diagnose import drive, planted
@@ -9,6 +11,7 @@ from test_diagnose import drive, planted
 from hand_model.diagnose.name.balance import Balance, Term
 from hand_model.diagnose.name.grid import stacked
 from hand_model.diagnose.name.selection import scan
+from hand_model.diagnose.name.wander import Wander
 from hand_model.effects import effect
 
 
@@ -23,6 +26,22 @@ def test_a_scan_finds_the_shape_of_which_a_refit_is_best(name, shape, amplitude)
     best = min(balance.fit((Term(kind, s),)).rss for s in balance.grid(kind).shapes)
     assert scan(balance, kind, ()).rss == pytest.approx(best, rel=1e-9)
     assert scan(balance, kind, ()).rss == pytest.approx(best, rel=1e-9)  # from kept columns
+
+
+@pytest.mark.parametrize(("name", "shape"), [("current_channel_delay", {"form": 0.0, "delay": 0.03}), ("current_saturation", {"limit": 50.0}),
+                                             ("stribeck_friction", {"form": 0.0, "stribeck_speed": 20.0})])
+def test_what_is_learned_is_the_same_without_the_recordings_that_take_no_part(name, shape) -> None:
+    states = drive(7, planted("detent_load", {"form": 0.0, "centre": 50.0, "width": 6.0}, [12.0]), trials=4)
+    balance = Balance(states)
+    balance = balance.wandering(Wander(balance.stroke, 2.0, 9.0, np.inf))
+    terms = (Term(effect("detent_load"), {"form": 0.0, "centre": 50.0, "width": 6.0}), Term(effect(name), shape))
+    whole, learned = balance.fit(terms), balance.learning().fit(terms)
+    assert len(learned.prediction) == balance.train.sum() < len(whole.prediction)
+    np.testing.assert_allclose(whole.prediction[balance.train], learned.prediction, rtol=1e-9)
+    assert learned.rss == pytest.approx(whole.rss, rel=1e-9) and learned.declared == pytest.approx(whole.declared, rel=1e-9)
+    assert balance.learning() is balance.learning() and balance.learning().learning() is balance.learning()
+    again = pickle.loads(pickle.dumps(balance))
+    assert again.fit(terms).rss == whole.rss and len(pickle.dumps(balance)) < 2 * len(pickle.dumps(Balance(states)))
 
 
 def test_sparse_and_dense_columns_have_the_same_products() -> None:

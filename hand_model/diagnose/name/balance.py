@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
-from copy import copy
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +17,8 @@ from numpy.typing import NDArray
 from ...effects.base import DriveState
 from ...effects.path import strokes
 from .grid import Grid, GridColumns, stacked
-from .least_squares import bounded_least_squares
+from .least_squares import from_products
+from .noise import noise
 from .projection import Projection
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 # What physics allows of a declared coefficient, by its column's name.
 DECLARED_LOW = {"inertia": 0.0, "viscous": 0.0, "coulomb": 0.0, "spring": 0.0}
 MOST_KEPT = 3e8  # bytes of columns that one balance keeps
-MOST_LAST = 24  # columns of single terms that it remembers
+MOST_LAST = 1e8  # bytes of columns of single terms that it remembers: grids ask for the same ones again
 UNSETTLED = 1e-3  # weight left to a start or stop where steady motion alone is asked
 DISCRETE = ("side", "trial", "form", "end")  # shapes that choose among few cases: no continuous parameter is spent on them
 
@@ -61,6 +61,33 @@ class Fit:
         return term.effect.columns(state, term.shape) @ np.array(list(self.amplitudes[which].values()))
 
 
+class _Remembered:
+    """What was asked for last, as much as MOST_LAST bytes hold."""
+
+    def __init__(self) -> None:
+        self._items: OrderedDict[Any, Array] = OrderedDict()
+        self._bytes = 0
+
+    def get(self, key: Any) -> Array | None:
+        """What is remembered under a key, None where nothing is."""
+        if key in self._items:
+            self._items.move_to_end(key)
+        return self._items.get(key)
+
+    def put(self, key: Any, value: Array) -> Array:
+        """The value, remembered; what was not asked for longest is forgotten."""
+        self._items[key] = value
+        self._bytes += value.nbytes
+        while self._bytes > MOST_LAST and len(self._items) > 1:
+            self._bytes -= self._items.popitem(last=False)[1].nbytes
+        return value
+
+
+def additive(effect: Any) -> bool:
+    """Whether an effect adds its columns and leaves all others as they are."""
+    return effect.replaces is None and not effect.warps and not effect.clips
+
+
 def _key(shape: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
     return tuple(sorted((k, float(v)) for k, v in shape.items()))
 
@@ -69,12 +96,22 @@ def _keys(terms: tuple[Term, ...]) -> tuple[Any, ...]:
     return tuple((t.effect, _key(t.shape)) for t in terms)
 
 
+def _warped_columns(effect: Any, shape: Mapping[str, float], warps: tuple[Term, ...]) -> Callable[[DriveState], Array]:
+    def one(state: DriveState) -> Array:
+        columns = effect.columns(state, shape)
+        for term in warps:
+            columns = term.effect.warp(state, columns, term.shape)
+        return columns
+
+    return one
+
+
 class Balance:
     """The compared samples of several DriveStates, stacked.
 
     effort, weight (1 / standard deviation), timing (the part of that deviation that starts and stops bring), train (bool): (n,). sigma: noise of the effort; inflation: integrated
-    autocorrelation of that noise (1 where it is white): a sum of squares counts divided by it. typical: declared
-    coefficients of other balances of the same kind, by name.
+    autocorrelation of that noise (1 where it is white): a sum of squares counts divided by it. untouched: whether some recordings take no
+    part in learning. typical: declared coefficients of other balances of the same kind, by name.
     """
 
     def __init__(self, states: tuple[DriveState, ...], everything: bool = False,
@@ -85,6 +122,7 @@ class Balance:
         self.effort = self.gather(lambda s: s.effort)
         self.train = np.concatenate([np.full(m.sum(), everything or not s.validate)
                                      for s, m in zip(states, self.masks, strict=True)])
+        self.untouched = not self.train.all()
         self.names = states[0].declared_names or tuple(f"c{i}" for i in range(states[0].declared.shape[1]))
         self.stroke = self._strokes()
         self.sigma, self.inflation = 1.0, 1.0
@@ -97,8 +135,9 @@ class Balance:
         self._grids: dict[Any, Grid] = {}
         self._kept: dict[Any, GridColumns] = {}
         self._warped: tuple[Any, ...] = ()
-        self._last: OrderedDict[Any, Array] = OrderedDict()
+        self._last = _Remembered()
         self._apart: Any = None
+        self._learning: Balance | None = None
 
     def wandering(self, wander: Wander | None) -> Balance:
         """The same balance with a random level per while in its noise, where that is real."""
@@ -114,7 +153,7 @@ class Balance:
             scale = state.extra["scale"]
             return replace(state, extra={**state.extra, "slope": Polynomial(powers).deriv()(state.position / scale) / scale})
 
-        return self._with(states=tuple(with_slope(s) for s in self.states), _last=OrderedDict())
+        return self._with(states=tuple(with_slope(s) for s in self.states), _last=_Remembered())
 
     def required(self, fit: Fit) -> Balance:
         """The same balance with what is "required" of the drive as a fit has it, its effects included."""
@@ -124,26 +163,50 @@ class Balance:
                 effort = effort + fit.added(which, state)
             return replace(state, extra={**state.extra, "required": effort})
 
-        return self._with(states=tuple(asked(s) for s in self.states), _last=OrderedDict())
+        return self._with(states=tuple(asked(s) for s in self.states), _last=_Remembered())
 
     def settled(self) -> Balance:
         """The same balance with next to no weight on starts and stops."""
         return self._with(weight=np.where(self.steady, self.weight, UNSETTLED * self.weight))
 
+    def learning(self) -> Balance:
+        """The same balance without the samples of recordings that take no part in learning: what is only compared is found there sooner."""
+        if self._learning is None:
+            mine = self.train
+            kept = {name: getattr(self, name)[mine] for name in ("effort", "weight", "timing", "steady", "stroke", "train")}
+            rows = [r[:0] if left_out else r for r, left_out in zip(self._rows, self._left_out(), strict=True)]
+            wander = None if self.wander is None else replace(self.wander, label=self.wander.label[mine])
+            self._learning = self if mine.all() else self._with(**kept, _rows=rows, wander=wander, _last=_Remembered())
+        return self._learning
+
+    def _left_out(self) -> list[bool]:
+        """Which recordings take no part in learning: all of their samples."""
+        ends = np.cumsum([len(r) for r in self._rows])
+        return [not self.train[end - len(rows) : end].any() for rows, end in zip(self._rows, ends, strict=True)]
+
     def _with(self, **changes: Any) -> Balance:
         """The same balance with other attributes, what is kept of weighted columns thrown away."""
-        other = copy(self)
-        for name, value in {"_kept": {}, "_apart": None, **changes}.items():
-            setattr(other, name, value)
+        other = object.__new__(Balance)
+        other.__dict__.update({**self.__dict__, "_kept": {}, "_apart": None, "_learning": None, **changes})
         return other
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What another process needs: nothing of what is only kept to save time."""
+        return {**self.__dict__, "_kept": {}, "_apart": None, "_learning": None, "_last": _Remembered()}
 
     def whiten(self, values: Array, weight: Array) -> Array:
         """Weighted values (n,) or (n, k) in which the noise is as good as white; as they are without `wander`."""
         return values if self.wander is None else self.wander.whiten(values, weight, self.inflation)
 
+    def products(self, columns: Array, weight: Array) -> Array:
+        """Products (k, k) with each other of columns (n, k), weighted and whitened."""
+        weighted = columns * weight[:, None]
+        out = weighted.T @ weighted
+        return out if self.wander is None else out - self.wander.common(weighted, weight, self.inflation)
+
     def gather(self, value: Any) -> Array:
         """Stack `value(state)` (n, ...) over the compared samples."""
-        return np.concatenate([np.asarray(value(s)).take(rows, axis=0) for s, rows in zip(self.states, self._rows, strict=True)])
+        return np.concatenate([np.asarray(value(s)).take(rows, axis=0) for s, rows in zip(self.states, self._rows, strict=True) if len(rows)])
 
     def _strokes(self) -> NDArray[np.int64]:
         out, count = [], 0
@@ -157,23 +220,12 @@ class Balance:
 
     def columns(self, effect: Any, shape: Mapping[str, float], warps: tuple[Term, ...] = ()) -> Array:
         """An effect's columns (n, j), shifted by those of `warps`, unweighted. To be read only: the last ones are kept."""
-        def one(state: DriveState) -> Array:
-            columns = effect.columns(state, shape)
-            for term in warps:
-                columns = term.effect.warp(state, columns, term.shape)
-            return columns
-
-        return self._remembered((effect, _key(shape), _keys(warps)), one)
+        return self._remembered((effect, _key(shape), _keys(warps)), _warped_columns(effect, shape, warps))
 
     def _remembered(self, key: Any, value: Callable[[DriveState], Array]) -> Array:
         """What `gather` makes of `value`; while one term's shape is optimised the other terms' columns stay."""
-        if key in self._last:
-            self._last.move_to_end(key)
-        else:
-            self._last[key] = self.gather(value)
-            if len(self._last) > MOST_LAST:
-                self._last.popitem(last=False)
-        return self._last[key]
+        found = self._last.get(key)
+        return self._last.put(key, self.gather(value)) if found is None else found
 
     def grid(self, effect: Any) -> Grid:
         """Starting shapes of an effect on these recordings."""
@@ -189,10 +241,16 @@ class Balance:
             self._kept, self._warped = {}, _keys(warps)
         if plain and grid.effect in self._kept:
             return self._kept[grid.effect]
-        out = stacked([self.whiten(self.columns(grid.effect, shape, warps) * weight[:, None], weight) for shape in grid.shapes])
+        out = stacked(self._acting(_warped_columns(grid.effect, shape, warps), weight) for shape in grid.shapes)
         if plain and out.bytes + sum(c.bytes for c in self._kept.values()) < MOST_KEPT:
             self._kept[grid.effect] = out
         return out
+
+    def _acting(self, value: Callable[[DriveState], Array], weight: Array) -> Array:
+        """What `gather` makes of `value`, weighted and whitened, without columns that are zero: not remembered, for whole grids would
+        push out what is asked for again."""
+        columns = self.gather(value) * weight[:, None]
+        return self.whiten(columns[:, columns.any(0)], weight)
 
     def design(self, terms: tuple[Term, ...]) -> tuple[Array, Array, Array]:
         """Matrix (n, k + j) of declared and effect columns, lower and upper bounds (k + j,) of their coefficients."""
@@ -228,13 +286,16 @@ class Balance:
         inside = np.ones(len(self.effort), bool)
         for _ in range(4 if clips else 1):
             v = w * inside
-            coefficients = bounded_least_squares(self.whiten(matrix * v[:, None], v), self.whiten(self.effort * v, v), low, high)
+            products = self.products(np.column_stack([matrix, self.effort]), v)
+            coefficients = from_products(products[:-1, :-1], products[:-1, -1], low, high)
             if held:
                 coefficients = self._own_nuisances(matrix, coefficients, w, low)
             prediction = raw = matrix @ coefficients
             for term in clips:
                 prediction = term.effect.clip(prediction, term.shape)
-            inside = prediction == raw
+            was, inside = inside, prediction == raw
+            if np.array_equal(was, inside):
+                break
         rss = float(np.sum(self.whiten((self.effort - prediction) * w, w) ** 2)) + self.vagueness(weight) + self.unanswered(terms)
         k = len(self.names)
         amplitudes, start = [], k
@@ -271,7 +332,7 @@ class Balance:
         def fitted(shape: Mapping[str, float]) -> float:
             return self.fit((*terms, Term(effect, shape)), held=False).rss
 
-        if effect.replaces is not None or effect.warps or any(t.effect.clips for t in (*terms, Term(effect, {}))):
+        if not additive(effect) or any(t.effect.clips for t in terms):
             return fitted
         rest = self.apart(terms)
         if not rest.regular:
@@ -342,64 +403,3 @@ class Balance:
         out = coefficients.copy()
         out[columns] += np.linalg.lstsq(matrix[:, columns] * held[:, None], left, rcond=None)[0]
         return np.maximum(out, low)
-
-
-COLOURED = 0.05  # autocorrelation of neighbouring samples from which noise counts as coloured
-LONGEST = 15  # samples over which noise may be correlated; what lasts longer is a misfit
-
-
-def noise(balance: Balance) -> tuple[float, float]:
-    """Standard deviation of the effort's noise and its integrated autocorrelation time in samples.
-
-    Pure error of replicates: the declared fit's residual minus its mean over all strokes with the same direction, speed and
-    place. White noise: differences of neighbouring samples (von Neumann 1941) are sharper and are taken instead.
-    """
-    steady = balance.gather(lambda s: s.extra.get("steady", np.ones(len(s.time_s)))) > 0
-    r = balance.effort - _plain_fit(balance, steady)
-    same = (balance.stroke[1:] == balance.stroke[:-1]) & steady[1:] & steady[:-1]
-    if same.sum() < 20:
-        return float(np.std(r)) or 1.0, 1.0
-    neighbours = float(np.sqrt(np.mean(np.diff(r)[same] ** 2) / 2))
-    deviation, share = replicate_deviation(balance, r, steady)
-    if not len(deviation):
-        return max(neighbours, 1e-9), 1.0
-    lags = []
-    for k in range(LONGEST + 1):
-        pair = (balance.stroke[k:] == balance.stroke[: len(r) - k]) & np.isfinite(deviation[k:]) & np.isfinite(deviation[: len(r) - k])
-        lags.append(float(np.mean((deviation[k:] * deviation[: len(r) - k])[pair])) if pair.sum() > 20 else 0.0)
-    # What still correlates after LONGEST samples is a misfit that does not repeat (an event), no noise.
-    covariance = np.array(lags) - max(float(np.mean(lags[-5:])), 0.0)
-    rho = covariance / max(covariance[0], 1e-300)
-    if rho[1] < COLOURED:
-        return max(neighbours, 1e-9), 1.0
-    small = np.flatnonzero(rho < 0.03)
-    stop = int(small[0]) if len(small) else len(rho)
-    return float(np.sqrt(max(covariance[0], 1e-300) / share)), float(1 + 2 * rho[1:stop].sum())
-
-
-def replicate_deviation(balance: Balance, residual: Array, use: NDArray[np.bool_]) -> tuple[Array, float]:
-    """Residual minus its mean over the other strokes' replicates (n,), nan where there are none, and the share of the
-    variance that is left by taking a mean out."""
-    position, velocity = balance.gather(lambda s: s.position), balance.gather(lambda s: s.velocity)
-    place = np.searchsorted(np.quantile(position, np.linspace(0, 1, 31)[1:-1]), position)
-    speed = np.searchsorted(np.quantile(np.abs(velocity), np.linspace(0, 1, 7)[1:-1]), np.abs(velocity))
-    cell = np.unique(place * 20 + speed * 2 + (velocity > 0), return_inverse=True)[1]
-    cell = np.where(use, cell, -1)
-    out = np.full(len(residual), np.nan)
-    shares = []
-    for c in range(cell.max() + 1):
-        mine = np.flatnonzero(cell == c)
-        strokes_here, index = np.unique(balance.stroke[mine], return_inverse=True)
-        if len(strokes_here) < 3:
-            continue
-        means = np.bincount(index, residual[mine]) / np.bincount(index)
-        out[mine] = residual[mine] - means.mean()
-        shares.append(np.full(len(mine), 1 - 1 / len(mine)))
-    return (out, float(np.concatenate(shares).mean())) if shares else (np.zeros(0), 1.0)
-
-
-def _plain_fit(balance: Balance, use: NDArray[np.bool_]) -> Array:
-    matrix = balance.gather(lambda s: s.declared)
-    free = np.full(matrix.shape[1], np.inf)
-    use = use if use.sum() > 5 * matrix.shape[1] else np.ones(len(matrix), bool)
-    return matrix @ bounded_least_squares(matrix[use], balance.effort[use], -free, free)

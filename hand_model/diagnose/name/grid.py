@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,19 +47,13 @@ class GridColumns:
         return part.T @ part
 
 
-def stacked(columns: Sequence[Array]) -> GridColumns:
-    """One matrix from the columns (n, j) of every shape."""
+def stacked(columns: Iterable[Array]) -> GridColumns:
+    """One matrix from the columns (n, j) of every shape that act at all (of one shape at least)."""
     from scipy.sparse import csc_matrix, hstack
 
-    parts, owner, length = [], [], []
-    for i, part in enumerate(columns):
-        size = np.linalg.norm(part, axis=0)
-        acting = np.flatnonzero(size > 0)
-        parts.append(part[:, acting])
-        owner += [i] * len(acting)
-        length += size[acting].tolist()
-    if not owner:
-        return GridColumns(np.zeros((len(columns[0]), 0)), np.zeros(0, int), np.zeros(0))
-    dense = sum(np.count_nonzero(p) for p in parts) > SPARSE * len(parts[0]) * len(owner)
+    parts = [part[:, part.any(0)] for part in columns]
+    owner = np.repeat(np.arange(len(parts)), [p.shape[1] for p in parts])
+    length = np.concatenate([np.linalg.norm(p, axis=0) for p in parts])
+    dense = not len(owner) or sum(np.count_nonzero(p) for p in parts) > SPARSE * len(parts[0]) * len(owner)
     matrix = np.concatenate(parts, axis=1) if dense else hstack([csc_matrix(p) for p in parts if p.size], format="csc")
-    return GridColumns(matrix, np.array(owner), np.array(length))
+    return GridColumns(matrix, owner, length)

@@ -9,8 +9,12 @@ Array = NDArray[np.float64]
 
 
 def bounded_least_squares(matrix: Array, target: Array, low: Array, high: Array) -> Array:
-    """min |A x - b| with low <= x <= high, bounds 0 or infinite (active set on the normal equations)."""
-    gram, right = matrix.T @ matrix, matrix.T @ target
+    """min |A x - b| with low <= x <= high, bounds 0 or infinite."""
+    return from_products(matrix.T @ matrix, matrix.T @ target, low, high)
+
+
+def from_products(gram: Array, right: Array, low: Array, high: Array) -> Array:
+    """The same from A'A (k, k) and A'b (k,): an active set on the normal equations."""
     scale = np.sqrt(np.diag(gram))
     scale = np.where(scale > 0, scale, 1.0)
     gram, right = gram / np.outer(scale, scale), right / scale

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from scipy.optimize import minimize
 
 from ...background import Pair
 from ...effects.base import sample_interval
-from .balance import DISCRETE, Balance, Fit, Term
+from .balance import DISCRETE, Balance, Fit, Term, additive
 from .evidence import evidence, gain, rough_evidence, scale_of
 from .grid import Grid
 from .lack_of_fit import LackOfFit, lack_of_fit
@@ -34,6 +35,7 @@ ALONG = 1e-6  # of a column's length: less left beside the design, and it says n
 GRAIN = 1.5  # times what the best shape of a grid brings: more no shape between is expected to
 SMALL = 0.07  # share of the explained mismatch: less beside a larger effect may be no more than its form being another
 LOST_MOTION, BENT = "lost motion", 0.01  # a family, and the change of its map's slope from which another search is worth its time
+REFIT, DEARER = 30.0, 4.0  # times as long a refit takes as projecting a column, and a shape that needs refits as one that does not
 GROWN = 1.3  # change of that noise, from which another search is worth its time
 
 
@@ -66,26 +68,27 @@ def _named(balance: Balance, paired: Callable[[Balance], Pair], effects: tuple[A
     wander, mapped = estimate_wander(balance, balance.fit().prediction), balance
     for _ in range(MOST_SEARCHES):
         balance = mapped.wandering(wander)
-        pair = paired(balance)
-        fit, brought, ranked = _search(pair, effects, progress)
+        pair = paired(balance.learning())
+        learned, brought, ranked = _search(pair, effects, progress)
+        fit = balance.fit(learned.terms)
         wander = _unrepeated(balance, fit)
         lost = _overwhelmed(balance, fit)
         mapped = _remapped(balance, fit)
         if lost or (_alike(wander, balance.wander) and mapped is balance):
             break
-    calmed = None if lost else _calmed(balance, fit, ranked)
-    if calmed is not None:
-        rival, calmer = calmed
-        other = balance.wandering(calmer)
-        further, more, _ = _search(paired(other), effects, progress, rival.fit.terms)
+    rival = None if lost else _calmed(pair.state, learned, ranked)
+    if rival is not None:
+        other = balance.wandering(estimate_wander(balance, balance.fit(rival.fit.terms).prediction))
+        further, more, _ = _search(paired(other.learning()), effects, progress, rival.fit.terms)
         if rival.name in _names(further):
-            balance, brought = other.wandering(_unrepeated(other, further)), {**brought, **more}
-            pair = paired(balance)
-            fit = refit(balance, balance.fit(further.terms))
+            balance, brought = other.wandering(_unrepeated(other, other.fit(further.terms))), {**brought, **more}
+            pair = paired(balance.learning())
+            learned = refit(pair.state, pair.state.fit(further.terms))
+            fit = balance.fit(learned.terms)
     declared = balance.fit()
     before = _lack(balance, declared)
     after = _lack(balance, fit) if fit.terms else before
-    found = _findings(pair, effects, fit.terms, fit, declared)
+    found = _findings(pair, effects, learned)
     kept = {t.effect.name for t in fit.terms}
     rejected = tuple(sorted(((n, e) for n, e in brought.items() if n not in kept), key=lambda item: -item[1]))
     return Naming(balance, declared, fit, estimate_wander(balance, fit.prediction), before, after, found, rejected)
@@ -108,9 +111,9 @@ def _overwhelmed(balance: Balance, fit: Fit) -> bool:
     return len(fit.terms) >= MOST_TERMS and overwhelmed(len(fit.terms), _lack(balance, balance.fit()), _lack(balance, fit))
 
 
-def _calmed(balance: Balance, fit: Fit, ranked: Iterable[Rival]) -> tuple[Rival, Wander | None] | None:
-    """The refused candidate that would be taken if what does not repeat were estimated beside it, and that estimate: a slow change
-    of the machine looks like chance as long as nobody holds its law against it. The likeliest one; None where there is none."""
+def _calmed(balance: Balance, fit: Fit, ranked: Iterable[Rival]) -> Rival | None:
+    """The refused candidate that would be taken if what does not repeat were estimated beside it: a slow change of the machine looks
+    like chance as long as nobody holds its law against it. The likeliest one; None where there is none."""
     if balance.wander is None:
         return None
     chance = _likelihood(balance, fit, balance.wander)
@@ -119,7 +122,7 @@ def _calmed(balance: Balance, fit: Fit, ranked: Iterable[Rival]) -> tuple[Rival,
         calmer = estimate_wander(balance, rival.fit.prediction)
         brought = rival.evidence - gain(balance, rival.fit, fit) + _likelihood(balance, rival.fit, calmer) - chance
         if brought >= most:
-            best, most = (rival, calmer), brought
+            best, most = rival, brought
     return best
 
 
@@ -151,7 +154,7 @@ def _search(pair: Pair, effects: tuple[Any, ...], progress: Callable[[str], None
 
 def _least(balance: Balance, others: int) -> float:
     restless = balance.wander is not None and balance.wander.real
-    return EVIDENCE_LEAST if others or restless or balance.train.all() else FAINT
+    return EVIDENCE_LEAST if others or restless or not balance.untouched else FAINT
 
 
 def _names(fit: Fit) -> tuple[str, ...]:
@@ -202,10 +205,11 @@ def rank(pair: Pair, effects: Iterable[Any], terms: tuple[Term, ...], fit: Fit, 
     none is of interest."""
     balance, taken = pair.state, {t.effect.name for t in terms}
     places = [e if e.name not in taken or e.repeats else None for e in effects]
-    rough = [r for r in pair.map(_rough, places, terms, fit, least) if r is not None]
+    costs = [len(balance.grid(e).shapes) * (1.0 if additive(e) else REFIT) for e in effects]
+    rough = [r for r in pair.map(_rough, places, terms, fit, least, costs=costs) if r is not None]
     rough.sort(key=lambda item: -item[0])
     starts = [start for _, start in rough]
-    polished = pair.map(polish, starts[:refine], len(terms))
+    polished = pair.map(polish, starts[:refine], len(terms), costs=[1.0 if additive(s.terms[-1].effect) else DEARER for s in starts[:refine]])
     out = [(f, i < refine) for i, f in enumerate([*polished, *starts[refine:]]) if _possible(balance, f)]
     scale = min((scale_of(balance, f) for f, _ in out), default=1.0)
     weights = pair.map(_weight, out, fit, scale)
@@ -233,7 +237,7 @@ def scan(balance: Balance, effect: Any, terms: tuple[Term, ...], least: float = 
     if not grid.shapes:
         return None
     shapes = grid.shapes
-    if effect.replaces is None and not effect.warps and not effect.clips:
+    if additive(effect):
         shapes = _project(balance, grid, terms, 2 * balance.inflation * least / GRAIN)
     fits = [balance.fit((*terms, Term(effect, shape)), held=False) for shape in shapes]
     return balance.fit(likeliest(balance, fits, -1).terms) if fits else None
@@ -248,14 +252,16 @@ def _project(balance: Balance, grid: Grid, terms: tuple[Term, ...], least: float
     right = columns.products(rest.left)
     bounds = grid.effect.amplitudes()
     gains = np.zeros(len(grid.shapes))
-    for i in range(len(grid.shapes)):
-        mine = np.flatnonzero(columns.shape == i)  # what acts in validation recordings only tells nothing here
-        if not len(mine) or np.any(left[mine] < ALONG * columns.length[mine]):
+    allowed = ((right >= 0) | (bounds[0][2] < 0)) & ((right <= 0) | (bounds[0][3] > 0))
+    alone = np.where(allowed, right**2 / np.maximum(left, ALONG * columns.length) ** 2, 0.0)
+    own = left >= ALONG * columns.length
+    first = np.searchsorted(columns.shape, np.arange(len(grid.shapes) + 1))
+    for i, (begin, end) in enumerate(pairwise(first.tolist())):
+        if begin == end or not own[begin:end].all():  # what acts in validation recordings only tells nothing here
             continue
+        mine = np.arange(begin, end)
         if len(mine) == 1:
-            slope = float(right[mine[0]])
-            allowed = (slope >= 0 or bounds[0][2] < 0) and (slope <= 0 or bounds[0][3] > 0)
-            gains[i] = slope**2 / left[mine[0]] ** 2 if allowed else 0.0
+            gains[i] = alone[begin]
         else:
             gram = columns.gram(mine) - inside[mine] @ inside[mine].T
             gains[i] = float(right[mine] @ np.linalg.lstsq(gram, right[mine], rcond=None)[0])
@@ -365,11 +371,11 @@ def _swap(pair: Pair, effects: tuple[Any, ...], fit: Fit) -> Fit | None:
     return None
 
 
-def _findings(pair: Pair, effects: tuple[Any, ...], terms: tuple[Term, ...], fit: Fit, declared: Fit) -> tuple[Named, ...]:
+def _findings(pair: Pair, effects: tuple[Any, ...], fit: Fit) -> tuple[Named, ...]:
     """Each term with its rivals (every candidate in its place, small terms aside that may stand for one of them), its share and
     its probability; largest share first."""
-    balance, found = pair.state, []
-    explained = max(declared.rss - fit.rss, 1e-12)
+    balance, found, terms = pair.state, [], fit.terms
+    explained = max(balance.fit().rss - fit.rss, 1e-12)
     losses = [max(balance.fit(tuple(t for i, t in enumerate(terms) if i != which)).rss - fit.rss, 0.0)
               for which in range(len(terms))]
     large = [loss >= SMALL * sum(losses) for loss in losses]

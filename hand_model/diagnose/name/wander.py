@@ -8,11 +8,13 @@ accident. It is a random level per while (a random intercept; Laird & Ware 1982)
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .balance import Balance, replicate_deviation
+from .balance import Balance
+from .noise import replicate_deviation
 
 Array = NDArray[np.float64]
 
@@ -36,20 +38,41 @@ class Wander:
         """Whether it brings as much evidence as any effect must."""
         return self.evidence >= EVIDENCE_LEAST
 
+    @cached_property
+    def _starts(self) -> NDArray[np.int64]:
+        """Where each while begins: whiles follow each other."""
+        return np.flatnonzero(np.r_[True, np.diff(self.label) != 0])
+
+    @cached_property
+    def _lengths(self) -> NDArray[np.int64]:
+        return np.diff(np.r_[self._starts, len(self.label)])
+
     def whiten(self, values: Array, weight: Array, inflation: float) -> Array:
         """Weighted values (n,) or (n, k) with the level of each while shrunk to the size that noise has: uncorrelated again.
 
         weight: (n,) that `values` carry, zero for samples that take no part. Exact inverse root of
         I + d^2/inflation * w w' within each while (Woodbury).
         """
-        starts = np.flatnonzero(np.r_[True, np.diff(self.label) != 0])  # whiles follow each other
-        length = np.diff(np.r_[starts, len(self.label)])
-        size = np.add.reduceat(weight**2, starts)
+        size = np.add.reduceat(weight**2, self._starts)
         shrink = 1 - 1 / np.sqrt(1 + self.deviation**2 * size / inflation)
-        rate = np.repeat(np.where(size > 0, shrink / np.where(size > 0, size, 1.0), 0.0), length) * weight
-        columns = values.reshape(len(values), -1)
-        sums = np.repeat(np.add.reduceat(columns * weight[:, None], starts, axis=0), length, axis=0)
-        return (columns - rate[:, None] * sums).reshape(values.shape)
+        rate = np.where(size > 0, shrink / np.where(size > 0, size, 1.0), 0.0)
+
+        def one(column: Array) -> Array:
+            return column - np.repeat(rate * np.add.reduceat(column * weight, self._starts), self._lengths) * weight
+
+        if values.ndim == 1:
+            return one(values)
+        out = np.empty(values.shape)
+        for j in range(values.shape[1]):  # column by column: sums along the rows of a matrix are slow
+            out[:, j] = one(values[:, j])
+        return out
+
+    def common(self, weighted: Array, weight: Array, inflation: float) -> Array:
+        """What the levels take off the products (k, k) of weighted columns (n, k): X'X less this is that of the whitened ones (Woodbury)."""
+        size = np.add.reduceat(weight**2, self._starts)
+        sums = np.stack([np.add.reduceat(column * weight, self._starts) for column in weighted.T], axis=1)
+        share = self.deviation**2 / (inflation + self.deviation**2 * size)
+        return sums.T @ (share[:, None] * sums)
 
     def log_likelihood(self, residual: Array, weight: Array, inflation: float) -> float:
         """Log likelihood of a weighted residual (n,), normalised to that of white noise of the same weights."""
