@@ -225,7 +225,7 @@ def _modelled(findings: Findings, session: Session, hand: Hand | None, stations:
     if not any(f.correction is None for f in findings.findings):
         return findings, ()
     try:
-        hand = identify(session) if hand is None else hand
+        hand = identify(session, compared=False) if hand is None else hand
         tell(f"writing {output / 'model'}")
         named, replays = write_improved(hand, findings.findings, stations, ranges_of_counts(session), output, courses)
     except HandModelError as error:

@@ -46,16 +46,17 @@ class Identification:
     fingers: tuple[FingerFit, ...]
 
 
-def identify(session: Session | str | Path, say: Callable[[str], None] = lambda _: None) -> Hand:
+def identify(session: Session | str | Path, say: Callable[[str], None] = lambda _: None, compared: bool = True) -> Hand:
     """Identify the kinematics of a recorded hand: axes, centres, encoder maps, linkages, each with its uncertainty.
 
-    session: a session or its folder. say: called with one line per step. Raises SessionError and IdentificationError.
+    session: a session or its folder. say: called with one line per step. compared: with what the published method gives on the same
+    markers, too. Raises SessionError and IdentificationError.
     """
-    return identify_all(session, say).hand
+    return identify_all(session, say, compared).hand
 
 
 @single_threaded()
-def identify_all(session: Session | str | Path, say: Callable[[str], None] = lambda _: None) -> Identification:
+def identify_all(session: Session | str | Path, say: Callable[[str], None] = lambda _: None, compared: bool = True) -> Identification:
     """As `identify`, keeping poses, residuals and clocks for a report or a diagnosis."""
     session = session if isinstance(session, Session) else read_session(session)
     if session.rig is not None:
@@ -79,9 +80,9 @@ def identify_all(session: Session | str | Path, say: Callable[[str], None] = lam
         notes.append("no landmark trials: the palm frame is that of the palm markers, not the repeatable one")
     fingers, published = [], {}
     for fit in fits:
-        finger, table = _finger(fit, shape, frame, screws, notes)
+        finger, table = _finger(fit, shape, frame, screws, notes, compared)
         fingers.append(finger)
-        published[finger.name] = table
+        published |= {finger.name: table} if compared else {}
     found_motors = _motors(session, motors, notes)
     say(_motor_line(found_motors))
     rotation, origin = frame[0], frame[1]
@@ -158,6 +159,7 @@ def _finger(
     frame: tuple[Array, Array, Array],
     screws: Screws,
     notes: list[str],
+    compared: bool,
 ) -> tuple[Finger, dict[str, Any]]:
     data = aligned(fit)
     maps = encoder_maps(fit, data)
@@ -192,7 +194,7 @@ def _finger(
                 degenerate=degenerate,
             )
         )
-        published[segment.name] = _published(fit, k, covariance, arc)
+        published |= {segment.name: _published(fit, k, covariance, arc)} if compared else {}
     return Finger(fit.finger.name, fit.finger.actuator, tuple(joints), maps, links), published
 
 
