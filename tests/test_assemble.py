@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 
-from hand_model.diagnose.assemble import _of_hinges, _shared, _without_shadows, _without_tilts, assemble
+from hand_model.diagnose.assemble import _of_hinges, _of_loose, _shared, _without_shadows, _without_tilts, assemble
 from hand_model.diagnose.findings import Finding, weighed
 from hand_model.diagnose.locate.displacement import NO_HINGE
 
@@ -105,3 +107,11 @@ def test_where_no_finger_is_a_hinge_to_the_cameras_angles_tell_nothing() -> None
               with_share(0.5, "stribeck_friction", "index", "current", 1.0), with_share(0.5, "linkage_backlash", "little", "markers", 1.0)]
     assert _of_hinges(ranked, bent) == ranked[2:]
     assert _of_hinges(ranked, bent[:1]) == ranked[1:]  # one finger has none: its angles tell nothing, the other fingers do
+
+
+@pytest.mark.parametrize(("finger", "signal", "p", "doubtful"), [
+    ("index", "markers", 1e-9, True), ("index", "encoder", 1e-9, True), ("index", "markers", 0.2, False),
+    ("index", "current", 1e-9, False), ("ring", "markers", 1e-9, False)])
+def test_angles_of_segments_that_are_not_rigid_need_a_name_that_leaves_nothing(finger: str, signal: str, p: float, doubtful: bool) -> None:
+    station = SimpleNamespace(finger=finger, signal=signal, naming=SimpleNamespace(after=SimpleNamespace(p=p)))
+    assert _of_loose(station, {"index"}) is doubtful

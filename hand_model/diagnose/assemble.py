@@ -11,7 +11,7 @@ import numpy as np
 from ..effects import catalogue
 from ..effects.base import sample_interval
 from .findings import Finding, Findings
-from .locate.displacement import NO_HINGE
+from .locate.displacement import NO_HINGE, NOT_RIGID
 from .locate.markers import HINGE, SLIPS
 from .magnitude import channel_figures, magnitude
 from .name.distinguishability import protocol_pairs
@@ -39,8 +39,9 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
     ranked: list[tuple[float, Finding]] = _heaviest(marker_findings, _palm_marker)
     rejected: list[dict[str, str]] = []
     unexplained = list(unexplained)
+    loose = {entry["where"]["finger"] for entry in unexplained if entry["shape"] == NOT_RIGID}
     for station in stations:
-        if station.believed:
+        if station.believed and not _of_loose(station, loose):
             unexplained += [outsider_of(station, f) for f in station.outsiders]
             for weight, finding in (finding_of(station, *merged) for merged in _merged(station.kept)):
                 if station.naming.before.p >= ALPHA and _magnitude(finding, stations, _value) < MINUTE:
@@ -50,7 +51,7 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
                     ranked.append((weight, finding))
         elif station.missing:
             unexplained.append(unexplained_of(station, 1.0))
-        if station.believed and station.naming.after.p < ALPHA and station.explained < 0.95:
+        if station.believed and not _of_loose(station, loose) and station.naming.after.p < ALPHA and station.explained < 0.95:
             unexplained.append(unexplained_of(station, 1 - station.explained))
         rejected += [{"effect": name, "where": str(station.finger), "reason": _reason(value)}
                      for name, value in station.naming.rejected[:4] if name in NAMES]
@@ -74,6 +75,12 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
                 "after": variance_ratio(worst.naming, worst.naming.fit), "limit": 1 + 2.6 * float(np.sqrt(2 / count))}
     return Findings(verdict, lack, _protocol(stations), found, tuple(rejected), tuple(unexplained), _next(found),
                     tuple(channel_of(s) for s in stations), tuple(notes))
+
+
+def _of_loose(station: Station, loose: set[str]) -> bool:
+    """Whether a station's names leave something in angles of a finger whose markers leave their segments by no known way (`loose`): what is
+    wrong with the markers may be behind both."""
+    return station.finger in loose and station.signal != "current" and station.naming.after.p < ALPHA
 
 
 def _magnitude(finding: Finding, stations: Sequence[Station], read: Callable[[Mapping[str, Any]], float | None]) -> float:

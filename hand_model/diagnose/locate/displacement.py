@@ -13,6 +13,7 @@ Array = NDArray[np.float64]
 
 BOTH = (True, False)
 NO_HINGE = "no plain hinge"  # a joint whose markers leave the hinge in step with its angle, by none of the known ways
+NOT_RIGID = "markers leave their rigid segments, by no effect known here"
 CREEP = "creep"  # of a marker or support that moves all the time; a slip has a moment
 UNNAMED = (NO_HINGE, CREEP)  # what no table of effects names
 

@@ -14,7 +14,7 @@ from ...rotation import kabsch
 from ..findings import Finding, weighed
 from .angles import FingerAngles
 from .blocks import Blocks
-from .displacement import NO_HINGE, UNNAMED
+from .displacement import NO_HINGE, NOT_RIGID, UNNAMED
 from .markers import ALPHA, UNHINGED, MarkerEffect, MarkerNaming
 from .wobble import centre_travel, wobble_amplitude
 
@@ -72,7 +72,7 @@ def unexplained(angles: FingerAngles, naming: MarkerNaming) -> list[dict[str, An
     joints = [e.body - 1 for e in (*naming.found, naming.refused) if e is not None and e.effect in UNHINGED]
     if joints:
         return [entry(angles.finger.segments[joints[0]].name, 1.0, f"{NO_HINGE}: {IN_STEP}")]
-    return [entry(None, 1.0, "markers leave their rigid segments, by no effect known here")]
+    return [entry(None, 1.0, NOT_RIGID)]
 
 
 def _finding(angles: FingerAngles, naming: MarkerNaming, name: str, body: int, label: str | None,
