@@ -242,3 +242,42 @@ def test_a_drifting_clock_lifts_no_finger() -> None:
     for drift in (1.5e-3, -3e-3):
         states = joint(9, drift=drift)
         assert not any(np.any(s.extra["ahead"] > 0) for s in states)
+
+
+def held(begin_s: float, end_s: float, lift_deg: float):
+    """A finger held ahead of its drive for a while, as if somebody pushed: it can only be ahead."""
+    return lambda t, x, v: np.maximum(lift_deg * np.clip(np.minimum(t - begin_s, end_s - t) / 0.4, 0, 1) - np.polynomial.Polynomial(MAP)(x / 100), 0.0)
+
+
+@pytest.mark.parametrize("lasting_s", [2.0, 7.0])
+def test_a_finger_held_ahead_however_long_is_named_and_comes_back_without_a_jump(lasting_s: float) -> None:
+    states = joint(3, add=held(8.5, 8.5 + lasting_s, 60.0))
+    assert set(named(states, "encoder")) == {"spring_decoupling"}
+    for state in states:
+        ahead = state.extra["ahead"]
+        assert state.validate or np.any(ahead > 5.0) and np.abs(np.diff(ahead)).max() < 5.0  # of up to 60, at 100 Hz
+
+
+@pytest.mark.parametrize(("size_deg", "memory_s"), [(0.3, 1.0), (0.6, 4.0), (1.2, 1.0)])
+def test_an_angle_that_wanders_both_ways_is_lifted_by_nobody(size_deg: float, memory_s: float) -> None:
+    keep = np.exp(-0.01 / memory_s)
+    for seed in range(3):
+        rng = np.random.default_rng(100 + seed)
+
+        def wander(t, x, v, rng=rng):
+            level = [rng.normal()]
+            for _ in t[1:]:
+                level.append(keep * level[-1] + np.sqrt(1 - keep**2) * rng.normal())
+            return size_deg * np.array(level)
+
+        assert not any(np.any(s.extra["ahead"] > 0) for s in joint(seed, add=wander))
+
+
+def test_what_follows_a_lifted_joint_is_not_judged_while_it_is_lifted() -> None:
+    from hand_model.diagnose.locate.decoupled import of_hinged
+
+    ahead = joint(3, add=held(8.5, 10.5, 60.0))
+    state, other = of_hinged(joint(4), ahead)
+    during = ahead[0].extra["ahead"] > 0
+    assert during.any() and np.isnan(state.effort[during]).all()
+    assert np.isfinite(state.effort[(state.time_s < 7.0) | (state.time_s > 12.0)]).all() and np.isfinite(other.effort).all()

@@ -20,6 +20,7 @@ from .locate.angles import (
     ranges_of_counts,
 )
 from .locate.course import FingerCourses, finger_courses
+from .locate.decoupled import of_hinged
 from .locate.markers import HINGE, corrected_angles, name_markers
 from .locate.slips import marker_findings, steps
 from .locate.slips import unexplained as unexplained_of
@@ -71,6 +72,11 @@ def _reading(session: Session, finger: Finger, shape: Any, counts: dict[str, tup
         return FingerReading(finger.name, seen, notes=(str(error),))
 
 
+def _leaves(encoder: Station) -> bool:
+    """Whether a finger is found to run ahead of its drive for a while."""
+    return encoder.believed and any(f.term.effect.name == "spring_decoupling" and f.term.shape["form"] < 0.5 for f in encoder.kept)
+
+
 def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, float]]) -> FingerReading:
     markers = name_markers(seen)
     found = tuple(marker_findings(seen, markers))
@@ -90,6 +96,8 @@ def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, f
     for joint in range(1, len(finger.segments)):
         expected = expected_angles(stations[0].naming) if stations and joint == 1 else {}
         states = linkage_states(angles, joint, moments, expected, not parted)
+        if states and joint == 1 and stations and _leaves(stations[0]):
+            states = of_hinged(states, stations[0].naming.balance.states)
         if states:
             effects = [*catalogue("linkage"), *outsiders("linkage")]
             stations.append(judged("markers", finger.name, finger.actuator, finger.segments[joint].name, states, effects))

@@ -6,11 +6,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...effects.base import DriveState
 from ...effects.spring_decoupling import spans
 from ...identify.clock import align
 from .angles import FingerAngles
+
+Array = NDArray[np.float64]
 
 BESIDE = 0.4  # of an excursion's length, on either side: it is seen from where it stands out
 
@@ -18,6 +21,19 @@ BESIDE = 0.4  # of an excursion's length, on either side: it is seen from where 
 def while_driven(states: Sequence[DriveState], below: float) -> tuple[DriveState, ...]:
     """A drive's states without the current where the finger does not follow it open, below that position [%]: the spring is not on it there."""
     return tuple(replace(s, effort=np.where(s.position < below, np.nan, s.effort)) for s in states)
+
+
+def of_hinged(states: Sequence[DriveState], ahead: Sequence[DriveState]) -> tuple[DriveState, ...]:
+    """A linkage's states without whiles in which the joint before ran `ahead` of its drive (states of the encoder's balance): something held
+    the finger then, and how the joint moved is told by no more than its markers."""
+    found = {s.trial: spans(s) for s in ahead}
+    return tuple(replace(s, effort=np.where(_during(s.time_s, found.get(s.trial, [])), np.nan, s.effort)) for s in states)
+
+
+def _during(time_s: Array, whiles: Sequence[Sequence[float]]) -> NDArray[np.bool_]:
+    """Samples (n,) within or right beside one of the whiles [s]."""
+    close = [np.abs(time_s - 0.5 * (a + b)) <= (0.5 + BESIDE) * (b - a) for a, b in whiles]
+    return np.any(close, axis=0) if close else np.zeros(len(time_s), bool)
 
 
 def without_excursions(states: Sequence[DriveState], ahead: Sequence[DriveState], angles: FingerAngles) -> tuple[DriveState, ...]:
@@ -33,10 +49,7 @@ def without_excursions(states: Sequence[DriveState], ahead: Sequence[DriveState]
             record, flexed = records[state.trial], records[state.trial].angle_rad[:, 0]
             good = np.isfinite(flexed)
             clock = align(record.mocap.time_s[good], flexed[good], state.time_s, state.position, state.trial)
-            free = np.zeros(len(state.time_s), bool)
-            for begin, end in spans(found[state.trial]):
-                a, b = clock.log_time(np.array([begin, end]))
-                free |= np.abs(state.time_s - 0.5 * (a + b)) <= (0.5 + BESIDE) * (b - a)
+            free = _during(state.time_s, [clock.log_time(np.array(span)) for span in spans(found[state.trial])])
             state = replace(state, effort=np.where(free, np.nan, state.effort))
         out.append(state)
     return tuple(out)

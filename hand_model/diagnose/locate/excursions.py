@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,18 +15,22 @@ from .motion import local_quadratic
 
 Array = NDArray[np.float64]
 
-LONGEST_S = 2.5  # what lasts longer is no excursion
+LONGEST_S = 12.0  # what lasts longer is no excursion
 SHORTEST_S = 0.12
 GROWTH = 1.3  # from one length tried to the next
+FEWEST = 50  # samples of a recording below which nothing is searched
+BEYOND = 2.0  # times as much as anything stands out below
 LEAST = 12.0  # log likelihood ratio of an excursion, beyond the search over moments and lengths
 SMOOTH_S = 0.06  # bandwidth of its course
+EDGE_S = 0.3  # by which it may begin before and end after the window that tells it best
 
 
 def with_excursions(states: Sequence[DriveState]) -> tuple[DriveState, ...]:
     """The states with "ahead" in `extra`: (n,) [effort unit] the course of every excursion, zero elsewhere.
 
     The residual of the declared map and a drifting clock, minus its median over replicates (same place and direction in other strokes), is
-    searched for windows whose mean stands out by a likelihood ratio; each must have ended before LONGEST_S.
+    searched for windows whose mean stands out by a likelihood ratio, and beyond what stands out below: nothing pushes a finger behind its
+    drive, so what does so there is chance (an angle that wanders goes both ways). Each must have ended before LONGEST_S.
     """
     states = tuple(states)
     if not states:
@@ -34,15 +38,35 @@ def with_excursions(states: Sequence[DriveState]) -> tuple[DriveState, ...]:
     balance = Balance(states, everything=True)
     drifting = balance.fit((Term(effect("clock_drift"), {}),))  # a clock at another rate lifts the finger where it is fast
     residual = _beside_replicates(balance, balance.effort - drifting.prediction)
-    out, start = [], 0
-    for state, mask in zip(states, balance.masks, strict=True):
-        mine = residual[start : start + mask.sum()]
-        start += len(mine)
+    coloured = balance.sigma * np.sqrt(balance.inflation) if balance.inflation > 1 else 0.0
+    parts = np.split(residual, np.cumsum([m.sum() for m in balance.masks])[:-1])
+    told = [_Told.of(s.time_s[m], r, coloured) if len(r) > FEWEST else None for s, m, r in zip(states, balance.masks, parts, strict=True)]
+    behind = max((_best_window(-t.residual, t.sigma, t.lengths)[0] for t in told if t is not None), default=0.0)
+    out = []
+    for state, mask, one in zip(states, balance.masks, told, strict=True):
         ahead = np.zeros(len(state.time_s))
-        if len(mine) > 50:
-            ahead[mask] = _course(state.time_s[mask], mine, balance.sigma * np.sqrt(balance.inflation) if balance.inflation > 1 else 0.0)
+        if one is not None:
+            ahead[mask] = _course(one, max(LEAST, BEYOND * behind))
         out.append(replace(state, extra={**state.extra, "ahead": ahead}))
     return tuple(out)
+
+
+@dataclass(frozen=True)
+class _Told:
+    """One recording's residual (n,) beside replicates. sigma: its noise. lengths: of the windows to try, in samples."""
+
+    time_s: Array
+    residual: Array
+    sigma: float
+    lengths: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, time_s: Array, residual: Array, coloured: float) -> _Told:
+        """coloured: deviation of one reading that a mean over many has, where noise is not white, else zero."""
+        step = float(np.median(np.diff(time_s)))
+        steps = 1 + int(np.log(LONGEST_S / SHORTEST_S) / np.log(GROWTH))
+        lengths = np.unique(np.geomspace(SHORTEST_S / step, LONGEST_S / step, steps).astype(int))
+        return cls(time_s, residual, max(float(np.sqrt(np.median(np.diff(residual) ** 2) / 0.9099)), coloured), lengths)
 
 
 def _beside_replicates(balance: Balance, residual: Array) -> Array:
@@ -61,22 +85,28 @@ def _beside_replicates(balance: Balance, residual: Array) -> Array:
     return out
 
 
-def _course(time_s: Array, residual: Array, coloured: float) -> Array:
-    """Smoothed residual (n,) within the excursions of one recording, zero elsewhere. coloured: deviation of one reading that a mean over
-    many has, where noise is not white, else zero."""
-    step = float(np.median(np.diff(time_s)))
-    left = residual.copy()
+def _course(told: _Told, least: float) -> Array:
+    """Smoothed residual (n,) within the excursions of one recording, zero elsewhere. least: log likelihood ratio of each."""
+    left = told.residual.copy()
     inside = np.zeros(len(left), bool)
-    quiet = max(float(np.sqrt(np.median(np.diff(residual) ** 2) / 0.9099)), coloured)
-    lengths = np.unique(np.geomspace(SHORTEST_S / step, LONGEST_S / step, 1 + int(np.log(LONGEST_S / SHORTEST_S) / np.log(GROWTH))).astype(int))
     for _ in range(len(left)):
-        gain, begin, end = _best_window(left, quiet, lengths)
-        if gain < LEAST or end - begin >= lengths[-1]:
+        gain, begin, end = _best_window(left, told.sigma, told.lengths)
+        if gain < least or end - begin >= told.lengths[-1]:
             break
         inside[begin:end] = True
         left[begin:end] = 0.0
-    smooth = local_quadratic(time_s, residual, SMOOTH_S)[0]
-    return np.where(inside, np.maximum(smooth, 0.0), 0.0)
+    smooth = np.maximum(local_quadratic(told.time_s, told.residual, SMOOTH_S)[0], 0.0)
+    return np.where(_to_zero(inside, smooth, int(EDGE_S / float(np.median(np.diff(told.time_s))))), smooth, 0.0)
+
+
+def _to_zero(inside: NDArray[np.bool_], smooth: Array, most: int) -> NDArray[np.bool_]:
+    """The windows (n,), each on to where the course is back at zero, `most` samples at most: a finger does not jump."""
+    out = inside.copy()
+    for step in (1, -1):
+        grown = out[::step]
+        for _ in range(most):
+            grown[1:] |= grown[:-1] & (smooth[::step][1:] > 0)
+    return out
 
 
 def _best_window(residual: Array, sigma: float, lengths: NDArray[np.int64]) -> tuple[float, int, int]:
