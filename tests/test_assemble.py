@@ -7,8 +7,10 @@ from types import SimpleNamespace
 import pytest
 
 from hand_model.diagnose.assemble import _of_hinges, _of_loose, _shared, _without_shadows, _without_tilts, assemble
+from hand_model.diagnose.diagnosis import _without_settled_sags
 from hand_model.diagnose.findings import Finding, weighed
 from hand_model.diagnose.locate.displacement import NO_HINGE
+from hand_model.effects import effect
 
 
 def periodic(effect: str, actuator: str, period: float) -> tuple[float, Finding]:
@@ -115,3 +117,13 @@ def test_where_no_finger_is_a_hinge_to_the_cameras_angles_tell_nothing() -> None
 def test_angles_of_segments_that_are_not_rigid_need_a_name_that_leaves_nothing(finger: str, signal: str, p: float, doubtful: bool) -> None:
     station = SimpleNamespace(finger=finger, signal=signal, naming=SimpleNamespace(after=SimpleNamespace(p=p)))
     assert _of_loose(station, {"index"}) is doubtful
+
+
+@pytest.mark.parametrize(("named", "believed", "stays"), [("drive_sag", True, False), ("current_saturation", True, False), ("drive_sag", False, True),
+                                                          ("stribeck_friction", True, True)])
+def test_a_loss_of_speed_is_named_once_and_not_where_the_current_is_cut(named: str, believed: bool, stays: bool) -> None:
+    kept = [SimpleNamespace(term=SimpleNamespace(effect=effect(named)))]
+    station = SimpleNamespace(actuator="index", believed=believed, kept=kept)
+    mine, other = (1.0, finding("drive_sag", "index", "command", sag=0.1)), (1.0, finding("drive_sag", "ring", "command", sag=0.1))
+    late = (1.0, finding("command_delay", "index", "command", delay=0.05))
+    assert _without_settled_sags([mine, other, late], [station]) == ([mine] if stays else []) + [other, late]

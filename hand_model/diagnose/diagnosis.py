@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -159,9 +159,14 @@ class _Heard:
         odd = preload_findings(self.stations)
         for _, finding in odd:
             self.tell(finding.statement)
-        # A reading that clips says little of the load, on which a sag of speed is judged; one that the current shows, too, is named there, with a law to write.
-        settled = {s.actuator for s in self.stations if s.believed for f in s.kept if f.term.effect.clips or f.term.effect.name == "drive_sag"}
-        self.found = [i for i in (*self.found, *odd) if i[1].effect != "drive_sag" or i[1].where["actuator"] not in settled]
+        self.found = _without_settled_sags([*self.found, *odd], self.stations)
+
+
+def _without_settled_sags(found: list[tuple[float, Finding]], stations: Sequence[Station]) -> list[tuple[float, Finding]]:
+    """Without losses of speed of drives whose current settles the matter: a reading that clips says little of the load on which such a sag is
+    judged, and one that the current shows, too, is named there, with a law to write."""
+    settled = {s.actuator for s in stations if s.believed for f in s.kept if f.term.effect.clips or f.term.effect.name == "drive_sag"}
+    return [i for i in found if i[1].effect != "drive_sag" or i[1].where["actuator"] not in settled]
 
 
 def _timed(drives: dict[str, tuple[DriveState, ...]],
