@@ -10,7 +10,7 @@ from test_diagnose import drive, planted
 
 from hand_model.diagnose.name.balance import Balance, Term
 from hand_model.diagnose.name.grid import stacked
-from hand_model.diagnose.name.selection import scan
+from hand_model.diagnose.name.shapes import scan
 from hand_model.diagnose.name.wander import Wander
 from hand_model.effects import effect
 

@@ -11,7 +11,8 @@ from test_kinematic_stations import MAP, joint
 
 from hand_model.diagnose.name.balance import Balance, Term
 from hand_model.diagnose.name.reread import of_recording, reread
-from hand_model.diagnose.name.selection import name_effects, polish
+from hand_model.diagnose.name.selection import name_effects
+from hand_model.diagnose.name.shapes import polish
 from hand_model.diagnose.name.station import finding_of, judged
 from hand_model.effects import catalogue, effect
 

@@ -30,7 +30,7 @@ from .locate.stamps import Stamps, stamps
 from .name.balance import Balance
 from .name.evidence import gain, typical_coefficients
 from .name.reread import reread
-from .name.selection import polish, scan
+from .name.shapes import polish, scan
 from .name.station import Station, judged
 from .page import write_page
 from .prove.correct import refuse_output, write_corrected

@@ -5,7 +5,6 @@ Everything here is generic in what the effort is (current, torque, an angle) and
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -18,6 +17,7 @@ from ...effects.base import DriveState
 from ...effects.path import strokes
 from .grid import Grid, GridColumns, stacked
 from .least_squares import from_products
+from .memory import Memory
 from .noise import noise
 from .projection import Projection
 
@@ -30,7 +30,6 @@ Array = NDArray[np.float64]
 # What physics allows of a declared coefficient, by its column's name.
 DECLARED_LOW = {"inertia": 0.0, "viscous": 0.0, "coulomb": 0.0, "spring": 0.0}
 MOST_KEPT = 3e8  # bytes of columns that one balance keeps
-MOST_LAST = 1e8  # bytes of columns of single terms that it remembers: grids ask for the same ones again
 UNSETTLED = 1e-3  # weight left to a start or stop where steady motion alone is asked
 DISCRETE = ("side", "trial", "form", "end")  # shapes that choose among few cases: no continuous parameter is spent on them
 
@@ -59,28 +58,6 @@ class Fit:
         """What the columns of one term add to the effort (n,) along a recording."""
         term = self.terms[which]
         return term.effect.columns(state, term.shape) @ np.array(list(self.amplitudes[which].values()))
-
-
-class _Remembered:
-    """What was asked for last, as much as MOST_LAST bytes hold."""
-
-    def __init__(self) -> None:
-        self._items: OrderedDict[Any, Array] = OrderedDict()
-        self._bytes = 0
-
-    def get(self, key: Any) -> Array | None:
-        """What is remembered under a key, None where nothing is."""
-        if key in self._items:
-            self._items.move_to_end(key)
-        return self._items.get(key)
-
-    def put(self, key: Any, value: Array) -> Array:
-        """The value, remembered; what was not asked for longest is forgotten."""
-        self._items[key] = value
-        self._bytes += value.nbytes
-        while self._bytes > MOST_LAST and len(self._items) > 1:
-            self._bytes -= self._items.popitem(last=False)[1].nbytes
-        return value
 
 
 def additive(effect: Any) -> bool:
@@ -135,7 +112,7 @@ class Balance:
         self._grids: dict[Any, Grid] = {}
         self._kept: dict[Any, GridColumns] = {}
         self._warped: tuple[Any, ...] = ()
-        self._last = _Remembered()
+        self._last = Memory()
         self._apart: Any = None
         self._learning: Balance | None = None
 
@@ -153,7 +130,7 @@ class Balance:
             scale = state.extra["scale"]
             return replace(state, extra={**state.extra, "slope": Polynomial(powers).deriv()(state.position / scale) / scale})
 
-        return self._with(states=tuple(with_slope(s) for s in self.states), _last=_Remembered())
+        return self._with(states=tuple(with_slope(s) for s in self.states), _last=Memory())
 
     def required(self, fit: Fit) -> Balance:
         """The same balance with what is "required" of the drive as a fit has it, its effects included."""
@@ -163,7 +140,7 @@ class Balance:
                 effort = effort + fit.added(which, state)
             return replace(state, extra={**state.extra, "required": effort})
 
-        return self._with(states=tuple(asked(s) for s in self.states), _last=_Remembered())
+        return self._with(states=tuple(asked(s) for s in self.states), _last=Memory())
 
     def settled(self) -> Balance:
         """The same balance with next to no weight on starts and stops."""
@@ -176,7 +153,7 @@ class Balance:
             kept = {name: getattr(self, name)[mine] for name in ("effort", "weight", "timing", "steady", "stroke", "train")}
             rows = [r[:0] if left_out else r for r, left_out in zip(self._rows, self._left_out(), strict=True)]
             wander = None if self.wander is None else replace(self.wander, label=self.wander.label[mine])
-            self._learning = self if mine.all() else self._with(**kept, _rows=rows, wander=wander, _last=_Remembered())
+            self._learning = self if mine.all() else self._with(**kept, _rows=rows, wander=wander, _last=Memory())
         return self._learning
 
     def _left_out(self) -> list[bool]:
@@ -192,7 +169,7 @@ class Balance:
 
     def __getstate__(self) -> dict[str, Any]:
         """What another process needs: nothing of what is only kept to save time."""
-        return {**self.__dict__, "_kept": {}, "_apart": None, "_learning": None, "_last": _Remembered()}
+        return {**self.__dict__, "_kept": {}, "_apart": None, "_learning": None, "_last": Memory()}
 
     def whiten(self, values: Array, weight: Array) -> Array:
         """Weighted values (n,) or (n, k) in which the noise is as good as white; as they are without `wander`."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .balance import DISCRETE, Balance, Fit, Term
 from .evidence import gain, oddity
 from .naming import Naming
-from .selection import likeliest, refit
+from .shapes import likeliest, refit
 
 Array = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from ...effects.base import DriveState
 from ..findings import Finding
 from .balance import Balance, Fit, Term
 from .interval import Reading, parameter_intervals, undisturbed
-from .selection import refit, reform
+from .shapes import refit, reform
 from .station import Station, finding_of
 
 Array = NDArray[np.float64]

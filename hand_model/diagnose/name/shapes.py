@@ -1,0 +1,119 @@
+"""The shape of a term beside others: the best of a grid of starts, then optimised, everything linear refitted at each step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from .balance import DISCRETE, Balance, Fit, Term, additive
+from .grid import Grid
+
+Array = NDArray[np.float64]
+
+ALONG = 1e-6  # of a column's length: less left beside the design, and it says nothing of its own
+GRAIN = 1.5  # times what the best shape of a grid brings: more no shape between is expected to
+
+
+def scan(balance: Balance, effect: Any, terms: tuple[Term, ...], least: float = 0.0) -> Fit | None:
+    """Best starting shape of `effect` beside `terms`; columns are projected, anything else is refitted. None where no shape could bring
+    a log likelihood near `least`."""
+    grid = balance.grid(effect)
+    if not grid.shapes:
+        return None
+    shapes = grid.shapes
+    if additive(effect):
+        shapes = _project(balance, grid, terms, 2 * balance.inflation * least / GRAIN)
+    fits = [balance.fit((*terms, Term(effect, shape)), held=False) for shape in shapes]
+    return balance.fit(likeliest(balance, fits, -1).terms) if fits else None
+
+
+def _project(balance: Balance, grid: Grid, terms: tuple[Term, ...], least: float) -> list[dict[str, float]]:
+    """The two best shapes of a grid by the fall of the RSS, more than `least`, that its columns, orthogonal to the design, bring."""
+    rest = balance.apart(terms)
+    columns = balance.grid_columns(grid, rest.weight, tuple(t for t in terms if t.effect.warps))
+    inside = columns.products(rest.basis)
+    left = np.sqrt(np.maximum(columns.length**2 - np.sum(inside**2, axis=1), 0.0))
+    right = columns.products(rest.left)
+    bounds = grid.effect.amplitudes()
+    gains = np.zeros(len(grid.shapes))
+    allowed = ((right >= 0) | (bounds[0][2] < 0)) & ((right <= 0) | (bounds[0][3] > 0))
+    alone = np.where(allowed, right**2 / np.maximum(left, ALONG * columns.length) ** 2, 0.0)
+    own = left >= ALONG * columns.length
+    first = np.searchsorted(columns.shape, np.arange(len(grid.shapes) + 1))
+    for i, (begin, end) in enumerate(pairwise(first.tolist())):
+        if begin == end or not own[begin:end].all():  # what acts in validation recordings only tells nothing here
+            continue
+        mine = np.arange(begin, end)
+        if len(mine) == 1:
+            gains[i] = alone[begin]
+        else:
+            gram = columns.gram(mine) - inside[mine] @ inside[mine].T
+            gains[i] = float(right[mine] @ np.linalg.lstsq(gram, right[mine], rcond=None)[0])
+    order = np.argsort(gains)[::-1]
+    return [grid.shapes[i] for i in order[:2] if gains[i] > max(least, 0.0)]
+
+
+def polish(balance: Balance, fit: Fit, which: int) -> Fit:
+    """Optimise the shape of one term (Nelder-Mead within its bounds), everything linear refitted at each step."""
+    term = fit.terms[which]
+    shapes = [s for s in term.effect.shapes(balance.states) if s.name not in DISCRETE]
+    if not shapes:
+        return fit
+    span = np.array([s.high - s.low for s in shapes])
+    start = np.array([term.shape[s.name] for s in shapes])
+    error = balance.error_beside(tuple(t for i, t in enumerate(fit.terms) if i != which), term.effect)
+
+    def shaped(u: Array) -> dict[str, float]:
+        return {**term.shape, **{s.name: float(np.clip(v, s.low, s.high)) for s, v in zip(shapes, start + u * span, strict=True)}}
+
+    step = [np.zeros(len(shapes))]
+    for i, s in enumerate(shapes):
+        corner = np.zeros(len(shapes))
+        near = [abs(v - start[i]) for v in s.starts if v != start[i]]
+        corner[i] = 0.4 * (min(near) if near else 0.1 * span[i]) / span[i]
+        step.append(corner)
+    result = minimize(lambda u: error(shaped(u)), np.zeros(len(shapes)), method="Nelder-Mead",
+                      options={"initial_simplex": np.array(step), "maxfev": 30 + 25 * len(shapes), "fatol": 0.02,
+                               "xatol": 1e-4})
+    terms = list(fit.terms)
+    terms[which] = Term(term.effect, shaped(result.x))
+    best = balance.fit(tuple(terms))
+    return best if best.rss < fit.rss else fit
+
+
+def refit(balance: Balance, fit: Fit, rounds: int = 2) -> Fit:
+    """Optimise all shapes, one term after the other, until nothing falls any more."""
+    for _ in range(rounds if len(fit.terms) > 1 else 1):
+        before = fit.rss
+        for which in range(len(fit.terms)):
+            fit = polish(balance, fit, which)
+        if before - fit.rss < 0.5:
+            break
+    return fit
+
+
+def reform(balance: Balance, fit: Fit, which: int) -> Fit:
+    """The likeliest of the forms of one term, each with its shape optimised."""
+    term = fit.terms[which]
+    forms = next((s.starts for s in term.effect.shapes(balance.states) if s.name == "form"), ())
+    fits = [fit]
+    for form in forms:
+        if form != term.shape["form"]:
+            terms = list(fit.terms)
+            terms[which] = Term(term.effect, {**term.shape, "form": form})
+            fits.append(polish(balance, balance.fit(tuple(terms)), which))
+    return likeliest(balance, fits, which)
+
+
+def likeliest(balance: Balance, fits: Iterable[Fit], which: int, cost: Callable[[Fit], float] = lambda f: f.rss) -> Fit:
+    """The fit of the smallest cost, of those whose term `which` a machine may have where there are any."""
+    def key(fit: Fit) -> tuple[bool, float]:
+        term, amplitudes = fit.terms[which], fit.amplitudes[which]
+        return not term.effect.possible(balance.states, term.effect.parameters(term.shape, amplitudes, fit.declared)), cost(fit)
+
+    return min(fits, key=key)
