@@ -151,15 +151,10 @@ class Balance:
         if self._learning is None:
             mine = self.train
             kept = {name: getattr(self, name)[mine] for name in ("effort", "weight", "timing", "steady", "stroke", "train")}
-            rows = [r[:0] if left_out else r for r, left_out in zip(self._rows, self._left_out(), strict=True)]
+            rows = [rows[:0] if state.validate else rows for state, rows in zip(self.states, self._rows, strict=True)]
             wander = None if self.wander is None else replace(self.wander, label=self.wander.label[mine])
             self._learning = self if mine.all() else self._with(**kept, _rows=rows, wander=wander, _last=Memory())
         return self._learning
-
-    def _left_out(self) -> list[bool]:
-        """Which recordings take no part in learning: all of their samples."""
-        ends = np.cumsum([len(r) for r in self._rows])
-        return [not self.train[end - len(rows) : end].any() for rows, end in zip(self._rows, ends, strict=True)]
 
     def _with(self, **changes: Any) -> Balance:
         """The same balance with other attributes, what is kept of weighted columns thrown away."""
