@@ -15,7 +15,7 @@ from .angles import FingerAngles
 
 Array = NDArray[np.float64]
 
-BESIDE = 0.4  # of an excursion's length, on either side: it is seen from where it stands out
+BESIDE, MOST_S = 0.4, 1.0  # of an excursion's length, at most, on either side: it is seen from where it stands out
 
 
 def while_driven(states: Sequence[DriveState], below: float) -> tuple[DriveState, ...]:
@@ -32,7 +32,7 @@ def of_hinged(states: Sequence[DriveState], ahead: Sequence[DriveState]) -> tupl
 
 def _during(time_s: Array, whiles: Sequence[Sequence[float]]) -> NDArray[np.bool_]:
     """Samples (n,) within or right beside one of the whiles [s]."""
-    close = [np.abs(time_s - 0.5 * (a + b)) <= (0.5 + BESIDE) * (b - a) for a, b in whiles]
+    close = [np.abs(time_s - 0.5 * (a + b)) <= 0.5 * (b - a) + min(BESIDE * (b - a), MOST_S) for a, b in whiles]
     return np.any(close, axis=0) if close else np.zeros(len(time_s), bool)
 
 
