@@ -12,11 +12,11 @@ from hand_model.rig import diagnose_rig, load_rig
 from hand_model.rig.candidates import UNDECLARED, candidates
 from hand_model.rig.compete import Term, pose, rescaled, solution
 from hand_model.rig.diagnose import trusted_fit
-from hand_model.rig.laws import GEAR, Now, law
+from hand_model.rig.laws import GEAR, GEAR_LOW, LOW, MOTOR, MOTOR_LOW, TURNING, Now, law
 from hand_model.session import read_session
 
 SIZE = 0.25
-LAWS = {"motor side": lambda drive, load, bias: np.abs(drive), GEAR: lambda drive, load, bias: 0.5 * np.abs(drive + bias),
+LAWS = {MOTOR: lambda drive, load, bias: np.abs(drive), GEAR: lambda drive, load, bias: 0.5 * np.abs(drive + bias),
         "": lambda drive, load, bias: np.abs(load)}  # fmt: skip
 
 
@@ -55,6 +55,23 @@ def test_friction_of_a_gear_is_half_the_sum_of_both_sides() -> None:
     assert act is not None
     assert act(Now(0.0, 1.0, load=9.0, drive=3.0, bias=1.0)) == pytest.approx((0.0, 0.4))
     assert act(Now(0.0, 1.0, load=9.0, drive=3.0, bias=-3.0)) == pytest.approx((0.0, 0.0))
+
+
+def test_every_friction_by_load_is_in_open_loop_what_it_is_in_the_balance(tmp_path: Path) -> None:
+    rig = load_rig(read_session(bench(tmp_path / "s", MOTOR)))
+    fit = trusted_fit(rig)[0]
+    row, variants = fit.rows[0], set()
+    sides = [row.position, row.velocity, row.load(fit.theta), fit.expected(row), row.bias(fit.theta)]
+    for candidate in (c for c in candidates(rig, fit, "hinge") if c.effect == "load_dependent_friction" and c.variant not in ("", TURNING)):
+        shape = candidate.grid[-1]
+        act = law({"effect": candidate.effect, "variant": candidate.variant, "shape": shape, "amplitude": {candidate.amplitudes[0][0]: 0.2}})
+        assert act is not None
+        size = np.array([np.sum(act(Now(*now))) for now in zip(*(x[100:400] for x in sides), strict=True)])
+        column = 0.2 * candidate.columns(row, shape)[100:400, 0]
+        moving = np.abs(row.velocity[100:400]) > 0.3
+        np.testing.assert_allclose(np.abs(column)[moving], np.abs(size)[moving], rtol=1e-6)
+        variants.add(candidate.variant)
+    assert variants == {LOW, MOTOR, MOTOR_LOW, GEAR, GEAR_LOW, "with speed"}
 
 
 def test_a_spring_that_nobody_declared(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..effects import DriveState, catalogue, effect
 from .balance import Rows
 from .declared import DeclaredFit
-from .laws import GEAR, GEAR_LOW, LINE, TURNING
+from .laws import GEAR, GEAR_LOW, LINE, LOW, MOTOR, MOTOR_LOW, TURNING
 from .model import RigModel
 
 Array = NDArray[np.float64]
@@ -179,14 +179,15 @@ def _by_load(fit: DeclaredFit, joint: str, rows: list[Rows], driven: bool) -> li
         return Candidate("load_dependent_friction", variant, joint, (("per_load", "1", 0.0, np.inf),), knees,
                          lambda r, s: (direction(r) * by[r.trial] * np.exp(-((r.velocity / s["stribeck_speed"]) ** 2)))[:, None])  # fmt: skip
 
-    found = [at_low_speed("low speed", load),
+    found = [at_low_speed(LOW, load),
              Candidate("load_dependent_friction", "with speed", joint, (("per_load_speed", "s", 0.0, np.inf),), ({},),
                        lambda r, s: (r.velocity * load[r.trial])[:, None])]  # fmt: skip
     if driven:
         expected = {r.trial: fit.expected(r) for r in mine}
+        motor = {t: np.abs(e) for t, e in expected.items()}
         gear = {r.trial: 0.5 * np.abs(expected[r.trial] + r.bias(fit.theta)) for r in mine}
-        found += [friction("motor side", "per_effort", {t: np.abs(e) for t, e in expected.items()}),
-                  friction(GEAR, "per_load", gear), at_low_speed(GEAR_LOW, gear)]  # fmt: skip
+        found += [friction(MOTOR, "per_effort", motor), friction(GEAR, "per_load", gear),
+                  at_low_speed(MOTOR_LOW, motor), at_low_speed(GEAR_LOW, gear)]
     return found
 
 

@@ -13,9 +13,9 @@ from ..effects import DriveState, effect
 
 # Effects that depend on the present state alone; of those, the frictions.
 FRICTION = frozenset({"stribeck_friction", "position_dependent_friction"})
-GEAR = "both sides of the gear"  # variant of friction by load
-GEAR_LOW = "both sides of the gear, low speed"
-TURNING = "turning round over a distance"  # variant of friction by load
+# Variants of friction by load: by what the joint carries where nothing else is said.
+MOTOR, GEAR, TURNING = "motor side", "both sides of the gear", "turning round over a distance"
+LOW, MOTOR_LOW, GEAR_LOW = "low speed", f"{MOTOR}, low speed", f"{GEAR}, low speed"
 LINE = "linear_stiffness"  # of a spring where none is declared
 OF_STATE = FRICTION | {"nonlinear_spring", "end_stop_contact", "detent_load", "torque_ripple"}
 
@@ -74,18 +74,25 @@ def _of_state(record: Mapping[str, Any]) -> Law:
 def _by_load(variant: str, shape: Mapping[str, float], size: float) -> Law:
     if variant == "with speed":
         return lambda n: (size * n.velocity * abs(n.load), 0.0)
-    if variant in ("low speed", GEAR_LOW):
-        side = _gear if variant == GEAR_LOW else lambda n: abs(n.load)
+    side = _SIDES.get(variant, _SIDES[LOW])
+    if variant in (LOW, MOTOR_LOW, GEAR_LOW):
         return lambda n: (0.0, size * side(n) * math.exp(-((n.velocity / shape["stribeck_speed"]) ** 2)))
-    if variant == GEAR:
-        return lambda n: (0.0, size * _gear(n))
-    if variant == "motor side":
-        return lambda n: (0.0, size * abs(n.drive))
-    return lambda n: (0.0, size * abs(n.load))
+    return lambda n: (0.0, size * side(n))
+
+
+def _joint(now: Now) -> float:
+    return abs(now.load)
+
+
+def _motor(now: Now) -> float:
+    return abs(now.drive)
 
 
 def _gear(now: Now) -> float:
     return 0.5 * abs(now.drive + now.bias)
+
+
+_SIDES = {LOW: _joint, MOTOR: _motor, MOTOR_LOW: _motor, GEAR: _gear, GEAR_LOW: _gear}
 
 
 class _Stop:
