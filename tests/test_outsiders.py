@@ -111,6 +111,25 @@ def test_frames_that_were_lost_are_no_drift_of_a_clock() -> None:
     assert "clock_drift" not in {f.term.effect.name for f in station.kept}
 
 
+@pytest.mark.parametrize("since_s", [12.0, 29.0])
+def test_an_encoder_whose_scale_changes_lifts_no_finger(since_s: float) -> None:
+    def further(t, x, v):
+        later = (t >= since_s) if t[-1] > 25 else np.ones(len(t), bool)  # the second recording comes after it
+        return np.polynomial.Polynomial(MAP)(1.025 * x / 100 * later + x / 100 * ~later) - np.polynomial.Polynomial(MAP)(x / 100)
+
+    station = judged("encoder", "index", "index", "proximal", joint(3, add=further), [*catalogue("encoder"), *outsiders("encoder")])
+    assert not station.kept and [f.term.effect.name for f in station.outsiders] == ["scale_change"]
+    assert station.outsiders[0].amplitudes["change"] == pytest.approx(0.025, abs=0.005)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_names_that_leave_what_recordings_kept_out_show_are_not_believed(seed: int) -> None:
+    def at_speed(state):  # a spring that is there at speed only: no row of the table, and no outsider
+        return 0.5 * np.maximum(state.position - 50, 0) * (np.abs(state.velocity) > 45) * np.sign(state.velocity)
+
+    assert not judged("current", "index", "index", None, drive(seed, at_speed), catalogue("drive")).believed
+
+
 def test_a_drifting_clock_is_named_beside_outsiders() -> None:
     station = judged("encoder", "index", "index", "proximal", joint(5, drift=2e-3), [*catalogue("encoder"), *outsiders("encoder")])
     assert [f.term.effect.name for f in station.kept] == ["clock_drift"] and not station.outsiders

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..findings import UNWRITTEN, Finding, weighed
-from .interval import brought_held_out, held_out, parameter_intervals, sized, undisturbed
+from .interval import brought_held_out, held_out, parameter_intervals, sized, undisturbed, variance_ratio
 from .naming import ALPHA, EXPLAINED_LEAST, Named, Naming
 from .selection import EVIDENCE_LEAST, SMALL, name_effects
 
@@ -20,6 +20,7 @@ CHANNELS = 20  # of a session: what no test of one sees must stand against as ma
 ALIKE = 1 / 3  # of the size of a larger effect of the same family: below, no finding of its own
 UNREST = 0.3  # of the noise: wander that every machine is granted; more is no explanation
 WORSE = 1.5  # times the mean square of training recordings
+KEPT_OUT, EXPLAINED_MOST = 1.05, 2 / 3  # times the noise of recordings kept out, and the share of what is above it that true names take
 EXPLAINED_SOME = 1 / 3  # of a mismatch that the lack-of-fit test sees: below, they are not what is missing, whatever is left to see
 
 
@@ -70,7 +71,17 @@ class Station:
         """Whether the names stand: the final model passes the test, or takes most of the mismatch away. Names that take little of a
         plain mismatch away do not, however little is left to see, nor names of nothing where more than the noise does not repeat."""
         idle = self.explained < (EXPLAINED_SOME if self.naming.before.p < ALPHA else SMALL if self.wander > 1 else 0.0)
-        return bool(self.proven) and not idle and (self.naming.after.p >= ALPHA or self.explained >= EXPLAINED_LEAST)
+        return bool(self.proven) and not idle and not self._short and (self.naming.after.p >= ALPHA or self.explained >= EXPLAINED_LEAST)
+
+    @property
+    def _short(self) -> bool:
+        """Whether the names leave recordings kept out plainly above their noise, and more than a third of what was, or make them worse: something
+        else is missing. Of steady motion: what acts at starts and stops is not asked."""
+        if self.naming.before.p >= ALPHA or any(f.term.effect.warps or f.term.effect.replaces for f in self.naming.found):
+            return False
+        before, after = (variance_ratio(self.naming, fit) for fit in (self.naming.declared, self.naming.fit))
+        least, floor = KEPT_OUT**2, 1 + self.wander**2
+        return after > max(before, least) or after > least * floor and before - after < EXPLAINED_MOST * (before - floor)
 
     @property
     def kept(self) -> tuple[Named, ...]:
