@@ -274,10 +274,10 @@ def test_an_angle_that_wanders_both_ways_is_lifted_by_nobody(size_deg: float, me
 
 
 def test_what_follows_a_lifted_joint_is_not_judged_while_it_is_lifted() -> None:
-    from hand_model.diagnose.locate.decoupled import of_hinged
+    from hand_model.diagnose.locate.decoupled import beside_excursions
 
     ahead = joint(3, add=held(8.5, 10.5, 60.0))
-    state, other = of_hinged(joint(4), ahead)
+    state, other = beside_excursions(joint(4), ahead)
     during = ahead[0].extra["ahead"] > 0
     assert during.any() and np.isnan(state.effort[during]).all()
     assert np.isfinite(state.effort[(state.time_s < 7.0) | (state.time_s > 12.0)]).all() and np.isfinite(other.effort).all()

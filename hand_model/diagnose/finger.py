@@ -20,7 +20,7 @@ from .locate.angles import (
     ranges_of_counts,
 )
 from .locate.course import FingerCourses, finger_courses
-from .locate.decoupled import of_hinged
+from .locate.decoupled import beside_excursions
 from .locate.markers import HINGE, corrected_angles, name_markers
 from .locate.slips import marker_findings, steps
 from .locate.slips import unexplained as unexplained_of
@@ -97,7 +97,7 @@ def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, f
         expected = expected_angles(stations[0].naming) if stations and joint == 1 else {}
         states = linkage_states(angles, joint, moments, expected, not parted)
         if states and joint == 1 and stations and _leaves(stations[0]):
-            states = of_hinged(states, stations[0].naming.balance.states)
+            states = beside_excursions(states, stations[0].naming.balance.states)
         if states:
             effects = [*catalogue("linkage"), *outsiders("linkage")]
             stations.append(judged("markers", finger.name, finger.actuator, finger.segments[joint].name, states, effects))

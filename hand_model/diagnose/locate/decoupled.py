@@ -23,7 +23,7 @@ def while_driven(states: Sequence[DriveState], below: float) -> tuple[DriveState
     return tuple(replace(s, effort=np.where(s.position < below, np.nan, s.effort)) for s in states)
 
 
-def of_hinged(states: Sequence[DriveState], ahead: Sequence[DriveState]) -> tuple[DriveState, ...]:
+def beside_excursions(states: Sequence[DriveState], ahead: Sequence[DriveState]) -> tuple[DriveState, ...]:
     """A linkage's states without whiles in which the joint before ran `ahead` of its drive (states of the encoder's balance): something held
     the finger then, and how the joint moved is told by no more than its markers."""
     found = {s.trial: spans(s) for s in ahead}
