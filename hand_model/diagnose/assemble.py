@@ -41,7 +41,8 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
     unexplained = list(unexplained)
     loose = {entry["where"]["finger"] for entry in unexplained if entry["shape"] == NOT_RIGID}
     for station in stations:
-        if station.believed and not _of_loose(station, loose):
+        stands = station.believed and not _of_loose(station, loose)
+        if stands:
             unexplained += [outsider_of(station, f) for f in station.outsiders]
             for weight, finding in (finding_of(station, *merged) for merged in _merged(station.kept)):
                 if station.naming.before.p >= ALPHA and _magnitude(finding, stations, _value) < MINUTE:
@@ -51,7 +52,7 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
                     ranked.append((weight, finding))
         elif station.missing:
             unexplained.append(unexplained_of(station, 1.0))
-        if station.believed and not _of_loose(station, loose) and station.naming.after.p < ALPHA and station.explained < 0.95:
+        if stands and station.naming.after.p < ALPHA and station.explained < 0.95:
             unexplained.append(unexplained_of(station, 1 - station.explained))
         rejected += [{"effect": name, "where": str(station.finger), "reason": _reason(value)}
                      for name, value in station.naming.rejected[:4] if name in NAMES]

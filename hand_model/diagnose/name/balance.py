@@ -73,14 +73,14 @@ def _keys(terms: tuple[Term, ...]) -> tuple[Any, ...]:
     return tuple((t.effect, _key(t.shape)) for t in terms)
 
 
-def _warped_columns(effect: Any, shape: Mapping[str, float], warps: tuple[Term, ...]) -> Callable[[DriveState], Array]:
-    def one(state: DriveState) -> Array:
-        columns = effect.columns(state, shape)
-        for term in warps:
-            columns = term.effect.warp(state, columns, term.shape)
-        return columns
+def _warped(state: DriveState, columns: Array, warps: tuple[Term, ...]) -> Array:
+    for term in warps:
+        columns = term.effect.warp(state, columns, term.shape)
+    return columns
 
-    return one
+
+def _warped_columns(effect: Any, shape: Mapping[str, float], warps: tuple[Term, ...]) -> Callable[[DriveState], Array]:
+    return lambda state: _warped(state, effect.columns(state, shape), warps)
 
 
 class Balance:
@@ -233,9 +233,7 @@ class Balance:
             for term in terms:
                 if term.effect.replaces is not None:
                     columns = term.effect.declared(replace(state, declared=columns), term.shape)
-            for term in warps:
-                columns = term.effect.warp(state, columns, term.shape)
-            return columns
+            return _warped(state, columns, warps)
 
         changing = tuple(t for t in terms if t.effect.replaces is not None)
         parts = [self._remembered(("declared", _keys(changing), _keys(warps)), declared)]

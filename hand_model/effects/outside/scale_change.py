@@ -29,8 +29,6 @@ class ScaleChange(Outsider):
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """How far the segment goes with what the encoder has counted, from then on, (n, 1)."""
-        if "slope" not in state.extra:
-            return np.zeros((len(state.time_s), 0))
         return ((_place(state) >= shape["since"]) * state.slope * state.position)[:, None]
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
