@@ -18,10 +18,10 @@ from hand_model.rig.diagnose import trusted_fit
 from hand_model.rig.diagnose_swing import _standing
 from hand_model.rig.evidence import weigh
 from hand_model.rig.laws import TURNING
-from hand_model.rig.swing import PARAMETERS, Lane, Swing, simulate, vector
+from hand_model.rig.swing import PARAMETERS, Lane, Swing, errors, simulate, vector
 from hand_model.rig.swing_build import ENOUGH_STEPS, thinned
 from hand_model.rig.swing_compete import _folds
-from hand_model.rig.swing_start import started
+from hand_model.rig.swing_start import freed, started
 from hand_model.session import read_session
 
 
@@ -138,14 +138,31 @@ def test_a_free_swing_starts_where_its_first_period_says() -> None:
     theta = vector({"inertia": 0.02, "damping": 4e-4, "coulomb": 1e-3})
     starts, steps = ((1.2, 0.5), (0.3, -1.5), (-0.6, 2.0)), 1500
     blank = [Lane(n, False, np.zeros(steps), 1.0, np.zeros(steps), s, np.zeros(steps), np.ones(steps)) for n, s in zip("abc", starts, strict=True)]
-    swing = Swing(tuple(blank), 0.8, 0.0, {"inertia": 0.02}, False, 4e-3)
+    swing = Swing(tuple(blank), 0.8, 0.0, {"inertia": 0.02}, False, 4e-3, 1.0)
     q = simulate(swing, np.repeat(theta[None], 3, 0), np.arange(3))
     lanes = tuple(replace(lane, position=q[:, k], start=(lane.start[0] + 0.009, lane.start[1] - 0.1)) for k, lane in enumerate(swing.lanes))
     wrong = theta * np.where(np.isin(PARAMETERS, ("damping", "coulomb")), 1.1, 1.0)
-    found = started(replace(swing, lanes=lanes), wrong, 1.0)
+    found = started(replace(swing, lanes=lanes), wrong)
     assert np.abs([np.subtract(lane.start, s) for lane, s in zip(found.lanes, starts, strict=True)]).max() < 0.005
     driven = replace(swing, lanes=lanes, driven=True)
-    assert started(driven, wrong, 1.0) is driven
+    assert started(driven, wrong) is driven and freed(driven, wrong) is driven
+
+
+def test_a_free_start_takes_no_part_in_what_a_law_is_held_to() -> None:
+    """Under the true law nothing is left, whatever the start was taken for; of a wrong law it leaves what no start explains."""
+    theta, steps = vector({"inertia": 0.02, "damping": 4e-4, "coulomb": 1e-3, "lateral": 4e-3}), 1500
+    blank = Lane("a", False, np.zeros(steps), 1.0, np.zeros(steps), (0.5, -1.5), np.zeros(steps), np.ones(steps))
+    swing = Swing((blank,), 0.8, 0.0, {"inertia": 0.02}, False, 4e-3, 1.0)
+    q = simulate(swing, theta[None], np.array([0]))[:, 0]
+    swing = replace(swing, lanes=(replace(blank, position=q, start=(0.504, -1.53)),))
+    zero = vector({"inertia": 0.02, "damping": 4e-4, "coulomb": 1e-3})  # whose encoder's zero is 5 mrad off
+
+    def left(some: Swing, law: np.ndarray) -> float:
+        return float(np.sqrt(np.mean(errors(some, law[None], np.array([0])) ** 2)))
+
+    fixed, free = started(swing, zero), freed(swing, zero)
+    assert left(free, theta) < 0.05 * left(fixed, theta)
+    assert left(free, zero) > 0.5 * left(fixed, zero)
 
 
 def test_recordings_left_out_whole_are_predicted_whole() -> None:

@@ -12,21 +12,22 @@ import numpy as np
 from ..background import Background
 from ..session import Session
 from .declared import DeclaredFit
-from .findings import NOT_BORNE_OUT, Finding
+from .findings import NOT_BORNE_OUT, NOT_TOLD, Finding
 from .model import RigModel, load_rig
 from .replay import RigResiduals, replay_rig
 from .states import fill_gaps, noise_std
-from .swing import INDEX, PARAMETERS, STEP_S, Swing, parameter_units, vector
-from .swing_build import build_swing, free_period_s, search_step_s, thinned, windows_s
-from .swing_compete import LEAST_GAIN, Round, Variant, all_free, compete_swing, fit_stages, free_declared
+from .swing import INDEX, NEUTRAL, PARAMETERS, STEP_S, Swing, parameter_units, vector
+from .swing_build import build_swing, search_step_s, thinned, windows_s
+from .swing_compete import LEAST_GAIN, Round, Variant, all_free, compete_swing, fit_apart, fit_stages, free_declared
 from .swing_fit import Fitted, Task
 from .swing_interval import intervals
 from .swing_patch import write_swing
-from .swing_start import started
+from .swing_start import freed, started_each
 from .words import shares, statement
 
 RESAMPLES = 500
 Taken = tuple[Variant, Round]
+Ends = Mapping[str, tuple[float, float]]
 
 
 def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Callable[[str], None]) -> tuple:
@@ -35,9 +36,8 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
     stages = [thinned(build_swing(rig, fit, step, w)) for w in windows]
     free = free_declared(stages[0])
     declared = fit_stages(stages, [Task(free, vector(stages[0].initial), ())], 15)[0]
-    period = free_period_s(rig)
     if not stages[0].driven:
-        stages = [started(swing, declared.theta, period) for swing in stages]
+        stages = [freed(swing, declared.theta) for swing in stages]
         declared = fit_stages(stages, [Task(free, declared.theta, ())], 15)[0]
     floor, held = _resolution(rig), bool(rig.select(True))  # without validation recordings the training ones measure
     taken, rounds = compete_swing(stages, declared, floor, build_swing(rig, fit, step))
@@ -45,16 +45,18 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
     # Last, at the step of the replay; a free swing over whole recordings, for its phase is known well enough by now. What
     # a coarse step there does to the period (4e-4 of it at most, with a hundred steps in each) the last steps take back.
     last_stages = [(STEP_S, windows[-1], 8)] if stages[0].driven else [(2 * step, windows[-1], 8), (2 * step, np.inf, 12), (STEP_S, np.inf, 3)]
-    fine = [(started(build_swing(rig, fit, step_s, window_s), declared.theta, period), most) for step_s, window_s, most in last_stages]
+    fine = [(build_swing(rig, fit, step_s, window_s), most) for step_s, window_s, most in last_stages]
     known: dict[tuple[str, ...], Link] = {}
 
     def chain_of(some: Sequence[Taken]) -> list[Link]:
         return _chain(rig, session, held, fine, declared.theta, some, known)
 
-    kept, chain, rejected = _standing(list(zip(taken, rounds, strict=True)), chain_of)
+    def ends_of(link: Link) -> Ends:
+        return intervals(freed(build_swing(rig, fit, STEP_S, windows[-1]), link.fit.theta), link.free, link.fit.theta)
+
+    kept, chain, ends, rejected = _told(list(zip(taken, rounds, strict=True)), chain_of, ends_of)
     figures = [c.error for c in chain]
     found = []
-    ends = intervals(started(build_swing(rig, fit, STEP_S, windows[-1]), declared.theta, period), chain[-1].free, chain[-1].fit.theta)
     for k, (variant, round_) in enumerate(kept):
         before, after = _sides(kept, chain, k, chain_of)
         proof = {"metric": "position_rmse", "unit": rig.unit(rig.joints[0]), "before": before.error, "after": after.error,
@@ -80,6 +82,20 @@ class Link:
     xml: bytes
     replay: RigResiduals
     error: float
+
+
+def _told(kept: list[Taken], chain_of: Callable[[Sequence[Taken]], list[Link]],
+          ends_of: Callable[[Link], Ends]) -> tuple[list[Taken], list[Link], Ends, list[dict[str, Any]]]:  # fmt: skip
+    """`_standing`, and of those that stand the ones whose size is told from zero, with the interval of every parameter."""
+    rejected: list[dict[str, Any]] = []
+    while True:
+        kept, chain, more = _standing(kept, chain_of)
+        rejected, ends = [*rejected, *more], ends_of(chain[-1])
+        vague = [k for k, (v, _) in enumerate(kept) if all(ends[n][0] <= 0.0 <= ends[n][1] for n in v.start if n not in NEUTRAL)]
+        if not vague:
+            return kept, chain, ends, rejected
+        rejected.append({"effect": kept[vague[-1]][0].key, "reason": NOT_TOLD})
+        kept = [*kept[: vague[-1]], *kept[vague[-1] + 1 :]]
 
 
 def _standing(
@@ -123,16 +139,16 @@ def _chain(rig: RigModel, session: Session, held: bool, stages: Sequence[tuple[S
            kept: Sequence[Taken], known: dict[tuple[str, ...], Link]) -> list[Link]:  # fmt: skip
     """The declared model, with the first effect, with the first two, ...: fitted in one batch, written and replayed; stages:
     each with its most iterations; known holds those that were before, by the effects in them."""
-    swing = stages[0][0]
     keys = [tuple(v.key for v, _ in kept[:k]) for k in range(len(kept) + 1)]
     new = [k for k, key in enumerate(keys) if key not in known]
-    free = [all_free(swing, [v for v, _ in kept[:k]]) for k in new]
+    free = [all_free(stages[0][0], [v for v, _ in kept[:k]]) for k in new]
     starts = [_start(names, kept[k - 1][1].fit.theta, kept[-1][1].fit.theta) if k else declared for k, names in zip(new, free, strict=True)]
     fits: list[Fitted] = []
     for stage, most in stages if new else ():
         starts = [f.theta for f in fits] or starts
-        fits = fit_stages([stage], [Task(names, s, ()) for names, s in zip(free, starts, strict=True)], most)
-    files = [write_swing(rig, swing, f.theta) for f in fits]
+        swing, stretches = started_each(stage, starts)
+        fits = fit_apart(swing, [Task(*task) for task in zip(free, starts, stretches, strict=True)], most)
+    files = [write_swing(rig, stages[0][0], f.theta) for f in fits]
     replays = Background(_replayed, [(session, x, held) for x in files]).results()
     for k, names, f, x, r in zip(new, free, fits, files, replays, strict=True):
         known[keys[k]] = Link(names, f, x, r, r.figure("position_rmse", held))
@@ -150,12 +166,12 @@ def _replayed(session: Session, xml: bytes, held: bool) -> RigResiduals:
 
 
 def _resolution(rig: RigModel) -> float:
-    """What a recording cannot tell from no error: encoder noise, and the way that the joint goes within one sample, for
+    """What a recording cannot tell from no error: encoder noise, and of a driven joint the way that it goes within one sample, for
     position and drive are read at some instant of it (uniform: step / sqrt(12))."""
     joint, floors = rig.joints[0], []
     for t in rig.trials:
         q = fill_gaps(t.time_s, t.position[joint])
-        step = float(np.median(np.diff(t.time_s)))
+        step = float(np.median(np.diff(t.time_s))) if rig.drive(joint) is not None else 0.0
         floors.append(np.hypot(noise_std(q, t.time_s), float(np.std(np.gradient(q, t.time_s))) * step / np.sqrt(12.0)))
     return float(np.median(floors))
 
@@ -169,7 +185,7 @@ def _fall(before: Any, after: Any, held: bool) -> list[float]:
     return [float(x) for x in np.percentile(fall, [2.5, 97.5])]
 
 
-def _swing_finding(rig: RigModel, variant: Variant, round_: Round, ends: Mapping[str, tuple[float, float]], link: Link,
+def _swing_finding(rig: RigModel, variant: Variant, round_: Round, ends: Ends, link: Link,
                    proof: dict) -> Finding:  # fmt: skip
     """parameters: beside all effects that were kept (link), with their intervals (ends)."""
     joint = rig.joints[0]

@@ -15,6 +15,7 @@ from ..diagnose.findings import Finding, Findings
 __all__ = ["CouplingResidual", "Finding", "Findings", "RigFindings"]
 Array = NDArray[np.float64]
 NOT_TAKEN = "error on training recordings left out of the fit does not fall enough"
+NOT_TOLD = "interval of its size holds zero"
 NOT_BORNE_OUT = "error on validation recordings does not fall enough"
 
 

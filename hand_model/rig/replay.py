@@ -21,6 +21,7 @@ from .supply import supply_deviation
 
 Array = NDArray[np.float64]
 States = tuple[Array, Array, Array]  # times [s], positions, velocities
+STEPS = 4  # of Gauss and Newton, towards a start: the motion is smooth in it
 
 
 @dataclass(frozen=True)
@@ -144,19 +145,62 @@ def simulate_trial(
     """Positions (n, joints) simulated in open loop at the trial's time stamps (n,), and those stamps.
 
     Start: recorded position and smoothed velocity, taken again after every horizon_s [s] (recorded: `recorded_states`,
-    where they are known already). Recorded effort or control goes in; nothing is fed back.
+    where they are known already); of a single joint that nothing drives what its first period asks for. Recorded effort
+    or control goes in; nothing is fed back.
     """
-    import mujoco
-
     model = compile_model(rig, trial)
-    data = mujoco.MjData(model)
     apply_levels(model, rig, trial)
     effects = EffectStepper(model, read_effects(rig.xml))
     step = float(model.opt.timestep)
     grid = np.arange(0.0, trial.time_s[-1] + step, step)
     control, applied = _controls(rig, trial, model, effects, grid)
     stride = len(grid) if np.isinf(horizon_s) else max(1, round(horizon_s / step))
-    starts = _states_at(recorded or recorded_states(rig, trial), grid[::stride])
+    known = recorded or recorded_states(rig, trial)
+    starts = _states_at(known, grid[::stride])
+    if stride == len(grid) and not model.nu and model.nv == 1 and not applied.any():
+        starts = _asked_start(model, effects, trial, rig.joints[0], starts, _period_s(known))
+    out = _simulated(model, effects, control, applied, starts, stride)
+    at = np.stack([np.interp(trial.time_s, grid, column) for column in out.T], 1)
+    return trial.time_s, at
+
+
+def _asked_start(model: Any, effects: EffectStepper, trial: RigTrial, joint: str, start: tuple[Array, Array],
+                 period_s: float) -> tuple[Array, Array]:  # fmt: skip
+    """Position and velocity (1, 1) each that fit the first period best (Gauss and Newton): a speed differentiated from an
+    encoder is wrong by more than friction does within it, and the error stays for good."""
+    recorded, step = fill_gaps(trial.time_s, trial.position[joint]), float(model.opt.timestep)
+    seen = trial.time_s <= period_s
+    grid = np.arange(0.0, trial.time_s[seen][-1] + step, step)
+    none, sizes = np.zeros((len(grid), 0)), 1e-3 * np.array([1.0, 2 * np.pi / period_s])
+
+    def left(state: Array) -> Array:
+        run = _simulated(model, effects, none, np.zeros((len(grid), 1)), tuple(state.reshape(2, 1, 1)), len(grid))
+        return np.interp(trial.time_s[seen], grid, run[:, 0]) - recorded[seen]
+
+    state = np.array([float(s[0, 0]) for s in start])
+    error = left(state)
+    for _ in range(STEPS if seen.sum() > len(state) else 0):
+        slopes = np.stack([(left(state + size * e) - error) / size for size, e in zip(sizes, np.eye(2), strict=True)], 1)
+        moved = state - np.linalg.lstsq(slopes, error)[0]
+        if not (after := left(moved)) @ after < error @ error:
+            break
+        state, error = moved, after
+    return tuple(state.reshape(2, 1, 1))
+
+
+def _period_s(recorded: States) -> float:
+    """Period [s] of a swing, by its usual position and velocity; at most a quarter of the recording."""
+    time_s, q, v = recorded
+    return float(min(2 * np.pi * np.std(q) / max(np.std(v), 1e-300), 0.25 * time_s[-1]))
+
+
+def _simulated(model: Any, effects: EffectStepper, control: Array, applied: Array, starts: tuple[Array, Array], stride: int) -> Array:
+    """Positions (n, nq) at every step, from starts (positions and velocities, (n / stride, nq) each), taken again after every
+    stride steps."""
+    import mujoco
+
+    data = mujoco.MjData(model)
+    step, grid = float(model.opt.timestep), control
     data.qpos[:], data.qvel[:] = (s[0] for s in starts)
     if not model.nu:  # semi-implicit Euler is leapfrog when the velocity starts half a step early
         mujoco.mj_forward(model, data)
@@ -182,8 +226,7 @@ def simulate_trial(
                 mujoco.mj_fwdActuation(model, data)
                 effects.passive(model, data)
                 mujoco.mj_step2(model, data)
-    at = np.stack([np.interp(trial.time_s, grid, column) for column in out.T], 1)
-    return trial.time_s, at
+    return out
 
 
 def can_simulate(rig: RigModel, trial: RigTrial) -> bool:

@@ -50,7 +50,8 @@ class Lane:
     drive (n,): recorded voltage, or effort, or zeros; live: the trial's gear over the declared one (zero: disconnected);
     position (n,) [rad or m]; start: (q, v); supply (n,): relative deviation of the supply from its mean; used (n,):
     weights 0 or 1 (recorded, not padded). Of the trial's own bodies: more_inertia [kg m2 or kg] than declared, sine and
-    cosine of its weight (None: the swing's); coulomb_scale: its own Coulomb level over the declared one.
+    cosine of its weight (None: the swing's); coulomb_scale: its own Coulomb level over the declared one. give (n, 2): what a
+    small change of the start does, orthonormal; residuals are what is left beyond it (None: the start is known).
     """
 
     trial: str
@@ -64,11 +65,13 @@ class Lane:
     coulomb_scale: float = 1.0
     more_inertia: float = 0.0
     weight: tuple[float, float] | None = None
+    give: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Swing:
-    """All stretches of a session, and the joint's weight: gravity effort = sine sin q + cosine cos q (what holds it)."""
+    """All stretches of a session, the joint's weight: gravity effort = sine sin q + cosine cos q (what holds it), and the period
+    period_s [s] of its small swings."""
 
     lanes: tuple[Lane, ...]
     sine: float
@@ -76,6 +79,7 @@ class Swing:
     initial: Mapping[str, float]
     driven: bool
     step_s: float = STEP_S
+    period_s: float = 1.0
 
     def train(self) -> Array:
         """Indices of stretches that may be fitted."""
@@ -96,8 +100,14 @@ def simulate(swing: Swing, theta: Array, lanes: Array) -> Array:
 
 
 def errors(swing: Swing, theta: Array, lanes: Array) -> Array:
-    """Position residuals (steps, L), zero where nothing was recorded."""
-    return np.clip(np.nan_to_num(_chunks(swing, theta, lanes, True), nan=1e1, posinf=1e1, neginf=-1e1), -10.0, 10.0)
+    """Position residuals (steps, L), zero where nothing was recorded, without what a start that is free takes up (variable
+    projection, Golub & Pereyra 1973)."""
+    out = np.clip(np.nan_to_num(_chunks(swing, theta, lanes, True), nan=1e1, posinf=1e1, neginf=-1e1), -10.0, 10.0)
+    for i in np.unique(lanes):
+        if (give := swing.lanes[i].give) is not None:
+            mine, n = np.flatnonzero(lanes == i), min(len(give), len(out))
+            out[:n, mine] -= give[:n] @ (give[:n].T @ out[:n, mine])
+    return out
 
 
 LANES_AT_ONCE = 3000  # so many runs' state fits a core's own cache

@@ -92,7 +92,7 @@ def build_swing(rig: RigModel, fit: DeclaredFit, step_s: float = STEP_S, longest
         initial["gain"] = drive.gain
         initial["back_emf"] = next((c.value for c in fit.columns if c.kind == "back_emf"), 0.0)
     lanes = tuple(lane for t in rig.trials for lane in _stretches(rig, t, step_s, longest_s))
-    return Swing(lanes, sine, cosine, initial, drive is not None, step_s)
+    return Swing(lanes, sine, cosine, initial, drive is not None, step_s, free_period_s(rig))
 
 
 def _rigid(model: Any) -> tuple[float, float, float]:

@@ -16,6 +16,7 @@ from ..background import Background
 from .evidence import ONE_STANDARD_ERROR, weigh
 from .swing import DECLARED, INDEX, LOW_SPEED, Swing, errors, vector
 from .swing_fit import Fitted, Task, fit_together
+from .swing_start import freed, started
 
 Array = NDArray[np.float64]
 FOLDS, SHORTLIST, ALIKE = 4, 6, 3
@@ -102,12 +103,13 @@ def free_declared(swing: Swing) -> tuple[str, ...]:
 
 
 def _blocks(swing: Swing, theta: Array, lanes: Sequence[int]) -> Array:
-    """Root mean square error of every part of every stretch, (len(lanes) * PARTS,): one part in which the joint sticks
+    """Root mean square error of every part of every stretch, (len(lanes) * PARTS,), from the starts that theta asks for: one part in which the joint sticks
     when it should not would outweigh all others if squares were added."""
-    residual = errors(swing, np.repeat(theta[None], len(lanes), 0), np.array(lanes))
+    own = started(replace(swing, lanes=tuple(swing.lanes[i] for i in lanes)), theta)
+    residual = errors(own, np.repeat(theta[None], len(lanes), 0), np.arange(len(lanes)))
     out = []
-    for run, lane in enumerate(lanes):
-        n = len(swing.lanes[lane].position)
+    for run, lane in enumerate(own.lanes):
+        n = len(lane.position)
         out += [float(np.sqrt(np.mean(p**2))) for p in np.array_split(residual[:n, run], PARTS)]
     return np.array(out)
 
@@ -143,14 +145,14 @@ def compete_swing(
     """Forward selection from the declared model (fitted as current), while the error is above what the recordings can tell
     (floor [rad or m]); returns the variants and their rounds, each with the fit of all taken so far. whole: the recordings
     uncut; those left out whole are predicted so, as the ones that validate are."""
-    swing = stages[-1]
-    train = tuple(int(i) for i in swing.train())
-    test, folds = _folds(swing, train, whole)
+    train = tuple(int(i) for i in stages[-1].train())
+    test, folds = _folds(stages[-1], train, whole)
     taken: tuple[Variant, ...] = ()
     rounds: list[Round] = []
-    most = MOST_TERMS if len({swing.lanes[i].trial for i in train}) >= FOLDS else MOST_OF_FEW
+    most = MOST_TERMS if len({stages[-1].lanes[i].trial for i in train}) >= FOLDS else MOST_OF_FEW
     while len(taken) < most and current.cost > floor**2:
-        free = all_free(swing, taken)
+        stages = [freed(s, current.theta) for s in stages]
+        swing, free = stages[-1], all_free(stages[-1], taken)
         rivals = [v for v in variants(swing) if not set(v.start) <= set(free)]
         tasks = [Task(all_free(swing, (*taken, v)), _started(current.theta, v), ()) for v in rivals]
         fits = fit_stages(stages, tasks, 8)
