@@ -19,7 +19,7 @@ from .swing_fit import Fitted, Task, fit_together
 from .swing_start import freed, started
 
 Array = NDArray[np.float64]
-FOLDS, SHORTLIST, ALIKE = 4, 6, 3
+FOLDS, MOST_FOLDS, SHORTLIST, ALIKE = 4, 10, 6, 3
 LEAST_GAIN, MOST_TERMS, MOST_OF_FEW = 0.025, 5, 3  # of few recordings what is left after so many goes by many names
 BETTER = 1.01  # an exchange of variants has to pay
 FEW_RUNS = 500
@@ -219,20 +219,19 @@ def _several(swing: Swing, tasks: Sequence[Task], starts: int = 2, iterations: i
 def _folds(
     swing: Swing, train: Sequence[int], whole: Swing | None = None
 ) -> tuple[Swing, list[tuple[tuple[int, ...], tuple[int, ...]]]]:
-    """The swing in which errors are measured, and (stretches kept, stretches of it left out): whole recordings are left out where
-    there are several, as the validation trials are; else neighbouring stretches together: what is held out then lies
-    elsewhere in the motion, and a term that fits only where it was fitted is told (blocked cross-validation, Roberts et al. 2017).
-    Recordings of one kind are spread over the folds, those whose drive is disconnected too: left out together they would leave
-    what they alone show (a damping that is not the motor's) unknown, and the truest law at a loss."""
-    kinds = {swing.lanes[i].trial: abs(swing.lanes[i].live) for i in train}
-    trials = {name: (k + k // FOLDS) % FOLDS for k, name in enumerate(sorted(kinds, key=lambda name: -kinds[name]))}
+    """The swing in which errors are measured, and (stretches kept, stretches of it left out): recordings are left out whole where
+    there are several, as the validation trials are, each alone (two of a kind together would leave unknown what they alone show,
+    a damping that is not the motor's, and the truest law at a loss) while they are not too many; else neighbouring stretches
+    together: what is held out then lies elsewhere in the motion, and a term that fits only where it was fitted is told
+    (blocked cross-validation, Roberts et al. 2017)."""
+    trials = {name: k for k, name in enumerate(dict.fromkeys(swing.lanes[i].trial for i in train))}
     if len(trials) < FOLDS:
         count = min(FOLDS, len(train))
         fold = [k * count // len(train) for k in range(len(train))]
         return swing, [_parted(train, fold, train, fold, f) for f in range(count)]
-    test = whole or swing
-    fold, apart = ([trials[s.lanes[i].trial] for i in some] for s, some in ((swing, train), (test, test.train())))
-    return test, [_parted(train, fold, test.train(), apart, f) for f in range(FOLDS)]
+    test, count = whole or swing, min(len(trials), MOST_FOLDS)
+    fold, apart = ([trials[s.lanes[i].trial] % count for i in some] for s, some in ((swing, train), (test, test.train())))
+    return test, [_parted(train, fold, test.train(), apart, f) for f in range(count)]
 
 
 def _parted(train: Sequence[int], fold: Sequence[int], test: Sequence[int], apart: Sequence[int], f: int) -> tuple:
@@ -260,7 +259,7 @@ def _left_out(
     """Block errors of "none" and of each rival on what is left out of `test`."""
     everyone = [none, *rivals]
     tasks = [replace(task, start=fit.theta, stretches=kept) for task, fit in everyone for kept, _ in folds]
-    fits = fit_apart(swing, tasks, 5)
+    fits = fit_apart(swing, tasks, 3)
     out = []
     for k in range(len(everyone)):
         parts = [_blocks(test, fits[k * len(folds) + f].theta, left) for f, (_, left) in enumerate(folds)]
