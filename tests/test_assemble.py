@@ -6,7 +6,14 @@ from types import SimpleNamespace
 
 import pytest
 
-from hand_model.diagnose.assemble import _of_hinges, _of_loose, _shared, _without_shadows, _without_tilts, assemble
+from hand_model.diagnose.assemble import (
+    _leave_something,
+    _of_hinges,
+    _shared,
+    _without_shadows,
+    _without_tilts,
+    assemble,
+)
 from hand_model.diagnose.diagnosis import _without_settled_sags
 from hand_model.diagnose.findings import Finding, weighed
 from hand_model.diagnose.locate.displacement import NO_HINGE
@@ -108,15 +115,21 @@ def test_where_no_finger_is_a_hinge_to_the_cameras_angles_tell_nothing() -> None
     ranked = [with_share(1.0, "linkage_backlash", "index", "markers", 1.0), with_share(0.5, "joint_wobble", "ring", "markers", 1.0),
               with_share(0.5, "stribeck_friction", "index", "current", 1.0), with_share(0.5, "linkage_backlash", "little", "markers", 1.0)]
     assert _of_hinges(ranked, bent) == ranked[2:]
-    assert _of_hinges(ranked, bent[:1]) == ranked[1:]  # one finger has none: its angles tell nothing, the other fingers do
+    assert _of_hinges(ranked, bent[:1]) == ranked  # one finger has none: whether its angles tell anything, what they leave says
 
 
-@pytest.mark.parametrize(("finger", "signal", "p", "doubtful"), [
-    ("index", "markers", 1e-9, True), ("index", "encoder", 1e-9, True), ("index", "markers", 0.2, False),
-    ("index", "current", 1e-9, False), ("ring", "markers", 1e-9, False)])
-def test_angles_of_segments_that_are_not_rigid_need_a_name_that_leaves_nothing(finger: str, signal: str, p: float, doubtful: bool) -> None:
-    station = SimpleNamespace(finger=finger, signal=signal, naming=SimpleNamespace(after=SimpleNamespace(p=p)))
-    assert _of_loose(station, {"index"}) is doubtful
+@pytest.mark.parametrize(("finger", "signal", "p", "other", "doubtful"), [
+    ("index", "markers", 1e-9, 0.5, True), ("index", "encoder", 1e-9, 0.5, True), ("index", "markers", 0.2, 0.5, False),
+    ("index", "markers", 0.2, 1e-9, True), ("index", "current", 1e-9, 0.5, False), ("ring", "markers", 0.2, 1e-9, False)])
+def test_angles_of_markers_that_leave_segments_or_hinge_need_names_that_leave_nothing(
+        finger: str, signal: str, p: float, other: float, doubtful: bool) -> None:  # fmt: skip
+    """At no station of that finger's angles: other is the p of the index's other one."""
+    def station(finger: str, signal: str, p: float) -> SimpleNamespace:
+        return SimpleNamespace(finger=finger, signal=signal, naming=SimpleNamespace(after=SimpleNamespace(p=p)))
+
+    asked = station(finger, signal, p)
+    every = [asked, station("index", "encoder", other), station("index", "current", 1e-9)]
+    assert _leave_something(asked, every) is doubtful
 
 
 @pytest.mark.parametrize(("named", "believed", "stays"), [("drive_sag", True, False), ("current_saturation", True, False), ("drive_sag", False, True),

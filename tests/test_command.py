@@ -33,7 +33,7 @@ def braking(x: float, full: float) -> float:
     return full * min(1.0, 0.2 + (100 - x) / 25)
 
 
-def strokes(profile, seed: int, repeats: int = 4) -> tuple[DriveState, np.ndarray]:
+def strokes(profile, seed: int, repeats: int = 4, noise: float = 5.0, viscous: float = VISCOUS) -> tuple[DriveState, np.ndarray]:
     """One recording of strokes there and back at every commanded speed, and its current."""
     rng = np.random.default_rng(seed)
     x, v, c, told = [], [], [], []
@@ -44,14 +44,23 @@ def strokes(profile, seed: int, repeats: int = 4) -> tuple[DriveState, np.ndarra
                 place = at if way > 0 else 100 - at
                 speed = profile(place, full) if way > 0 else full
                 x, v, told = [*x, place], [*v, way * speed], [*told, raw]
-                c.append(load(place) + VISCOUS * speed if way > 0 else -25 + 0.2 * place - VISCOUS * speed)
+                c.append(load(place) + viscous * speed if way > 0 else -25 + 0.2 * place - viscous * speed)
                 at += speed * STEP_S
         x, v, c, told = x + [0.0] * 5, v + [0.0] * 5, c + [0.0] * 5, told + [raw] * 5
     x, v, c = (np.array(k) for k in (x, v, c))
-    current = c + rng.normal(0, 5, len(c))
+    current = c + rng.normal(0, noise, len(c))
     state = DriveState("trial", "index", np.arange(len(x)) * STEP_S, x, v + rng.normal(0, 0.5, len(x)), np.zeros(len(x)),
                        np.where(v == 0, np.nan, current), np.ones((len(x), 1)), extra={"speed": np.array(told)})
     return state, current
+
+
+@pytest.mark.parametrize(("begin", "told"), [(30.0, True), (50.0, False)])
+def test_a_drive_that_loses_no_more_than_a_healthy_controller_is_at_no_limit(begin: float, told: bool) -> None:
+    """From some place on speed falls by just what keeps the current from rising: by 6 %, or by 3.3 %."""
+    viscous = 1.6
+    held = load(begin) + 100 * viscous
+    state, current = strokes(lambda x, full: min(full, (held - load(x)) / viscous), 0, 8, 0.2, viscous)
+    assert np.isfinite(command_facts((state,), (current,)).ceiling) == told
 
 
 @pytest.mark.parametrize("seed", range(3))

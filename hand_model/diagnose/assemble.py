@@ -39,9 +39,9 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
     ranked: list[tuple[float, Finding]] = _heaviest(marker_findings, _palm_marker)
     rejected: list[dict[str, str]] = []
     unexplained = list(unexplained)
-    loose = {entry["where"]["finger"] for entry in unexplained if entry["shape"] == NOT_RIGID}
+    loose = {entry["where"]["finger"] for entry in unexplained if entry["shape"] == NOT_RIGID or NO_HINGE in entry["shape"]}
     for station in stations:
-        stands = station.believed and not _of_loose(station, loose)
+        stands = station.believed and not (station.finger in loose and _leave_something(station, stations))
         if stands:
             unexplained += [outsider_of(station, f) for f in station.outsiders]
             for weight, finding in (finding_of(station, *merged) for merged in _merged(station.kept)):
@@ -78,10 +78,11 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
                     tuple(channel_of(s) for s in stations), tuple(notes))
 
 
-def _of_loose(station: Station, loose: set[str]) -> bool:
-    """Whether a station's names leave something in angles of a finger whose markers leave their segments by no known way (`loose`): what is
-    wrong with the markers may be behind both."""
-    return station.finger in loose and station.signal != "current" and station.naming.after.p < ALPHA
+def _leave_something(station: Station, stations: Sequence[Station]) -> bool:
+    """Whether a station is of angles, and angles of its finger leave something beside their names: where markers leave their segments or
+    their hinge by no known way, what is wrong with the markers may be behind both."""
+    angles = [s for s in stations if s.finger == station.finger and s.signal != "current"]
+    return station.signal != "current" and any(s.naming.after.p < ALPHA for s in angles)
 
 
 def _magnitude(finding: Finding, stations: Sequence[Station], read: Callable[[Mapping[str, Any]], float | None]) -> float:
@@ -180,10 +181,10 @@ def _without_shadows(ranked: list[tuple[float, Finding]]) -> list[tuple[float, F
 
 
 def _of_hinges(ranked: list[tuple[float, Finding]], unexplained: Sequence[Mapping[str, Any]]) -> list[tuple[float, Finding]]:
-    """Without what angles tell of a finger whose markers leave the hinges' motion by no known way: they are no angles of a hinge. Where
-    no finger's joint is a hinge to the cameras, it is the cameras that bend space."""
+    """Without what markers and angles tell where several fingers' markers leave the hinges' motion by no known way: it is the cameras
+    that bend space."""
     bent = {entry["where"]["finger"] for entry in unexplained if NO_HINGE in entry["shape"]}
-    wrong = ANGULAR | {*HINGE, *SLIPS} if len(bent) > 1 else ANGULAR
+    wrong = ANGULAR | {*HINGE, *SLIPS} if len(bent) > 1 else set()
     return [item for item in ranked if item[1].where["finger"] not in bent or item[1].effect not in wrong]
 
 

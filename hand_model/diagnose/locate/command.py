@@ -118,7 +118,8 @@ def _ceiling(strokes: list[Stroke]) -> tuple[float, float]:
     if viscous <= 0:
         return none
     velocity, current = (np.concatenate([getattr(s, name) for s in mine]) for name in ("velocity", "current"))
-    lost = float(np.quantile(velocity, FULL_SPEED)) - velocity
+    full = float(np.quantile(velocity, FULL_SPEED))
+    lost = full - velocity
     needed = _load_design(mine) @ beta + viscous * lost
     limit = float(np.median(current[needed > np.quantile(needed, 0.75)]))
     over = needed > limit
@@ -129,7 +130,8 @@ def _ceiling(strokes: list[Stroke]) -> tuple[float, float]:
     rest = y - share * x
     told = share > CEILING_T * float(np.std(rest)) / np.sqrt(max(float(x @ x), 1e-12))
     alone = float(rest @ rest) < CEILING_LEFT * float(y @ y)  # speed changes for no other reason
-    if not (told and alone and CEILING_SHARE < share < 1 / CEILING_SHARE):
+    slight = float(np.quantile(lost[over], FULL_SPEED)) < SAG_LEAST * full  # a healthy controller loses as much
+    if slight or not (told and alone and CEILING_SHARE < share < 1 / CEILING_SHARE):
         return none
     noise = max(float(np.std(np.concatenate([s.current for s in slower]) - _load_design(slower) @ beta)), 1e-9)
     every = np.concatenate([s.current for s in strokes])
