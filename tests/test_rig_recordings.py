@@ -12,7 +12,7 @@ from scipy.signal import butter, filtfilt
 from hand_model.effects.path import jenkins
 from hand_model.rig import fit_declared, load_rig, replay_rig
 from hand_model.rig.candidates import candidates
-from hand_model.rig.channels import sinusoids_left
+from hand_model.rig.channels import check_channels, sinusoids_left
 from hand_model.rig.diagnose import trusted_fit
 from hand_model.rig.states import low_pass, noise_std
 from hand_model.session import read_session
@@ -122,6 +122,18 @@ def test_a_ramp_is_no_sinusoid_and_an_unplugged_drive_no_command(tmp_path: Path)
     table[:, 2] = 0.0
     np.savetxt(log, table, delimiter=",", header="time,position,torque", comments="", fmt="%.8g")
     assert trusted_fit(load_rig(read_session(tmp_path / "s")))[1] == ()
+
+
+def test_one_sinusoid_among_other_torques_is_no_command(tmp_path: Path) -> None:
+    """Where the others are none, it is what a joint that swings so takes; in most of them, the column is a command."""
+    recorded(tmp_path / "s", ARM, 5, balance, 0.0)
+    for count, refused in ((1, False), (3, True)):
+        for k in range(count):
+            log = tmp_path / "s" / "log" / f"{k}.csv"
+            table = np.genfromtxt(log, delimiter=",", skip_header=1)
+            table[:, 2] = 0.4 * np.sin(2 * np.pi * 0.7 * table[:, 0])
+            np.savetxt(log, table, delimiter=",", header="time,position,torque", comments="", fmt="%.8g")
+        assert any("sinusoid" in i.reason for i in check_channels(load_rig(read_session(tmp_path / "s")))) is refused
 
 
 def test_uneven_stamps_are_no_noise() -> None:

@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 MAX_RATE_HZ = 250.0  # faster recordings are thinned to this: joints move below 50 Hz
 STATE_CUTOFF = 3.0  # of the states, in cut-offs of the balance
 MOST_ENDS = 0.05  # of a recording are left out at most at each end
+RINGING = 1e-2  # of a joint's mean speed [rms]: what a filter leaves of it in a pause, which is no motion
 MAX_SAMPLES = 4000  # per trial: residuals are correlated over far longer than this spacing
 
 
@@ -163,7 +164,7 @@ def trial_rows(
     q = np.stack([low_pass(raw[j], rate, wide) for j in rig.joints], 1)
     v = differentiate(q, rate, wide < PASSED * rate)
     a = differentiate(v, rate, wide < PASSED * rate)
-    rest = np.array([max(3 * velocity_noise(raw[j], rate, min(wide, PASSED * rate)), 1e-3 * float(np.std(v[:, i])))
+    rest = np.array([max(3 * velocity_noise(raw[j], rate, min(wide, PASSED * rate)), RINGING * float(np.std(v[:, i])))
                      for i, j in enumerate(rig.joints)])  # fmt: skip
     sign = np.clip(v / rest, -1.0, 1.0)
     thin = max(1, int(rate / max(12 * cutoff, 24.0)))

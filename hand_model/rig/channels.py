@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 SAME = 0.01  # a measured channel differs from its command by more than this share: drives, sensors and CAN buses do
 STRANGE = 0.7  # share of an effort that may stay unexplained before it is said to explain nothing
 UNSIGNED = "has no sign: it follows the size of the expected effort"
+SINUSOID = "is a sinusoid of time"
 LEAST_PERIODS = 2.0
 LEAST_TURNS = 4  # changes of sign that must be seen before a channel is said to have none
 CLIPPED = 0.05  # share of samples on one and the same extreme value
@@ -88,7 +89,7 @@ def _looks(trial: RigTrial, joint: str, values: Array, measured: bool) -> list[t
         out.append(("current_saturation", float(sum(limits)), "stands on its limits, the same both ways"))
     share = sinusoids_left(trial.time_s, values)
     if share < SAME:
-        out.append(("command_as_measurement", share, "is a sinusoid of time"))
+        out.append(("command_as_measurement", share, SINUSOID))
     share = static_left(trial, joint, values)
     if share < SAME:
         out.append(("command_as_measurement", share, "is a static function of the position"))
@@ -106,11 +107,14 @@ def _reverses(trial: RigTrial, joint: str) -> bool:
 
 
 def _gather(rig: RigModel, joint: str, channel: str, found: dict, usable: int) -> list[ChannelIssue]:
-    """One issue per kind and reason; a command in half of the recordings or more is one in all: the column is the same."""
+    """One issue per kind and reason; a command in half of the recordings or more is one in all: the column is the same. A sinusoid in
+    fewer is what a joint that swings so takes."""
     out = []
     flagged = {n for (kind, _), hits in found.items() if kind == "command_as_measurement" for n, _, _ in hits}
     whole = usable > 0 and len(flagged) >= 0.5 * usable
     for (kind, reason), hits in found.items():
+        if reason == SINUSOID and not whole:
+            continue
         trials = tuple(dict.fromkeys(n for n, _, _ in hits))
         if kind == "command_as_measurement" and whole:
             trials = tuple(t.name for t in rig.trials)
