@@ -44,6 +44,19 @@ def test_what_is_learned_is_the_same_without_the_recordings_that_take_no_part(na
     assert again.fit(terms).rss == whole.rss and len(pickle.dumps(balance)) < 2 * len(pickle.dumps(Balance(states)))
 
 
+def test_beside_a_term_that_clips_kept_columns_serve() -> None:
+    """What is clipped is left out of them: the starts are those of columns made anew."""
+    balance = Balance(drive(7, planted("detent_load", {"form": 0.0, "centre": 50.0, "width": 6.0}, [12.0]), trials=3))
+    kind, clips = effect("detent_load"), (Term(effect("current_saturation"), {"limit": 60.0}),)
+    assert 0 < (~balance.unclipped(clips)).mean() < 0.5
+    balance.apart(())
+    scan(balance, kind, ())  # keeps the columns
+    assert kind in balance._kept
+    kept = scan(balance, kind, clips)
+    anew = scan(Balance(balance.states), kind, clips)
+    assert kept.terms == anew.terms and kept.rss == pytest.approx(anew.rss, rel=1e-9)
+
+
 def test_sparse_and_dense_columns_have_the_same_products() -> None:
     rng = np.random.default_rng(0)
     columns = [np.where(np.arange(200)[:, None] // 10 == k, rng.normal(size=(200, 2)), 0.0) for k in range(20)]
@@ -55,6 +68,11 @@ def test_sparse_and_dense_columns_have_the_same_products() -> None:
     assert not isinstance(sparse.matrix, np.ndarray)
     np.testing.assert_allclose(sparse.products(other), whole[:, acting].T @ other, atol=1e-12)
     np.testing.assert_array_equal(sparse.shape, np.repeat(np.arange(20), 2)[acting])
+    for kept in (sparse, stacked([whole[:, acting] + 1.0])):
+        inside = np.arange(200) > 15
+        part, dense = kept.within(inside), kept.products(np.eye(200)) * inside
+        np.testing.assert_allclose(part.products(other), dense @ other, atol=1e-12)
+        np.testing.assert_allclose(part.length, np.linalg.norm(dense, axis=1), atol=1e-12)
     mine = np.flatnonzero(sparse.shape == 5)
     np.testing.assert_allclose(sparse.gram(mine), columns[5].T @ columns[5], atol=1e-12)
 

@@ -207,16 +207,22 @@ class Balance:
 
     def grid_columns(self, grid: Grid, weight: Array, warps: tuple[Term, ...] = ()) -> GridColumns:
         """The columns of every shape of a grid, weighted by `weight` (n,) and whitened; kept under the balance's own weight, for
-        each step of a search asks again."""
-        plain = np.array_equal(weight, self.weight * self.train)
-        if plain and self._warped != _keys(warps):
+        each step of a search asks again. What a term clips is left out of these: near enough to choose a start by."""
+        own = self.weight * self.train
+        inside = (weight != 0) | (own == 0)
+        if not np.array_equal(weight, own * inside):
+            return self._stacked(grid, weight, warps)
+        if self._warped != _keys(warps):
             self._kept, self._warped = {}, _keys(warps)
-        if plain and grid.effect in self._kept:
-            return self._kept[grid.effect]
-        out = stacked(self._acting(_warped_columns(grid.effect, shape, warps), weight) for shape in grid.shapes)
-        if plain and out.bytes + sum(c.bytes for c in self._kept.values()) < MOST_KEPT:
-            self._kept[grid.effect] = out
-        return out
+        out = self._kept.get(grid.effect)
+        if out is None:
+            out = self._stacked(grid, own, warps)
+            if out.bytes + sum(c.bytes for c in self._kept.values()) < MOST_KEPT:
+                self._kept[grid.effect] = out
+        return out if inside.all() else out.within(inside)
+
+    def _stacked(self, grid: Grid, weight: Array, warps: tuple[Term, ...]) -> GridColumns:
+        return stacked(self._acting(_warped_columns(grid.effect, shape, warps), weight) for shape in grid.shapes)
 
     def _acting(self, value: Callable[[DriveState], Array], weight: Array) -> Array:
         """What `gather` makes of `value`, weighted and whitened, without columns that are zero: not remembered, for whole grids would

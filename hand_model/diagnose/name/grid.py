@@ -40,6 +40,17 @@ class GridColumns:
         """matrix^T other, (c,) or (c, k)."""
         return np.asarray(self.matrix.T @ other)
 
+    def within(self, inside: NDArray[np.bool_]) -> GridColumns:
+        """The same columns, zero where `inside` (n,) is false."""
+        from scipy.sparse import diags
+        from scipy.sparse.linalg import norm
+
+        if isinstance(self.matrix, np.ndarray):
+            matrix = self.matrix * inside[:, None]
+            return GridColumns(matrix, self.shape, np.linalg.norm(matrix, axis=0))
+        matrix = (diags(inside.astype(float)) @ self.matrix).tocsc()
+        return GridColumns(matrix, self.shape, norm(matrix, axis=0))
+
     def gram(self, which: NDArray[np.int64]) -> Array:
         """Products (k, k) of some columns with each other."""
         part = self.matrix[:, which]

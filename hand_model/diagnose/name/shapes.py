@@ -42,8 +42,8 @@ def _project(balance: Balance, grid: Grid, terms: tuple[Term, ...], least: float
     bounds = grid.effect.amplitudes()
     gains = np.zeros(len(grid.shapes))
     allowed = ((right >= 0) | (bounds[0][2] < 0)) & ((right <= 0) | (bounds[0][3] > 0))
-    alone = np.where(allowed, right**2 / np.maximum(left, ALONG * columns.length) ** 2, 0.0)
-    own = left >= ALONG * columns.length
+    own = left > ALONG * columns.length
+    alone = np.divide(right**2, left**2, out=np.zeros(len(left)), where=allowed & own)
     first = np.searchsorted(columns.shape, np.arange(len(grid.shapes) + 1))
     for i, (begin, end) in enumerate(pairwise(first.tolist())):
         if begin == end or not own[begin:end].all():  # what acts in validation recordings only tells nothing here
