@@ -13,11 +13,12 @@ from rig_bench import ARM, Motion, recorded
 from hand_model.effects.path import jenkins
 from hand_model.rig import diagnose_rig, load_rig
 from hand_model.rig.candidates import candidates
-from hand_model.rig.compete import borne_out, compete, normal, pose, score, splits
+from hand_model.rig.compete import borne_out, compete, score, splits
 from hand_model.rig.diagnose import trusted_fit
 from hand_model.rig.diagnose_swing import _standing
 from hand_model.rig.evidence import weigh
 from hand_model.rig.laws import TURNING
+from hand_model.rig.problem import normal, pose
 from hand_model.rig.swing import PARAMETERS, Lane, Swing, errors, simulate, vector
 from hand_model.rig.swing_build import ENOUGH_STEPS, thinned
 from hand_model.rig.swing_compete import _folds

@@ -12,12 +12,12 @@ import pytest
 from hand_model.effects import DriveState, effect
 from hand_model.errors import SessionError
 from hand_model.rig import diagnose_rig, fit_declared, load_rig, replay_rig
-from hand_model.rig.compete import pose, solution
 from hand_model.rig.evidence import multiplicities, weigh
 from hand_model.rig.horizon import open_loop
 from hand_model.rig.laws import Now, law
 from hand_model.rig.mjcf import read_effects, write_effects
 from hand_model.rig.overrides import apply_overrides, compile_model
+from hand_model.rig.problem import pose, solution
 from hand_model.rig.proof import Bench
 from hand_model.rig.replay import can_simulate
 from hand_model.rig.supply import supply_channel, supply_deviation

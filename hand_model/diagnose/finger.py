@@ -22,7 +22,7 @@ from .locate.angles import (
 from .locate.course import FingerCourses, finger_courses
 from .locate.decoupled import beside_excursions
 from .locate.markers import HINGE, corrected_angles, name_markers
-from .locate.slips import marker_findings, steps
+from .locate.slips import marker_findings, steps, with_steps
 from .locate.slips import unexplained as unexplained_of
 from .name.station import Station, judged
 from .prove.markers import OWN, marker_fit, of_chain
@@ -102,4 +102,5 @@ def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, f
             effects = [*catalogue("linkage"), *outsiders("linkage")]
             stations.append(judged("markers", finger.name, finger.actuator, finger.segments[joint].name, states, effects))
     lines += [s.line() for s in stations]
+    found = with_steps(found, seen, moments, {s.joint: s.naming.fit.declared for s in stations})
     return FingerReading(finger.name, seen, tuple(stations), found, tuple(unexplained_of(seen, markers)), (), tuple(lines), courses)

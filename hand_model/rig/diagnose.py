@@ -14,19 +14,7 @@ from ..background import single_threaded
 from ..session import Session
 from .candidates import Candidate, candidates
 from .channels import ChannelIssue, check_balance, check_channels
-from .compete import (
-    LEAST_SHARE,
-    Score,
-    Step,
-    Term,
-    held_out,
-    judge,
-    normal,
-    pose,
-    resampled,
-    score,
-    solution,
-)
+from .compete import LEAST_SHARE, Score, Step, judge, score
 from .couplings import coupling_terms, with_couplings
 from .declared import DeclaredFit, fit_declared
 from .diagnose_swing import diagnose_swing
@@ -35,7 +23,9 @@ from .horizon import open_loop
 from .joint_search import as_term, offsets_first, search_joints
 from .model import RigModel, load_rig
 from .noise import effort_noise
+from .problem import Term, held_out, normal, pose, resampled, solution
 from .proof import Bench
+from .refit import refit
 from .settled import settled
 from .states import fill_gaps
 from .swing_build import can_swing
@@ -183,7 +173,7 @@ def _diagnose_balance(rig: RigModel, fit: DeclaredFit, say: Callable[[str], None
         found.append(finding)
     later, kept = _prove(bench, fit, stories, kept, rejected)
     found += later
-    one, two, every = ((fit, *_settled(bench, fit, _first(kept, k))) for k in (1, 2, len(kept)))
+    one, two, every = ((fit, *_settled(bench, fit, _first(fit, kept, k))) for k in (1, 2, len(kept)))
     lack = {"metric": "effort_rmse", "unit": "share of the declared model's", "before": 1.0,
             "after": bench.ratio(plain, every), "one_effect": bench.ratio(plain, one),
             "two_effects": bench.ratio(plain, two), "engine": bench.engine,
@@ -236,9 +226,13 @@ def _settled(bench: Bench, fit: DeclaredFit, terms: Sequence[Term]) -> tuple[lis
     return settled(bench.rig, fit, terms)[:2] if bench.mujoco else (list(terms), solution(pose(fit), terms))
 
 
-def _first(terms: Sequence[Term], count: int) -> list[Term]:
-    """The first so many terms of every joint."""
-    return [t for k, t in enumerate(terms) if sum(o.candidate.joint == t.candidate.joint for o in terms[:k]) < count]
+def _first(fit: DeclaredFit, terms: Sequence[Term], count: int) -> list[Term]:
+    """The first so many terms of every joint, in their best shapes without the others."""
+    out: list[Term] = []
+    for joint in dict.fromkeys(t.candidate.joint for t in terms):
+        mine = [t for t in terms if t.candidate.joint == joint]
+        out += refit(pose(fit, joint), mine[:count]) if len(mine) > count else mine
+    return out
 
 
 def _off_axis(bench: Bench, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple[DeclaredFit, Finding] | None:

@@ -8,9 +8,10 @@ from typing import Any
 
 from ..background import Background
 from .candidates import Candidate, candidates
-from .compete import Step, Term, compete, pose
+from .compete import Step, compete
 from .declared import DeclaredFit
 from .model import RigModel
+from .problem import Term, pose
 from .settled import settled
 
 

@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .compete import Term, design
 from .declared import DeclaredFit
 from .inverse import EffortResidual, effort_residuals, level_records
 from .mjcf import write_effects
 from .model import RigModel
 from .overrides import body_records
 from .patch import write_declared
+from .problem import Term, design
 from .states import noise_std
 
 Array = NDArray[np.float64]

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .candidates import TURNS, beside, candidates
-from .compete import Term, pose, solution
 from .declared import DeclaredFit
 from .model import RigModel
+from .problem import Term, pose, solution
 
 Array = NDArray[np.float64]
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -124,6 +125,24 @@ def turn(blocks: Blocks, members: Sequence[MarkerEffect], main: MarkerEffect) ->
     moved = arm + _shift(members, main)[:, mine]
     trace = np.einsum("bii->b", kabsch(arm, moved)[0])
     return float(np.median(np.arccos(np.clip((trace - 1) / 2, -1, 1))))
+
+
+def with_steps(found: Sequence[tuple[float, Finding]], angles: FingerAngles, moments: Sequence[tuple[int, float]],
+               stepped_deg: Mapping[str, Mapping[str, float]]) -> tuple[tuple[float, Finding], ...]:
+    """Findings with what supports turned about their joint's own axis, which markers alone cannot tell from motion. moments: of `steps`;
+    stepped_deg: joint -> declared coefficients of the balance of its angle, in which "step_i" [deg] belongs to the i-th moment."""
+    names = {(angles.records[r].trial.name, at): f"step_{i}" for i, (r, at) in enumerate(moments)}
+    out = []
+    for weight, finding in found:
+        known = finding.parameters
+        name = names.get((finding.where["trials"][0], known["moment"]["value"])) if "turn" in known else None
+        step = np.deg2rad(stepped_deg.get(finding.where["joint"], {}).get(name, 0.0))
+        if step:
+            whole = float(np.hypot(known["turn"]["value"], step))
+            weight *= whole / max(known["turn"]["value"], 1e-3 * whole)
+            finding = replace(finding, parameters={**known, "turn": {**known["turn"], "value": whole}})
+        out.append((weight, finding))
+    return tuple(out)
 
 
 def _shift(members: Sequence[MarkerEffect], main: MarkerEffect) -> Array:

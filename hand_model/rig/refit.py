@@ -1,0 +1,74 @@
+"""Shapes of terms beside each other: the best of their forms, continuous shapes moved until the training error falls no more."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..diagnose.name.balance import DISCRETE
+from .problem import Problem, Term, extended, normal, training_error
+
+Array = NDArray[np.float64]
+ROUNDS = 2  # of all terms in turn
+
+
+def refined(problem: Problem, terms: Sequence[Term], term: Term, parts: tuple) -> Term:
+    """The term beside others (with their normal equations) in the best of its forms, its continuous shapes moved together."""
+    train = _error_beside(problem, terms, term, parts)
+    forms: dict[tuple, list[dict[str, float]]] = {}
+    for shape in term.candidate.grid:
+        forms.setdefault(tuple(v for n, v in shape.items() if n in DISCRETE), []).append(shape)
+    starts = [min(grid, key=train) for grid in forms.values()] if len(forms) > 1 else [dict(term.shape)]
+    ends = [_descended(train, term.candidate.grid, shape) for shape in starts]
+    return Term(term.candidate, min(ends, key=train))
+
+
+def refit(problem: Problem, terms: Sequence[Term], first: int = 0) -> tuple[Term, ...]:
+    """The terms, from `first` on, each in the best of its shapes beside all others, in turn."""
+    terms = tuple(terms)
+    for _ in range(ROUNDS):
+        before = terms
+        for k, term in list(enumerate(terms))[first:]:
+            rest = terms[:k] + terms[k + 1 :]
+            train = _error_beside(problem, rest, term, normal(problem, rest))
+            moved = Term(term.candidate, _descended(train, term.candidate.grid, term.shape))
+            terms = (*terms[:k], moved, *terms[k + 1 :])
+        if terms == before:
+            break
+    return terms
+
+
+def _error_beside(problem: Problem, terms: Sequence[Term], term: Term, parts: tuple) -> Callable[[Mapping[str, float]], float]:
+    """Training error of the terms (with their normal equations) and one more, as a function of its shape."""
+
+    def train(shape: Mapping[str, float]) -> float:
+        moved = Term(term.candidate, shape)
+        some = normal(problem, [*terms, moved]) if term.candidate.delays else extended(problem, terms, moved, parts)
+        return training_error(problem, [*terms, moved], some)
+
+    return train
+
+
+def _descended(train: Callable[[Mapping[str, float]], float], shapes: Sequence[Mapping[str, float]],
+               start: Mapping[str, float]) -> Mapping[str, float]:  # fmt: skip
+    """The shape of least training error near one of a grid of shapes and within their bounds (Nelder & Mead 1965)."""
+    from scipy.optimize import minimize
+
+    grid = {n: np.unique([g[n] for g in shapes]) for n in start if n not in DISCRETE}
+    names = [n for n, values in grid.items() if len(values) > 1]
+    if not names:
+        return start
+    low, high = (np.array([grid[n][k] for n in names]) for k in (0, -1))
+    at = np.array([start[n] for n in names])
+
+    def shape(x: Array) -> dict[str, float]:
+        return {**start, **dict(zip(names, (float(v) for v in np.clip(x, low, high)), strict=True))}
+
+    near = np.array([grid[n][np.argsort(np.abs(grid[n] - x))[1]] for n, x in zip(names, at, strict=True)])
+    corners = at + np.concatenate([np.zeros((1, len(names))), np.diag(0.5 * (near - at))])
+    begin = train(start)
+    found = minimize(lambda x: train(shape(x)), at, method="Nelder-Mead", options={
+        "initial_simplex": corners, "maxfev": 15 + 20 * len(names), "xatol": 0, "fatol": 1e-4 * begin})  # fmt: skip
+    return shape(found.x) if found.fun < begin else start
