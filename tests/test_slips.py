@@ -7,8 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from hand_model.diagnose.findings import Finding
 from hand_model.diagnose.locate.markers import MarkerEffect
-from hand_model.diagnose.locate.slips import displacement, turn
+from hand_model.diagnose.locate.slips import displacement, turn, with_steps
 from hand_model.diagnose.locate.wobble import centre_travel, wobble_amplitude
 
 
@@ -35,6 +36,28 @@ def test_a_support_turns_by_the_angle_of_all_its_effects_together() -> None:
     halves = [MarkerEffect("support_slip", 1, None, 20, 60, 0.5 * shift.reshape(60, 15, 1), 50.0, 100.0, np.ones(1)) for _ in range(2)]
     blocks = SimpleNamespace(body=body, position=position)
     assert turn(blocks, halves, halves[0]) == pytest.approx(0.12, rel=1e-3)
+
+
+def test_a_turn_is_whole_with_what_a_small_slip_and_the_angle_took_of_it() -> None:
+    """Markers cannot tell a turn about the hinge from motion: the encoder sees it as a step."""
+    rng = np.random.default_rng(2)
+    position = rng.normal(size=(1, 5, 3)) * 0.01 + np.zeros((60, 1, 1))
+    body, axis = np.array([0, 0, 1, 1, 1]), np.array([0.0, 1.0, 0.0])
+    whole, step = np.array([0.05, 0.04, -0.02]), 0.03
+    seen = whole - step * axis
+    shift = np.zeros((60, 5, 3))
+    shift[:, 2:] = position[:, 2:] @ (turned(seen, float(np.linalg.norm(seen))) - np.eye(3)).T
+    slipped = np.zeros((60, 5, 3))
+    slipped[:, 4] = 2e-4
+    main = MarkerEffect("support_slip", 1, None, 20, 60, (shift - slipped).reshape(60, 15, 1), 900.0, 1000.0, np.ones(1))
+    small = MarkerEffect("marker_slip", 1, "P3", 20, 60, slipped.reshape(60, 15, 1), 15.0, 20.0, np.ones(1))
+    blocks = SimpleNamespace(body=body, position=position, axes=np.broadcast_to(axis, (60, 1, 3)), record=np.zeros(60, int))
+    naming = SimpleNamespace(blocks=blocks, found=(main, small), believed=True)
+    finger = SimpleNamespace(segments=[SimpleNamespace(name="proximal")])
+    found = Finding("support_slip", ("support_slip",), 1.0, (), {"joint": "proximal"}, "", {"turn": {"value": 0.03, "unit": "rad"}}, {}, None)
+    (weight, told), = with_steps([(2.0, found)], SimpleNamespace(finger=finger), naming, {"proximal": {"step_0": np.rad2deg(step)}})
+    assert told.parameters["turn"]["value"] == pytest.approx(np.linalg.norm(whole), rel=0.01)
+    assert weight == pytest.approx(2.0 * told.parameters["turn"]["value"] / 0.03)
 
 
 @pytest.mark.parametrize(("wave", "amplitude"), [(lambda u: np.sin(2 * np.pi * u + 0.8), 0.04), (lambda u: np.sin(np.pi * u), 0.03)])

@@ -102,5 +102,5 @@ def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, f
             effects = [*catalogue("linkage"), *outsiders("linkage")]
             stations.append(judged("markers", finger.name, finger.actuator, finger.segments[joint].name, states, effects))
     lines += [s.line() for s in stations]
-    found = with_steps(found, seen, moments, {s.joint: s.naming.fit.declared for s in stations})
+    found = with_steps(found, seen, markers, {s.joint: s.naming.fit.declared for s in stations})
     return FingerReading(finger.name, seen, tuple(stations), found, tuple(unexplained_of(seen, markers)), (), tuple(lines), courses)

@@ -41,14 +41,19 @@ def marker_findings(angles: FingerAngles, naming: MarkerNaming) -> list[tuple[fl
     groups: dict[tuple[str, int, str | None], list[MarkerEffect]] = {}
     for effect in naming.found:
         groups.setdefault((effect.effect, effect.body, effect.label), []).append(effect)
-    least = max([SMALL * sum(e.gain for e in naming.found), *(e.gain for e in naming.found if e.effect in UNNAMED)])
+    least = _least(naming)
     for (name, body, label), members in groups.items():
         if name in UNNAMED or sum(e.gain for e in members) < least:
-            continue  # no more than the form of the large one being another
+            continue
         readings = max(float(naming.blocks.weight.sum()) * 3, 1.0)
         moved = float(np.sqrt(sum(e.gain for e in members) / readings))  # over the noise of one reading
         out.append((weighed(moved, _contrast(angles)), _finding(angles, naming, name, body, label, members)))
     return out
+
+
+def _least(naming: MarkerNaming) -> float:
+    """Gain below which effects are no more than the form of a larger one being another."""
+    return max([SMALL * sum(e.gain for e in naming.found), *(e.gain for e in naming.found if e.effect in UNNAMED)])
 
 
 def _contrast(angles: FingerAngles) -> float:
@@ -120,29 +125,43 @@ def displacement(members: Sequence[MarkerEffect], main: MarkerEffect) -> float:
 
 def turn(blocks: Blocks, members: Sequence[MarkerEffect], main: MarkerEffect) -> float:
     """Median over the time in which `main` acts of the angle [rad] by which its effects together turn the segment's markers (Kabsch 1976)."""
+    return float(np.median(np.linalg.norm(_turned(blocks, members, main), axis=1)))
+
+
+def _turned(blocks: Blocks, members: Sequence[MarkerEffect], main: MarkerEffect) -> Array:
+    """Rotation vectors (b, 3) [rad] of that turn."""
+    from scipy.spatial.transform import Rotation
+
     mine = blocks.body == main.body
     arm = blocks.position[main.begin or 0 : main.end, mine]
-    moved = arm + _shift(members, main)[:, mine]
-    trace = np.einsum("bii->b", kabsch(arm, moved)[0])
-    return float(np.median(np.arccos(np.clip((trace - 1) / 2, -1, 1))))
+    return Rotation.from_matrix(kabsch(arm, arm + _shift(members, main)[:, mine])[0]).as_rotvec()
 
 
-def with_steps(found: Sequence[tuple[float, Finding]], angles: FingerAngles, moments: Sequence[tuple[int, float]],
+def with_steps(found: Sequence[tuple[float, Finding]], angles: FingerAngles, naming: MarkerNaming,
                stepped_deg: Mapping[str, Mapping[str, float]]) -> tuple[tuple[float, Finding], ...]:
-    """Findings with what supports turned about their joint's own axis, which markers alone cannot tell from motion. moments: of `steps`;
-    stepped_deg: joint -> declared coefficients of the balance of its angle, in which "step_i" [deg] belongs to the i-th moment."""
-    names = {(angles.records[r].trial.name, at): f"step_{i}" for i, (r, at) in enumerate(moments)}
+    """Findings with what supports turned about their joint's own axis, which markers alone cannot tell from motion, and what they share
+    with slips too small to report. stepped_deg: joint -> declared coefficients of the balance of its angle, in which "step_i" [deg]
+    belongs to the i-th of `steps`."""
     out = []
     for weight, finding in found:
-        known = finding.parameters
-        name = names.get((finding.where["trials"][0], known["moment"]["value"])) if "turn" in known else None
-        step = np.deg2rad(stepped_deg.get(finding.where["joint"], {}).get(name, 0.0))
-        if step:
-            whole = float(np.hypot(known["turn"]["value"], step))
-            weight *= whole / max(known["turn"]["value"], 1e-3 * whole)
-            finding = replace(finding, parameters={**known, "turn": {**known["turn"], "value": whole}})
+        if "turn" in finding.parameters:
+            body = 1 + next(k for k, s in enumerate(angles.finger.segments) if s.name == finding.where["joint"])
+            seen = finding.parameters["turn"]["value"]
+            whole = _whole_turn(naming, body, stepped_deg.get(finding.where["joint"], {}))
+            weight *= whole / max(seen, 1e-3 * whole)
+            finding = replace(finding, parameters={**finding.parameters, "turn": {"value": whole, "unit": "rad"}})
         out.append((weight, finding))
     return tuple(out)
+
+
+def _whole_turn(naming: MarkerNaming, body: int, stepped_deg: Mapping[str, float]) -> float:
+    blocks, least = naming.blocks, _least(naming)
+    main = max((e for e in naming.found if e.effect == "support_slip" and e.body == body), key=lambda e: e.gain)
+    acting = [e for e in naming.found if e.body == body and (e.effect == "support_slip" or e.effect == "marker_slip" and e.gain < least)]
+    step = sum(stepped_deg.get(f"step_{i}", 0.0) for i, e in enumerate(_stepping(naming))
+               if e.body == body and blocks.record[e.begin] == blocks.record[main.begin])  # fmt: skip
+    along = np.deg2rad(step) * blocks.axes[main.begin : main.end, body - 1]
+    return float(np.median(np.linalg.norm(_turned(blocks, acting, main) + along, axis=1)))
 
 
 def _shift(members: Sequence[MarkerEffect], main: MarkerEffect) -> Array:
@@ -226,5 +245,8 @@ def _displaced(angles: FingerAngles, labels: list[str], lasting_s: float) -> flo
 def steps(angles: FingerAngles, naming: MarkerNaming) -> list[tuple[int, float]]:
     """(record, time [s]) of every slip: a support that turns about its joint's own axis steps the angle, which markers alone
     cannot tell from motion; encoder and linkage balances let the angle step there."""
-    return [(int(naming.blocks.record[e.begin]), float(naming.blocks.time_s[e.begin]))
-            for e in naming.found if naming.believed and e.begin is not None and e.effect in ("support_slip", "palm_marker_slip")]
+    return [(int(naming.blocks.record[e.begin]), float(naming.blocks.time_s[e.begin])) for e in _stepping(naming)]
+
+
+def _stepping(naming: MarkerNaming) -> list[MarkerEffect]:
+    return [e for e in naming.found if naming.believed and e.begin is not None and e.effect in ("support_slip", "palm_marker_slip")]
