@@ -130,6 +130,16 @@ def test_names_that_leave_what_recordings_kept_out_show_are_not_believed(seed: i
     assert not judged("current", "index", "index", None, drive(seed, at_speed), catalogue("drive")).believed
 
 
+@pytest.mark.parametrize(("cold", "believed"), [(40.0, True), (6.0, False)])
+def test_names_that_leave_nothing_of_what_recordings_kept_out_showed_plainly_are_believed(cold: float, believed: bool) -> None:
+    """Whatever repeats beside them: the test hardly sees what changes over a recording."""
+    warm = planted("thermal_friction_drift", {"form": 0.0, "warm_up_time": 50.0, "cooling_time": 50.0}, [cold])
+    naming = judged("current", "index", "index", None, drive(2, warm), catalogue("drive")).naming
+    assert [f.term.effect.name for f in naming.found] == ["thermal_friction_drift"]
+    some = replace(naming.after, p=1e-6, excess=0.5 * naming.before.excess)
+    assert Station("current", "index", "index", None, replace(naming, before=replace(naming.before, p=1e-9), after=some)).believed is believed
+
+
 def test_a_drifting_clock_is_named_beside_outsiders() -> None:
     station = judged("encoder", "index", "index", "proximal", joint(5, drift=2e-3), [*catalogue("encoder"), *outsiders("encoder")])
     assert [f.term.effect.name for f in station.kept] == ["clock_drift"] and not station.outsiders

@@ -21,6 +21,7 @@ ALIKE = 1 / 3  # of the size of a larger effect of the same family: below, no fi
 UNREST = 0.3  # of the noise: wander that every machine is granted; more is no explanation
 WORSE = 1.5  # times the mean square of training recordings
 KEPT_OUT, EXPLAINED_MOST = 1.05, 2 / 3  # times the noise of recordings kept out, and the share of what is above it that true names take
+PLAINLY = 1 / 3  # of the mean square of recordings kept out before, at most, is noise
 EXPLAINED_SOME = 1 / 3  # of a mismatch that the lack-of-fit test sees: below, they are not what is missing, whatever is left to see
 
 
@@ -68,10 +69,19 @@ class Station:
 
     @property
     def believed(self) -> bool:
-        """Whether the names stand: the final model passes the test, or takes most of the mismatch away. Names that take little of a
-        plain mismatch away do not, however little is left to see, nor names of nothing where more than the noise does not repeat."""
+        """Whether the names stand: the final model passes the test, or takes most of the mismatch away, or all that recordings kept out
+        show. Names that take little of a plain mismatch away do not, however little is left to see, nor names of nothing where more than
+        the noise does not repeat."""
         idle = self.explained < (EXPLAINED_SOME if self.naming.before.p < ALPHA else SMALL if self.wander > 1 else 0.0)
-        return bool(self.proven) and not idle and not self._short and (self.naming.after.p >= ALPHA or self.explained >= EXPLAINED_LEAST)
+        most = self.naming.after.p >= ALPHA or self.explained >= EXPLAINED_LEAST or self._predicted
+        return bool(self.proven) and not idle and not self._short and most
+
+    @property
+    def _predicted(self) -> bool:
+        """Whether recordings kept out, plainly above their noise before, are within it beside the names: the test asks what repeats at the same
+        place, speed and direction, and not what changes over a recording."""
+        before, after = (variance_ratio(self.naming, fit) for fit in (self.naming.declared, self.naming.fit))
+        return self.naming.balance.untouched and after <= KEPT_OUT**2 < PLAINLY * before
 
     @property
     def _short(self) -> bool:
