@@ -103,15 +103,12 @@ def free_declared(swing: Swing) -> tuple[str, ...]:
 
 
 def _blocks(swing: Swing, theta: Array, lanes: Sequence[int]) -> Array:
-    """Root mean square error of every part of every stretch, (len(lanes) * PARTS,), from the starts that theta asks for: one part in which the joint sticks
-    when it should not would outweigh all others if squares were added."""
+    """Root mean square error (runs, PARTS) of every part of every stretch lanes[k] from the start that theta[k] asks for, (runs, len(PARAMETERS)):
+    one part in which the joint sticks when it should not would outweigh all others if squares were added."""
     own = started(replace(swing, lanes=tuple(swing.lanes[i] for i in lanes)), theta)
-    residual = errors(own, np.repeat(theta[None], len(lanes), 0), np.arange(len(lanes)))
-    out = []
-    for run, lane in enumerate(own.lanes):
-        n = len(lane.position)
-        out += [float(np.sqrt(np.mean(p**2))) for p in np.array_split(residual[:n, run], PARTS)]
-    return np.array(out)
+    residual = errors(own, theta, np.arange(len(lanes)))
+    parts = [np.array_split(residual[: len(lane.position), run], PARTS) for run, lane in enumerate(own.lanes)]
+    return np.array([[float(np.sqrt(np.mean(p**2))) for p in run] for run in parts])
 
 
 def fit_apart(swing: Swing, tasks: Sequence[Task], iterations: int = 14) -> list[Fitted]:
@@ -260,11 +257,10 @@ def _left_out(
     everyone = [none, *rivals]
     tasks = [replace(task, start=fit.theta, stretches=kept) for task, fit in everyone for kept, _ in folds]
     fits = fit_apart(swing, tasks, 3)
-    out = []
-    for k in range(len(everyone)):
-        parts = [_blocks(test, fits[k * len(folds) + f].theta, left) for f, (_, left) in enumerate(folds)]
-        out.append(np.concatenate(parts))
-    return out[0], out[1:]
+    apart = [left for _ in everyone for _, left in folds]
+    theta = np.concatenate([np.repeat(fit.theta[None], len(left), 0) for fit, left in zip(fits, apart, strict=True)])
+    out = _blocks(test, theta, [i for left in apart for i in left]).reshape(len(everyone), -1)
+    return out[0], list(out[1:])
 
 
 def _judge(

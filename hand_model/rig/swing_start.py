@@ -23,8 +23,8 @@ LEAST_STEPS = 8
 
 
 def started(swing: Swing, theta: Array) -> Swing:
-    """The swing with the start of every stretch fitted to its first period at parameters theta (len(PARAMETERS),), and known; a
-    driven one as it is, for there friction counts within a period."""
+    """The swing with the start of every stretch fitted to its first period at parameters theta, (len(PARAMETERS),) or of each stretch
+    (stretches, len(PARAMETERS)), and known; a driven one as it is, for there friction counts within a period."""
     if swing.driven:
         return swing
     steps = max(LEAST_STEPS, round(swing.period_s / swing.step_s))
@@ -64,7 +64,7 @@ def _slopes(swing: Swing, lanes: Sequence[Lane], theta: Array) -> tuple[Array, A
 
 
 def _errors(swing: Swing, lanes: Sequence[Lane], theta: Array) -> Array:
-    return errors(replace(swing, lanes=tuple(lanes)), np.repeat(theta[None], len(lanes), 0), np.arange(len(lanes)))
+    return errors(replace(swing, lanes=tuple(lanes)), np.broadcast_to(theta, (len(lanes), theta.shape[-1])), np.arange(len(lanes)))
 
 
 def _moved(lane: Lane, by: Array) -> Lane:
