@@ -13,12 +13,12 @@ from rig_bench import ARM, Motion, recorded
 from hand_model.effects.path import jenkins
 from hand_model.rig import diagnose_rig, load_rig
 from hand_model.rig.candidates import candidates
-from hand_model.rig.compete import borne_out, compete, score, splits
+from hand_model.rig.compete import _settled_down, borne_out, compete, score, splits
 from hand_model.rig.diagnose import trusted_fit
 from hand_model.rig.diagnose_swing import _standing
 from hand_model.rig.evidence import weigh
 from hand_model.rig.laws import TURNING
-from hand_model.rig.problem import normal, pose
+from hand_model.rig.problem import Term, extended, normal, pose
 from hand_model.rig.swing import PARAMETERS, Lane, Swing, errors, simulate, vector
 from hand_model.rig.swing_build import ENOUGH_STEPS, thinned
 from hand_model.rig.swing_compete import _folds
@@ -64,6 +64,30 @@ def test_a_torque_that_acts_a_fraction_of_a_sample_late_is_a_delay_and_no_spring
         terms = compete(pose(fit), candidates(rig, fit, "hinge"))[0]
         assert [t.candidate.effect for t in terms] == ["current_channel_delay"] * (late > 0)
         assert not late or terms[0].shape["delay"] == pytest.approx(-late, rel=0.1)
+
+
+def test_terms_are_fitted_beside_each_other_and_leave_where_they_do_not_pay(tmp_path: Path) -> None:
+    """A shape that is off finds its place beside another term; what takes nothing away goes, unless that was tried before."""
+    rig = load_rig(read_session(bench(tmp_path / "s", 0.3, 0.01)))
+    fit = trusted_fit(rig)[0]
+    problem, known = pose(fit, "hinge"), {c.key: c for c in candidates(rig, fit, "hinge")}
+    turning, drag = (next(c for k, c in known.items() if k.startswith(name)) for name in (f"load_dependent_friction/{TURNING}", "quadratic_damping"))
+    terms = Term(turning, {"form": 1.0, "reach": 0.3}), Term(drag, {})
+    kept, stays = _settled_down(problem, terms, 0, set())
+    assert [t.candidate.key for t in kept] == [turning.key] and stays == [True, False]
+    assert kept[0].shape["reach"] == pytest.approx(0.1, rel=0.3)  # at the loads of the declared fit
+    assert _settled_down(problem, terms, 0, {(turning.key,)})[1] == [True, True]
+
+
+def test_a_column_beside_a_delay_is_late_as_all_others_are(tmp_path: Path) -> None:
+    """Normal equations with one more term are those of all terms at once."""
+    rig = load_rig(read_session(bench(tmp_path / "s", 0.3, 0.01, late=0.02)))
+    fit = trusted_fit(rig)[0]
+    known = {c.effect: c for c in candidates(rig, fit, "hinge")}
+    late, drag = Term(known["current_channel_delay"], {"delay": 0.02}), Term(known["quadratic_damping"], {})
+    problem = pose(fit, "hinge")
+    for one, other in zip(extended(problem, [late], drag, normal(problem, [late])), normal(problem, [late, drag]), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9 * np.abs(other).max())
 
 
 def test_the_best_of_many_rivals_is_held_to_the_best_of_chance() -> None:

@@ -81,11 +81,14 @@ def term_columns(row: Rows, term: Term) -> Array:
 
 def design(row: Rows, terms: Sequence[Term]) -> Array:
     """Declared columns and those of the terms (m, P + J), each delayed where a term says so."""
-    matrix = np.concatenate([row.columns, *(term_columns(row, t) for t in terms)], 1)
+    return _delayed(row, np.concatenate([row.columns, *(term_columns(row, t) for t in terms)], 1), terms)
+
+
+def _delayed(row: Rows, columns: Array, terms: Sequence[Term]) -> Array:
     for t in terms:
         if t.candidate.delays and t.candidate.joint == row.joint:
-            matrix = later(row.time_s[:: row.step], matrix, t.shape["delay"])
-    return matrix
+            columns = later(row.time_s[:: row.step], columns, t.shape["delay"])
+    return columns
 
 
 def limits(problem: Problem, terms: Sequence[Term]) -> tuple[Array, Array, Array, Array]:
@@ -126,7 +129,7 @@ def extended(problem: Problem, terms: Sequence[Term], new: Term, parts: tuple) -
             continue
         scale = problem.fit.scale[row.joint]
         x, y = _moving_design(problem, row, terms), row.effort[row.moving] / scale
-        c = term_columns(row, new)[row.moving] / scale
+        c = _delayed(row, term_columns(row, new), terms)[row.moving] / scale
         for b, s in _pieces(block[row.moving]):
             cross = x[s].T @ c[s]
             g[b, :p, p:] += cross
