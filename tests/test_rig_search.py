@@ -11,7 +11,7 @@ import pytest
 from rig_bench import ARM, Motion, recorded
 
 from hand_model.effects.path import jenkins
-from hand_model.rig import diagnose_rig, load_rig
+from hand_model.rig import diagnose_rig, load_rig, swing_compete
 from hand_model.rig.candidates import candidates
 from hand_model.rig.compete import _settled_down, borne_out, compete, score, splits
 from hand_model.rig.diagnose import trusted_fit
@@ -21,7 +21,8 @@ from hand_model.rig.laws import TURNING
 from hand_model.rig.problem import Term, extended, normal, pose
 from hand_model.rig.swing import PARAMETERS, Lane, Swing, errors, simulate, vector
 from hand_model.rig.swing_build import ENOUGH_STEPS, thinned
-from hand_model.rig.swing_compete import _folds
+from hand_model.rig.swing_compete import PARTS, Variant, _folds
+from hand_model.rig.swing_fit import Fitted
 from hand_model.rig.swing_start import freed, started
 from hand_model.session import read_session
 
@@ -236,3 +237,23 @@ def test_a_term_of_one_recording_is_borne_out_in_every_part_of_it(tmp_path: Path
         stands[c.key] = borne_out(problem, ((), parts), ((s.term,), s.parts))
     assert stands[f"load_dependent_friction/{TURNING}@hinge"]
     assert not stands["detent_load@hinge"]
+
+
+@pytest.mark.parametrize(("helps", "names"), [(True, ["stribeck_friction", "command_delay"]), (False, [])])
+def test_what_one_effect_hides_is_sought_beside_another(monkeypatch: pytest.MonkeyPatch, helps: bool, names: list[str]) -> None:
+    """Friction that gains in two recordings and costs in the others, as long as a late drive is not known: both or none."""
+    count, blocks = 8, 8 * PARTS
+    stage = SimpleNamespace(lanes=[SimpleNamespace(trial=f"run_{k}") for k in range(count)], train=lambda: np.arange(count))
+    fitted = Fitted(np.zeros(len(PARAMETERS)), 1.0, 1, 3)
+    alone = np.where(np.arange(blocks) < 2 * PARTS, 0.1, 1.05)
+
+    def two_rounds(stages, taken, current, test, folds):
+        rival = swing_compete._Rival(Variant("command_delay" if taken else "stribeck_friction", "", {}), fitted, np.full(blocks, 0.2) if taken and helps else alone)
+        return fitted, np.ones(blocks), [rival] if len(taken) < 2 else []
+
+    monkeypatch.setattr(swing_compete, "_round", two_rounds)
+    monkeypatch.setattr(swing_compete, "freed", lambda swing, theta: swing)
+    monkeypatch.setattr(swing_compete, "_exchanged", lambda stages, taken, fit: (taken, fit))
+    monkeypatch.setattr(swing_compete, "_folds", lambda swing, train, whole: (swing, [((), (k,)) for k in range(count)]))
+    taken, rounds = swing_compete.compete_swing([stage], fitted)
+    assert [v.effect for v in taken] == names and [r.variant.effect for r in rounds] == names

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..background import Background
-from .evidence import ONE_STANDARD_ERROR, weigh
+from .evidence import BEYOND_DOUBT, ONE_STANDARD_ERROR, weigh
 from .swing import DECLARED, INDEX, LOW_SPEED, Swing, errors, vector
 from .swing_fit import Fitted, Task, fit_together
 from .swing_start import freed, started
@@ -50,6 +50,15 @@ class Round:
     rivals: tuple[tuple[str, float], ...]
     equals: tuple[str, ...]
     fit: Fitted | None = None
+
+
+@dataclass(frozen=True)
+class _Rival:
+    """A variant added to those taken, its fit and the errors (blocks,) of what is left out."""
+
+    variant: Variant
+    fit: Fitted
+    error: Array
 
 
 def variants(swing: Swing) -> tuple[Variant, ...]:
@@ -139,7 +148,7 @@ def fit_stages(stages: Sequence[Swing], tasks: Sequence[Task], iterations: int =
 def compete_swing(
     stages: Sequence[Swing], current: Fitted, floor: float = 0.0, whole: Swing | None = None
 ) -> tuple[tuple[Variant, ...], tuple[Round, ...]]:
-    """Forward selection from the declared model (fitted as current), while the error is above what the recordings can tell
+    """Forward selection from the declared model (fitted as current), by pairs where no variant alone is better, while the error is above what the recordings can tell
     (floor [rad or m]); returns the variants and their rounds, each with the fit of all taken so far. whole: the recordings
     uncut; those left out whole are predicted so, as the ones that validate are."""
     train = tuple(int(i) for i in stages[-1].train())
@@ -149,21 +158,43 @@ def compete_swing(
     most = MOST_TERMS if len({stages[-1].lanes[i].trial for i in train}) >= FOLDS else MOST_OF_FEW
     while len(taken) < most and current.cost > floor**2:
         stages = [freed(s, current.theta) for s in stages]
-        swing, free = stages[-1], all_free(stages[-1], taken)
-        rivals = [v for v in variants(swing) if not set(v.start) <= set(free)]
-        tasks = [Task(all_free(swing, (*taken, v)), _started(current.theta, v), ()) for v in rivals]
-        fits = fit_stages(stages, tasks, 8)
-        order = _shortlist(rivals, fits)
-        same = Task(free, current.theta, train)  # nothing more has the same starts as they have, or they would win by theirs
-        current, *best = _several(swing, [same, *(Task(tasks[k].free, fits[k].theta, train) for k in order)])
-        none, scores = _left_out(swing, test, folds, (same, current), [(tasks[k], f) for k, f in zip(order, best, strict=True)])
-        group = np.array([name for _, left in folds for i in left for name in [test.lanes[i].trial] * PARTS])
-        found = _judge(none, scores, [rivals[k] for k in order], best, group, len(train))
+        current, none, rivals = _round(stages, taken, current, test, folds)
+        found = _judged(none, rivals, test, folds, len(train))
+        if found is None and rivals and not taken:  # what one leaves may hide it, as a late drive hides friction: two at once
+            first = min(rivals, key=lambda r: r.error.sum())
+            stages = [freed(s, first.fit.theta) for s in stages]
+            rivals = _round(stages, (first.variant,), first.fit, test, folds)[2]
+            found = _judged(none, rivals, test, folds, len(train), BEYOND_DOUBT)
+            if found is not None:
+                taken, rounds = (first.variant,), [replace(found[1], variant=first.variant, fit=first.fit)]
         if found is None:
             break
-        taken, current = _exchanged(stages, (*taken, rivals[order[found[0]]]), best[found[0]])
+        won = rivals[found[0]]
+        taken, current = _exchanged(stages, (*taken, won.variant), won.fit)
         rounds.append(replace(found[1], fit=current))
     return taken, tuple(rounds)
+
+
+def _round(stages: Sequence[Swing], taken: tuple[Variant, ...], current: Fitted, test: Swing, folds: list) -> tuple[Fitted, Array, list[_Rival]]:
+    """The fit of all taken so far, its errors (blocks,) of what is left out, and the best of those that might be added."""
+    swing, train = stages[-1], tuple(int(i) for i in stages[-1].train())
+    free = all_free(swing, taken)
+    others = [v for v in variants(swing) if not set(v.start) <= set(free)]
+    tasks = [Task(all_free(swing, (*taken, v)), _started(current.theta, v), ()) for v in others]
+    fits = fit_stages(stages, tasks, 8)
+    order = _shortlist(others, fits)
+    same = Task(free, current.theta, train)  # nothing more has the same starts as they have, or they would win by theirs
+    current, *best = _several(swing, [same, *(Task(tasks[k].free, fits[k].theta, train) for k in order)])
+    none, scores = _left_out(swing, test, folds, (same, current), [(tasks[k], f) for k, f in zip(order, best, strict=True)])
+    return current, none, [_Rival(others[k], f, s) for k, f, s in zip(order, best, scores, strict=True)]
+
+
+def _judged(none: Array, rivals: Sequence[_Rival], test: Swing, folds: list, stretches: int,
+            least: float = ONE_STANDARD_ERROR) -> tuple[int, Round] | None:  # fmt: skip
+    if not rivals:
+        return None
+    group = np.array([name for _, left in folds for i in left for name in [test.lanes[i].trial] * PARTS])
+    return _judge(none, [r.error for r in rivals], [r.variant for r in rivals], [r.fit for r in rivals], group, stretches, least)
 
 
 def _shortlist(rivals: Sequence[Variant], fits: Sequence[Fitted]) -> list[int]:
@@ -264,12 +295,13 @@ def _left_out(
 
 
 def _judge(
-    none: Array, scores: list[Array], rivals: Sequence[Variant], fits: Sequence[Fitted], group: Array, stretches: int
+    none: Array, scores: list[Array], rivals: Sequence[Variant], fits: Sequence[Fitted], group: Array, stretches: int,
+    least: float = ONE_STANDARD_ERROR,
 ) -> tuple[int, Round] | None:
-    """Index of the winner and what the round says, or None where nothing beats "none" by a standard error. Which effect it
+    """Index of the winner and what the round says, or None where nothing beats "none" (with probability `least`, by a standard error). Which effect it
     is, recordings left out decide; between forms of it that they cannot tell apart, the likelihood: BIC with every
     stretch as one sample (Schwarz 1978). One that has more parameters has to predict what is left out better as well."""
-    said = weigh(none, np.array(scores), [f.free for f in fits], group, ONE_STANDARD_ERROR, worth=LEAST_GAIN)
+    said = weigh(none, np.array(scores), [f.free for f in fits], group, least, worth=LEAST_GAIN)
     if said is None:
         return None
     same = tuple(dict.fromkeys(rivals[k].effect for k in said.close))
