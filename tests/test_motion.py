@@ -46,3 +46,21 @@ def test_noise_of_the_position_is_not_found_again_with_the_acceleration() -> Non
     fast = np.abs(motion.acceleration) > 200.0
     assert fast.sum() > 20
     assert np.all(np.abs(sure[fast]) > 0.75 * np.abs(motion.acceleration[fast]))
+
+
+def test_noise_of_the_position_takes_nothing_off_a_motor_s_inertia() -> None:
+    """As a column with an error of its own it would: what starts and stops then lack looks like a bent spring."""
+    at = stamps(4, 0.009)
+    clean = np.where(at < 8.0, strokes(at, 850.0, 95.0), strokes(at, 850.0, 15.0))  # fast ones set the kernel
+    exact = estimate_motion(at, clean)
+    noisy = clean + np.random.default_rng(5).normal(0, 0.05, len(at))
+    effort = 0.014 * exact.acceleration + 0.15 * exact.velocity + 35 * np.sign(exact.velocity) + 0.2 * exact.position
+    motion = estimate_motion(at, noisy)
+    use = motion.moving & (motion.since_start_s > 0.03) & (motion.until_stop_s > 0.03)
+
+    def inertia(acceleration: np.ndarray) -> float:
+        columns = np.stack([acceleration, motion.velocity, np.sign(motion.velocity), motion.position], axis=-1)[use]
+        return float(np.linalg.lstsq(columns, effort[use], rcond=None)[0][0])
+
+    assert inertia(motion.acceleration) < 0.8 * 0.014  # else this test tells nothing
+    assert abs(inertia(sure_acceleration(motion, at)) / 0.014 - 1) < 0.15

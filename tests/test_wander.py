@@ -14,7 +14,7 @@ from hand_model.diagnose.locate.stamps import stamps
 from hand_model.diagnose.name.balance import Balance
 from hand_model.diagnose.name.selection import name_effects
 from hand_model.diagnose.name.wander import Wander, estimate_wander
-from hand_model.effects import catalogue, effect
+from hand_model.effects import catalogue, effect, outsiders
 from hand_model.session import Log
 
 
@@ -77,6 +77,18 @@ def test_physics_is_found_through_a_wandering_zero():
     naming = name_effects(drive(3, lambda s: extra(s) + wandering(s)), catalogue("drive"))
     assert [f.term.effect.name for f in naming.found] == ["position_dependent_friction"]
     assert naming.found[0].amplitudes["extra_friction"] == pytest.approx(15.0, rel=0.2)
+
+
+@pytest.mark.parametrize(("seed", "before", "share"), [(1, 12, 0.5), (2, 8, 0.5), (2, 8, 0.7)])
+def test_a_jump_of_friction_is_found_between_the_moments_that_are_tried(seed, before, share):
+    """Beside levels per stroke only the stroke in which it happens tells the moment, and every start may be in another one."""
+    jump = next(e for e in outsiders("drive") if e.name == "friction_jump")
+    starts = jump.shapes(drive(seed))[0].starts
+    moment = (1 - share) * starts[before] + share * starts[before + 1]
+    states = drive(seed, lambda s: jump.columns(s, {"moment": moment}) @ np.array([14.0]), noise=2.5)
+    naming = name_effects(states, (*catalogue("drive"), *outsiders("drive")))
+    assert [f.term.effect.name for f in naming.found] == ["friction_jump"]
+    assert naming.found[0].term.shape["moment"] == pytest.approx(moment, abs=0.1)
 
 
 def log_of(state, time_s, position) -> Log:

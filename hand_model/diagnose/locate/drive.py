@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...effects.base import DriveState
 from ...effects.path import dahl, from_rest
 from ...session import Log, Session, Trial
-from .motion import Motion, estimate_motion
+from .motion import Motion, estimate_motion, sure_acceleration
 
 Array = NDArray[np.float64]
 
@@ -107,7 +107,7 @@ def _prepare(
         extra["bandwidth_s"] = np.full(len(time_s), motion.bandwidth_s)
         extra["position_noise"] = np.full(len(time_s), motion.noise)
         extra["steady"] = steady(time_s, motion).astype(float)
-        declared = np.stack([motion.acceleration, motion.velocity, np.sign(motion.velocity), motion.position,
+        declared = np.stack([sure_acceleration(motion, time_s), motion.velocity, np.sign(motion.velocity), motion.position,
                              np.ones(len(time_s))], axis=-1)
         states.append(DriveState(trial.name, actuator, time_s, motion.position, motion.velocity, motion.acceleration,
                                  effort, declared, extra=extra, validate=trial.validate,

@@ -82,11 +82,11 @@ def position_at(motion: Motion, time_s: Array, then: Array) -> Array:
 
 def sure_acceleration(motion: Motion, time_s: Array) -> Array:
     """Acceleration (n,) without what may be noise of the position: that would be found again, with the other sign, in whatever the
-    position is held against. The noise is that of the kernel's second derivative, step / h^5 int ((u^2 - 1) phi)^2 du = 0.2116 step / h^5."""
+    position is held against, and as an error of a regressor would take off its coefficient (Fuller 1987). The noise is that of the
+    kernel's second derivative, step / h^5 int ((u^2 - 1) phi)^2 du = 0.2116 step / h^5; what exceeds it stays as it is."""
     step = float(np.median(np.diff(time_s)))
     noise = motion.noise * np.sqrt(0.2116 * step / motion.bandwidth_s**5)
-    share = (SURE * noise / np.where(motion.acceleration == 0, 1.0, motion.acceleration)) ** 2
-    return motion.acceleration * np.clip(1 - share, 0.0, None)
+    return np.where(np.abs(motion.acceleration) > SURE * noise, motion.acceleration, 0.0)
 
 
 def _drop_short(flag: NDArray[np.bool_], shortest: int) -> NDArray[np.bool_]:

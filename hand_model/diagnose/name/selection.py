@@ -32,6 +32,7 @@ REFUTED = 3.0  # standard deviations by which a delay may miss what answers to c
 SMALL = 0.07  # share of the explained mismatch: less beside a larger effect may be no more than its form being another
 LOST_MOTION, BENT = "lost motion", 0.01  # a family, and the change of its map's slope from which another search is worth its time
 REFIT, DEARER = 30.0, 4.0  # times as long a refit takes as projecting a column, and a shape that needs refits as one that does not
+ABSORBED = 0.5  # of a column squared, at most, is left of what is mostly a level per while
 GROWN = 1.3  # change of that noise, from which another search is worth its time
 
 
@@ -114,12 +115,37 @@ def _calmed(balance: Balance, fit: Fit, ranked: Iterable[Rival]) -> Rival | None
         return None
     chance = _likelihood(balance, fit, balance.wander)
     best, most = None, EVIDENCE_LEAST
-    for rival in ranked:
+    for rival in [*ranked, *_shaped_calmly(balance, fit, ranked)]:
         calmer = estimate_wander(balance, rival.fit.prediction)
         brought = rival.evidence - gain(balance, rival.fit, fit) + _likelihood(balance, rival.fit, calmer) - chance
         if brought >= most:
             best, most = rival, brought
     return best
+
+
+def _shaped_calmly(balance: Balance, fit: Fit, ranked: Iterable[Rival]) -> list[Rival]:
+    """Candidates, and terms in their own place, of which chance levels take the better part, with the shapes that are best without such
+    levels: beside them nothing but the stroke in which it happens tells the moment of a jump."""
+    if balance.wander is None or not balance.wander.real:
+        return []
+    calm, out = balance.wandering(None), []
+    places = [(fit.terms, r.fit.terms[-1]) for r in ranked]
+    places += [(fit.terms[:i] + fit.terms[i + 1:], term) for i, term in enumerate(fit.terms)]
+    for others, term in places:
+        start = scan(calm, term.effect, others) if term.shape and _absorbed(balance, term) else None
+        if start is not None:
+            shaped, reference = polish(calm, start, len(others)), calm.fit(others)
+            free = evidence(calm, shaped, reference) - gain(calm, shaped, reference) if others == fit.terms else 0.0
+            again = balance.fit(shaped.terms)
+            out.append(Rival(term.effect.name, free + gain(balance, again, fit), again))
+    return out
+
+
+def _absorbed(balance: Balance, term: Term) -> bool:
+    """Whether chance levels take the better part of a term's column."""
+    weight = balance.weight * balance.train
+    column = balance.columns(term.effect, term.shape) * weight[:, None]
+    return bool(np.sum(balance.whiten(column, weight) ** 2) < ABSORBED * np.sum(column**2))
 
 
 def _search(pair: Pair, effects: tuple[Any, ...], progress: Callable[[str], None] | None,
