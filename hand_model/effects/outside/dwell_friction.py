@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -13,24 +14,35 @@ from .outsider import Outsider
 
 
 class DwellFriction(Outsider):
-    """F = A sign(v) exp(-s / distance), s travelled since the last rest."""
+    """F = A sign(v) r exp(-s / distance), s travelled since the last rest, r how far that rest restored what had been worn off: at rest
+    it approaches 1 with the time constant of healing (Dieterich 1979)."""
 
     name = "dwell_friction"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """The way on which it is worn off."""
+        """The way on which it is worn off, and the time in which it heals."""
         low, high = position_range(states)
         span = high - low
-        return (Shape("distance", states[0].position_unit, 0.01 * span, 0.4 * span, tuple(np.geomspace(0.015, 0.25, 6) * span)),)
+        return (Shape("distance", states[0].position_unit, 0.01 * span, 0.4 * span, tuple(np.geomspace(0.015, 0.25, 6) * span)),
+                Shape("healing_time", "s", 0.02, 10.0, (0.05, 0.5, 2.0)))
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Friction beyond the usual, just after a rest."""
         return (("excess", "effort", 0.0, np.inf),)
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """sign(v) exp(-s / distance), (n, 1)."""
+        """sign(v) r exp(-s / distance), (n, 1)."""
         moving = state.extra.get("moving", np.ones(len(state.time_s))) > 0
-        return (state.direction * np.exp(-from_rest(state.position, moving) / shape["distance"]))[:, None]
+        worn = np.exp(-from_rest(state.position, moving) / shape["distance"])
+        edges = [0, *(np.flatnonzero(np.diff(moving)) + 1).tolist(), len(moving)]
+        healed, left = np.zeros(len(moving)), 1.0  # before a recording it rested long
+        for a, b in pairwise(edges):
+            if moving[a]:
+                healed[a:b] = left * worn[a:b]
+                left = healed[b - 1]
+            else:
+                left = 1 - (1 - left) * np.exp(-(state.time_s[min(b, len(moving) - 1)] - state.time_s[a]) / shape["healing_time"])
+        return (state.direction * healed)[:, None]
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """How much and for how long."""
