@@ -9,10 +9,10 @@ import pytest
 from rig_bench import ARM, Motion, recorded
 
 from hand_model.rig import diagnose_rig, load_rig
-from hand_model.rig.candidates import UNDECLARED, candidates
 from hand_model.rig.diagnose import trusted_fit
 from hand_model.rig.laws import GEAR, GEAR_LOW, LOW, MOTOR, MOTOR_LOW, TURNING, Now, law
-from hand_model.rig.problem import Term, pose, rescaled, solution
+from hand_model.rig.name.candidates import UNDECLARED, candidates
+from hand_model.rig.name.problem import Term, pose, rescaled, solution
 from hand_model.session import read_session
 
 SIZE = 0.25

@@ -11,9 +11,9 @@ from scipy.signal import butter, filtfilt
 
 from hand_model.effects.path import jenkins
 from hand_model.rig import fit_declared, load_rig, replay_rig
-from hand_model.rig.candidates import candidates
 from hand_model.rig.channels import check_channels, sinusoids_left
 from hand_model.rig.diagnose import trusted_fit
+from hand_model.rig.name.candidates import candidates
 from hand_model.rig.states import low_pass, noise_std
 from hand_model.session import read_session
 

@@ -11,19 +11,20 @@ import pytest
 from rig_bench import ARM, Motion, recorded
 
 from hand_model.effects.path import jenkins
-from hand_model.rig import diagnose_rig, load_rig, swing_compete
-from hand_model.rig.candidates import candidates
-from hand_model.rig.compete import _settled_down, borne_out, compete, score, splits
+from hand_model.rig import diagnose_rig, load_rig
 from hand_model.rig.diagnose import trusted_fit
-from hand_model.rig.diagnose_swing import _standing
-from hand_model.rig.evidence import weigh
 from hand_model.rig.laws import TURNING
-from hand_model.rig.problem import Term, extended, normal, pose
-from hand_model.rig.swing import PARAMETERS, Lane, Swing, errors, simulate, vector
-from hand_model.rig.swing_build import ENOUGH_STEPS, thinned
-from hand_model.rig.swing_compete import PARTS, Variant, _folds
-from hand_model.rig.swing_fit import Fitted
-from hand_model.rig.swing_start import freed, started
+from hand_model.rig.name.candidates import candidates
+from hand_model.rig.name.compete import _settled_down, borne_out, compete, score, splits
+from hand_model.rig.name.evidence import weigh
+from hand_model.rig.name.problem import Term, extended, normal, pose
+from hand_model.rig.swing import compete as swing_compete
+from hand_model.rig.swing.build import ENOUGH_STEPS, thinned
+from hand_model.rig.swing.compete import PARTS, Variant, _folds
+from hand_model.rig.swing.diagnose import _standing
+from hand_model.rig.swing.fit import Fitted
+from hand_model.rig.swing.simulation import PARAMETERS, Lane, Swing, errors, simulate, vector
+from hand_model.rig.swing.start import freed, started
 from hand_model.session import read_session
 
 

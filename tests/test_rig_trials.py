@@ -12,21 +12,21 @@ import pytest
 from hand_model.effects import DriveState, effect
 from hand_model.errors import SessionError
 from hand_model.rig import diagnose_rig, fit_declared, load_rig, replay_rig
-from hand_model.rig.evidence import multiplicities, weigh
 from hand_model.rig.horizon import open_loop
 from hand_model.rig.laws import Now, law
 from hand_model.rig.mjcf import read_effects, write_effects
+from hand_model.rig.name.evidence import multiplicities, weigh
+from hand_model.rig.name.problem import pose, solution
 from hand_model.rig.overrides import apply_overrides, compile_model
-from hand_model.rig.problem import pose, solution
 from hand_model.rig.proof import Bench
 from hand_model.rig.replay import can_simulate
 from hand_model.rig.supply import supply_channel, supply_deviation
-from hand_model.rig.swing import INDEX, simulate, vector
-from hand_model.rig.swing_build import build_swing, can_swing
-from hand_model.rig.swing_compete import all_free, compete_swing, fit_stages
-from hand_model.rig.swing_fit import Task, fit_together
-from hand_model.rig.swing_interval import intervals
-from hand_model.rig.swing_patch import write_swing
+from hand_model.rig.swing.build import build_swing, can_swing
+from hand_model.rig.swing.compete import all_free, compete_swing, fit_stages
+from hand_model.rig.swing.fit import Task, fit_together
+from hand_model.rig.swing.interval import intervals
+from hand_model.rig.swing.patch import write_swing
+from hand_model.rig.swing.simulation import INDEX, simulate, vector
 from hand_model.session import read_session
 
 BENCH = """<mujoco model="bench"><compiler angle="radian"/><option timestep="0.001" gravity="0 0 -9.81"/>

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from .compete import Score, Step, compete
 from .declared import DeclaredFit
 from .model import Coupling, RigModel
+from .name.compete import Score, Step, compete
+from .name.problem import Term, pose, solution
 from .patch import write_couplings
-from .problem import Term, pose, solution
 from .transmission import coupling_candidates, fit_coupling, zero_shift
 
 Known = tuple[DeclaredFit, tuple[Term, ...], tuple[Step, ...], tuple[Score, ...], bool]

@@ -12,23 +12,23 @@ from numpy.typing import NDArray
 
 from ..background import single_threaded
 from ..session import Session
-from .candidates import Candidate, candidates
 from .channels import ChannelIssue, check_balance, check_channels
-from .compete import LEAST_SHARE, Score, Step, judge, score
 from .couplings import coupling_terms, with_couplings
 from .declared import DeclaredFit, fit_declared
-from .diagnose_swing import diagnose_swing
 from .findings import NOT_BORNE_OUT, NOT_TAKEN, CouplingResidual, Finding, RigFindings
 from .horizon import open_loop
-from .joint_search import as_term, offsets_first, search_joints
 from .model import RigModel, load_rig
+from .name.candidates import Candidate, candidates
+from .name.compete import LEAST_SHARE, Score, Step, judge, score
+from .name.joint_search import as_term, offsets_first, search_joints
+from .name.problem import Term, held_out, normal, pose, resampled, solution
+from .name.refit import refit
+from .name.settled import settled
 from .noise import effort_noise
-from .problem import Term, held_out, normal, pose, resampled, solution
 from .proof import Bench
-from .refit import refit
-from .settled import settled
 from .states import fill_gaps
-from .swing_build import can_swing
+from .swing.build import can_swing
+from .swing.diagnose import diagnose_swing
 from .transmission import angle_residual
 from .words import shares, statement
 

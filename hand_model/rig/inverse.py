@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from ..errors import DescriptionError
 from .balance import Column, Rows, declared_columns, trial_rows
-from .candidates import TURNS, Candidate, beside, candidates
 from .declared import DeclaredFit
 from .mjcf import read_effects
 from .model import RigModel, RigTrial
+from .name.candidates import TURNS, Candidate, beside, candidates
 from .overrides import compile_model
 from .states import later
 

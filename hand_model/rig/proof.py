@@ -16,9 +16,9 @@ from .declared import DeclaredFit
 from .inverse import EffortResidual, effort_residuals, level_records
 from .mjcf import write_effects
 from .model import RigModel
+from .name.problem import Term, design
 from .overrides import body_records
 from .patch import write_declared
-from .problem import Term, design
 from .states import noise_std
 
 Array = NDArray[np.float64]

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from ..effects.path import jenkins
 from .balance import Column, Rows
-from .candidates import Candidate
 from .declared import DeclaredFit, _robust_fit
 from .findings import CouplingResidual
 from .model import Coupling, RigModel, RigTrial
-from .problem import Term, design, pose, solution
+from .name.candidates import Candidate
+from .name.problem import Term, design, pose, solution
 from .states import choose_cutoff, differentiate, fill_gaps, low_pass, uniform_time, velocity_noise
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .swing import Lane, Swing, errors
+from .simulation import Lane, Swing, errors
 
 Array = NDArray[np.float64]
 STEPS = 3  # of Gauss and Newton: the motion is smooth in its start

@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from .swing import INDEX, PARAMETERS, Swing, errors, vector
+from .simulation import INDEX, PARAMETERS, Swing, errors, vector
 
 Array = NDArray[np.float64]
 

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects import DriveState, catalogue, effect
-from .balance import Rows
-from .declared import DeclaredFit
-from .laws import GEAR, GEAR_LOW, LINE, LOW, MOTOR, MOTOR_LOW, TURNING
-from .model import RigModel
+from ...effects import DriveState, catalogue, effect
+from ..balance import Rows
+from ..declared import DeclaredFit
+from ..laws import GEAR, GEAR_LOW, LINE, LOW, MOTOR, MOTOR_LOW, TURNING
+from ..model import RigModel
 
 Array = NDArray[np.float64]
 # Those that rigs have in a form of their own, or that need a hand.

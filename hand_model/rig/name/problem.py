@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .balance import Rows
+from ..balance import Rows
+from ..consistent import consistent
+from ..declared import DeclaredFit, bounds, prior
+from ..states import later
 from .candidates import Candidate
-from .consistent import consistent
-from .declared import DeclaredFit, bounds, prior
 from .solve import solve_bounded
-from .states import later
 
 Array = NDArray[np.float64]
 FOLDS = 6

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..declared import DeclaredFit
+from ..model import RigModel
 from .candidates import TURNS, beside, candidates
-from .declared import DeclaredFit
-from .model import RigModel
 from .problem import Term, pose, solution
 
 Array = NDArray[np.float64]

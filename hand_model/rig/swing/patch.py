@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .dynamics import inertial_columns, inertial_parameters
-from .mjcf import find, number, parse, serialise, write_effects
-from .model import RigModel
-from .overrides import body_records, compile_model
-from .patch import _actuator
-from .swing import DECLARED, INDEX, LOW_SPEED, NEUTRAL, PARAMETERS, Swing
+from ..dynamics import inertial_columns, inertial_parameters
+from ..mjcf import find, number, parse, serialise, write_effects
+from ..model import RigModel
+from ..overrides import body_records, compile_model
+from ..patch import _actuator
+from .simulation import DECLARED, INDEX, LOW_SPEED, NEUTRAL, PARAMETERS, Swing
 
 Array = NDArray[np.float64]
 # Dry friction is a soft constraint in MuJoCo; left at its defaults a joint creeps while it should stick.

@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..background import Background
-from .evidence import BEYOND_DOUBT, ONE_STANDARD_ERROR, weigh
-from .swing import DECLARED, INDEX, LOW_SPEED, Swing, errors, vector
-from .swing_fit import Fitted, Task, fit_together
-from .swing_start import freed, started
+from ...background import Background
+from ..name.evidence import BEYOND_DOUBT, ONE_STANDARD_ERROR, weigh
+from .fit import Fitted, Task, fit_together
+from .simulation import DECLARED, INDEX, LOW_SPEED, Swing, errors, vector
+from .start import freed, started
 
 Array = NDArray[np.float64]
 FOLDS, MOST_FOLDS, SHORTLIST, ALIKE = 4, 10, 6, 3

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from .declared import DeclaredFit
-from .dynamics import inertial_columns, inertial_parameters
-from .model import RigModel, RigTrial
-from .overrides import compile_model
-from .states import fill_gaps, recorded_states
-from .supply import supply_deviation
-from .swing import STEP_S, Lane, Swing
+from ..declared import DeclaredFit
+from ..dynamics import inertial_columns, inertial_parameters
+from ..model import RigModel, RigTrial
+from ..overrides import compile_model
+from ..states import fill_gaps, recorded_states
+from ..supply import supply_deviation
+from .simulation import STEP_S, Lane, Swing
 
 # A trial is fitted in stretches (multiple shooting, Bock 1981), in periods of the free swing: short ones where a drive
 # keeps the motion going, for then the cost is smooth; longer ones where damping is all there is to see.

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .swing import INDEX, Swing
-from .swing_fit import LOW, Task, jacobian, typical
+from .fit import LOW, Task, jacobian, typical
+from .simulation import INDEX, Swing
 
 Array = NDArray[np.float64]
 QUANTILE = 1.96

@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ..background import Background
+from ...background import Background
+from ..declared import DeclaredFit
+from ..model import RigModel
 from .candidates import Candidate, candidates
 from .compete import Step, compete
-from .declared import DeclaredFit
-from .model import RigModel
 from .problem import Term, pose
 from .settled import settled
 

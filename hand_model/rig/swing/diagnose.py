@@ -9,21 +9,21 @@ from typing import Any
 
 import numpy as np
 
-from ..background import Background
-from ..session import Session
-from .declared import DeclaredFit
-from .findings import NOT_BORNE_OUT, NOT_TOLD, Finding
-from .model import RigModel, load_rig
-from .replay import RigResiduals, replay_rig
-from .states import fill_gaps, noise_std
-from .swing import INDEX, NEUTRAL, PARAMETERS, STEP_S, Swing, parameter_units, vector
-from .swing_build import build_swing, search_step_s, thinned, windows_s
-from .swing_compete import LEAST_GAIN, Round, Variant, all_free, compete_swing, fit_apart, fit_stages, free_declared
-from .swing_fit import Fitted, Task
-from .swing_interval import intervals
-from .swing_patch import write_swing
-from .swing_start import freed, started_each
-from .words import shares, statement
+from ...background import Background
+from ...session import Session
+from ..declared import DeclaredFit
+from ..findings import NOT_BORNE_OUT, NOT_TOLD, Finding
+from ..model import RigModel, load_rig
+from ..replay import RigResiduals, replay_rig
+from ..states import fill_gaps, noise_std
+from ..words import shares, statement
+from .build import build_swing, search_step_s, thinned, windows_s
+from .compete import LEAST_GAIN, Round, Variant, all_free, compete_swing, fit_apart, fit_stages, free_declared
+from .fit import Fitted, Task
+from .interval import intervals
+from .patch import write_swing
+from .simulation import INDEX, NEUTRAL, PARAMETERS, STEP_S, Swing, parameter_units, vector
+from .start import freed, started_each
 
 RESAMPLES = 500
 Taken = tuple[Variant, Round]

@@ -1,0 +1,1 @@
+"""What a balance of effort lacks: candidates compete in one regression."""
