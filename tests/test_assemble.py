@@ -110,6 +110,12 @@ def test_a_trifle_beside_a_large_effect_of_the_same_finger_is_no_finding_but_is_
     assert names((1.0, main), (0.01, finding("current_channel_delay", "index", "current", delay=0.06))) == ["clock_drift", "current_channel_delay"]
 
 
+def test_exchanged_labels_make_no_trifle_of_what_a_current_shows() -> None:
+    main, small = finding("marker_swap", "index", "markers", lasting=4.0), finding("current_channel_delay", "index", "current", delay=0.004)
+    assert {f.effect for f in assemble([], [(1.0, main), (0.01, small)], []).findings} == {"marker_swap", "current_channel_delay"}
+
+
+
 def test_where_no_finger_is_a_hinge_to_the_cameras_angles_tell_nothing() -> None:
     bent = [{"where": {"finger": f}, "shape": f"{NO_HINGE}: the markers leave it", "share_of_mismatch": 1.0} for f in ("index", "ring")]
     ranked = [with_share(1.0, "linkage_backlash", "index", "markers", 1.0), with_share(0.5, "joint_wobble", "ring", "markers", 1.0),

@@ -124,10 +124,12 @@ def _same_place(finding: Finding) -> Any:
 
 def _trifles(ranked: list[tuple[float, Finding]], magnitudes: Mapping[int, float]) -> list[tuple[Finding, str]]:
     """Findings that are small for their kind and hardly show beside the heaviest one of the same finger, each with the reason: they may
-    be no more than its form being another."""
+    be no more than its form being another. What markers alone show shapes no current."""
     out = []
     for weight, finding in ranked:
-        heaviest, main = next(((w, f) for w, f in ranked if f.where["finger"] == finding.where["finger"] and f.effect != REFUSED), (0.0, finding))
+        beside = ((w, f) for w, f in ranked if f.where["finger"] == finding.where["finger"] and f.effect != REFUSED
+                  and not (f.where["signal"] == "markers" and finding.where["signal"] == "current"))
+        heaviest, main = next(beside, (0.0, finding))
         if weight**2 < TRIFLE * heaviest**2 and magnitudes[id(finding)] < SLIGHT:
             out.append((finding, f"a trifle beside {main.effect.replace('_', ' ')}, whose form may be slightly another"))
     return out
