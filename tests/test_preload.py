@@ -38,6 +38,12 @@ def test_of_two_that_differ_the_heavier_is_odd_unless_one_has_lost_its_preload()
     assert [f.where["finger"] for _, f in preload_findings(hand(-12.0, 0.0))] == ["finger_0"]
 
 
+def test_drives_alike_in_everything_else_are_held_to_be_alike_in_their_preload_and_others_are_not() -> None:
+    assert [f.where["finger"] for _, f in preload_findings(hand(8.0, 0.0))] == ["finger_0"]
+    other = judged("current", "ring", "ring", None, drive(12, lambda s: 14.0 * s.direction + 0.07 * s.velocity), [effect("torque_ripple")])
+    assert not preload_findings([*hand(8.0), other])
+
+
 def test_of_two_either_may_be_the_odd_one_and_the_probability_says_so() -> None:
     two, three = (next(f for _, f in preload_findings(hand(*halves))).probability for halves in ((25.0, 0.0), (25.0, 0.0, 0.5)))
     assert 0.5 < two < three

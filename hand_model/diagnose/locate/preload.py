@@ -6,7 +6,7 @@ of the same hand are like speaks for it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,8 @@ from ...effects import effect
 from ..findings import Finding, weighed
 from ..name.station import Station
 
-SPREAD = 0.15  # mean absolute deviation of the logarithm of a drive's preload within one hand
+SPREAD, HANDS = 0.15, 3.0  # mean absolute deviation of the logarithm of a drive's preload within one hand, as sure as from so many comparisons
+LIKE = ("viscous", "coulomb", "spring")  # coefficients that say how alike the drives of a hand are
 ODD_P = 0.03  # of two drives that differ as much by chance; beyond, one of them is odd
 LOST = 0.2  # of the other's preload: less, or the wrong sign, and there is none
 SURE_LEAST = 0.1  # of a half difference counts in the ranking, however uncertain the rest is
@@ -32,6 +33,7 @@ def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]
     pulled = {s.actuator for s in stations if s.believed and any(f.term.effect.name == "spring_decoupling" for f in s.kept)}
     sound = [s for s in stations if s.signal == "current" and s.actuator not in pulled and "preload" in s.naming.fit.declared and _sound(s)]
     preload = {id(s): float(s.naming.fit.declared["preload"]) for s in sound}
+    spread = _spread([s.naming.fit.declared for s in sound])
     out = []
     for station in sound:
         rest = [s for s in sound if s is not station]
@@ -43,11 +45,11 @@ def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]
         if usual <= 0 or (len(others) == 1 and usual < LOST * preload[id(station)]):
             continue
         own, error = preload[id(station)], _standard_error(station)
-        p = max(_by_chance(own, error, other) for other in others)  # unlike every other
+        p = max(_by_chance(own, error, other, spread) for other in others)  # unlike every other
         if p < ODD_P and (len(others) > 1 or own > usual or own < LOST * usual):
             # Of two either may be odd: the odds are those of the sizes, where a usual preload may have any scale (Jeffreys 1946).
             larger = own / (own + usual) if len(others) == 1 and own > usual else 1.0
-            out.append(_finding(station, own - usual, error, usual, (1 - p) * larger))
+            out.append(_finding(station, own - usual, error, spread * usual, (1 - p) * larger))
     return out
 
 
@@ -61,13 +63,26 @@ def _sound(station: Station) -> bool:
     return station.believed and abs(named - plain) < SPREAD * max(abs(named), abs(plain))
 
 
-def _by_chance(own: float, error: float, usual: float) -> float:
+def _spread(drives: Sequence[Mapping[str, float]]) -> float:
+    """Mean absolute deviation of the logarithm of a preload among these drives: what is known of hands, and how alike the drives of this
+    one are in everything else (mean of an inverse gamma prior and the drives' coefficients; of two Laplace ones a pair differs by 1.5)."""
+    known, weight = HANDS * SPREAD, HANDS
+    for name in LIKE:
+        values = np.array([d[name] for d in drives if d.get(name, 0.0) > 0])
+        if len(values) > 1:
+            apart = np.abs(np.subtract.outer(np.log(values), np.log(values)))[np.triu_indices(len(values), 1)]
+            known += (len(values) - 1) * float(np.mean(apart)) / 1.5
+            weight += len(values) - 1
+    return known / weight
+
+
+def _by_chance(own: float, error: float, usual: float, spread: float) -> float:
     """Probability of two healthy preloads so far apart (logarithms by Laplace), at the nearer end of the standard error."""
     if usual <= 0:
         return 0.0
     nearer = own + np.sign(usual - own) * min(2 * error, abs(usual - own))
     x = abs(np.log(max(nearer, 1e-3 * usual) / usual))
-    return float((1 + x / (2 * SPREAD)) * np.exp(-x / SPREAD))
+    return float((1 + x / (2 * spread)) * np.exp(-x / spread))
 
 
 def _standard_error(station: Station) -> float:
@@ -78,8 +93,8 @@ def _standard_error(station: Station) -> float:
     return float(np.sqrt(np.linalg.pinv(matrix.T @ matrix)[at, at] * balance.inflation))
 
 
-def _finding(station: Station, half_difference: float, error: float, usual: float, probability: float) -> tuple[float, Finding]:
-    doubt = 2 * float(np.hypot(error, SPREAD * np.sqrt(2) * usual))
+def _finding(station: Station, half_difference: float, error: float, spread: float, probability: float) -> tuple[float, Finding]:
+    doubt = 2 * float(np.hypot(error, spread * np.sqrt(2)))
     unit = station.naming.balance.states[0].effort_unit
     parameters = {"half_difference": {"value": half_difference, "unit": unit, "ci95": [half_difference - doubt, half_difference + doubt]}}
     where: dict[str, Any] = {"finger": station.finger, "joint": None, "actuator": station.actuator, "signal": "current", "marker": None,
