@@ -27,24 +27,25 @@ CLASS = ("asymmetric_friction", "spring_preload")
 def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]:
     """Drives whose preload the others' do not let expect, with their weight.
 
-    The other drives' median is the reference. What pulls a finger off its drive pulls at its preload. Drives of which something else is missing are compared where that is no load: the preload is the same with and
-    without its name.
+    The other drives' median is the reference; one of which something is missing is none. What pulls a finger off its drive pulls at its
+    preload. A drive of which something else is missing must be unlike the others both with and without its name.
     """
     pulled = {s.actuator for s in stations if s.believed and any(f.term.effect.name == "spring_decoupling" for f in s.kept)}
-    sound = [s for s in stations if s.signal == "current" and s.actuator not in pulled and "preload" in s.naming.fit.declared and _sound(s)]
-    preload = {id(s): float(s.naming.fit.declared["preload"]) for s in sound}
-    spread = _spread([s.naming.fit.declared for s in sound])
+    drives = [s for s in stations if s.signal == "current" and s.actuator not in pulled and "preload" in s.naming.fit.declared and _tells(s)]
+    healthy = [s for s in drives if not s.missing]
+    spread = _spread([s.naming.fit.declared for s in healthy])
     out = []
-    for station in sound:
-        rest = [s for s in sound if s is not station]
+    for station in drives:
+        rest = [s for s in drives if s is not station and (_settled(s) or s in healthy)]
         if all(s.missing for s in rest):  # a drive of which something is missing accuses no other
             continue
-        others = [preload[id(s)] for s in rest]
+        others = [float(s.naming.fit.declared["preload"]) for s in rest]
         usual = float(np.median(others))
+        own = min((float(fit.declared["preload"]) for fit in (station.naming.fit, station.naming.declared)), key=lambda p: abs(p - usual))
         # Of two that differ the larger is odd, unless one has lost its preload altogether: springs do not push.
-        if usual <= 0 or (len(others) == 1 and usual < LOST * preload[id(station)]):
+        if usual <= 0 or (len(others) == 1 and usual < LOST * own):
             continue
-        own, error = preload[id(station)], _standard_error(station)
+        error = _standard_error(station)
         p = max(_by_chance(own, error, other, spread) for other in others)  # unlike every other
         if p < ODD_P and (len(others) > 1 or own > usual or own < LOST * usual):
             # Of two either may be odd: the odds are those of the sizes, where a usual preload may have any scale (Jeffreys 1946).
@@ -53,14 +54,15 @@ def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]
     return out
 
 
-def _sound(station: Station) -> bool:
-    """Whether a drive's preload is told apart from whatever else is missing of it; one that does not repeat itself has none to speak of."""
-    if station.wander > RESTLESS:
-        return False
-    if not station.missing:
-        return True
+def _tells(station: Station) -> bool:
+    """Whether a drive's preload can be spoken of: of one that does not repeat itself, or of which something unknown is missing, it cannot."""
+    return station.wander <= RESTLESS and (station.believed or not station.missing)
+
+
+def _settled(station: Station) -> bool:
+    """Whether what is missing of a drive is no load: its preload is the same with and without the name."""
     named, plain = (float(fit.declared["preload"]) for fit in (station.naming.fit, station.naming.declared))
-    return station.believed and abs(named - plain) < SPREAD * max(abs(named), abs(plain))
+    return abs(named - plain) < SPREAD * max(abs(named), abs(plain))
 
 
 def _spread(drives: Sequence[Mapping[str, float]]) -> float:
