@@ -26,7 +26,7 @@ TILT = 0.2  # the same, of a wobble's or a travelling centre's, in the angles of
 ANGULAR = {e.name for station in ("encoder", "linkage") for e in catalogue(station)} - {"clock_drift"}
 REFUSED = "command_as_measurement"  # a channel that tells nothing: no other finding is small beside it
 TRIFLE, SLIGHT = 0.01, 0.25  # of the square of the heaviest weight, and of the magnitude at which an effect is plain
-MINUTE = 0.08  # of that magnitude: less, where the lack-of-fit test sees nothing, is left to the imperfections of reading angles and speeds
+MINUTE = 0.15  # of that magnitude: less, where the lack-of-fit test sees nothing, is left to the imperfections of reading angles and speeds
 SIGNALS = {"drive": "current", "motors": "current", "command": "current", "encoder": "encoder", "linkage": "markers"}
 SHOWN_IN = {e.name: SIGNALS[e.station] for e in catalogue() if e.station in SIGNALS}
 NAMES = {e.name for e in catalogue()}
@@ -34,8 +34,8 @@ NAMES = {e.name for e in catalogue()}
 
 def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding]], notes: list[str],
              unexplained: Sequence[dict[str, Any]] = ()) -> Findings:
-    """One ranked list from all stations: by what a finding shows in its channel (its weight, `findings.weighed`) and how large it is for its
-    kind, the geometric mean of both. unexplained: of the markers."""
+    """One ranked list from all stations: by what a finding shows in its channel (its weight, `findings.weighed`) and, twice as much, by how
+    large it is for its kind (weighted geometric mean). unexplained: of the markers."""
     ranked: list[tuple[float, Finding]] = _heaviest(marker_findings, _palm_marker)
     rejected: list[dict[str, str]] = []
     unexplained = list(unexplained)
@@ -60,7 +60,7 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
     ranked = _without_tilts(_without_shadows(_one_clock(_of_hinges(ranked, unexplained))))
     # how far a hinge that is none moves is told only beside what another hinge would explain: that it is none is sure all the same
     sized = [(_magnitude(f, stations, _value if f.effect in HINGE else _sure), weight, f) for weight, f in ranked]
-    ranked = sorted(((float(np.sqrt(m * weight)), f) for m, weight, f in sized), key=lambda item: -item[0])
+    ranked = sorted(((float(np.cbrt(m**2 * weight)), f) for m, weight, f in sized), key=lambda item: -item[0])
     ranked = _heaviest(ranked, _same_place)
     trifles = _trifles(ranked, {id(f): m for m, _, f in sized})
     rejected += [{"effect": f.effect, "where": str(f.where["finger"]), "reason": reason} for f, reason in trifles]
