@@ -19,8 +19,8 @@ from hand_model.rig.consistent import BASIS, consistent, is_physical, pseudo_ine
 from hand_model.rig.dynamics import INERTIAL, inertial_columns, inertial_parameters
 from hand_model.rig.findings import NOT_BORNE_OUT, NOT_TAKEN
 from hand_model.rig.mjcf import read_effects, write_effects
-from hand_model.rig.name.solve import solve_bounded
 from hand_model.rig.physical import physical
+from hand_model.rig.solve import solve_bounded
 from hand_model.rig.states import local_states
 from hand_model.rig.swing.fit import Task, fit_together
 from hand_model.rig.swing.simulation import Lane, Swing, errors, simulate, vector

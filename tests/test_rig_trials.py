@@ -12,10 +12,10 @@ import pytest
 from hand_model.effects import DriveState, effect
 from hand_model.errors import SessionError
 from hand_model.rig import diagnose_rig, fit_declared, load_rig, replay_rig
+from hand_model.rig.evidence import multiplicities, weigh
 from hand_model.rig.horizon import open_loop
 from hand_model.rig.laws import Now, law
 from hand_model.rig.mjcf import read_effects, write_effects
-from hand_model.rig.name.evidence import multiplicities, weigh
 from hand_model.rig.name.problem import pose, solution
 from hand_model.rig.overrides import apply_overrides, compile_model
 from hand_model.rig.proof import Bench

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from .balance import MOMENTS, STATE_CUTOFF, Column, Rows, declared_columns, trial_rows
 from .dynamics import inertial_parameters
 from .model import RigModel, RigTrial
-from .name.solve import solve_bounded
 from .overrides import compile_model
+from .solve import solve_bounded
 
 Array = NDArray[np.float64]
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..evidence import BEYOND_DOUBT, weigh
 from .candidates import Candidate
-from .evidence import BEYOND_DOUBT, weigh
 from .problem import (
     Problem,
     Term,

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from ..balance import Rows
 from ..consistent import consistent
 from ..declared import DeclaredFit, bounds, prior
+from ..solve import solve_bounded
 from ..states import later
 from .candidates import Candidate
-from .solve import solve_bounded
 
 Array = NDArray[np.float64]
 FOLDS = 6

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...background import Background
-from ..name.evidence import BEYOND_DOUBT, ONE_STANDARD_ERROR, weigh
+from ..evidence import BEYOND_DOUBT, ONE_STANDARD_ERROR, weigh
 from .fit import Fitted, Task, fit_together
 from .simulation import DECLARED, INDEX, LOW_SPEED, Swing, errors, vector
 from .start import freed, started
