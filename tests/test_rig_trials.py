@@ -234,9 +234,9 @@ def test_the_form_of_a_friction_by_load_is_the_one_that_was_planted(tmp_path: Pa
         lanes = tuple(replace(lane, position=q[: len(lane.position), k] + e[k, : len(lane.position)]) for k, lane in enumerate(blank.lanes))
         swing = replace(blank, lanes=lanes)
         declared = fit_stages([swing], [Task(all_free(swing, []), vector(line), ())], 12)[0]
-        taken, rounds = compete_swing([swing], declared, 2e-3)
-        assert taken[0].effect == "load_dependent_friction" and form in taken[0].name
-        assert rounds[0].fit.cost < 1.1e-6
+        first, round_ = compete_swing([swing], declared, 2e-3)[0]
+        assert first.effect == "load_dependent_friction" and form in first.name
+        assert round_.fit.cost < 1.1e-6
 
 
 COUPLED = """<mujoco><compiler angle="radian"/><option timestep="0.001" integrator="implicitfast" gravity="0 0 0"/><worldbody>

@@ -51,8 +51,9 @@ class Rows:
 
     Full-rate grid (n,): time_s, states, extra channels (never filtered: an effect reads them as they are), full_columns
     (n, P), still_columns (n, P): the same without acceleration, carried (P,) bool and load_known (n,): of what the joint carries besides its own drive and friction. Filtered and thinned (m,): effort, columns (m, P), moving (bool): what the fit uses, neither at rest nor at the ends.
-    effort: recorded, less what the trial's own bodies add to the declared ones. states: position, velocity, acceleration (n, joints) of the whole rig; rest_speeds (joints,); jacobian: joint -> (n,),
-    what hangs on this joint by couplings, itself included; declared: the columns' names.
+    effort: recorded, less what the trial's own bodies add to the declared ones. states: position, velocity, acceleration (n, joints) of the whole rig; direction (n,), directions (n, joints): of
+    friction in [-1, 1]: the sign of velocity, linear where it drowns in noise, its mean around each instant (or jumps between two would
+    all be up to half a sample early or late); jacobian: joint -> (n,), what hangs on this joint by couplings, itself included; declared: the columns' names.
     """
 
     trial: str
@@ -74,7 +75,8 @@ class Rows:
     load_known: Array
     step: int
     states: tuple[Array, Array, Array] = ()
-    rest_speeds: Array = ()
+    direction: Array = ()
+    directions: Array = ()
     jacobian: Mapping[str, Array] = field(default_factory=dict)
     declared: tuple[Column, ...] = ()
     still_columns: Array = field(default_factory=lambda: np.zeros((0, 0)))
@@ -168,7 +170,7 @@ def trial_rows(
                      for i, j in enumerate(rig.joints)])  # fmt: skip
     sign = np.clip(v / rest, -1.0, 1.0)
     thin = max(1, int(rate / max(12 * cutoff, 24.0)))
-    q, v, a, sign = (x[::thin] for x in (q, v, a, sign))
+    q, v, a, sign = (*(x[::thin] for x in (q, v, a)), _averaged(sign, thin))
     effort = {j: None if e is None else _thinned(e, rate, thin) for j, e in effort.items()}
     grid, channels = grid[::thin], {k: c[::thin] for k, c in channels.items()}
     rate = rate / thin
@@ -191,7 +193,7 @@ def trial_rows(
             Rows(trial.name, joint, trial.validate, grid, q[:, i], v[:, i], a[:, i],
                  low_pass(y, rate, cutoff)[::step], low_pass(x, rate, cutoff)[::step],
                  (settled & (np.abs(v[:, i]) > rest[i]))[::step], float(rest[i]), cutoff, rate,
-                 {"effort": y, **channels}, x, external, y - effort[joint], step, (q, v, a), rest, jacobian, columns, x_still)
+                 {"effort": y, **channels}, x, external, y - effort[joint], step, (q, v, a), sign[:, i], sign, jacobian, columns, x_still)
         )  # fmt: skip
     return tuple(rows)
 
@@ -207,6 +209,14 @@ def _own_bodies(rig: RigModel, trial: RigTrial, model: Any, q: Array, v: Array, 
 def _thinned(values: Array, rate: float, skip: int) -> Array:
     """Every skip-th sample (m,) after an anti-alias filter."""
     return values if skip == 1 else low_pass(values, rate, 0.4 * rate / skip)[::skip]
+
+
+def _averaged(values: Array, skip: int) -> Array:
+    """Every skip-th sample (m, joints) of the mean over so many around it, which does not ring about a jump."""
+    from scipy.ndimage import convolve1d
+
+    kernel = np.ones(skip) if skip % 2 else np.convolve(np.ones(skip), [0.5, 0.5])
+    return convolve1d(values, kernel / skip, axis=0, mode="nearest")[::skip]
 
 
 def _channels(trial: RigTrial, grid: Array) -> dict[str, Array]:

@@ -26,13 +26,14 @@ ENOUGH = 6  # recordings from which on they are drawn whole
 class Verdict:
     """best, chosen: indices among those that surely beat nothing (chosen is the simplest as good as the best);
     probability: of the chosen one against nothing; wins (rivals,): share of resamples in which each is best of all; close:
-    not told from the best, in order of error; gain: share of the error of "nothing" that the chosen one takes away."""
+    not told from the best, in order of error; tied: within one standard error of it; gain: share of the error of "nothing" that the chosen one takes away."""
 
     best: int
     chosen: int
     probability: float
     wins: Array
     close: tuple[int, ...]
+    tied: tuple[int, ...]
     gain: float
 
 
@@ -97,5 +98,6 @@ def weigh(none: Array, errors: Array, sizes: Sequence[int], group: Array,
         float(against[chosen]),
         np.bincount(np.argmin(resampled, 0), minlength=len(errors)) / len(draws),
         tuple(close),
+        tuple(tied),
         float(1.0 - total[chosen] / max(none.sum(), 1e-300)),
     )

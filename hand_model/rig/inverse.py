@@ -92,7 +92,7 @@ def joint_efforts(rig: RigModel, trial: RigTrial, row: Rows) -> Array:
         data.qpos[:], data.qvel[:], data.qacc[:] = q[k], v[k], a[k]
         mujoco.mj_inverse(model, data)
         out[k] = data.qfrc_inverse
-    out += model.dof_frictionloss * np.clip(v / row.rest_speeds, -1.0, 1.0)
+    out += model.dof_frictionloss * row.directions
     for drive in rig.drives:
         if drive.joint in trial.live:
             i, j = model.actuator(drive.name).id, rig.joints.index(drive.joint)

@@ -78,17 +78,12 @@ def beside(rows: Sequence[Rows], acting: Sequence[tuple[Candidate, Mapping[str, 
     return out
 
 
-def direction(row: Rows) -> Array:
-    """Friction's direction (n,) in [-1, 1]: the sign of velocity, linear where it drowns in noise."""
-    return np.clip(row.velocity / row.rest_speed, -1.0, 1.0)
-
-
 def drive_state(rig: RigModel, row: Rows, theta: Array) -> DriveState:
     """The row as an effect of the catalogue reads it."""
     extra: dict[str, Array] = {"load": row.load(theta)}
     for channel, values in row.extra.items():
         extra[channel.split(":")[0] if channel == f"setpoint:{row.joint}" else channel] = values
-    declared = np.stack([row.acceleration, row.velocity, direction(row)], 1)
+    declared = np.stack([row.acceleration, row.velocity, row.direction], 1)
     effort = np.where(np.abs(row.velocity) > row.rest_speed, row.extra["effort"], np.nan)  # at rest friction is unknown
     return DriveState(row.trial, row.joint, row.time_s, row.position, row.velocity, row.acceleration, effort, declared,
                       rig.unit(row.joint), rig.effort_unit(row.joint), extra,
@@ -173,11 +168,11 @@ def _by_load(fit: DeclaredFit, joint: str, rows: list[Rows], driven: bool) -> li
 
     def friction(variant: str, amplitude: str, by: Mapping[str, Array]) -> Candidate:
         return Candidate("load_dependent_friction", variant, joint, ((amplitude, "1", 0.0, np.inf),), ({},),
-                         lambda r, s: (direction(r) * by[r.trial])[:, None])  # fmt: skip
+                         lambda r, s: (r.direction * by[r.trial])[:, None])  # fmt: skip
 
     def at_low_speed(variant: str, by: Mapping[str, Array]) -> Candidate:
         return Candidate("load_dependent_friction", variant, joint, (("per_load", "1", 0.0, np.inf),), knees,
-                         lambda r, s: (direction(r) * by[r.trial] * np.exp(-((r.velocity / s["stribeck_speed"]) ** 2)))[:, None])  # fmt: skip
+                         lambda r, s: (r.direction * by[r.trial] * np.exp(-((r.velocity / s["stribeck_speed"]) ** 2)))[:, None])  # fmt: skip
 
     found = [at_low_speed(LOW, load),
              Candidate("load_dependent_friction", "with speed", joint, (("per_load_speed", "s", 0.0, np.inf),), ({},),

@@ -146,25 +146,26 @@ def fit_stages(stages: Sequence[Swing], tasks: Sequence[Task], iterations: int =
 
 
 def compete_swing(
-    stages: Sequence[Swing], current: Fitted, floor: float = 0.0, whole: Swing | None = None
-) -> tuple[tuple[Variant, ...], tuple[Round, ...]]:
+    stages: Sequence[Swing], current: Fitted, floor: float = 0.0, whole: Swing | None = None,
+    begin: Sequence[tuple[Variant, Round]] = (), without: frozenset[str] = frozenset(),
+) -> list[tuple[Variant, Round]]:
     """Forward selection from the declared model (fitted as current), by pairs where no variant alone is better, while the error is above what the recordings can tell
     (floor [rad or m]); returns the variants and their rounds, each with the fit of all taken so far. whole: the recordings
-    uncut; those left out whole are predicted so, as the ones that validate are."""
+    uncut; those left out whole are predicted so, as the ones that validate are. begin: what stands already (current has it);
+    without: effects that are not asked."""
     train = tuple(int(i) for i in stages[-1].train())
     test, folds = _folds(stages[-1], train, whole)
-    taken: tuple[Variant, ...] = ()
-    rounds: list[Round] = []
+    taken, rounds = tuple(v for v, _ in begin), [r for _, r in begin]
     most = MOST_TERMS if len({stages[-1].lanes[i].trial for i in train}) >= FOLDS else MOST_OF_FEW
     while len(taken) < most and current.cost > floor**2:
         stages = [freed(s, current.theta) for s in stages]
-        current, none, rivals = _round(stages, taken, current, test, folds)
-        found = _judged(none, rivals, test, folds, len(train))
+        current, none, rivals = _round(stages, taken, current, test, folds, without)
+        found = _judged(current, none, rivals, test, folds, floor)
         if found is None and rivals and not taken:  # what one leaves may hide it, as a late drive hides friction: two at once
             first = min(rivals, key=lambda r: r.error.sum())
             stages = [freed(s, first.fit.theta) for s in stages]
-            rivals = _round(stages, (first.variant,), first.fit, test, folds)[2]
-            found = _judged(none, rivals, test, folds, len(train), BEYOND_DOUBT)
+            rivals = _round(stages, (first.variant,), first.fit, test, folds, without)[2]
+            found = _judged(current, none, rivals, test, folds, floor, BEYOND_DOUBT)
             if found is not None:
                 taken, rounds = (first.variant,), [replace(found[1], variant=first.variant, fit=first.fit)]
         if found is None:
@@ -172,14 +173,15 @@ def compete_swing(
         won = rivals[found[0]]
         taken, current = _exchanged(stages, (*taken, won.variant), won.fit)
         rounds.append(replace(found[1], fit=current))
-    return taken, tuple(rounds)
+    return list(zip(taken, rounds, strict=True))
 
 
-def _round(stages: Sequence[Swing], taken: tuple[Variant, ...], current: Fitted, test: Swing, folds: list) -> tuple[Fitted, Array, list[_Rival]]:
+def _round(stages: Sequence[Swing], taken: tuple[Variant, ...], current: Fitted, test: Swing, folds: list,
+           without: frozenset[str] = frozenset()) -> tuple[Fitted, Array, list[_Rival]]:  # fmt: skip
     """The fit of all taken so far, its errors (blocks,) of what is left out, and the best of those that might be added."""
     swing, train = stages[-1], tuple(int(i) for i in stages[-1].train())
     free = all_free(swing, taken)
-    others = [v for v in variants(swing) if not set(v.start) <= set(free)]
+    others = [v for v in variants(swing) if not set(v.start) <= set(free) and v.effect not in without]
     tasks = [Task(all_free(swing, (*taken, v)), _started(current.theta, v), ()) for v in others]
     fits = fit_stages(stages, tasks, 8)
     order = _shortlist(others, fits)
@@ -189,12 +191,20 @@ def _round(stages: Sequence[Swing], taken: tuple[Variant, ...], current: Fitted,
     return current, none, [_Rival(others[k], f, s) for k, f, s in zip(order, best, scores, strict=True)]
 
 
-def _judged(none: Array, rivals: Sequence[_Rival], test: Swing, folds: list, stretches: int,
+def _judged(current: Fitted, none: Array, rivals: Sequence[_Rival], test: Swing, folds: list, floor: float,
             least: float = ONE_STANDARD_ERROR) -> tuple[int, Round] | None:  # fmt: skip
-    if not rivals:
+    """Index of the winner and what the round says. Only those are asked that explain what they were fitted to: another may predict
+    what is left out by chance. What is left out of a swing that dies away counts as shares of what "none" leaves there (not
+    below the floor [rad or m]), or its first turns would speak for all."""
+    trials = [test.lanes[i].trial for _, some in folds for i in some]
+    stretches = len({i for kept, _ in folds for i in kept})
+    able = [k for k, r in enumerate(rivals) if r.fit.cost < (1 - LEAST_GAIN) ** 2 * current.cost]
+    if not able:
         return None
-    group = np.array([name for _, left in folds for i in left for name in [test.lanes[i].trial] * PARTS])
-    return _judge(none, [r.error for r in rivals], [r.variant for r in rivals], [r.fit for r in rivals], group, stretches, least)
+    some = [rivals[k] for k in able]
+    scale = np.ones(len(none)) if test.driven else np.maximum(none, max(floor, 1e-300))
+    said = _judge(none / scale, [r.error / scale for r in some], [r.variant for r in some], [r.fit for r in some], np.repeat(trials, PARTS), stretches, least)
+    return None if said is None else (able[said[0]], said[1])
 
 
 def _shortlist(rivals: Sequence[Variant], fits: Sequence[Fitted]) -> list[int]:
@@ -307,7 +317,7 @@ def _judge(
     same = tuple(dict.fromkeys(rivals[k].effect for k in said.close))
     wins = tuple((rivals[k].key, float(said.wins[k])) for k in np.argsort(-said.wins) if said.wins[k] > 0.005)
     first = said.chosen
-    forms = [k for k in {*said.close, first} if rivals[k].effect == rivals[first].effect
+    forms = [k for k in {*said.close, *said.tied, first} if k in said.tied or rivals[k].effect == rivals[first].effect
              and (fits[k].free <= fits[first].free or scores[k].sum() <= scores[first].sum())]  # fmt: skip
     best = min(forms, key=lambda k: stretches * np.log(fits[k].cost) + fits[k].free * np.log(stretches))
     gain = float(1.0 - scores[best].sum() / max(none.sum(), 1e-300))

@@ -26,6 +26,7 @@ from .simulation import INDEX, NEUTRAL, PARAMETERS, STEP_S, Swing, parameter_uni
 from .start import freed, started_each
 
 RESAMPLES = 500
+MOST_SEARCHES = 3
 Taken = tuple[Variant, Round]
 Ends = Mapping[str, tuple[float, float]]
 
@@ -40,8 +41,7 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
         stages = [freed(swing, declared.theta) for swing in stages]
         declared = fit_stages(stages, [Task(free, declared.theta, ())], 15)[0]
     floor, held = _resolution(rig), bool(rig.select(True))  # without validation recordings the training ones measure
-    taken, rounds = compete_swing(stages, declared, floor, build_swing(rig, fit, step))
-    say(f"{rig.name}: {', '.join(v.key for v in taken) or 'nothing'}")
+    whole = build_swing(rig, fit, step)
     # Last, at the step of the replay; a free swing over whole recordings, for its phase is known well enough by now. What
     # a coarse step there does to the period (4e-4 of it at most, with a hundred steps in each) the last steps take back.
     last_stages = [(STEP_S, windows[-1], 8)] if stages[0].driven else [(2 * step, windows[-1], 8), (2 * step, np.inf, 12), (STEP_S, np.inf, 3)]
@@ -54,7 +54,12 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
     def ends_of(link: Link) -> Ends:
         return intervals(freed(build_swing(rig, fit, STEP_S, windows[-1]), link.fit.theta), link.free, link.fit.theta)
 
-    kept, chain, ends, rejected = _told(list(zip(taken, rounds, strict=True)), chain_of, ends_of)
+    def search(kept: list[Taken], without: frozenset[str]) -> list[Taken]:
+        taken = compete_swing(stages, kept[-1][1].fit if kept else declared, floor, whole, kept, without)
+        say(f"{rig.name}: {', '.join(v.key for v, _ in taken) or 'nothing'}")
+        return taken
+
+    kept, chain, ends, rejected = _searched(search, chain_of, ends_of)
     figures = [c.error for c in chain]
     found = []
     for k, (variant, round_) in enumerate(kept):
@@ -82,6 +87,23 @@ class Link:
     xml: bytes
     replay: RigResiduals
     error: float
+
+
+def _searched(search: Callable[[list[Taken], frozenset[str]], list[Taken]], chain_of: Callable[[Sequence[Taken]], list[Link]],
+              ends_of: Callable[[Link], Ends]) -> tuple[list[Taken], list[Link], Ends, list[dict[str, Any]]]:  # fmt: skip
+    """What `_told` leaves of a search; an effect that came last and whose size cannot be told leaves its place to what came next to it."""
+    kept: list[Taken] = []
+    vague: frozenset[str] = frozenset()
+    rejected: list[dict[str, Any]] = []
+    for _ in range(MOST_SEARCHES):
+        taken = search(kept, vague)
+        kept, chain, ends, more = _told(taken, chain_of, ends_of)
+        rejected += [r for r in more if r not in rejected]
+        told = vague | {v.effect for v, _ in taken if {"effect": v.key, "reason": NOT_TOLD} in more}
+        if told == vague or kept != taken[: len(kept)]:
+            break
+        vague = told
+    return kept, chain, ends, rejected
 
 
 def _told(kept: list[Taken], chain_of: Callable[[Sequence[Taken]], list[Link]],
