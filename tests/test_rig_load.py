@@ -99,3 +99,17 @@ def test_a_large_effect_does_not_hold_the_declared_parameters_back(tmp_path: Pat
     weight = theta[[c.label for c in fit.columns].index("inertial:arm:hz")]
     assert weight == pytest.approx(-0.6 * 0.2, rel=5e-3)
     assert rescaled(pose(fit), [offset]).fit.scale["hinge"] < 0.05 * fit.scale["hinge"]
+
+
+def test_bristles_that_slacken_with_speed_are_in_open_loop_what_they_are_in_the_balance(tmp_path: Path) -> None:
+    rig = load_rig(read_session(bench(tmp_path / "s")))
+    fit = trusted_fit(rig)[0]
+    row = fit.rows[0]
+    candidate = next(c for c in candidates(rig, fit, "hinge") if (c.effect, c.variant) == ("stribeck_friction", TURNING))
+    shape = candidate.grid[5]
+    act = law({"effect": candidate.effect, "variant": candidate.variant, "shape": shape, "amplitude": {"static_excess": 0.2}})
+    assert act is not None
+    column = 0.2 * candidate.columns(row, shape)[:, 0]
+    stepped = np.array([np.sum(act(Now(q, v, 0.0, 0.0))) for q, v in zip(row.position, row.velocity, strict=True)])
+    np.testing.assert_allclose(column[50:], stepped[50:], atol=1e-9)
+    assert np.ptp(column) > 0.1

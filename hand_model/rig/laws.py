@@ -40,8 +40,8 @@ def law(record: Mapping[str, Any]) -> Law | None:
     """The law of a record {"effect", "variant", "shape", "amplitude"} of a file; None where it has none in open loop."""
     name, variant = record["effect"], record.get("variant", "")
     shape, size = record.get("shape", {}), tuple(record.get("amplitude", {}).values())
-    if name == "load_dependent_friction" and variant == TURNING:
-        return _Stop(shape, size[0], by_load=True)
+    if variant == TURNING:
+        return _Stop(shape, size[0], by_load=name == "load_dependent_friction")
     if name == "load_dependent_friction":
         return _by_load(variant, shape, size[0])
     if name == "elastoplastic_hysteresis":
@@ -96,11 +96,12 @@ _SIDES = {LOW: _joint, MOTOR: _motor, MOTOR_LOW: _motor, GEAR: _gear, GEAR_LOW: 
 
 
 class _Stop:
-    """Stop operator (form 0) or exponential build-up (form 1) along the path, step by step; by_load: times the load."""
+    """Stop operator (form 0) or exponential build-up (form 1) along the path, step by step; by_load: times the load; slower than
+    a Stribeck speed where the shape has one."""
 
     def __init__(self, shape: Mapping[str, float], size: float, by_load: bool = False) -> None:
         self.reach, self.abrupt, self.size, self.by_load = max(shape["reach"], 1e-12), shape["form"] < 0.5, size, by_load
-        self.state, self.last = 0.0, math.nan
+        self.slow, self.state, self.last = shape.get("stribeck_speed", math.inf), 0.0, math.nan
 
     def __call__(self, now: Now) -> tuple[float, float]:
         """Effort of the present state, no further friction."""
@@ -111,4 +112,5 @@ class _Stop:
         elif moved:
             way = math.copysign(1.0, moved)
             self.state = way + (self.state - way) * math.exp(-abs(moved) / self.reach)
-        return self.size * self.state * (abs(now.load) if self.by_load else 1.0), 0.0
+        by = math.exp(-((now.velocity / self.slow) ** 2)) * (abs(now.load) if self.by_load else 1.0)
+        return self.size * self.state * by, 0.0

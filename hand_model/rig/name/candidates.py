@@ -104,7 +104,7 @@ def candidates(rig: RigModel, fit: DeclaredFit, joint: str, every: bool = False)
         found += [_with_line(c) for c in bends]
     elif not _is_declared([r.filtered(r.position) for r in rows], rows):
         found = [c for c in found if c not in bends] + [_with_line(c) for c in bends]
-    found += [*_own(rig, fit, joint, rows), *_turning_round(rig, fit, joint, train, states)]
+    found += [*_own(rig, fit, joint, rows), *_turning_round(rig, fit, joint, train, states, rows)]
     return tuple(c for c in found if c.grid)
 
 
@@ -139,16 +139,19 @@ def _with_line(bend: Candidate) -> Candidate:
 
 
 def _turning_round(
-    rig: RigModel, fit: DeclaredFit, joint: str, train: tuple[DriveState, ...], states: Mapping[str, DriveState]
+    rig: RigModel, fit: DeclaredFit, joint: str, train: tuple[DriveState, ...], states: Mapping[str, DriveState], rows: list[Rows]
 ) -> list[Candidate]:
-    """Friction that needs a distance to turn round: a constant one, one in proportion to the load, and where trials declare
-    Coulomb levels, one for each."""
+    """Friction that needs a distance to turn round: a constant one, one in proportion to the load, one that falls with speed (the
+    bristles of a LuGre model, Canudas de Wit et al. 1995, slow against their own state), and where trials declare Coulomb levels, one for each."""
     stop = _from_catalogue(effect("elastoplastic_hysteresis"), joint, train, states)
     span = max(float(np.ptp(state.position)) for state in train)
     stop = replace(stop, grid=tuple({"form": form, "reach": float(share * span)} for form in (0.0, 1.0) for share in REACHES))
     load = {r.trial: np.abs(r.load(fit.theta))[:, None] for r in fit.rows if r.joint == joint}
     found = [stop, replace(stop, effect="load_dependent_friction", variant=TURNING, amplitudes=(("per_load", "1", 0.0, np.inf),),
-                           columns=lambda r, s: load[r.trial] * stop.columns(r, s))]  # fmt: skip
+                           columns=lambda r, s: load[r.trial] * stop.columns(r, s)),
+             replace(stop, effect="stribeck_friction", variant=TURNING, amplitudes=(("static_excess", rig.effort_unit(joint), 0.0, np.inf),),
+                     grid=tuple({"form": 0.0, "reach": float(share * span), **knee} for share in REACHES[::2] for knee in _knees(rows)),
+                     columns=lambda r, s: stop.columns(r, s) * np.exp(-((r.velocity / s["stribeck_speed"]) ** 2))[:, None])]  # fmt: skip
     key = f"joint:{joint}:frictionloss"
     level = {t.name: float(np.atleast_1d(t.set[key])[0]) for t in rig.trials if key in t.set}
     levels = np.unique(list(level.values()))
@@ -158,13 +161,18 @@ def _turning_round(
     return found
 
 
+def _knees(rows: list[Rows], count: int = 4) -> tuple[dict[str, float], ...]:
+    """Stribeck speeds between the slow and the fast ones of the recordings."""
+    speeds = np.concatenate([np.abs(r.velocity) for r in rows])
+    return tuple({"stribeck_speed": float(s)} for s in np.geomspace(*np.percentile(speeds[speeds > 0], [10, 90]), count))
+
+
 def _by_load(fit: DeclaredFit, joint: str, rows: list[Rows], driven: bool) -> list[Candidate]:
     """Friction by what the joint carries, by what its drive puts in, or by both sides of a gear at once: the mean of the
     drive's effort and of the bias that it works against (Duclusaud et al. 2024, model M3)."""
     mine = [r for r in fit.rows if r.joint == joint]
     load = {r.trial: np.abs(r.load(fit.theta)) for r in mine}
-    speeds = np.concatenate([np.abs(r.velocity) for r in rows])
-    knees = tuple({"stribeck_speed": float(s)} for s in np.geomspace(*np.percentile(speeds[speeds > 0], [10, 90]), 6))
+    knees = _knees(rows, 6)
 
     def friction(variant: str, amplitude: str, by: Mapping[str, Array]) -> Candidate:
         return Candidate("load_dependent_friction", variant, joint, ((amplitude, "1", 0.0, np.inf),), ({},),

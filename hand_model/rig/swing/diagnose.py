@@ -26,7 +26,7 @@ from .simulation import INDEX, NEUTRAL, PARAMETERS, STEP_S, Swing, parameter_uni
 from .start import freed, started_each
 
 RESAMPLES = 500
-MOST_SEARCHES = 3
+MOST_SEARCHES = 2
 Taken = tuple[Variant, Round]
 Ends = Mapping[str, tuple[float, float]]
 
