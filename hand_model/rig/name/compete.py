@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...diagnose.name.balance import DISCRETE
 from ..evidence import BEYOND_DOUBT, weigh
 from .candidates import Candidate
 from .problem import (
@@ -30,6 +31,7 @@ from .refit import refined, refit
 
 Array = NDArray[np.float64]
 LEAST_SHARE = 0.05  # of the held-out residual variance: less is not worth a name
+LOADED = "load_dependent_friction"
 MOST_TERMS, MOST_OF_FEW = 4, 3  # of few recordings what is left after so many goes by many names
 
 Settle = Callable[[tuple[Term, ...]], tuple[tuple[Term, ...], Sequence[Candidate]]]
@@ -88,6 +90,8 @@ def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ..
         steps = [s for s, stays in zip((*steps, step), kept, strict=True) if stays]
         been.add(_names(terms))
         if settle is not None:
+            terms, kept = _resettled(problem, settle(terms)[0], len(begin), been, settle)
+            steps = [s for s, stays in zip(steps, kept, strict=True) if stays]
             terms, rivals = settle(terms)
     return terms, tuple(steps), tuple(scores)
 
@@ -106,10 +110,28 @@ def _settled_down(problem: Problem, terms: tuple[Term, ...], first: int, been: C
     return terms, stays
 
 
+def _resettled(problem: Problem, terms: tuple[Term, ...], first: int, been: Collection[tuple[str, ...]], settle: Settle) -> tuple[tuple[Term, ...], list[bool]]:
+    """Terms at their own loads, without what, from `first` on, stood in for the last one alone where friction by load is among them: at the
+    loads of those that remain, refitted. Which of these stay."""
+    stays = [True] * (len(terms) - first)
+    if len(stays) < 2 or not any(t.candidate.effect == LOADED for t in terms):
+        return terms, stays
+    total, loss = held_out(problem, terms, normal(problem, terms)).sum(), {}
+    for k in range(first, len(terms) - 1):
+        if _names(terms[:k] + terms[k + 1 :]) not in been:
+            rest = settle(refit(problem, settle(terms[:k] + terms[k + 1 :])[0], first))[0]
+            loss[k] = 1 - total / held_out(problem, rest, normal(problem, rest)).sum(), rest
+    weak = min(loss, key=lambda k: loss[k][0], default=None)
+    if weak is None or loss[weak][0] >= LEAST_SHARE:
+        return terms, stays
+    stays[weak - first] = False
+    return loss[weak][1], stays
+
+
 def _superfluous(problem: Problem, terms: tuple[Term, ...], first: int) -> int | None:
     """The term, from `first` on, without which recordings left out are predicted next to as well; None where all pay. Friction by load
     has columns from the loads of a fit with all terms before it: these are in it already, and stay."""
-    first = max([first, *(k for k, t in enumerate(terms) if t.candidate.effect == "load_dependent_friction")])
+    first = max([first, *(k for k, t in enumerate(terms) if t.candidate.effect == LOADED)])
     total, loss = held_out(problem, terms, normal(problem, terms)).sum(), {}
     for k in range(first, len(terms)):
         rest = terms[:k] + terms[k + 1 :]
@@ -149,7 +171,8 @@ def judge(none: Array, scores: Sequence[Score], problem: Problem) -> tuple[int, 
 
 
 def _size(term: Term) -> int:
-    return len(term.shape) + len(term.candidate.amplitudes)
+    """Its parameters; which of two forms it has is no more one than which of two variants it is."""
+    return len(term.shape.keys() - DISCRETE) + len(term.candidate.amplitudes)
 
 
 def borne_out(problem: Problem, few: tuple[Sequence[Term], tuple], many: tuple[Sequence[Term], tuple]) -> bool:
