@@ -81,11 +81,6 @@ class Rows:
     declared: tuple[Column, ...] = ()
     still_columns: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
-    @property
-    def filtered_effort(self) -> Array:
-        """Effort (n,) at full rate, through the filter."""
-        return low_pass(self.extra["effort"], self.rate_hz, self.cutoff_hz)
-
     def filtered(self, values: Array) -> Array:
         """Full-rate columns (n, ...) through the filter of this balance, thinned to (m, ...)."""
         return low_pass(values, self.rate_hz, self.cutoff_hz)[:: self.step]
