@@ -284,7 +284,7 @@ def test_native_elements_are_not_written_where_there_is_no_motor() -> None:
 
 
 @pytest.mark.parametrize(("name", "parameters", "lugre"), [
-    ("stribeck_friction", {"static_ratio": 1.8, "stribeck_speed": 18.0, "static_excess": 28.0}, [350.0, 0.0, 36.372, 56.476, 20.556]),
+    ("stribeck_friction", {"static_ratio": 1.8, "stribeck_speed": 18.0, "static_excess": 14.0, "exponent": 2.0}, [350.0, 0.0, 35.0, 63.0, 18.0]),
     ("presliding_friction", {"bristle_length": 7.0}, [5.0, 0.0, 35.0, 35.0, 20.0]),
     ("presliding_friction", {"bristle_length": 7.0, "bristle_time": 0.04}, [5.0, 0.2, 35.0, 35.0, 20.0])])
 def test_lugre_replaces_the_joints_friction(name, parameters, lugre) -> None:
@@ -296,6 +296,20 @@ def test_lugre_replaces_the_joints_friction(name, parameters, lugre) -> None:
     assert mujoco.MjModel.from_xml_string(etree.tostring(root).decode()).dof_frictionloss[0] == 0
     written = [float(x) for x in root.find("actuator/dcmotor").get("lugre").split()]
     np.testing.assert_allclose(written, lugre, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("damping", "nearly"), [(0.0, 0.025), (0.05, 0.02), (0.15, 0.014), (0.5, 0.0125)])
+def test_a_rise_of_exponent_one_is_written_as_near_as_the_joints_damping_allows(damping, nearly) -> None:
+    """Friction and damping of the file against 35 + 28 exp(-v / 18) + damping v (root mean square over the rise, 0.25 to 9 Stribeck speeds)."""
+    from lxml import etree
+
+    root = etree.fromstring(MOTOR.replace('damping="0.15"', f'damping="{damping}"'))
+    effect("stribeck_friction").write_mjcf(root, {"actuator": "index"}, {"static_ratio": 1.8, "stribeck_speed": 18.0, "static_excess": 14.0, "exponent": 1.0})
+    _, _, sliding, static, speed = (float(x) for x in root.find("actuator/dcmotor").get("lugre").split())
+    linear, quadratic = (float(x) for x in root.find(".//joint").get("damping").split()[:2])
+    v = np.linspace(0.25 * 18, 9 * 18, 300)
+    written = sliding + (static - sliding) * np.exp(-((v / speed) ** 2)) + linear * v + quadratic * v**2
+    assert linear >= 0 and np.sqrt(np.mean((written - (35 + 28 * np.exp(-v / 18) + damping * v)) ** 2)) < nearly * 28
 
 
 def test_a_recording_without_the_pose_of_the_hand_bears_no_weight_out() -> None:
