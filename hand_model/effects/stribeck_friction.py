@@ -84,7 +84,7 @@ def _nearest(room: float) -> tuple[float, float, float, float, float]:
 
     def fit(width: float) -> tuple[float, Array]:
         columns = np.stack([np.ones_like(SPEEDS), np.exp(-((SPEEDS / width) ** 2)), SPEEDS, SPEEDS**2], 1)
-        found = lsq_linear(columns, np.exp(-SPEEDS), ([0.0, 0.0, -max(room, 1e-9), 0.0], np.inf), method="bvls")
+        found = lsq_linear(columns, np.exp(-SPEEDS), ([0.0, 0.0, -(1 - 1e-9) * room, 0.0], np.inf), method="bvls")
         return float(found.cost), found.x
 
     width = min(WIDTHS, key=lambda w: fit(w)[0])
