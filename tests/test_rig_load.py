@@ -113,3 +113,17 @@ def test_bristles_that_slacken_with_speed_are_in_open_loop_what_they_are_in_the_
     stepped = np.array([np.sum(act(Now(q, v, 0.0, 0.0))) for q, v in zip(row.position, row.velocity, strict=True)])
     np.testing.assert_allclose(column[50:], stepped[50:], atol=1e-9)
     assert np.ptp(column) > 0.1
+
+
+def test_a_stribeck_rise_beside_friction_by_load_is_read_at_its_size(tmp_path: Path) -> None:
+    """Where it is largest friction turns round: what is read there must not be blurred by how the log is thinned."""
+
+    def torque(motion: Motion) -> np.ndarray:
+        _, q, v, a = motion
+        load = (0.6 * 0.04 + 0.002) * a + 0.6 * 0.2 * 9.81 * np.sin(q)
+        return load + 0.03 * v + np.sign(v) * (0.08 + 0.06 * np.exp(-np.abs(v) / 0.3) + SIZE * np.abs(load))
+
+    found = diagnose_rig(read_session(recorded(tmp_path / "s", ARM, 6, torque, 0.01))).findings
+    assert [f.effect for f in found] == ["load_dependent_friction", "stribeck_friction"]
+    sizes = found[0].parameters["per_load"], found[1].parameters["static_excess"], found[1].parameters["stribeck_speed"]
+    assert [p["value"] for p in sizes] == pytest.approx([SIZE, 0.06, 0.3], rel=0.1)
