@@ -11,8 +11,10 @@ from rig_bench import ARM, Motion, recorded
 from hand_model.rig import diagnose_rig, load_rig
 from hand_model.rig.diagnose import trusted_fit
 from hand_model.rig.laws import GEAR, GEAR_LOW, LOW, MOTOR, MOTOR_LOW, TURNING, Now, law
-from hand_model.rig.name.candidates import UNDECLARED, candidates
+from hand_model.rig.name.candidates import UNDECLARED, Candidate, candidates
+from hand_model.rig.name.compete import _resettled
 from hand_model.rig.name.problem import Term, pose, rescaled, solution
+from hand_model.rig.name.settled import settled
 from hand_model.session import read_session
 
 SIZE = 0.25
@@ -127,3 +129,19 @@ def test_a_stribeck_rise_beside_friction_by_load_is_read_at_its_size(tmp_path: P
     assert [f.effect for f in found] == ["load_dependent_friction", "stribeck_friction"]
     sizes = found[0].parameters["per_load"], found[1].parameters["static_excess"], found[1].parameters["stribeck_speed"]
     assert [p["value"] for p in sizes] == pytest.approx([SIZE, 0.06, 0.3], rel=0.1)
+
+
+def test_what_stood_in_for_a_later_friction_by_load_goes(tmp_path: Path) -> None:
+    """Each at the loads of what remains; not where the rest stood before, or two sets would follow each other for ever."""
+    rig = load_rig(read_session(bench(tmp_path / "s", MOTOR)))
+    fit = trusted_fit(rig)[0]
+
+    def settle(terms: tuple[Term, ...]) -> tuple[tuple[Term, ...], tuple[Candidate, ...]]:
+        same, _, at = settled(rig, fit, terms)
+        return tuple(same), candidates(rig, at, "hinge")
+
+    known = {c.variant: c for c in candidates(rig, fit, "hinge") if c.effect == "load_dependent_friction"}
+    terms = settle((Term(known["with speed"], {}), Term(known[MOTOR], {})))[0]
+    kept, stays = _resettled(pose(fit, "hinge"), terms, 0, set(), settle)
+    assert [t.candidate.variant for t in kept] == [MOTOR] and stays == [False, True]
+    assert _resettled(pose(fit, "hinge"), terms, 0, {(terms[1].candidate.key,)}, settle)[1] == [True, True]

@@ -21,7 +21,7 @@ from hand_model.rig.name.problem import Term, extended, normal, pose
 from hand_model.rig.swing import compete as swing_compete
 from hand_model.rig.swing.build import ENOUGH_STEPS, thinned
 from hand_model.rig.swing.compete import PARTS, Variant, _folds
-from hand_model.rig.swing.diagnose import _standing
+from hand_model.rig.swing.diagnose import _searched, _standing
 from hand_model.rig.swing.fit import Fitted
 from hand_model.rig.swing.simulation import PARAMETERS, Lane, Swing, errors, simulate, vector
 from hand_model.rig.swing.start import freed, started
@@ -133,6 +133,40 @@ def test_effects_that_help_only_together_stand_together() -> None:
         assert "".join(v.key for v, _ in kept) == order
         assert [r["effect"] for r in rejected] == gone
         assert links[-1].error == min(table.values())
+
+
+def test_an_effect_whose_size_cannot_be_told_leaves_its_place_to_the_next() -> None:
+    """The last of the first search goes, the search goes on without it, and what it finds stands."""
+    a, b, c = (SimpleNamespace(key=k, effect=k, start={k: 0.0}) for k in "abc")
+    asked = []
+
+    def search(kept, without):
+        asked.append(([v.key for v, _ in kept], set(without)))
+        return [(a, None), (c if "b" in without else b, None)]
+
+    def chain(some):
+        return [SimpleNamespace(error=1.0 / (k + 1)) for k in range(len(some) + 1)]
+
+    def ends(link):
+        return {"a": (0.5, 1.5), "b": (-1.0, 1.0), "c": (0.1, 0.2)}
+
+    kept, _, _, rejected = _searched(search, chain, ends)
+    assert [v.key for v, _ in kept] == ["a", "c"] and [r["effect"] for r in rejected] == ["b"]
+    assert asked == [([], set()), (["a"], {"b"})]
+
+
+@pytest.mark.parametrize(("cost", "named"), [(0.5, True), (0.99, False)])
+def test_only_what_explains_its_own_recordings_may_explain_others(cost: float, named: bool) -> None:
+    """A rival that predicts what is left out of a dying swing, and one that does so without lowering the error that it was fitted to; and
+    the large first turns do not speak for all."""
+    blocks, folds = 8 * PARTS, [(tuple(i for i in range(8) if i != k), (k,)) for k in range(8)]
+    test = SimpleNamespace(lanes=[SimpleNamespace(trial=f"run_{k}") for k in range(8)], driven=False)
+    none = np.where(np.arange(blocks) < PARTS, 100.0, 1.0)
+    error = np.where(np.arange(blocks) < PARTS, 110.0, 0.3)
+    current = Fitted(np.zeros(len(PARAMETERS)), 1.0, 1, 3)
+    rival = swing_compete._Rival(Variant("quadratic_damping", "", {}), replace(current, cost=cost, free=4), error)
+    found = swing_compete._judged(current, none, [rival], test, folds, 1e-3)
+    assert (found is not None and found[0] == 0) == named
 
 
 def test_a_long_swing_is_searched_on_some_of_its_stretches() -> None:

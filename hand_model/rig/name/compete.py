@@ -92,6 +92,7 @@ def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ..
         if settle is not None:
             terms, kept = _resettled(problem, settle(terms)[0], len(begin), been, settle)
             steps = [s for s, stays in zip(steps, kept, strict=True) if stays]
+            been.add(_names(terms))
             terms, rivals = settle(terms)
     return terms, tuple(steps), tuple(scores)
 

@@ -103,7 +103,7 @@ def _searched(search: Callable[[list[Taken], frozenset[str]], list[Taken]], chai
         if told == vague or kept != taken[: len(kept)]:
             break
         vague = told
-    return kept, chain, ends, rejected
+    return kept, chain, ends, [r for r in rejected if r["effect"] not in {v.key for v, _ in kept}]
 
 
 def _told(kept: list[Taken], chain_of: Callable[[Sequence[Taken]], list[Link]],
