@@ -20,6 +20,6 @@ def shares(found: Sequence[Finding]) -> list[Finding]:
 
 def statement(effect: str, variant: str, joint: str, parameters: Mapping[str, float], proof: Mapping[str, Any]) -> str:
     """One plain sentence: what, where, how much, and what it is worth on recordings held out."""
-    listed = ", ".join(f"{k.replace('_', ' ')} {v:.4g}" for k, v in parameters.items())
+    listed = ", ".join(f"{k.replace('_', ' ')}{': ' if k[-1].isdigit() else ' '}{v:.4g}" for k, v in parameters.items())
     return (f"{joint}: {effect.replace('_', ' ')}{f' ({variant})' if variant else ''}: {listed}; held-out "
             f"{proof['metric'].replace('_', ' ')} falls from {proof['before']:.4g} to {proof['after']:.4g} {proof['unit']}.")  # fmt: skip
