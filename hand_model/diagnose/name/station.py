@@ -16,7 +16,7 @@ from .selection import EVIDENCE_LEAST, SMALL, name_effects
 ENGINE = {"current": "inverse dynamics of the motor's balance, motion as recorded", "encoder": "encoder map, motion as recorded",
           "markers": "linkage polynomial, motion as recorded"}
 SECOND_HEARINGS, DISPLACING = 2, 0.1  # and the share of what was explained from which a fallen name has displaced others
-CHANNELS = 20  # of a session: what no test of one sees must stand against as many chances
+CHANCES = 20 * 25  # channels of a session, times names: what no test of a channel sees must stand against as many
 ALIKE = 1 / 3  # of the size of a larger effect of the same family: below, no finding of its own
 UNREST = 0.3  # of the noise: wander that every machine is granted; more is no explanation
 WORSE = 1.5  # times the mean square of training recordings
@@ -32,7 +32,7 @@ class Station:
         self.signal, self.finger, self.actuator, self.joint, self.naming = signal, finger, actuator, joint, naming
         places = {id(f): naming.fit.terms.index(f.term) for f in naming.found}
         self.reading = undisturbed(naming)
-        least = EVIDENCE_LEAST + (np.log(CHANNELS) if naming.before.p >= ALPHA else 0.0)
+        least = EVIDENCE_LEAST + (np.log(CHANCES) if naming.before.p >= ALPHA else 0.0)
         stand = [places[id(f)] for f in naming.found if _stands(naming, f, places[id(f)], least) and
                  (sized(self.reading, places[id(f)]) or _plain_at_ends(naming, f, least))]
         self.parameters = {which: parameter_intervals(self.reading, which) for which in stand}
