@@ -119,7 +119,7 @@ def test_a_faint_effect_needs_the_word_of_untouched_recordings(seed: int) -> Non
     def half_untouched(states: tuple[DriveState, ...]) -> tuple[DriveState, ...]:
         return tuple(replace(s, validate=k > 1) for k, s in enumerate(states))
 
-    faint = half_untouched(drive(seed, planted("load_dependent_friction", {}, [0.012])))
+    faint = half_untouched(drive(seed, planted("load_dependent_friction", {}, [0.014])))
     healthy = half_untouched(drive(seed))
     borne_out, refuted = (judged("current", "index", "index", None, states, catalogue("drive"))
                           for states in (faint, (*faint[:2], *healthy[2:])))
