@@ -90,7 +90,7 @@ def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ..
         steps = [s for s, stays in zip((*steps, step), kept, strict=True) if stays]
         been.add(_names(terms))
         if settle is not None:
-            terms, kept = _resettled(problem, settle(terms)[0], len(begin), been, settle)
+            terms, kept = _resettled(problem, terms, len(begin), been, settle)
             steps = [s for s, stays in zip(steps, kept, strict=True) if stays]
             been.add(_names(terms))
             terms, rivals = settle(terms)
@@ -115,7 +115,10 @@ def _resettled(problem: Problem, terms: tuple[Term, ...], first: int, been: Coll
     """Terms at their own loads, without what, from `first` on, stood in for the last one alone where friction by load is among them: at the
     loads of those that remain, refitted. Which of these stay."""
     stays = [True] * (len(terms) - first)
-    if len(stays) < 2 or not any(t.candidate.effect == LOADED for t in terms):
+    if not any(t.candidate.effect == LOADED for t in terms):  # no loads to settle
+        return terms, stays
+    terms = settle(terms)[0]
+    if len(stays) < 2:
         return terms, stays
     total, loss = held_out(problem, terms, normal(problem, terms)).sum(), {}
     for k in range(first, len(terms) - 1):

@@ -309,8 +309,8 @@ def _judge(
     least: float = ONE_STANDARD_ERROR,
 ) -> tuple[int, Round] | None:
     """Index of the winner and what the round says, or None where nothing beats "none" (with probability `least`, by a standard error). Which effect it
-    is, recordings left out decide; between forms of it that they cannot tell apart, the likelihood: BIC with every
-    stretch as one sample (Schwarz 1978). One that has more parameters has to predict what is left out better as well."""
+    is, recordings left out decide; between what they leave within a standard error, and forms of one that they cannot tell apart, the
+    likelihood: BIC with every stretch as one sample (Schwarz 1978). One that has more parameters has to predict what is left out better as well."""
     said = weigh(none, np.array(scores), [f.free for f in fits], group, least, worth=LEAST_GAIN)
     if said is None:
         return None
