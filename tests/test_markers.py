@@ -43,6 +43,15 @@ def slipping(at: float):
     return shift
 
 
+def slipping_together(share, turn, arm):
+    """A support and two of its markers slip anew in each recording, soon after each other."""
+    turned = Rotation.from_rotvec([0.01, 0.006, -0.004]).apply(arm) - arm
+    out = (share >= 0.26)[:, None, None] * np.einsum("bij,mj->bmi", turn, turned)
+    out[:, 1] += (share >= 0.32)[:, None] * (turn @ np.array([1.2e-4, 1.8e-4, -0.9e-4]))
+    out[:, 3] += (share >= 0.28)[:, None] * (turn @ np.array([-2e-4, 0.5e-4, 1.5e-4]))
+    return out
+
+
 def creeping(share, turn, arm):
     turned = np.stack([Rotation.from_rotvec(s * np.array([0.05, 0.02, -0.08])).apply(arm) - arm for s in share])
     return np.einsum("bij,bmj->bmi", turn, turned)
@@ -62,6 +71,14 @@ def test_slips_in_every_recording_are_slips(at: float) -> None:
     naming = seen(slipping(at))
     assert naming.believed and places(naming) == {("marker_slip", "M4")}
     assert naming.p_after > 0.003
+
+
+def test_slips_close_to_each_other_are_told_apart_whatever_was_found_first() -> None:
+    naming = seen(slipping_together)
+    assert places(naming) == {("support_slip", None), ("marker_slip", "M5"), ("marker_slip", "M7")}
+    assert naming.p_after > 0.003
+    assert {(e.effect, e.begin // COUNT, round(e.begin % COUNT / COUNT, 2)) for e in naming.found if e.begin is not None} == {
+        (effect, record, at) for record in range(RECORDS) for effect, at in (("support_slip", 0.26), ("marker_slip", 0.32), ("marker_slip", 0.28))}
 
 
 def test_a_support_that_turns_all_the_time_does_not_slip() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hand_model.diagnose.findings import Finding
-from hand_model.diagnose.locate.markers import MarkerEffect
+from hand_model.diagnose.locate.displacement import MarkerEffect
 from hand_model.diagnose.locate.slips import displacement, turn, with_steps
 from hand_model.diagnose.locate.wobble import centre_travel, wobble_amplitude
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,16 +21,57 @@ UNNAMED = (NO_HINGE, CREEP)  # what no table of effects names
 
 @dataclass(frozen=True)
 class Candidate:
-    """columns: (b, 3m, c) [m per unit]. shifts: which of them (c,) shift what a joint carries and do not turn it. step: it begins at some moment. lasting: a step that lasts for the session, or until the
-    end of the recording (it was put right after)."""
+    """base: (b, 3m, d) [m per unit], shared by several candidates. pick: which of its columns are this one's, None for all. shifts: which of
+    them (c,) shift what a joint carries and do not turn it. step: it begins at some moment. lasting: a step that lasts for the session, or
+    until the end of the recording (it was put right after)."""
 
     effect: str
     body: int
     label: str | None
-    columns: Array
+    base: Array
     step: bool
     lasting: bool = True
     shifts: tuple[bool, ...] = ()
+    pick: tuple[int, ...] | None = None
+
+    @property
+    def columns(self) -> Array:
+        """(b, 3m, c) [m per unit]."""
+        return self.base if self.pick is None else self.base[..., self.pick]
+
+
+@dataclass(frozen=True)
+class MarkerEffect:
+    """A candidate that was chosen. everywhere: (b, 3m, c) unprojected, as if it acted always. begin, end: first block of a
+    step and the one after its last, None where it acts always. coefficients: (c,) of the columns, covariance: (c, c)."""
+
+    effect: str
+    body: int
+    label: str | None
+    begin: int | None
+    end: int | None
+    everywhere: Array
+    evidence: float
+    gain: float
+    coefficients: Array = field(default_factory=lambda: np.zeros(0))
+    covariance: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    shifts: tuple[bool, ...] = ()
+
+    @property
+    def columns(self) -> Array:
+        """(b, 3m, c) where it acts, zero elsewhere."""
+        if self.begin is None:
+            return self.everywhere
+        index = np.arange(len(self.everywhere))
+        return self.everywhere * ((index >= self.begin) & (index < self.end))[:, None, None]
+
+    def acts(self, blocks: Blocks, record: int, time_s: Array) -> Array:
+        """(n,) one where it acts at times [s] of a record, else zero."""
+        if self.begin is None:
+            return np.ones(len(time_s))
+        first, last = int(blocks.record[self.begin]), int(blocks.record[self.end - 1])
+        here = np.full(len(time_s), first < record <= last, float)
+        return (time_s >= blocks.time_s[self.begin]).astype(float) if record == first else here
 
 
 def candidates_of(blocks: Blocks) -> list[Candidate]:
@@ -65,7 +107,7 @@ def creeping(blocks: Blocks, slip: Candidate) -> list[Candidate]:
         t = blocks.time_s[mine]
         within[mine] = (t - t[0]) / max(t[-1] - t[0], 1e-9)
     whole = np.arange(len(within)) / max(len(within) - 1, 1)
-    return [Candidate(CREEP, slip.body, slip.label, slip.columns * ramp[:, None, None], False) for ramp in (whole, within)]
+    return [Candidate(CREEP, slip.body, slip.label, slip.base * ramp[:, None, None], False) for ramp in (whole, within)]
 
 
 def _frames(blocks: Blocks, body: int, marker: int) -> list[Array]:
@@ -80,8 +122,9 @@ def _no_hinge(blocks: Blocks, k: int) -> list[Candidate]:
     where the centre is taken to be, or passes anywhere: then what it carries is shifted in step with the tilt."""
     b, m = blocks.weight.shape
     u = share_of_range(blocks, k - 1)[:, None]
-    wave = [np.sin(2 * np.pi * u), np.cos(2 * np.pi * u)]
-    forms: list[list[Array]] = [[u**2], [u**2, u**3], wave, [u**2, u**3, *wave]]
+    functions = [u, u**2, u**3, np.sin(2 * np.pi * u), np.cos(2 * np.pi * u)]
+    even, square, cube, *wave = range(len(functions))
+    forms = [[square], [square, cube], wave, [square, cube, *wave]]
     moved = np.flatnonzero(blocks.body >= k)
     axis = blocks.axes[:, k - 1]
     helper = np.eye(3)[np.argmin(np.abs(axis.mean(0)))]
@@ -89,19 +132,20 @@ def _no_hinge(blocks: Blocks, k: int) -> list[Candidate]:
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     across = (first, np.cross(axis, first))
     arm = blocks.position[:, moved] - blocks.centres[:, k - 1][:, None]
-    shifts = [np.broadcast_to(d[:, None], arm.shape) for d in across]
-    tilts = [np.cross(d[:, None], arm) for d in across]
+    ways = [np.cross(d[:, None], arm) for d in across] + [np.broadcast_to(d[:, None], arm.shape) for d in across]
+    tilts, shifts = (0, 1), (2, 3)
+    columns = np.zeros((b, m, 3, len(functions) * len(ways)))
+    columns[:, moved] = np.stack([f[:, :, None] * way for f in functions for way in ways], axis=-1)
+    base = columns.reshape(b, 3 * m, -1)
 
-    def candidate(name: str, functions: list[Array], ways: list[Array]) -> Candidate:
-        columns = np.zeros((b, m, 3, len(functions) * len(ways)))
-        columns[:, moved] = np.stack([f[:, :, None] * way for f in functions for way in ways], axis=-1)
-        mask = tuple(any(way is s for s in shifts) for _ in functions for way in ways)
-        return Candidate(name, k, None, columns.reshape(b, 3 * m, -1), False, shifts=mask)
+    def candidate(name: str, form: Sequence[int], which: Sequence[int]) -> Candidate:
+        pick = tuple(len(ways) * f + way for f in form for way in which)
+        return Candidate(name, k, None, base, False, shifts=tuple(way in shifts for _ in form for way in which), pick=pick)
 
     out = []
     for form in forms:
-        out += [candidate("joint_wobble", form, tilts), candidate("joint_wobble", form, [*tilts, *shifts]),
-                candidate("moving_centre", form if form is wave else [u, *form], shifts)]
+        out += [candidate("joint_wobble", form, tilts), candidate("joint_wobble", form, tilts + shifts),
+                candidate("moving_centre", form if form is wave else [even, *form], shifts)]
     return out
 
 

@@ -15,8 +15,8 @@ from ...rotation import kabsch
 from ..findings import Finding, weighed
 from .angles import FingerAngles
 from .blocks import Blocks
-from .displacement import NO_HINGE, NOT_RIGID, UNNAMED
-from .markers import ALPHA, UNHINGED, MarkerEffect, MarkerNaming
+from .displacement import NO_HINGE, NOT_RIGID, UNNAMED, MarkerEffect
+from .markers import ALPHA, UNHINGED, MarkerNaming
 from .wobble import centre_travel, wobble_amplitude
 
 Array = NDArray[np.float64]
