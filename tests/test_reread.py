@@ -85,7 +85,7 @@ def test_a_shape_polished_beside_a_projection_is_that_of_full_fits(name, shape, 
     amplitude = [12.0] if name == "detent_load" else [4.0, 3.0]
     balance = Balance(drive(7, planted(name, {**shape, "centre": 57.0, "period": 9.0}, amplitude), trials=3))
     others = (Term(effect("stribeck_friction"), {"form": 0.0, "stribeck_speed": 20.0}), Term(effect("nonlinear_spring"), {"form": 0.0}))
-    error = balance.error_beside(others, effect(name))
+    error = balance.error_beside(others, effect(name), balance.fit(others))
     for step in (0.0, 0.3, 0.7):
         moved = {**shape, **{k: v + step for k, v in start.items()}}
         whole = balance.fit((*others, Term(effect(name), moved))).rss

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from ..output import forget
 from ..session import Log, Session, check_session, moves, read_session
 from .assemble import assemble
 from .findings import FILES, FOLDERS, Finding, Findings
-from .finger import finger_readings
+from .finger import FingerReading, finger_calls
 from .locate.angles import FingerAngles
 from .locate.command import CommandFacts, command_facts, command_findings, refused, with_lateness
 from .locate.course import FingerCourses
@@ -69,7 +70,8 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
     if output is not None:
         refuse_output(Path(output))
     heard = _Heard(session, tell, step)
-    heard.listen_to_fingers()
+    owned = output is not None and model is None
+    identified = heard.listen_to_fingers(beside=(partial(_identified, session),) if owned else ())
     drives = heard.drives()
     facts = _command(session, drives)
     heard.found += command_findings(facts, {a: _finger_of(session, a) for a in facts})
@@ -84,7 +86,8 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
         replays: tuple[Replay, ...] = ()
         forget(output, FOLDERS, FILES[0])
         if model is not False:
-            with Pair((findings, session, hand, written, heard.courses, Path(output), tell)) as pair:
+            known = identified[0] if owned else hand
+            with Pair((findings, session, known, written, heard.courses, Path(output), tell)) as pair:
                 (findings, replays), _ = pair.map(_written, ("model", "corrected"))
         write_page(findings, stations, replays, session.path.name, Path(output))
         findings.save(output)
@@ -109,9 +112,13 @@ class _Heard:
             refused(a, _finger_of(session, a), tuple(t.name for t in drive_trials(session)[a]), "position", why) for a, why in unmeasured.items()]
         self.unread = (*distrusted, *unmeasured)  # actuators whose log is not believed
 
-    def listen_to_fingers(self) -> None:
-        """What the cameras say of each finger."""
-        for reading in finger_readings(self.session, self.unread):
+    def listen_to_fingers(self, beside: tuple[Callable[[], Any], ...] = ()) -> list[Any]:
+        """What the cameras say of each finger. beside: further calls, made where a core is free meanwhile; what they return."""
+        calls, done = finger_calls(self.session, self.unread), []
+        for reading in Background(_made, [(call,) for call in (*calls, *beside)]).results():
+            if not isinstance(reading, FingerReading):
+                done.append(reading)
+                continue
             self.step()
             for line in reading.lines:
                 self.tell(line)
@@ -123,6 +130,7 @@ class _Heard:
                 self.fingers[reading.finger] = reading.angles
             if reading.courses is not None:
                 self.courses[reading.finger] = reading.courses
+        return done
 
     def drives(self) -> dict[str, tuple[DriveState, ...]]:
         """The drives' balances while they carry their fingers, encoders put right; those whose current is no measurement are refused.
@@ -221,16 +229,30 @@ def _written(results: tuple[Any, ...], what: str) -> Any:
     return write_corrected(session, findings.findings, _counts_corrected(session, stations), output)
 
 
-def _modelled(findings: Findings, session: Session, hand: Hand | None, stations: list[Station], courses: dict[str, FingerCourses],
-              output: Path, tell: Callable[[str], None]) -> tuple[Findings, tuple[Replay, ...]]:
-    """The findings with the model that holds them written, and its replays; without a `hand` the session's own is identified."""
+def _made(call: Callable[[], Any]) -> Any:
+    return call()
+
+
+def _identified(session: Session) -> Hand | HandModelError:
+    """The session's own hand, or why it has none."""
     from ..identify import identify
+
+    try:
+        return identify(session, compared=False)
+    except HandModelError as error:
+        return error
+
+
+def _modelled(findings: Findings, session: Session, hand: Hand | HandModelError, stations: list[Station], courses: dict[str, FingerCourses],
+              output: Path, tell: Callable[[str], None]) -> tuple[Findings, tuple[Replay, ...]]:
+    """The findings with the model that holds them written, and its replays."""
     from .locate.angles import ranges_of_counts
 
     if not any(f.correction is None for f in findings.findings):
         return findings, ()
     try:
-        hand = identify(session, compared=False) if hand is None else hand
+        if isinstance(hand, HandModelError):
+            raise hand
         tell(f"writing {output / 'model'}")
         named, replays = write_improved(hand, findings.findings, stations, ranges_of_counts(session), output, courses)
     except HandModelError as error:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
-from ..background import Background
 from ..effects import catalogue, outsiders
 from ..errors import IdentificationError
 from ..session import Finger, Session
@@ -43,22 +43,21 @@ class FingerReading:
     courses: FingerCourses | None = None
 
 
-def finger_readings(session: Session, unread: tuple[str, ...] = ()) -> Iterator[FingerReading]:
-    """Every finger of a session with flexion trials before cameras, each as soon as it is judged; two at a time.
+def finger_calls(session: Session, unread: tuple[str, ...] = ()) -> list[Callable[[], FingerReading]]:
+    """What reads every finger of a session with flexion trials before cameras, one call each.
 
     unread: actuators whose counts are not believed.
     """
     from ..identify.identification import palm_shape
 
     if session.palm is None or not any(t.mocap_path for t in session.select("flexion")):
-        return
+        return []
     try:
         shape = palm_shape(session)
     except IdentificationError as error:
-        yield FingerReading("palm", notes=(str(error),))
-        return
+        return [partial(FingerReading, "palm", notes=(str(error),))]
     counts = {a: c for a, c in ranges_of_counts(session).items() if a not in unread}
-    yield from Background(_reading, [(session, finger, shape, counts) for finger in session.fingers]).results()
+    return [partial(_reading, session, finger, shape, counts) for finger in session.fingers]
 
 
 def _reading(session: Session, finger: Finger, shape: Any, counts: dict[str, tuple[float, float]]) -> FingerReading:

@@ -39,8 +39,10 @@ class CurrentChannelDelay(Effect):
             return columns
         if _filters(shape):
             return _filtered(columns, state.time_s, shape["delay"])
-        then = state.time_s - shape["delay"]
-        return np.stack([np.interp(then, state.time_s, column) for column in columns.T], axis=-1)
+        then = np.clip(state.time_s - shape["delay"], state.time_s[0], state.time_s[-1])
+        after = np.clip(np.searchsorted(state.time_s, then), 1, len(then) - 1)
+        share = ((then - state.time_s[after - 1]) / (state.time_s[after] - state.time_s[after - 1]))[:, None]
+        return (1 - share) * columns[after - 1] + share * columns[after]
 
     def lateness(self, shape: Mapping[str, float]) -> tuple[float, float]:
         """How late [s] a sudden rise of the current is seen, at least and at most: behind a filter that depends on its height over the

@@ -5,7 +5,7 @@ Everything here is generic in what the effort is (current, torque, an angle) and
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 # What physics allows of a declared coefficient, by its column's name.
 DECLARED_LOW = {"inertia": 0.0, "viscous": 0.0, "coulomb": 0.0, "spring": 0.0}
 MOST_KEPT = 3e8  # bytes of columns that one balance keeps
+AT_ONCE = 60  # shapes of a grid whose columns are made together
 UNSETTLED = 1e-3  # weight left to a start or stop where steady motion alone is asked
 DISCRETE = ("side", "trial", "form", "end")  # shapes that choose among few cases: no continuous parameter is spent on them
 
@@ -222,13 +223,17 @@ class Balance:
         return out if inside.all() else out.within(inside)
 
     def _stacked(self, grid: Grid, weight: Array, warps: tuple[Term, ...]) -> GridColumns:
-        return stacked(self._acting(_warped_columns(grid.effect, shape, warps), weight) for shape in grid.shapes)
+        chunks = [grid.shapes[i:i + AT_ONCE] for i in range(0, len(grid.shapes), AT_ONCE)]
+        return stacked(part for chunk in chunks for part in self._acting(grid.effect, chunk, weight, warps))
 
-    def _acting(self, value: Callable[[DriveState], Array], weight: Array) -> Array:
-        """What `gather` makes of `value`, weighted and whitened, without columns that are zero: not remembered, for whole grids would
-        push out what is asked for again."""
-        columns = self.gather(value) * weight[:, None]
-        return self.whiten(columns[:, columns.any(0)], weight)
+    def _acting(self, effect: Any, shapes: Sequence[Mapping[str, float]], weight: Array, warps: tuple[Term, ...]) -> list[Array]:
+        """The columns (n, j) of each shape that are not zero, weighted and whitened; what shifts them shifts all of them at once. Not
+        remembered, for whole grids would push out what is asked for again."""
+        plain = {id(state): np.concatenate([effect.columns(state, shape) for shape in shapes], axis=1)
+                 for state, rows in zip(self.states, self._rows, strict=True) if len(rows)}
+        acting = np.any([columns.any(0) for columns in plain.values()], axis=0)
+        together = self.gather(lambda state: _warped(state, plain[id(state)][:, acting], warps)) * weight[:, None]
+        return np.split(self.whiten(together, weight), np.cumsum(acting.reshape(len(shapes), -1).sum(1))[:-1], axis=1)
 
     def design(self, terms: tuple[Term, ...]) -> tuple[Array, Array, Array]:
         """Matrix (n, k + j) of declared and effect columns, lower and upper bounds (k + j,) of their coefficients."""
@@ -298,19 +303,24 @@ class Balance:
         """The design of `terms` taken out of the effort, samples that they clip left out. The last one is kept, for every candidate
         beside the same terms asks for it."""
         if self._apart is None or self._apart[0] != terms:
-            w = self.weights(terms) * self.train * self.unclipped(terms)
-            matrix, low, high = self.design(terms)
-            self._apart = terms, Projection.of(self.whiten(matrix * w[:, None], w), self.whiten(self.effort * w, w), w, low, high)
+            self._apart = terms, self._taken_out(terms, self.unclipped(terms))
         return self._apart[1]
 
-    def error_beside(self, terms: tuple[Term, ...], effect: Any) -> Callable[[Mapping[str, float]], float]:
-        """The sum of squares (as `Fit.rss`) of `terms` and one more effect, as a function of that effect's shape."""
+    def _taken_out(self, terms: tuple[Term, ...], inside: NDArray[np.bool_]) -> Projection:
+        w = self.weights(terms) * self.train * inside
+        matrix, low, high = self.design(terms)
+        return Projection.of(self.whiten(matrix * w[:, None], w), self.whiten(self.effort * w, w), w, low, high)
+
+    def error_beside(self, terms: tuple[Term, ...], effect: Any, near: Fit | None = None) -> Callable[[Mapping[str, float]], float]:
+        """The sum of squares (as `Fit.rss`) of `terms` and one more effect, as a function of that effect's shape. near: beside terms that clip,
+        of the samples that this fit leaves unclipped; as long as these stay so, what the others add is the same."""
         def fitted(shape: Mapping[str, float]) -> float:
             return self.fit((*terms, Term(effect, shape)), held=False).rss
 
-        if not additive(effect) or any(t.effect.clips for t in terms):
+        clipped = any(t.effect.clips for t in terms)
+        if not additive(effect) or clipped and near is None:
             return fitted
-        rest = self.apart(terms)
+        rest = self._taken_out(terms, self.unclipped_by(near)) if clipped else self.apart(terms)
         if not rest.regular:
             return fitted
         more = self.vagueness(self.weights(terms)) + self.unanswered(terms)
@@ -360,11 +370,12 @@ class Balance:
 
     def unclipped(self, terms: tuple[Term, ...]) -> NDArray[np.bool_]:
         """Samples (n,) whose prediction no term clips: there the balance is linear."""
-        clips = [t for t in terms if t.effect.clips]
-        if not clips:
-            return np.ones(len(self.effort), bool)
-        free = self.fit(terms).prediction
-        levels = [term.effect.clip(np.full(len(free), sign * np.inf), term.shape) for term in clips for sign in (1, -1)]
+        return self.unclipped_by(self.fit(terms)) if any(t.effect.clips for t in terms) else np.ones(len(self.effort), bool)
+
+    def unclipped_by(self, fit: Fit) -> NDArray[np.bool_]:
+        """The same (n,) of a fit, some of whose terms clip."""
+        free = fit.prediction
+        levels = [t.effect.clip(np.full(len(free), sign * np.inf), t.shape) for t in fit.terms if t.effect.clips for sign in (1, -1)]
         return ~np.any([np.isclose(free, level) for level in levels], axis=0)
 
     def _own_nuisances(self, matrix: Array, coefficients: Array, w: Array, low: Array) -> Array:

@@ -42,13 +42,13 @@ class GridColumns:
 
     def within(self, inside: NDArray[np.bool_]) -> GridColumns:
         """The same columns, zero where `inside` (n,) is false."""
-        from scipy.sparse import diags
+        from scipy.sparse import csc_matrix
         from scipy.sparse.linalg import norm
 
         if isinstance(self.matrix, np.ndarray):
             matrix = self.matrix * inside[:, None]
             return GridColumns(matrix, self.shape, np.linalg.norm(matrix, axis=0))
-        matrix = (diags(inside.astype(float)) @ self.matrix).tocsc()
+        matrix = csc_matrix((self.matrix.data * inside[self.matrix.indices], self.matrix.indices, self.matrix.indptr), self.matrix.shape)
         return GridColumns(matrix, self.shape, norm(matrix, axis=0))
 
     def gram(self, which: NDArray[np.int64]) -> Array:
@@ -61,10 +61,12 @@ class GridColumns:
 def stacked(columns: Iterable[Array]) -> GridColumns:
     """One matrix from the columns (n, j) of every shape that act at all (of one shape at least)."""
     from scipy.sparse import csc_matrix, hstack
+    from scipy.sparse.linalg import norm
 
     parts = [part[:, part.any(0)] for part in columns]
     owner = np.repeat(np.arange(len(parts)), [p.shape[1] for p in parts])
-    length = np.concatenate([np.linalg.norm(p, axis=0) for p in parts])
-    dense = not len(owner) or sum(np.count_nonzero(p) for p in parts) > SPARSE * len(parts[0]) * len(owner)
-    matrix = np.concatenate(parts, axis=1) if dense else hstack([csc_matrix(p) for p in parts if p.size], format="csc")
-    return GridColumns(matrix, owner, length)
+    if not len(owner) or sum(np.count_nonzero(p) for p in parts) > SPARSE * len(parts[0]) * len(owner):
+        dense = np.concatenate(parts, axis=1)
+        return GridColumns(dense, owner, np.linalg.norm(dense, axis=0))
+    matrix = hstack([csc_matrix(p) for p in parts if p.size], format="csc")
+    return GridColumns(matrix, owner, norm(matrix, axis=0))

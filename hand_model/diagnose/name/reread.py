@@ -23,6 +23,7 @@ from .station import Station, finding_of
 Array = NDArray[np.float64]
 
 ROUNDS = 10  # until what is asked of a drive is what its loss lets it ask
+SETTLED = 0.003  # of the noise: a round that moves the prediction less is the last
 
 
 def reread(findings: Sequence[Finding], stations: Sequence[Station]) -> tuple[tuple[Finding, ...], list[Station]]:
@@ -68,9 +69,11 @@ def _settled(balance: Balance, terms: tuple[Term, ...], rounds: int) -> tuple[Ba
         balance = balance.remapped(fit)
         if any(t.effect.asks for t in fit.terms):
             balance = balance.required(fit)
-        fit = refit(balance, balance.fit(fit.terms))
+        before, fit = fit, refit(balance, balance.fit(fit.terms))
         for which, term in enumerate(fit.terms):
             fit = reform(balance, fit, which) if term.effect.asks else fit
+        if np.mean(((fit.prediction - before.prediction) * balance.weight) ** 2) < SETTLED**2:
+            break
     return balance, fit
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from itertools import pairwise
 from typing import Any
 
@@ -16,6 +16,7 @@ from .grid import Grid
 Array = NDArray[np.float64]
 
 ALONG = 1e-6  # of a column's length: less left beside the design, and it says nothing of its own
+CLIPPED_ANEW = 0.005  # of the samples: where more are clipped that were not, or no longer, a shape is sought with whole fits
 GRAIN = 1.5  # times what the best shape of a grid brings: more no shape between is expected to
 
 
@@ -29,7 +30,10 @@ def scan(balance: Balance, effect: Any, terms: tuple[Term, ...], least: float = 
     if additive(effect):
         shapes = _project(balance, grid, terms, 2 * balance.inflation * least / GRAIN)
     fits = [balance.fit((*terms, Term(effect, shape)), held=False) for shape in shapes]
-    return balance.fit(likeliest(balance, fits, -1).terms) if fits else None
+    if not fits:
+        return None
+    best = likeliest(balance, fits, -1)
+    return best if balance.train.all() else balance.fit(best.terms)
 
 
 def _project(balance: Balance, grid: Grid, terms: tuple[Term, ...], least: float) -> list[dict[str, float]]:
@@ -66,7 +70,7 @@ def polish(balance: Balance, fit: Fit, which: int) -> Fit:
         return fit
     span = np.array([s.high - s.low for s in shapes])
     start = np.array([term.shape[s.name] for s in shapes])
-    error = balance.error_beside(tuple(t for i, t in enumerate(fit.terms) if i != which), term.effect)
+    others = tuple(t for i, t in enumerate(fit.terms) if i != which)
 
     def shaped(u: Array) -> dict[str, float]:
         return {**term.shape, **{s.name: float(np.clip(v, s.low, s.high)) for s, v in zip(shapes, start + u * span, strict=True)}}
@@ -77,12 +81,15 @@ def polish(balance: Balance, fit: Fit, which: int) -> Fit:
         near = [abs(v - start[i]) for v in s.starts if v != start[i]]
         corner[i] = 0.4 * (min(near) if near else 0.1 * span[i]) / span[i]
         step.append(corner)
-    result = minimize(lambda u: error(shaped(u)), np.zeros(len(shapes)), method="Nelder-Mead",
-                      options={"initial_simplex": np.array(step), "maxfev": 30 + 25 * len(shapes), "fatol": 0.02,
-                               "xatol": 1e-4})
-    terms = list(fit.terms)
-    terms[which] = Term(term.effect, shaped(result.x))
-    best = balance.fit(tuple(terms))
+
+    def optimum(error: Callable[[Mapping[str, float]], float]) -> Fit:
+        result = minimize(lambda u: error(shaped(u)), np.zeros(len(shapes)), method="Nelder-Mead",
+                          options={"initial_simplex": np.array(step), "maxfev": 30 + 25 * len(shapes), "fatol": 0.02, "xatol": 1e-4})
+        return balance.fit((*fit.terms[:which], Term(term.effect, shaped(result.x)), *fit.terms[which + 1:]))
+
+    best = optimum(balance.error_beside(others, term.effect, fit))
+    if any(t.effect.clips for t in others) and np.mean(balance.unclipped_by(best) != balance.unclipped_by(fit)) > CLIPPED_ANEW:
+        best = optimum(balance.error_beside(others, term.effect))
     return best if best.rss < fit.rss else fit
 
 
