@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .balance import DISCRETE, Balance, Fit, Term
 from .evidence import gain, oddity
 from .naming import Naming
-from .shapes import likeliest, refit
+from .shapes import likeliest, polish, refit
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,8 @@ class Reading:
 def parameter_intervals(reading: Reading, which: int) -> dict[str, dict[str, Any]]:
     """Parameters of the fit's term `which` with 95 % intervals (Gauss-Newton, delta method), by name.
 
-    Where the model does not fit (residual variance more than 1.5 times the pure error) the interval is left out.
+    What another form would say of them counts by how likely it is (Hoeting et al. 1999, "Bayesian model averaging", eq. 4). Where the model
+    does not fit (residual variance more than 1.5 times the pure error) the interval is left out.
     """
     balance, fit = reading.balance, reading.fit
     term = fit.terms[which]
@@ -43,6 +44,7 @@ def parameter_intervals(reading: Reading, which: int) -> dict[str, dict[str, Any
     if scale < MISFIT_LIMIT:
         covariance = _covariance(balance, fit, theta, build) * scale * balance.inflation
     units = _units(term, balance)
+    forms = _forms(balance, fit, which, scale) if covariance is not None else []
     out = {}
     for name, value in now.items():
         entry: dict[str, Any] = {"value": float(value), "unit": units.get(name, "1")}
@@ -53,11 +55,26 @@ def parameter_intervals(reading: Reading, which: int) -> dict[str, dict[str, Any
                 up, down = theta.copy(), theta.copy()
                 up[i], down[i] = theta[i] + step, theta[i] - step
                 gradient[i] = (_one(term, which, name, build(up)) - _one(term, which, name, build(down))) / (2 * step)
-            sd = float(np.sqrt(max(gradient @ covariance @ gradient, 0.0)))
+            apart = sum(p * (other[name] - value) ** 2 for p, other, unit in forms if unit.get(name) == units.get(name) and name in other)
+            sd = float(np.sqrt(max(gradient @ covariance @ gradient, 0.0) + apart))
             if np.isfinite(sd):
                 entry["ci95"] = [float(value) - 1.96 * sd, float(value) + 1.96 * sd]
         out[name] = entry
     return out
+
+
+def _forms(balance: Balance, fit: Fit, which: int, scale: float) -> list[tuple[float, dict[str, float], dict[str, str]]]:
+    """Probability, parameters and their units of the other forms of a term, each with its shape optimised."""
+    term = fit.terms[which]
+    forms = next((s.starts for s in term.effect.shapes(balance.states) if s.name == "form"), ())
+    out = []
+    for form in (f for f in forms if f != term.shape.get("form")):
+        other = Term(term.effect, {**term.shape, "form": form})
+        out.append(polish(balance, balance.fit((*fit.terms[:which], other, *fit.terms[which + 1:])), which))
+    ahead = np.array([gain(balance, f, fit, scale) + oddity(balance, fit) - oddity(balance, f) for f in out])
+    chance = np.exp(np.minimum(ahead, 0.0))
+    return [(float(p), f.terms[which].effect.parameters(f.terms[which].shape, f.amplitudes[which], f.declared), _units(f.terms[which], balance))
+            for p, f in zip(chance / (1 + chance.sum()), out, strict=True)]
 
 
 def undisturbed(naming: Naming) -> Reading:
