@@ -178,7 +178,7 @@ def _diagnose_balance(rig: RigModel, fit: DeclaredFit, say: Callable[[str], None
             "after": bench.ratio(plain, every), "one_effect": bench.ratio(plain, one),
             "two_effects": bench.ratio(plain, two), "engine": bench.engine,
             "joints": {j: bench.proof(j, plain, every) for j in joints}}  # fmt: skip
-    return shares(found), rejected, lack, bench.file(*every), bench.file(*plain)
+    return shares(found, lack["joints"]), rejected, lack, bench.file(*every), bench.file(*plain)
 
 
 def _prove(bench: Bench, fit: DeclaredFit, stories: Sequence[tuple[Step, Term]], kept: Sequence[Term],
@@ -320,7 +320,8 @@ def _diagnose_coupling(
         if moved:
             words += " The zero between the two encoders differs between recordings and was taken out of each."
         named.append(replace(f, fit=proof, where=where, statement=words))
-    return shares(named), rejected, angle_residual(rig, coupling, fit, kept)
+    declared = {f.where["joint"]: f.fit for f in reversed(named)}  # the first was held to nothing else
+    return shares(named, declared), rejected, angle_residual(rig, coupling, fit, kept)
 
 
 # --- verdict -----------------------------------------------------------------------------------------------------------

@@ -74,7 +74,7 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
             "two_effects": figures[min(2, len(figures) - 1)], "engine": "mujoco", "mae_before": means[0], "mae_after": means[1],
             "noise_floor": floor,
             "declared": {n: float(chain[0].fit.theta[INDEX[n]]) for n in free}}  # fmt: skip
-    return shares(found), rejected, lack, chain[-1].xml, chain[0].xml
+    return shares(found, {rig.joints[0]: lack}), rejected, lack, chain[-1].xml, chain[0].xml
 
 
 @dataclass(frozen=True)
