@@ -27,12 +27,13 @@ from .problem import (
     rescaled,
     training_error,
 )
-from .refit import refined, refit
+from .refit import moves, refined, refit
 
 Array = NDArray[np.float64]
 LEAST_SHARE = 0.05  # of the held-out residual variance: less is not worth a name
 LOADED = "load_dependent_friction"
 MOST_TERMS, MOST_OF_FEW = 4, 3  # of few recordings what is left after so many goes by many names
+TOGETHER = 3  # rivals for which the shapes of what stands are moved
 
 Settle = Callable[[tuple[Term, ...]], tuple[tuple[Term, ...], Sequence[Candidate]]]
 
@@ -40,11 +41,12 @@ Settle = Callable[[tuple[Term, ...]], tuple[tuple[Term, ...], Sequence[Candidate
 @dataclass(frozen=True)
 class Score:
     """A candidate added to the terms so far. error (B,): squared error of every block when left out [normalised]; parts: its
-    normal equations by block."""
+    normal equations by block; others: the terms that it is added to, where their shapes have moved for it."""
 
     term: Term
     error: Array
     parts: tuple = ()
+    others: tuple[Term, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -75,18 +77,18 @@ def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ..
         none = held_out(problem, terms, parts)
         taken = {t.candidate.key for t in terms}
         scores = [score(problem, terms, c, parts) for c in rivals if c.repeats or c.key not in taken]
-        stand = scores if left_out_whole(problem) else [s for s in scores if borne_out(problem, (terms, parts), ((*terms, s.term), s.parts))]
+        scores = _met(problem, terms, parts, scores, len(begin))
+        stand = scores if left_out_whole(problem) else [s for s in scores if borne_out(problem, (terms, parts), ((*(s.others or terms), s.term), s.parts))]
         found = judge(none, stand, problem)
         if found is None:
             break
         # Between the points of a grid a rival may be better than on them: those not told apart meet again at their best.
-        last = [refined(problem, terms, stand[k].term, parts) for k in dict.fromkeys((found[0], *found[1].close))]
+        last = [_together(problem, terms, parts, stand[k], len(begin)) for k in dict.fromkeys((found[0], *found[1].close))]
         won, step = last[0], found[1]
         if len(last) > 1:
-            errors = [Score(t, held_out(problem, (*terms, t), normal(problem, (*terms, t)))) for t in last]
-            again = judge(none, errors, problem)
+            again = judge(none, last, problem)
             won, step = (last[again[0]], again[1]) if again is not None else (won, step)
-        terms, kept = _settled_down(problem, (*terms, won), len(begin), been)
+        terms, kept = _settled_down(problem, (*(won.others or terms), won.term), len(begin), been)
         steps = [s for s, stays in zip((*steps, step), kept, strict=True) if stays]
         been.add(_names(terms))
         if settle is not None:
@@ -95,6 +97,25 @@ def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ..
             been.add(_names(terms))
             terms, rivals = settle(terms)
     return terms, tuple(steps), tuple(scores)
+
+
+def _met(problem: Problem, terms: tuple[Term, ...], parts: tuple, scores: list[Score], first: int) -> list[Score]:
+    """The scores, those of the rivals that explain most of what they were fitted to with the shapes of the terms moved for them, from `first` on: a
+    shape that has moved to take up what a rival is there for hides it (a Stribeck speed that is too high, drag)."""
+    if not any(moves(t) for t in terms[first:]):
+        return scores
+    best = sorted(scores, key=lambda s: training_error(problem, (*terms, s.term), s.parts))[:TOGETHER]
+    return [_together(problem, terms, parts, s, first) if any(s is b for b in best) else s for s in scores]
+
+
+def _together(problem: Problem, terms: tuple[Term, ...], parts: tuple, rival: Score, first: int) -> Score:
+    """The rival's score in the best of its forms, with all shapes from `first` on fitted beside each other."""
+    if rival.others:
+        return rival
+    every = (*terms, refined(problem, terms, rival.term, parts))
+    every = refit(problem, every, first) if any(moves(t) for t in terms[first:]) else every
+    more = normal(problem, every)
+    return Score(every[-1], held_out(problem, every, more), more, every[:-1])
 
 
 def _settled_down(problem: Problem, terms: tuple[Term, ...], first: int, been: Collection[tuple[str, ...]]) -> tuple[tuple[Term, ...], list[bool]]:

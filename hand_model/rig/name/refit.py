@@ -19,25 +19,38 @@ def refined(problem: Problem, terms: Sequence[Term], term: Term, parts: tuple) -
     train = _error_beside(problem, terms, term, parts)
     forms: dict[tuple, list[dict[str, float]]] = {}
     for shape in term.candidate.grid:
-        forms.setdefault(tuple(v for n, v in shape.items() if n in DISCRETE), []).append(shape)
-    starts = [min(grid, key=train) for grid in forms.values()] if len(forms) > 1 else [dict(term.shape)]
+        forms.setdefault(_form(shape), []).append(shape)
+    starts = [dict(term.shape), *(min(grid, key=train) for form, grid in forms.items() if form != _form(term.shape))]
     ends = [_descended(train, term.candidate.grid, shape) for shape in starts]
     return Term(term.candidate, min(ends, key=train))
 
 
+def _form(shape: Mapping[str, float]) -> tuple[float, ...]:
+    return tuple(float(v) for n, v in sorted(shape.items()) if n in DISCRETE)
+
+
 def refit(problem: Problem, terms: Sequence[Term], first: int = 0) -> tuple[Term, ...]:
-    """The terms, from `first` on, each in the best of its shapes beside all others, in turn."""
+    """The terms, from `first` on, each in the best of its forms and shapes beside all others, in turn."""
     terms = tuple(terms)
     for _ in range(ROUNDS):
         before = terms
         for k, term in list(enumerate(terms))[first:]:
             rest = terms[:k] + terms[k + 1 :]
-            train = _error_beside(problem, rest, term, normal(problem, rest))
-            moved = Term(term.candidate, _descended(train, term.candidate.grid, term.shape))
-            terms = (*terms[:k], moved, *terms[k + 1 :])
+            terms = (*terms[:k], refined(problem, rest, term, normal(problem, rest)), *terms[k + 1 :])
         if terms == before:
             break
     return terms
+
+
+def moves(term: Term) -> bool:
+    """Whether a term has a shape that is fitted."""
+    return bool(_continuous(term.candidate.grid))
+
+
+def _continuous(shapes: Sequence[Mapping[str, float]]) -> dict[str, Array]:
+    """Values of every continuous shape that a grid varies."""
+    grid = {n: np.unique([g[n] for g in shapes]) for n in shapes[0] if n not in DISCRETE}
+    return {n: values for n, values in grid.items() if len(values) > 1}
 
 
 def _error_beside(problem: Problem, terms: Sequence[Term], term: Term, parts: tuple) -> Callable[[Mapping[str, float]], float]:
@@ -56,8 +69,8 @@ def _descended(train: Callable[[Mapping[str, float]], float], shapes: Sequence[M
     """The shape of least training error near one of a grid of shapes and within their bounds (Nelder & Mead 1965)."""
     from scipy.optimize import minimize
 
-    grid = {n: np.unique([g[n] for g in shapes]) for n in start if n not in DISCRETE}
-    names = [n for n, values in grid.items() if len(values) > 1]
+    grid = _continuous(shapes)
+    names = [n for n in start if n in grid]
     if not names:
         return start
     low, high = (np.array([grid[n][k] for n in names]) for k in (0, -1))

@@ -1,0 +1,73 @@
+"""Effects with shapes beside each other: what stands must not keep out what it has made up for; what is largest comes first."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rig_bench import ARM, Motion, recorded
+
+from hand_model.rig import load_rig
+from hand_model.rig.diagnose import trusted_fit
+from hand_model.rig.findings import Finding
+from hand_model.rig.name.candidates import candidates
+from hand_model.rig.name.compete import LEAST_SHARE, _met, compete, score
+from hand_model.rig.name.problem import Term, held_out, normal, pose
+from hand_model.rig.name.refit import refit
+from hand_model.rig.words import shares
+from hand_model.session import read_session
+
+SPEED = 0.49  # rad/s, of the planted Stribeck rise
+
+
+@pytest.fixture(scope="module")
+def rig_fit(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """A hinge with a Stribeck rise and a small drag, and its declared fit."""
+
+    def torque(motion: Motion) -> np.ndarray:
+        _, q, v, a = motion
+        dry = 0.065 + 0.056 * np.exp(-((v / SPEED) ** 2))
+        return (0.6 * 0.04 + 0.002) * a + 0.6 * 0.2 * 9.81 * np.sin(q) + 0.02 * v + 0.0142 * v * np.abs(v) + np.sign(v) * dry
+
+    path: Path = tmp_path_factory.mktemp("bench") / "s"
+    rig = load_rig(read_session(recorded(path, ARM, 5, torque, 0.01)))
+    return rig, trusted_fit(rig)[0]
+
+
+def test_a_rival_is_held_to_what_stands_with_its_shapes_moved_for_it(rig_fit: Any) -> None:
+    """Alone a Stribeck rise takes a speed that makes up for the drag: beside that the drag is not worth a name, beside the right one it is."""
+    rig, fit = rig_fit
+    problem, known = pose(fit, "hinge"), {c.key: c for c in candidates(rig, fit, "hinge")}
+    rise = replace(known["stribeck_friction@hinge"], grid=tuple(g for g in known["stribeck_friction@hinge"].grid if g["form"] == 1.0))
+    terms = refit(problem, (Term(rise, dict(rise.grid[0])),))
+    parts = normal(problem, terms)
+    none = held_out(problem, terms, parts).sum()
+    frozen = score(problem, terms, known["quadratic_damping@hinge"], parts)
+    moved = _met(problem, terms, parts, [frozen], 0)[0]
+    assert frozen.error.sum() > (1 - 2 * LEAST_SHARE) * none
+    assert moved.error.sum() < 0.3 * none
+    assert moved.others[0].shape["stribeck_speed"] == pytest.approx(SPEED, rel=0.1)
+
+
+def test_a_form_that_was_chosen_without_a_later_effect_is_chosen_again_beside_it(rig_fit: Any) -> None:
+    """Without the drag the exponential rise explains more than the Gaussian one, which was planted."""
+    rig, fit = rig_fit
+    some = [c for c in candidates(rig, fit, "hinge") if c.effect in ("stribeck_friction", "quadratic_damping") and not c.variant]
+    first = compete(pose(fit), some, most=1)[0][0]
+    both = {t.candidate.effect: t.shape for t in compete(pose(fit), some)[0]}
+    assert first.shape["form"] == 0.0 and both["stribeck_friction"]["form"] == 1.0
+    assert both["stribeck_friction"]["stribeck_speed"] == pytest.approx(SPEED, rel=0.1)
+
+
+def test_a_faint_effect_alone_at_a_joint_is_a_small_share() -> None:
+    """Of what the declared model leaves beyond the noise, at each joint; where noise is all there is, of what is explained."""
+
+    def found(joint: str, before: float, after: float) -> Finding:
+        return Finding("torque_ripple", ("torque_ripple",), 1.0, (), {"joint": joint, "share_of_mismatch": before**2 - after**2}, "", {}, {}, None)
+
+    declared = {"shoulder": {"before": 5.0, "noise_floor": 3.0}, "elbow": {"before": 5.0, "noise_floor": 3.0}, "wrist": {"before": 2.0, "noise_floor": 2.0}}
+    told = shares([found("shoulder", 5.0, 4.9), found("elbow", 5.0, 3.5), found("wrist", 2.0, 1.0)], declared)
+    assert [f.where["share_of_mismatch"] for f in told] == pytest.approx([0.99 / 16, 12.75 / 16, 1.0])
