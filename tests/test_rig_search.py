@@ -292,3 +292,34 @@ def test_what_one_effect_hides_is_sought_beside_another(monkeypatch: pytest.Monk
     monkeypatch.setattr(swing_compete, "_folds", lambda swing, train, whole: (swing, [(tuple(i for i in range(count) if i != k), (k,)) for k in range(count)]))
     taken = swing_compete.compete_swing([stage], fitted)
     assert [v.effect for v, _ in taken] == names and [r.variant.effect for _, r in taken] == names
+
+
+@pytest.mark.parametrize(("error", "names"), [(3.0, ["stribeck_friction"]), (1.0, [])])
+def test_a_fit_within_the_noise_is_held_to_what_it_predicts(monkeypatch: pytest.MonkeyPatch, error: float, names: list[str]) -> None:
+    """A law that is wrong fits short stretches to within the noise of 2; only what it predicts to within it, too, is left at that."""
+    count = 8
+    stage = SimpleNamespace(lanes=[SimpleNamespace(trial=f"run_{k}") for k in range(count)], driven=True, train=lambda: np.arange(count))
+    fitted = Fitted(np.zeros(len(PARAMETERS)), 1.0, 1, 3)
+
+    def one_round(stages, taken, current, test, folds, without):
+        rival = swing_compete._Rival(Variant("stribeck_friction", "", {}), replace(fitted, cost=0.5), np.full(count * PARTS, 0.2 * error))
+        return fitted, np.full(count * PARTS, error), [] if taken else [rival]
+
+    monkeypatch.setattr(swing_compete, "_round", one_round)
+    monkeypatch.setattr(swing_compete, "freed", lambda swing, theta: swing)
+    monkeypatch.setattr(swing_compete, "_exchanged", lambda stages, taken, fit: (taken, fit))
+    monkeypatch.setattr(swing_compete, "_folds", lambda swing, train, whole: (swing, [(tuple(i for i in range(count) if i != k), (k,)) for k in range(count)]))
+    assert [v.effect for v, _ in swing_compete.compete_swing([stage], fitted, floor=2.0)] == names
+
+
+@pytest.mark.parametrize(("cost", "name"), [(1.001, "lateral"), (1.5, "both")])
+def test_what_made_up_for_a_later_effect_leaves_the_variant(monkeypatch: pytest.MonkeyPatch, cost: float, name: str) -> None:
+    """A variant with a parameter less takes the place of one that fits hardly better beside the later effect, not of one that fits better."""
+    both, lateral = Variant("gravity_load", "both", {"lateral": 0.0, "offset": 0.0}), Variant("gravity_load", "lateral", {"lateral": 0.0})
+    taken = both, Variant("stribeck_friction", "", {"static_excess": 0.0})
+    theta = np.zeros(len(PARAMETERS))
+    monkeypatch.setattr(swing_compete, "variants", lambda swing: (both, lateral))
+    monkeypatch.setattr(swing_compete, "free_declared", lambda swing: ("inertia",))
+    monkeypatch.setattr(swing_compete, "fit_stages", lambda stages, tasks, most: [Fitted(t.start, cost, 1, len(t.free)) for t in tasks])
+    kept, _ = swing_compete._exchanged([SimpleNamespace(train=lambda: np.arange(16))], taken, Fitted(theta, 1.0, 1, 4))
+    assert [v.name for v in kept] == [name, ""]

@@ -157,9 +157,11 @@ def compete_swing(
     test, folds = _folds(stages[-1], train, whole)
     taken, rounds = tuple(v for v, _ in begin), [r for _, r in begin]
     most = MOST_TERMS if len({stages[-1].lanes[i].trial for i in train}) >= FOLDS else MOST_OF_FEW
-    while len(taken) < most and current.cost > floor**2:
+    while len(taken) < most:
         stages = [freed(s, current.theta) for s in stages]
         current, none, rivals = _round(stages, taken, current, test, folds, without)
+        if max(current.cost, np.mean(none**2)) <= floor**2:  # a wrong law may fit to within the noise; what it predicts shows it
+            break
         found = _judged(current, none, rivals, test, folds, floor)
         if found is None and rivals and not taken:  # what one leaves may hide it, as a late drive hides friction: two at once
             first = min(rivals, key=lambda r: r.error.sum())
@@ -219,7 +221,8 @@ def _shortlist(rivals: Sequence[Variant], fits: Sequence[Fitted]) -> list[int]:
 def _exchanged(
     stages: Sequence[Swing], taken: tuple[Variant, ...], current: Fitted
 ) -> tuple[tuple[Variant, ...], Fitted]:
-    """Another variant of an effect that was taken before, where beside the later ones it fits better with no more parameters."""
+    """Another variant of an effect that was taken before, where beside the later ones it fits better with no more parameters, or as
+    well with fewer (by likelihood, `_bic`): what made up for a later effect goes."""
     swing = stages[-1]
     if len(taken) < 2:
         return taken, current
@@ -236,8 +239,15 @@ def _exchanged(
             theta = _started(theta, v) if v not in taken else theta
         tasks.append(Task(all_free(swing, group), theta, ()))
     fits = fit_stages(stages, tasks, 12)
-    best = min(range(len(sets)), key=lambda k: fits[k].cost)
-    return (sets[best], fits[best]) if BETTER * fits[best].cost < current.cost else (taken, current)
+    size = len(swing.train())
+    best = min(range(len(sets)), key=lambda k: _bic(fits[k], size))
+    pays = _bic(fits[best], size) + size * np.log(BETTER) < _bic(replace(current, free=len(all_free(swing, taken))), size)
+    return (sets[best], fits[best]) if pays else (taken, current)
+
+
+def _bic(fit: Fitted, stretches: int) -> float:
+    """Of a fit, every stretch one sample (Schwarz 1978)."""
+    return float(stretches * np.log(fit.cost) + fit.free * np.log(stretches))
 
 
 def _several(swing: Swing, tasks: Sequence[Task], starts: int = 2, iterations: int = 8) -> list[Fitted]:
@@ -319,6 +329,6 @@ def _judge(
     first = said.chosen
     forms = [k for k in {*said.close, *said.tied, first} if k in said.tied or rivals[k].effect == rivals[first].effect
              and (fits[k].free <= fits[first].free or scores[k].sum() <= scores[first].sum())]  # fmt: skip
-    best = min(forms, key=lambda k: stretches * np.log(fits[k].cost) + fits[k].free * np.log(stretches))
+    best = min(forms, key=lambda k: _bic(fits[k], stretches))
     gain = float(1.0 - scores[best].sum() / max(none.sum(), 1e-300))
     return best, Round(rivals[best], said.probability, gain, wins, same)
