@@ -11,7 +11,7 @@ import pytest
 from rig_bench import ARM, Motion, recorded
 
 from hand_model.rig import load_rig
-from hand_model.rig.diagnose import trusted_fit
+from hand_model.rig.diagnose import _rank, trusted_fit
 from hand_model.rig.findings import Finding
 from hand_model.rig.name.candidates import candidates
 from hand_model.rig.name.compete import LEAST_SHARE, _met, compete, score
@@ -62,12 +62,20 @@ def test_a_form_that_was_chosen_without_a_later_effect_is_chosen_again_beside_it
     assert both["stribeck_friction"]["stribeck_speed"] == pytest.approx(SPEED, rel=0.1)
 
 
+def found(joint: str, before: float, after: float) -> Finding:
+    """A finding at a joint that takes the error from before to after."""
+    return Finding("torque_ripple", ("torque_ripple",), 1.0, (), {"joint": joint, "share_of_mismatch": before**2 - after**2}, "", {}, {}, {})
+
+
 def test_a_faint_effect_alone_at_a_joint_is_a_small_share() -> None:
     """Of what the declared model leaves beyond the noise, at each joint; where noise is all there is, of what is explained."""
-
-    def found(joint: str, before: float, after: float) -> Finding:
-        return Finding("torque_ripple", ("torque_ripple",), 1.0, (), {"joint": joint, "share_of_mismatch": before**2 - after**2}, "", {}, {}, None)
-
     declared = {"shoulder": {"before": 5.0, "noise_floor": 3.0}, "elbow": {"before": 5.0, "noise_floor": 3.0}, "wrist": {"before": 2.0, "noise_floor": 2.0}}
     told = shares([found("shoulder", 5.0, 4.9), found("elbow", 5.0, 3.5), found("wrist", 2.0, 1.0)], declared)
     assert [f.where["share_of_mismatch"] for f in told] == pytest.approx([0.99 / 16, 12.75 / 16, 1.0])
+
+
+def test_shares_that_hardly_differ_do_not_set_the_order() -> None:
+    """What is first is first by more than what would be worth a name."""
+    declared = {j: {"before": 1.0, "noise_floor": 0.0} for j in ("effort", "angle", "half")}
+    told = shares([found("half", 1.0, 0.7), found("effort", 1.0, 0.08), found("angle", 1.0, 0.02)], declared)
+    assert [f.where["joint"] for f in sorted(told, key=_rank)] == ["effort", "angle", "half"]

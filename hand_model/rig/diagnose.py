@@ -97,10 +97,11 @@ def diagnose_rig(session: Session, output: str | Path | None = None,
     return findings
 
 
-def _rank(finding: Finding) -> tuple[int, float]:
-    """What is refused first, for all else was found without it; then by share of the mismatch; clipped samples last."""
+def _rank(finding: Finding) -> tuple[int, int]:
+    """What is refused first, for all else was found without it; then by share of the mismatch, in steps that are worth a name
+    (within one in the order found: efforts before angles between encoders); clipped samples last."""
     place = 1 if finding.model is not None else 0 if finding.effect == "command_as_measurement" else 2
-    return place, -float(finding.where.get("share_of_mismatch") or 0.0)
+    return place, -round(float(finding.where.get("share_of_mismatch") or 0.0) / LEAST_SHARE)
 
 
 def trusted_fit(rig: RigModel) -> tuple[DeclaredFit, tuple[ChannelIssue, ...]]:
