@@ -9,6 +9,7 @@ its map moves the target of its equality. Python is called in every step: some t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,15 +27,19 @@ LEAST_GIVE = 0.1  # [%]: the bristle of a motor whose file has plain Coulomb fri
 
 @dataclass(frozen=True)
 class Place:
-    """Where one effect acts in a model. actuator, joint: ids of the motor and its joint, in the unit [effort per raw].
-    equality: id of the follower's equality, None for a load on the motor joint. give: bristle length [%]. plane: (2, 3) unit vectors in
-    the palm, along the open finger and where flexion takes it."""
+    """Where one effect acts in a model. actuator: id of the motor, in the unit [effort per raw]. equality: id of the follower's
+    equality, None for a load on the motor joint. address, dof: of the joint whose state the law reads, the motor's or the follower's
+    driver; scale: its coordinate per unit of the law. body: of the palm. give: bristle length [%]. plane: (2, 3) unit vectors in the
+    palm, along the open finger and where flexion takes it."""
 
     effect: Effect
     actuator: int
-    joint: int
     unit: float
     equality: int | None
+    address: int
+    dof: int
+    scale: float
+    body: int
     give: float
     plane: Any
 
@@ -80,8 +85,7 @@ class EffectsOn:
         memory.time_s = data.time
         for place, law, bristle in zip(self.places, memory.laws, memory.bristles, strict=True):
             if place.equality is None:
-                dof = model.jnt_dofadr[place.joint]
-                data.qfrc_passive[dof] -= place.unit * law(_moment(model, data, place, step, bristle))
+                data.qfrc_passive[place.dof] -= place.unit * law(_moment(model, data, place, step, bristle))
             else:
                 _move_target(data, place.equality, law(_follower(model, data, place, step)))
 
@@ -152,7 +156,10 @@ def _place(model: Any, hand: Hand, found: Effect) -> Place | None:
     motor = next((m for m in hand.motors if m.actuator == name), None)
     give = 0.0 if motor is None or "presliding" not in motor.parameters else motor.parameters["presliding"].value
     unit = float(model.numeric_data[model.numeric_adr[number]])
-    return Place(found, actuator, joint, unit, equality, max(give, LEAST_GIVE), _plane(model, str(name)))
+    driver = joint if equality is None else int(model.eq_obj2id[equality])
+    scale = math.pi / 180 if station not in ("drive", "encoder") else 1.0  # radians for degrees, or percent
+    return Place(found, actuator, unit, equality, int(model.jnt_qposadr[driver]), int(model.jnt_dofadr[driver]), scale,
+                 int(model.body_parentid[model.jnt_bodyid[joint]]), max(give, LEAST_GIVE), _plane(model, str(name)))
 
 
 def _plane(model: Any, actuator: str) -> Any:
@@ -172,30 +179,25 @@ def _plane(model: Any, actuator: str) -> Any:
 
 
 def _moment(model: Any, data: Any, place: Place, step: float, bristle: Callable[[float], float]) -> Moment:
-    position = float(data.qpos[model.jnt_qposadr[place.joint]])
-    velocity = float(data.qvel[model.jnt_dofadr[place.joint]])
-    palm = data.xmat[model.body_parentid[model.jnt_bodyid[place.joint]]].reshape(3, 3)
-    along, across = (float(g) for g in place.plane @ (palm.T @ model.opt.gravity))
-    return Moment(data.time, step, position, velocity, bristle(position), place.give,
+    position = float(data.qpos[place.address])
+    along, across = (place.plane @ (data.xmat[place.body].reshape(3, 3).T @ model.opt.gravity)).tolist()
+    return Moment(data.time, step, position, float(data.qvel[place.dof]), bristle(position), place.give,
                   float(data.actuator_force[place.actuator]) / place.unit, along, across)
 
 
 def _follower(model: Any, data: Any, place: Place, step: float) -> Moment:
-    driver = int(model.eq_obj2id[place.equality])
-    scale = 1.0 if effect(place.effect.effect).station == "encoder" else np.pi / 180  # percent, or radians for degrees
-    position = float(data.qpos[model.jnt_qposadr[driver]])
-    slope = np.polynomial.polynomial.polyval(position, model.eq_data[place.equality, 1:5] * np.arange(1, 5))
-    return Moment(data.time, step, position / scale, float(data.qvel[model.jnt_dofadr[driver]]) / scale, 0.0, place.give,
-                  float(data.actuator_force[place.actuator]) / place.unit, 0.0, 0.0, float(slope) * scale)
+    position, scale = float(data.qpos[place.address]), place.scale
+    _, c1, c2, c3, c4 = model.eq_data[place.equality, :5].tolist()
+    slope = c1 + position * (2 * c2 + position * (3 * c3 + position * 4 * c4))
+    return Moment(data.time, step, position / scale, float(data.qvel[place.dof]) / scale, 0.0, place.give,
+                  float(data.actuator_force[place.actuator]) / place.unit, 0.0, 0.0, slope * scale)
 
 
 def _move_target(data: Any, equality: int, shift_rad: float) -> None:
     """Move the target of a joint equality: its violation counts from there. The reference acceleration is computed after this
     callback, within the same step."""
-    import mujoco
-
-    rows = np.flatnonzero((data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)) & (data.efc_id == equality))
-    data.efc_pos[rows] -= shift_rad
+    equalities = slice(data.ne)  # which come first
+    data.efc_pos[equalities] -= shift_rad * (data.efc_id[equalities] == equality)
 
 
 __all__ = ["EffectsOn", "effects_on"]

@@ -59,7 +59,7 @@ def protocol_pairs(balance: Balance, effects: Sequence[Any]) -> tuple[list[list[
         if value >= CLASS_WIDTH:
             for name in (a, b):
                 told.setdefault(name, [a, b, round(value, 1)])
-    nearest = sorted({tuple(entry) for entry in told.values()}, key=lambda entry: entry[2])
+    nearest = sorted({tuple(entry) for entry in told.values()}, key=lambda entry: (entry[2], *entry[:2]))
     return [list(entry) for entry in nearest], [[a, b] for (a, b), value in pairs.items() if value < CLASS_WIDTH]
 
 

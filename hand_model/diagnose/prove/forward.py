@@ -8,12 +8,14 @@ plays and stops do not mind, and nothing of the file that was not measured is te
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...effects import effect
 from ...effects.base import DriveState
 from ...effects.input import SUFFIX
 from ...engines.mujoco import HOLD, divergence, on_linkages
@@ -109,7 +111,8 @@ def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, pat
     data.qpos[at] = position[0]
     data.qpos[:] = _started(model, data.qpos, driver)
     rest = data.qpos[address].copy()
-    with effects_on(model, hand), divergence():
+    behind = replace(hand, effects=tuple(e for e in hand.effects if effect(e.effect).station != "drive"))  # loads move no held joint
+    with effects_on(model, behind), divergence():
         for i, (x, v, f) in enumerate(zip(position, velocity, load, strict=True)):
             data.qpos[address], data.qvel[dof] = rest, 0.0
             data.qpos[at], data.qvel[rate] = x, v
