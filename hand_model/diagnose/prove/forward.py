@@ -43,7 +43,9 @@ def follower_along(folder: Path, state: DriveState, where: Mapping[str, Any], st
         driver = _driver(model, str(where["actuator"]), follower, station)
         if driver is not None:
             path = state.position if station == "encoder" else np.deg2rad(state.position)
-            return _roll(model, load_hand(folder / "hand.json"), state, str(where["actuator"]), driver, path, follower)
+            hand = load_hand(folder / "hand.json")
+            own = replace(hand, effects=tuple(e for e in hand.effects if effect(e.effect).station == station))  # no other one moves it
+            return _roll(model, own, state, str(where["actuator"]), driver, path, follower)
     return None
 
 
@@ -111,8 +113,7 @@ def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, pat
     data.qpos[at] = position[0]
     data.qpos[:] = _started(model, data.qpos, driver)
     rest = data.qpos[address].copy()
-    behind = replace(hand, effects=tuple(e for e in hand.effects if effect(e.effect).station != "drive"))  # loads move no held joint
-    with effects_on(model, behind), divergence():
+    with effects_on(model, hand), divergence():
         for i, (x, v, f) in enumerate(zip(position, velocity, load, strict=True)):
             data.qpos[address], data.qvel[dof] = rest, 0.0
             data.qpos[at], data.qvel[rate] = x, v
