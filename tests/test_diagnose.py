@@ -11,10 +11,11 @@ import pytest
 
 from hand_model.diagnose import Finding, Findings, diagnose
 from hand_model.diagnose.locate.motion import estimate_motion, local_quadratic
-from hand_model.diagnose.name.balance import Balance
-from hand_model.diagnose.name.interval import held_out, parameter_intervals, undisturbed
+from hand_model.diagnose.name.balance import Balance, Term
+from hand_model.diagnose.name.interval import Reading, held_out, parameter_intervals, undisturbed
 from hand_model.diagnose.name.least_squares import bounded_least_squares
 from hand_model.diagnose.name.selection import name_effects
+from hand_model.diagnose.name.shapes import polish
 from hand_model.diagnose.name.station import judged
 from hand_model.effects import catalogue, effect
 from hand_model.effects.base import DriveState
@@ -92,6 +93,21 @@ def test_planted_effect_is_named_alone_with_its_parameters(name, shape, amplitud
     assert proof["after"] < proof["before"]
     assert proof["after"] < 1.06 * proof["noise_floor"]
     assert proof["held_out"] == ["trial_3"]
+
+
+def _read_as(form: float, amplitude: float, seed: int) -> dict[str, float]:
+    """Yield load and half width of its interval, of a gradual build-up read as one of form `form`."""
+    balance = Balance(drive(seed, planted("elastoplastic_hysteresis", {"form": 1.0, "reach": 30.0}, [amplitude])))
+    fit = polish(balance, balance.fit((Term(effect("elastoplastic_hysteresis"), {"form": form, "reach": 15.0}),)), 0)
+    entry = parameter_intervals(Reading(balance, balance.fit(), fit), 0)["yield_load"]
+    return {"value": entry["value"], "half": 0.5 * (entry["ci95"][1] - entry["ci95"][0])}
+
+
+def test_an_interval_knows_of_the_other_form_as_far_as_it_is_likely() -> None:
+    told = _read_as(1.0, 12.0, 2)
+    assert abs(told["value"] - 12.0) < told["half"] < 1.5  # the strong one is told by its form: no wider than noise makes it
+    weak = [_read_as(0.0, 5.0, seed) for seed in range(4)]
+    assert sum(abs(f["value"] - 5.0) < f["half"] for f in weak) >= 3  # read as the wrong form, but the right one has a say
 
 
 def test_two_effects_are_both_named() -> None:

@@ -35,36 +35,48 @@ def parameter_intervals(reading: Reading, which: int) -> dict[str, dict[str, Any
     does not fit (residual variance more than 1.5 times the pure error) the interval is left out.
     """
     balance, fit = reading.balance, reading.fit
-    term = fit.terms[which]
-    theta, build = _vector(fit)
-    shape, amplitude, declared = build(theta)
-    now = term.effect.parameters(shape[which], amplitude[which], declared)
     scale = max(fit.rss / max(balance.train.sum(), 1), 1.0)
-    covariance = None
-    if scale < MISFIT_LIMIT:
-        covariance = _covariance(balance, fit, theta, build) * scale * balance.inflation
-    units = _units(term, balance)
-    forms = _forms(balance, fit, which, scale) if covariance is not None else []
-    out = {}
-    for name, value in now.items():
-        entry: dict[str, Any] = {"value": float(value), "unit": units.get(name, "1")}
-        if covariance is not None and name not in DISCRETE:
-            gradient = np.zeros(len(theta))
-            for i in range(len(theta)):
-                step = 1e-4 * (abs(theta[i]) + 1e-6)
-                up, down = theta.copy(), theta.copy()
-                up[i], down[i] = theta[i] + step, theta[i] - step
-                gradient[i] = (_one(term, which, name, build(up)) - _one(term, which, name, build(down))) / (2 * step)
-            apart = sum(p * (other[name] - value) ** 2 for p, other, unit in forms if unit.get(name) == units.get(name) and name in other)
-            sd = float(np.sqrt(max(gradient @ covariance @ gradient, 0.0) + apart))
-            if np.isfinite(sd):
-                entry["ci95"] = [float(value) - 1.96 * sd, float(value) + 1.96 * sd]
-        out[name] = entry
+    values, units = _figures(balance, fit, which)
+    out: dict[str, dict[str, Any]] = {k: {"value": v, "unit": units.get(k, "1")} for k, v in values.items()}
+    if scale >= MISFIT_LIMIT:
+        return out
+    variance = _variances(balance, fit, which, scale)
+    said = [(p, *_figures(balance, f, which), _variances(balance, f, which, scale)) for p, f in _forms(balance, fit, which, scale)]
+    for name in (k for k in out if k not in DISCRETE):
+        others = [(p, v[name], s2[name]) for p, v, unit, s2 in said if name in v and unit.get(name) == units.get(name)]
+        apart = sum(p * ((v - values[name]) ** 2 + s2) for p, v, s2 in others if np.isfinite(v + s2))
+        within = (1 - sum(p for p, _, _ in others)) * variance[name]
+        sd = float(np.sqrt(within + apart))
+        if np.isfinite(sd):
+            out[name]["ci95"] = [values[name] - 1.96 * sd, values[name] + 1.96 * sd]
     return out
 
 
-def _forms(balance: Balance, fit: Fit, which: int, scale: float) -> list[tuple[float, dict[str, float], dict[str, str]]]:
-    """Probability, parameters and their units of the other forms of a term, each with its shape optimised."""
+def _figures(balance: Balance, fit: Fit, which: int) -> tuple[dict[str, float], dict[str, str]]:
+    """Parameters of a term as fitted, and their units."""
+    term = fit.terms[which]
+    values = term.effect.parameters(term.shape, fit.amplitudes[which], fit.declared)
+    return {k: float(v) for k, v in values.items()}, _units(term, balance)
+
+
+def _variances(balance: Balance, fit: Fit, which: int, scale: float) -> dict[str, float]:
+    """Variance of each parameter of a term: the covariance of all that is fitted, through the gradient of the parameter."""
+    theta, build = _vector(fit)
+    covariance = _covariance(balance, fit, theta, build) * scale * balance.inflation
+    term = fit.terms[which]
+    columns = []
+    for i in range(len(theta)):
+        step = 1e-4 * (abs(theta[i]) + 1e-6)
+        up, down = theta.copy(), theta.copy()
+        up[i], down[i] = theta[i] + step, theta[i] - step
+        above, below = (_all(term, which, build(at)) for at in (up, down))
+        columns.append({k: (above[k] - below[k]) / (2 * step) for k in above})
+    gradients = {k: np.array([c[k] for c in columns]) for k in columns[0]}
+    return {k: max(float(g @ covariance @ g), 0.0) for k, g in gradients.items()}
+
+
+def _forms(balance: Balance, fit: Fit, which: int, scale: float) -> list[tuple[float, Fit]]:
+    """Probability and fit of the other forms of a term, each with its shape optimised."""
     term = fit.terms[which]
     forms = next((s.starts for s in term.effect.shapes(balance.states) if s.name == "form"), ())
     out = []
@@ -73,8 +85,7 @@ def _forms(balance: Balance, fit: Fit, which: int, scale: float) -> list[tuple[f
         out.append(polish(balance, balance.fit((*fit.terms[:which], other, *fit.terms[which + 1:])), which))
     ahead = np.array([gain(balance, f, fit, scale) + oddity(balance, fit) - oddity(balance, f) for f in out])
     chance = np.exp(np.minimum(ahead, 0.0))
-    return [(float(p), f.terms[which].effect.parameters(f.terms[which].shape, f.amplitudes[which], f.declared), _units(f.terms[which], balance))
-            for p, f in zip(chance / (1 + chance.sum()), out, strict=True)]
+    return list(zip((chance / (1 + chance.sum())).tolist(), out, strict=True))
 
 
 def undisturbed(naming: Naming) -> Reading:
@@ -107,9 +118,9 @@ def undisturbed(naming: Naming) -> Reading:
     return Reading(calm, calm.fit(), best)
 
 
-def _one(term: Term, which: int, name: str, values: Any) -> float:
+def _all(term: Term, which: int, values: Any) -> dict[str, float]:
     shape, amplitude, declared = values
-    return float(term.effect.parameters(shape[which], amplitude[which], declared)[name])
+    return {k: float(v) for k, v in term.effect.parameters(shape[which], amplitude[which], declared).items()}
 
 
 def _units(term: Term, balance: Balance) -> dict[str, str]:
