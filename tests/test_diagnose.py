@@ -110,6 +110,15 @@ def test_an_interval_knows_of_the_other_form_as_far_as_it_is_likely() -> None:
     assert sum(abs(f["value"] - 5.0) < f["half"] for f in weak) >= 3  # read as the wrong form, but the right one has a say
 
 
+@pytest.mark.parametrize("share", [0.08, 0.25, 0.45])
+def test_readings_cut_at_a_limit_are_named_so_however_many_they_are(share: float) -> None:
+    states = drive(3)
+    limit = float(np.nanquantile(np.concatenate([np.abs(s.effort) for s in states]), 1 - share))
+    naming = name_effects(tuple(replace(s, effort=np.clip(s.effort, -limit, limit)) for s in states), catalogue("drive"))
+    assert [f.term.effect.name for f in naming.found] == ["current_saturation"]
+    assert naming.found[0].term.shape["limit"] == pytest.approx(limit, rel=0.02)
+
+
 def test_two_effects_are_both_named() -> None:
     one = planted("stribeck_friction", {"stribeck_speed": 20.0}, [20.0])
     two = planted("detent_load", {"form": 0.0, "centre": 60.0, "width": 6.0}, [-12.0])

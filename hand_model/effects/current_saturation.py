@@ -18,9 +18,9 @@ class CurrentSaturation(Effect):
     clips = True
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """Clipping level, among the highest recorded efforts."""
+        """Clipping level, among the highest recorded efforts; readings cut for nearly half of the time leave room below it."""
         effort = np.concatenate([np.abs(s.effort[np.isfinite(s.effort)]) for s in states])
-        low, high = (np.percentile(effort, 60), effort.max()) if len(effort) else (0.0, 1.0)
+        low, high = (min(np.percentile(effort, 60), effort.max() / 2), effort.max()) if len(effort) else (0.0, 1.0)
         return (Shape("limit", states[0].effort_unit, float(low), float(high), tuple(np.linspace(low, high, 16)[1:])),)
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
