@@ -158,6 +158,23 @@ def _elsewhere(naming: Naming) -> bool:
     return bool(outside.any() and inside.any() and np.mean(square[outside]) > WORSE * np.mean(square[inside]))
 
 
+def _altered(naming: Naming) -> bool:
+    """Whether a recording kept out is plainly that of a machine with other declared coefficients, as in another pose of the hand: what their own
+    fit gains there in log likelihood, less the penalty of Schwarz (1978). A change of level alone is spread too thin for tests of cells."""
+    balance = naming.balance
+    residual, matrix = balance.effort - naming.fit.prediction, balance.gather(lambda s: s.declared)
+    recording = balance.gather(lambda s: np.full(len(s.time_s), s.trial))
+    outside = balance.steady & ~balance.train
+    for name in np.unique(recording[outside]):
+        weight = balance.weight * (outside & (recording == name))
+        columns, left = (balance.whiten(v, weight) for v in (matrix * weight[:, None], residual * weight))
+        own = columns @ np.linalg.lstsq(columns, left, rcond=None)[0]
+        count = max(np.count_nonzero(weight) / balance.inflation, 2.0)
+        if float(own @ own) / (2 * balance.inflation) - matrix.shape[1] / 2 * np.log(count) > EVIDENCE_LEAST:
+            return True
+    return False
+
+
 def judged(signal: str, finger: str | None, actuator: str | None, joint: str | None, states: tuple[Any, ...], effects: Iterable[Any],
            typical: Mapping[str, float] | None = None) -> Station:
     """The station of the balance of `states`, named among `effects`. Where a name does not stand, or is another's form, the others are
@@ -175,8 +192,9 @@ def judged(signal: str, finger: str | None, actuator: str | None, joint: str | N
         if other.weight <= station.weight:
             break
         station = other
-    unknown = not station.believed or elsewhere and station.naming.after.p < ALPHA
-    if station.missing and unknown and not station.naming.overwhelmed and any(s.validate for s in states):
+    untold = not station.believed or elsewhere and station.naming.after.p < ALPHA
+    hopeless = station.naming.overwhelmed and not elsewhere  # in the training recordings already
+    if (station.missing and untold and not hopeless or not station.proven and _altered(station.naming)) and any(s.validate for s in states):
         # what the training recordings cannot tell, a pose that one of the others alone has may tell
         lasting = tuple(e for e in every if e.of_the_hand)  # what one recording had explains no other
         other = Station(signal, finger, actuator, joint, name_effects(states, lasting, typical=typical, whole=True))
