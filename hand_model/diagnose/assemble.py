@@ -34,7 +34,7 @@ NAMES = {e.name for e in catalogue()}
 
 def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding]], notes: list[str],
              unexplained: Sequence[dict[str, Any]] = ()) -> Findings:
-    """One ranked list from all stations: by what a finding shows in its channel (its weight, `findings.weighed`) and, twice as much, by how
+    """One ranked list from all stations: by what a finding shows in its channel (its weight, `findings.weighed`) and, three times as much, by how
     large it is for its kind (weighted geometric mean). unexplained: of the markers."""
     ranked: list[tuple[float, Finding]] = _heaviest(marker_findings, _palm_marker)
     rejected: list[dict[str, str]] = []
@@ -60,7 +60,7 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
     ranked = _without_tilts(_without_shadows(_one_clock(_of_hinges(ranked, unexplained))))
     # how far a hinge that is none moves is told only beside what another hinge would explain: that it is none is sure all the same
     sized = [(_magnitude(f, stations, _value if f.effect in HINGE else _sure), weight, f) for weight, f in ranked]
-    ranked = sorted(((float(np.cbrt(m**2 * weight)), f) for m, weight, f in sized), key=lambda item: -item[0])
+    ranked = sorted(((float((m**3 * weight) ** 0.25), f) for m, weight, f in sized), key=lambda item: -item[0])
     ranked = _heaviest(ranked, _same_place)
     trifles = _trifles(ranked, {id(f): m for m, _, f in sized})
     rejected += [{"effect": f.effect, "where": str(f.where["finger"]), "reason": reason} for f, reason in trifles]

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..background import Background, Pair, single_threaded
 from ..effects import catalogue, outsiders
-from ..effects.base import DriveState
+from ..effects.base import DriveState, least_delay
 from ..errors import HandModelError, SessionError
 from ..hand import Hand
 from ..output import forget
@@ -21,6 +21,7 @@ from .assemble import assemble
 from .findings import FILES, FOLDERS, Finding, Findings
 from .finger import FingerReading, finger_calls
 from .locate.angles import FingerAngles
+from .locate.channel import ChannelDelay, apart, channel_delay
 from .locate.command import CommandFacts, command_facts, command_findings, refused, with_lateness
 from .locate.course import FingerCourses
 from .locate.decoupled import while_driven, without_excursions
@@ -71,13 +72,15 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
         refuse_output(Path(output))
     heard = _Heard(session, tell, step)
     owned = output is not None and model is None
-    identified = heard.listen_to_fingers(beside=(partial(_identified, session),) if owned else ())
+    read = [a for a in drive_trials(session) if a not in heard.unread]
+    beside = [partial(channel_delay, session, a) for a in read] + ([partial(_identified, session)] if owned else [])
+    *delays, identified = heard.listen_to_fingers(tuple(beside)) if owned else (*heard.listen_to_fingers(tuple(beside)), None)
     drives = heard.drives()
     facts = _command(session, drives)
     heard.found += command_findings(facts, {a: _finger_of(session, a) for a in facts})
     for _, finding in heard.found:
         tell(finding.statement)
-    heard.listen_to_drives(*_timed(drives, facts))
+    heard.listen_to_drives(*_timed(drives, facts, apart({d.actuator: d for d in delays if d is not None and d.actuator in drives})))
     stations = heard.stations
     findings = assemble(stations, heard.found, heard.notes, heard.unexplained)
     listed, written = reread(findings.findings, stations)
@@ -86,7 +89,7 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
         replays: tuple[Replay, ...] = ()
         forget(output, FOLDERS, FILES[0])
         if model is not False:
-            known = identified[0] if owned else hand
+            known = identified if owned else hand
             with Pair((findings, session, known, written, heard.courses, Path(output), tell)) as pair:
                 (findings, replays), _ = pair.map(_written, ("model", "corrected"))
         write_page(findings, stations, replays, session.path.name, Path(output))
@@ -177,14 +180,14 @@ def _without_settled_sags(found: list[tuple[float, Finding]], stations: Sequence
     return [i for i in found if i[1].effect != "drive_sag" or i[1].where["actuator"] not in settled]
 
 
-def _timed(drives: dict[str, tuple[DriveState, ...]],
-           facts: dict[str, CommandFacts]) -> tuple[dict[str, tuple[DriveState, ...]], dict[str, bool]]:
+def _timed(drives: dict[str, tuple[DriveState, ...]], facts: dict[str, CommandFacts],
+           delays: dict[str, ChannelDelay]) -> tuple[dict[str, tuple[DriveState, ...]], dict[str, bool]]:
     """The drives with what is known of their current's lateness, and whether each may be late."""
-    timed = with_lateness(drives, facts)
+    timed = with_lateness(drives, facts, delays)
     late = _delays_apart(timed)
     in_time = [a for a in drives if not late[a]]
     if 0 < len(in_time) < len(drives):  # at a reversal a late current looks like a give, an early one like none
-        timed = with_lateness(with_gives(drives, in_time), facts)
+        timed = with_lateness(with_gives(drives, in_time), facts, delays)
     return timed, late
 
 
@@ -302,6 +305,8 @@ def _delays_apart(drives: dict[str, tuple[DriveState, ...]]) -> dict[str, bool]:
         x, bound = best[actuator] - common, least * step[actuator]
         if actuator not in late:
             return abs(x) > bound
+        if (told_to := least_delay(drives[actuator])) < bound:
+            return abs(float(late[actuator][0])) > told_to
         if late[actuator][0] < -max(bound, EARLY * late[actuator][1]):
             return True
         if x >= -bound:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...effects.base import DriveState
 from ..findings import UNWRITTEN, Finding, weighed
 from .answers import Answers, answers_of, lateness
+from .channel import ChannelDelay
 
 Array = NDArray[np.float64]
 
@@ -158,14 +159,15 @@ def command_findings(facts: dict[str, CommandFacts], fingers: dict[str, str | No
     return out
 
 
-def with_lateness(drives: Mapping[str, tuple[DriveState, ...]], facts: Mapping[str, CommandFacts]) -> dict[str, tuple[DriveState, ...]]:
-    """The states with what answers to commands say of their current channel: "late" (2,) [s], by how much and its doubt; a late
-    current shows starts and stops late as well, whatever model it is held against."""
+def with_lateness(drives: Mapping[str, tuple[DriveState, ...]], facts: Mapping[str, CommandFacts],
+                  delays: Mapping[str, ChannelDelay]) -> dict[str, tuple[DriveState, ...]]:
+    """The states with what is known of their current channel: "late" (2,) [s], by how much and its doubt, by the simulated drive (`delays`) or
+    by answers to commands; a late current shows starts and stops late as well, whatever model it is held against."""
+    told = {a: (x.channel_s, float(np.hypot(x.doubt_s, UNLIKE * x.channel_s))) for a, x in lateness({a: f.answers for a, f in facts.items()}).items()}
+    told |= {a: (d.delay_s, d.doubt_s) for a, d in delays.items()}
     out = dict(drives)
-    for actuator, told in lateness({a: f.answers for a, f in facts.items()}).items():
-        late = np.array([told.channel_s, float(np.hypot(told.doubt_s, UNLIKE * told.channel_s))])
-        out[actuator] = tuple(replace(s, extra={**s.extra, "late": late, "sigma": _lasting(s, told.channel_s)})
-                              for s in drives[actuator])
+    for actuator, late in told.items():
+        out[actuator] = tuple(replace(s, extra={**s.extra, "late": np.array(late), "sigma": _lasting(s, late[0])}) for s in drives[actuator])
     return out
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...background import Pair
-from ...effects.base import sample_interval
+from ...effects.base import least_delay
 from .balance import Balance, Fit, Term, additive
 from .evidence import evidence, gain, rough_evidence, scale_of
 from .lack_of_fit import LackOfFit, lack_of_fit
@@ -214,12 +214,11 @@ def _likelihood(balance: Balance, fit: Fit, wander: Wander | None) -> float:
 
 
 def _resolved(balance: Balance, term: Term) -> bool:
-    """Whether a delay exceeds three quarters of a sample interval and answers to commands do not refute it; true of anything else."""
+    """Whether a delay exceeds what is told of one and nothing that is known of it refutes it; true of anything else."""
     if "delay" not in term.shape:
         return True
-    step = sample_interval(balance.states)
     refuted = balance.unanswered((term,)) > REFUTED**2 * balance.inflation
-    return abs(term.shape["delay"]) > 0.75 * step and not refuted
+    return abs(term.shape["delay"]) > least_delay(balance.states) and not refuted
 
 
 def rank(pair: Pair, effects: Iterable[Any], terms: tuple[Term, ...], fit: Fit, refine: int = 6, least: float = 0.0) -> list[Rival]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..findings import UNWRITTEN, Finding, weighed
 from .interval import brought_held_out, held_out, parameter_intervals, sized, undisturbed, variance_ratio
-from .naming import ALPHA, EXPLAINED_LEAST, Named, Naming
+from .naming import ALPHA, EXPLAINED_LEAST, MOST_TERMS, Named, Naming
 from .selection import EVIDENCE_LEAST, SMALL, name_effects
 
 # How before and after were computed, said in the findings: no compiled file is involved until one is replayed.
@@ -21,6 +21,7 @@ ALIKE = 1 / 3  # of the size of a larger effect of the same family: below, no fi
 UNREST = 0.3  # of the noise: wander that every machine is granted; more is no explanation
 WORSE = 1.5  # times the mean square of training recordings
 KEPT_OUT, EXPLAINED_MOST = 1.05, 2 / 3  # times the noise of recordings kept out, and the share of what is above it that true names take
+MAIN = 0.5  # of what names explain together: what one of them must hold where they do not do
 PLAINLY = 1 / 3  # of the mean square of recordings kept out before, at most, is noise
 EXPLAINED_SOME = 1 / 3  # of a mismatch that the lack-of-fit test sees: below, they are not what is missing, whatever is left to see
 
@@ -71,10 +72,16 @@ class Station:
     def believed(self) -> bool:
         """Whether the names stand: the final model passes the test, or takes most of the mismatch away, or all that recordings kept out
         show. Names that take little of a plain mismatch away do not, however little is left to see, nor names of nothing where more than
-        the noise does not repeat."""
+        the noise does not repeat, nor as many as may be, none of them the main one, beside which the test fails."""
         idle = self.explained < (EXPLAINED_SOME if self.naming.before.p < ALPHA else SMALL if self.wander > 1 else 0.0)
         most = self.naming.after.p >= ALPHA or self.explained >= EXPLAINED_LEAST or self._predicted
-        return bool(self.proven) and not idle and not self._short and most
+        return bool(self.proven) and not idle and not self._short and not self._scattered and most
+
+    @property
+    def _scattered(self) -> bool:
+        """Whether as many names as may be leave something that the test sees, and none of them holds the better part of what they explain: each
+        describes a piece of what is something else."""
+        return self.naming.after.p < ALPHA and len(self.naming.found) >= MOST_TERMS and max(f.share for f in self.naming.found) < MAIN
 
     @property
     def _predicted(self) -> bool:
