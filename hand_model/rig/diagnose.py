@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..background import single_threaded
+from ..errors import HandModelError
+from ..output import refuse_file
 from ..session import Session
 from .channels import ChannelIssue, check_balance, check_channels
 from .couplings import coupling_terms, with_couplings
@@ -43,12 +45,17 @@ TIED_TO_POSITION = frozenset({"nonlinear_spring", "end_stop_contact", "detent_lo
 
 
 @single_threaded()
-def diagnose_rig(session: Session, output: str | Path | None = None,
-                 progress: Callable[[str], None] | None = None) -> RigFindings:  # fmt: skip
-    """Diagnose a rig session; with `output`, also write findings.json and the improved rig.xml there.
+def diagnose_rig(session: Session, output: str | Path | None = None, progress: Callable[[str], None] | None = None,
+                 model: bool = True) -> RigFindings:  # fmt: skip
+    """Diagnose a rig session; with `output`, also write findings.json there and, with `model`, the improved rig.xml.
 
-    Raises SessionError or DescriptionError where the session or its MJCF cannot be read.
+    Raises SessionError or DescriptionError where the session or its MJCF cannot be read, HandModelError for an output that is a file
+    or the session's own folder, whose model would be lost.
     """
+    if output is not None:
+        refuse_file(output)
+        if Path(output).resolve() == session.path.resolve():
+            raise HandModelError(f"{output}: is the session itself, whose model would be written over; name another folder")
     say = progress or (lambda _: None)
     rig = with_couplings(load_rig(session))
     fit, issues = trusted_fit(rig)
@@ -93,7 +100,7 @@ def diagnose_rig(session: Session, output: str | Path | None = None,
         couplings=tuple(angles),
     )  # fmt: skip
     if output is not None:
-        findings.write(output)
+        findings.write(output, model)
     return findings
 
 

@@ -54,13 +54,18 @@ class RigFindings(Findings):
         """The whole as the format has it, with the session's name and the declared parameters."""
         return {**super().to_dict(), "session": self.session, "declared": dict(self.declared)}
 
-    def write(self, folder: str | Path) -> None:
-        """Write rig.xml (improved), rig_declared.xml (fitted, nothing added) and findings.json, each whole or not at all."""
+    def write(self, folder: str | Path, model: bool = True) -> None:
+        """Write findings.json and, with `model`, rig.xml (improved) and rig_declared.xml (fitted, nothing added), each whole or not at
+        all; without, those of an earlier run go.
+        """
         path = Path(folder)
         path.mkdir(parents=True, exist_ok=True)
+        earlier = (path / "findings.json").is_file()
         for name, content in (("rig.xml", self.xml), ("rig_declared.xml", self.declared_xml)):
-            if content:
+            if content and model:
                 part = path / f".{name}.part"
                 part.write_bytes(content)
                 part.replace(path / name)
+            elif earlier:
+                (path / name).unlink(missing_ok=True)
         self.save(path)
