@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from ..rig.inverse import EffortResidual, effort_residuals
 from ..rig.model import RigModel, load_rig
 from ..rig.replay import simulate_trial
 from ..session import Session
-from .page import Element, Section, figures, key, listing, note, page, table
+from .page import Cell, Element, Section, figures, key, listing, note, page, table
 from .pictures import POINTS
 from .style import INK, SERIES, drawing
 from .words import count
@@ -51,7 +51,7 @@ def rig_findings_page(session: Session, findings: RigFindings) -> bytes:
         sections += _motion(rig, findings)
     if findings.couplings:
         sections.append(_couplings(findings.couplings))
-    sections.append(Section("next", "Next", f"{findings.next_experiment or 'Nothing more is asked for.'}", _rest(findings)))
+    sections.append(Section("next", "Next", (findings.next_experiment or "Nothing more is asked for.").replace("_", " "), _rest(findings)))
     lead = (f"{session.path.name}: the declared model, fitted, against {count(len(rig.trials), 'trial')}; what is named below "
             "was chosen on the training trials and measured on the others, by MuJoCo on the written files.")  # fmt: skip
     return page(session.hand or session.path.name, lead, _tiles(findings), sections)
@@ -78,11 +78,11 @@ def _conclusion(findings: RigFindings) -> str:
 def _findings(findings: RigFindings) -> list[Element]:
     rows = []
     for f in findings.findings:
-        known = "before" in f.fit
+        known = f.fit["before"] is not None
         rows.append([f.where.get("joint") or "", f.effect.replace("_", " "),
-                     ", ".join(m.replace("_", " ") for m in f.members if m != f.effect) or "–", f"{f.probability:.2f}",
+                     Cell(", ".join(m.replace("_", " ") for m in f.members if m != f.effect) or "–", "wrap"), f"{f.probability:.2f}",
                      f"{f.fit['before']:.4g}" if known else "–", f"{f.fit['after']:.4g}" if known else "–",
-                     f.fit.get("unit", "")])  # fmt: skip
+                     f.fit.get("unit") or ""])  # fmt: skip
     head = ("joint", "effect", "not told from", "probability", "held-out error before", "after", "unit")
     parts = [table(head, rows, "By share of the mismatch; each was measured beside those found before it", text_columns=3)] if rows else []
     return [*parts, listing([f.statement for f in findings.findings])] if rows else []
@@ -289,17 +289,17 @@ def _motion(rig: RigModel, findings: RigFindings) -> list[Section]:
         key(("c2", "recorded"), ("c1", "declared model"), ("ink", "with what was found")), figures(*drawn[:PICTURES])))]  # fmt: skip
 
 
-def _place(key: str) -> str:
-    """effect@joint in words."""
-    effect, _, joint = key.partition("@")
-    return effect.replace("_", " ") + (f" at {joint}" if joint else "")
+def _tried(rejected: Mapping[str, str]) -> str:
+    """Effect and variant in words."""
+    variant = rejected.get("variant")
+    return rejected["effect"].replace("_", " ") + (f" ({variant})" if variant else "")
 
 
 def _rest(findings: RigFindings) -> tuple[Element, ...]:
     said = [f"{u['where']['joint'] or 'the joint'}: {100 * u['share_of_mismatch']:.0f} % of the mismatch stays unexplained."
             for u in findings.unexplained]  # fmt: skip
-    withdrawn = [f"{_place(r['effect'])}: {r['reason']}." for r in findings.rejected if r["reason"] != NOT_TAKEN]
-    tried = sorted({r["effect"].split("@")[0].replace("_", " ") for r in findings.rejected if r["reason"] == NOT_TAKEN})
+    withdrawn = [f"{_tried(r)}{' at ' + r['where'] if 'where' in r else ''}: {r['reason']}." for r in findings.rejected if r["reason"] != NOT_TAKEN]
+    tried = sorted({_tried(r) for r in findings.rejected if r["reason"] == NOT_TAKEN})
     parts = [listing(said)] if said else []
     if withdrawn:
         parts += [note("Chosen on the training recordings, then withdrawn:"), listing(withdrawn)]
