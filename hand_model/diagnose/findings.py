@@ -56,7 +56,7 @@ class Findings:
     """The diagnosis of a session. verdict: "consistent", "mismatch" or "unexplained"."""
 
     verdict: str
-    lack_of_fit: Mapping[str, float]
+    lack_of_fit: Mapping[str, float | None]
     protocol: Mapping[str, Any]
     findings: tuple[Finding, ...] = ()
     rejected: tuple[Mapping[str, str], ...] = ()

@@ -87,7 +87,7 @@ def diagnose_rig(session: Session, output: str | Path | None = None, progress: C
         session=rig.name,
         verdict=_verdict(found, lack),
         lack_of_fit=lack,
-        protocol={"repeats": len(rig.select(False)), "rate_hz": _rate(rig), "held_out": [t.name for t in rig.select(True)],
+        protocol={"repeats": len(rig.select(False)), "rate_hz": _rate(rig), "speeds": None, "isolable": [], "held_out": [t.name for t in rig.select(True)],
                   "held_out_repeats_the_training_trajectory": again,
                   "probability": PROBABILITY,
                   "not_isolable": [list(f.members) for f in found if len(f.members) > 1]},
