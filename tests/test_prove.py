@@ -139,6 +139,13 @@ def test_a_model_that_holds_an_effect_already_gets_it_once() -> None:
     assert [(e.where["actuator"], e.parameters["centre"].value) for e in after.effects] == [("little", 60.0), ("index", 40.0)]
 
 
+def test_a_finding_whose_finger_the_model_lacks_is_in_no_file(tmp_path) -> None:
+    from hand_model.diagnose.prove.improve import written
+
+    told = written(tmp_path, tmp_path, _finding(), {"ring"})
+    assert told == {"native": False, "mjcf": None, "urdf": "not expressible", "callback": None, "note": "the model has no index"}
+
+
 def test_joints_go_where_newly_fitted_maps_take_them() -> None:
     from types import SimpleNamespace
 
