@@ -24,7 +24,16 @@ from .locate.angles import FingerAngles
 from .locate.command import CommandFacts, command_facts, command_findings, refused, with_lateness
 from .locate.course import FingerCourses
 from .locate.decoupled import while_driven, without_excursions
-from .locate.drive import drive_states, drive_trials, echoes_command, is_measured, opposes, rests_on_command, with_gives
+from .locate.drive import (
+    drive_states,
+    drive_trials,
+    echoes_command,
+    is_measured,
+    opposes,
+    rests_on_command,
+    too_short,
+    with_gives,
+)
 from .locate.gravity import with_gravity
 from .locate.preload import preload_findings
 from .locate.stamps import Stamps, stamps
@@ -101,7 +110,7 @@ class _Heard:
 
     def __init__(self, session: Session, tell: Callable[[str], None], step: Callable[[], None]) -> None:
         self.session, self.tell, self.step = session, tell, step
-        self.notes = list(check_session(session, dead=True))
+        self.notes = [*check_session(session, dead=True), *too_short(session)]
         self.fingers: dict[str, FingerAngles] = {}
         self.courses: dict[str, FingerCourses] = {}
         self.stations: list[Station] = []
