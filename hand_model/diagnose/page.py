@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..output import new_file
 from ..report.page import Cell, Section, figures, key, listing, note, page, table
 from ..report.style import INK, MUTED, SERIES, drawing
-from .findings import Finding, Findings
+from .findings import FILES, Finding, Findings
 from .name.balance import DISCRETE
 from .prove.replays import Replay
 
@@ -31,10 +32,9 @@ VERDICTS = {
 def write_page(findings: Findings, stations: Sequence[Any], replays: Sequence[Replay], title: str, folder: Path) -> Path:
     """Write `report.html` into `folder`, whole or not at all; stations: those of the diagnosis, with their balances. replays: of
     the compiled files, before and after."""
-    folder.mkdir(parents=True, exist_ok=True)
-    target, sibling = folder / "report.html", folder / ".report.html.part"
-    sibling.write_bytes(render(findings, stations, replays, title))
-    sibling.replace(target)
+    target = folder / FILES[1]
+    with new_file(target) as staging:
+        staging.write_bytes(render(findings, stations, replays, title))
     return target
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..output import new_file
 from ..rig.findings import NOT_TAKEN, CouplingResidual, RigFindings
 from ..rig.inverse import EffortResidual, effort_residuals
 from ..rig.model import RigModel, load_rig
@@ -32,10 +33,8 @@ Pair = tuple[EffortResidual, EffortResidual]
 def write_rig_findings(session: Session, findings: RigFindings, folder: str | Path) -> Path:
     """Write `report.html` beside the findings, whole or not at all; returns its path."""
     target = Path(folder) / "report.html"
-    target.parent.mkdir(parents=True, exist_ok=True)
-    part = target.with_name(".report.html.part")
-    part.write_bytes(rig_findings_page(session, findings))
-    part.replace(target)
+    with new_file(target) as staging:
+        staging.write_bytes(rig_findings_page(session, findings))
     return target
 
 

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..diagnose.findings import Finding, Findings
+from ..diagnose.findings import FILES, Finding, Findings
+from ..output import new_file
 
 __all__ = ["CouplingResidual", "Finding", "Findings", "RigFindings"]
 Array = NDArray[np.float64]
@@ -59,13 +60,11 @@ class RigFindings(Findings):
         all; without, those of an earlier run go.
         """
         path = Path(folder)
-        path.mkdir(parents=True, exist_ok=True)
-        earlier = (path / "findings.json").is_file()
+        earlier = (path / FILES[0]).is_file()
         for name, content in (("rig.xml", self.xml), ("rig_declared.xml", self.declared_xml)):
             if content and model:
-                part = path / f".{name}.part"
-                part.write_bytes(content)
-                part.replace(path / name)
+                with new_file(path / name) as staging:
+                    staging.write_bytes(content)
             elif earlier:
                 (path / name).unlink(missing_ok=True)
         self.save(path)
