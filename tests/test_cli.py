@@ -439,10 +439,19 @@ def test_what_is_not_meant_for_a_rig_or_a_folder_is_refused(rig, loop, tmp_path,
     (tmp_path / "file").write_text("x")
     assert "is a file" in refused(capsys, "diagnose", rig, "--output", tmp_path / "file")
     assert "session itself" in refused(capsys, "diagnose", rig, "--output", rig)
-    assert "--model" in refused(capsys, "diagnose", rig, "--output", tmp_path / "o", "--model", loop / "left.hand")
+    assert "brings its own model" in refused(capsys, "diagnose", rig, "--output", tmp_path / "o", "--model", loop / "left.hand")
     assert not (tmp_path / "o").exists() and (rig / "pendulum.xml").read_text() == PENDULUM
     assert "--fix" in refused(capsys, "check", loop / "compiled", "--fix", tmp_path / "fixed")
     assert "--json" in refused(capsys, "check", loop / "compiled", "--json")
+
+
+def test_the_python_call_diagnoses_a_rig_as_the_command_does(rig):
+    import hand_model
+    from hand_model.rig.findings import RigFindings
+
+    findings = hand_model.diagnose(rig)
+    assert isinstance(findings, RigFindings)
+    assert findings.protocol["held_out"] == ["log/b.csv"]
 
 
 def test_a_diagnosis_of_a_rig_without_a_model_leaves_none(rig, tmp_path):

@@ -25,20 +25,10 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace, say: Progress) -> int:
     """Diagnose and print the findings."""
     from ..diagnose import diagnose
-    from ..errors import SessionError
     from ..session import read_session
 
     session = read_session(options.session)
-    if session.rig is not None:
-        if options.model is not None:
-            raise SessionError(f"{session.path}: a rig session brings its own model; --model is for sessions of a hand")
-        from ..report.rig_findings import write_rig_findings
-        from ..rig.diagnose import diagnose_rig
-
-        findings = diagnose_rig(session, options.output, say, not options.no_model)
-        write_rig_findings(session, findings, options.output)
-    else:
-        findings = diagnose(session, False if options.no_model else options.model, options.output, say, say.share)
+    findings = diagnose(session, False if options.no_model else options.model, options.output, say, say.share)
     say.clear()
     print(f"verdict: {findings.verdict}")
     for finding in findings.findings:
