@@ -222,6 +222,5 @@ def _sag_finding(actuator: str, finger: str | None, fact: CommandFacts) -> tuple
     fit = {"metric": "speed_loss", "unit": "1", "before": loss, "after": 0.0, "noise_floor": fact.sag_se * fact.load_range,
            "ci95_reduction": None, "held_out": [], "engine": "strokes"}
     text = f"The {actuator} motor loses {100 * loss:.1f} % of its speed over the recorded loads."
-    model = {"native": False, "mjcf": None, "urdf": "not expressible: kept in hand.json"}
     per_stroke = fact.sag / fact.sag_se / np.sqrt(fact.strokes)
-    return weighed(per_stroke, per_stroke / max(loss, 1e-9)), Finding("drive_sag", ("drive_sag",), 0.999, (), _where(actuator, finger), text, parameters, fit, model)
+    return weighed(per_stroke, per_stroke / max(loss, 1e-9)), Finding("drive_sag", ("drive_sag",), 0.999, (), _where(actuator, finger), text, parameters, fit, dict(UNWRITTEN))
