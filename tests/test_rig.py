@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,11 @@ from hand_model.report.rig_findings import write_rig_findings
 from hand_model.rig import diagnose_rig, fit_declared, load_rig, replay_rig
 from hand_model.rig.balance import Column
 from hand_model.rig.consistent import BASIS, consistent, is_physical, pseudo_inertia
+from hand_model.rig.diagnose import _joint_finding
 from hand_model.rig.dynamics import INERTIAL, inertial_columns, inertial_parameters
 from hand_model.rig.findings import NOT_BORNE_OUT, NOT_TAKEN
 from hand_model.rig.mjcf import read_effects, write_effects
+from hand_model.rig.name.candidates import Candidate
 from hand_model.rig.physical import physical
 from hand_model.rig.solve import solve_bounded
 from hand_model.rig.states import local_states
@@ -357,6 +360,19 @@ def test_a_rigs_findings_say_names_and_units_as_the_format_has_them() -> None:
     values = {"drag": {"value": 0.5, "unit": "N s^2/m^2"}, "form": {"value": 0.0, "unit": "1"}, "ratio": {"value": 2.0, "unit": "1"}}
     said = statement("quadratic_damping", "", "slide", values, {"metric": "effort_rmse", "before": 2.0, "after": 1.0, "unit": "N"})
     assert said == "slide: quadratic damping: drag 0.5 N s^2/m^2, ratio 2; held-out effort rmse falls from 2 to 1 N."
+
+
+@pytest.mark.parametrize(("effect", "told"), [("command_delay", 0.02), ("current_channel_delay", -0.02)])
+def test_a_late_drive_has_a_positive_delay(effect: str, told: float) -> None:
+    """As in the findings of a hand: a drive acts later than told; a channel recorded ahead is early."""
+    rig = SimpleNamespace(unit=lambda j: "rad", effort_unit=lambda j: "N m", drive=lambda j: None)
+    candidate = Candidate(effect, "", "hinge", (), ({"delay": -0.02},), lambda r, s: np.zeros((0, 0)), True)
+    proof = {"metric": "effort_rmse", "unit": "N m", "before": 2.0, "after": 1.0, "held_out": ["log/b.csv"]}
+    step = SimpleNamespace(rivals=(), equals=(), probability=0.9)
+    found = _joint_finding(rig, None, step, SimpleNamespace(candidate=candidate, shape={"delay": -0.02}), np.zeros(0), proof, None)
+    assert found.parameters["delay"] == {"value": told, "unit": "s", "ci95": None}
+    assert f"delay {told} s" in found.statement
+    assert found.where["region"] is None and found.where["finger"] is None
 
 
 def test_report_of_a_rig_shows_what_was_found(planted_load: Path, tmp_path: Path) -> None:

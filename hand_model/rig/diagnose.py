@@ -148,7 +148,7 @@ def _channel_finding(issue: ChannelIssue) -> Finding:
         "it is refused, nothing is fitted to it" if issue.refuse else "samples there say only that it is at least that"
     )
     return Finding(
-        issue.kind, (issue.kind,), 1.0, (), _where(issue.joint, None, issue.channel, issue.trials, None),
+        issue.kind, (issue.kind,), 1.0, (), _where(issue.joint, None, issue.channel, issue.trials, 1.0 if issue.refuse else 0.0),
         f"{issue.reason}: {action}.", {"share_left": {"value": issue.share, "unit": "1"}}, UNMEASURED, None,
         "channel refused" if issue.refuse else "channel clipped",
     )  # fmt: skip
@@ -286,7 +286,7 @@ def _better_alone(rig: RigModel, fit: DeclaredFit, terms: Sequence[Term], error:
     return any(score(problem, terms, c, parts).error.sum() < error for c in every)
 
 
-def _where(joint: str | None, drive: Drive | None, signal: str, trials: Sequence[str], share: float | None) -> dict[str, Any]:
+def _where(joint: str | None, drive: Drive | None, signal: str, trials: Sequence[str], share: float) -> dict[str, Any]:
     """Where a finding of a rig is; share: of the mismatch, squared [effort or position unit] until `shares` divides it."""
     return {"finger": None, "joint": joint, "actuator": drive.name if drive else None, "signal": signal, "marker": None,
             "trials": list(trials), "region": None, "share_of_mismatch": share}  # fmt: skip
@@ -300,7 +300,9 @@ def _joint_finding(rig: RigModel, fit: DeclaredFit, step: Step, term: Term, ampl
     for k, ((name, unit, _, _), v) in enumerate(zip(c.amplitudes, amplitude, strict=True)):
         ends = None if spread is None else [float(x) for x in np.percentile(spread[:, k], [2.5, 97.5])]
         parameters[name] = {"value": float(v), "unit": joint_unit(unit, position, effort), "ci95": ends}
-    parameters |= {k: {"value": float(v), "unit": shape_unit(k, position), "ci95": None} for k, v in term.shape.items()}
+    sign = -1.0 if c.effect == "command_delay" else 1.0  # what a late drive leaves comes early in the balance: its command is ahead
+    parameters |= {k: {"value": sign * float(v) if k == "delay" else float(v), "unit": shape_unit(k, position), "ci95": None}
+                   for k, v in term.shape.items()}  # fmt: skip
     where = _where(c.joint, rig.drive(c.joint), "effort", proof["held_out"], max(proof["before"] ** 2 - proof["after"] ** 2, 0.0))
     return Finding(
         c.effect, (c.effect, *(e for e in step.equals if e != c.effect)), step.probability,
