@@ -61,8 +61,8 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
     writes none; a rig brings its own. output: folder that gets `findings.json`, `report.html` and, where physics was named, `model_before` and `model`,
     compiled; where the recording was put right, `corrected`, a session. say: called with one line per result as it comes. progress:
     called with the share of the work that is done, 0 to 1.
-    Raises SessionError for a session that breaks its format or a rig with a model, HandFileError for a model that is none or of another hand, HandModelError for an output
-    that is a file or holds a `corrected` that no diagnosis wrote.
+    Raises SessionError for a session that breaks its format or a rig with a model, HandFileError for a model that is none or of another
+    hand, HandModelError for an output that is a file or holds a `corrected` that no diagnosis wrote.
     """
     session = session if isinstance(session, Session) else read_session(session)
     if session.rig is not None:

@@ -74,7 +74,8 @@ def _ranked(findings: Findings) -> list[Any]:
     rows = []
     for f in findings.findings:
         unit, scale = _unit(f.fit.get("unit"))
-        rows.append([_words(f.effect), str(f.where.get("finger") or f.where.get("actuator") or "all"), unit, f"{f.where.get('share_of_mismatch', 0):.0%}", f"{f.probability:.3f}",
+        place, share = str(f.where.get("finger") or f.where.get("actuator") or "all"), f"{f.where.get('share_of_mismatch', 0):.0%}"
+        rows.append([_words(f.effect), place, unit, share, f"{f.probability:.3f}",
                      *(_number(f.fit.get(k), scale) for k in ("before", "after", "noise_floor")), _interval(f.fit.get("ci95_reduction"), scale)])
     columns = ("effect", "finger", "unit", "share", "probability", "error before", "after", "noise", "95 % of the reduction")
     out = [table(columns, rows, text_columns=3), note("; ".join(sorted({_proof(f) for f in findings.findings})) + ".")]
