@@ -12,7 +12,7 @@ from test_kinematic_stations import MAP, joint
 
 from hand_model.diagnose.assemble import assemble
 from hand_model.diagnose.locate.drive import with_required
-from hand_model.diagnose.name.station import Station, judged
+from hand_model.diagnose.name.station import Station, channel_of, judged
 from hand_model.effects import catalogue, effect, outsiders
 from hand_model.effects.base import DriveState
 
@@ -171,7 +171,10 @@ def test_the_only_effect_needs_no_steady_motion_where_it_is_plain_and_a_faint_on
     plain = heard(drive(3, planted(*PLANTED[0])))
     assert [f.term.effect.name for f in plain.kept] == [PLANTED[0][0]]
     faint = replace(plain.naming, found=(plain.naming.found[0],) * 2)
-    assert not Station("current", "index", "index", None, faint).proven
+    overlooked = Station("current", "index", "index", None, faint)
+    assert not overlooked.proven
+    assert channel_of(overlooked)["effects"] == []  # what does not stand is not told
+    assert channel_of(plain)["effects"] == [PLANTED[0][0]]
 
 
 @pytest.mark.parametrize(("count", "p", "left", "overwhelmed"), [(5, 1e-9, 0.5, True), (4, 1e-9, 0.5, False), (5, 0.2, 0.5, False), (5, 1e-9, 0.1, False)])

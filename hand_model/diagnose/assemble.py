@@ -68,7 +68,7 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
     found = _shared(ranked)
     verdict = "mismatch" if found else "unexplained" if unexplained else "consistent"
     worst = max(stations, key=lambda s: variance_ratio(s.naming, s.naming.declared), default=None)
-    lack = {"before": 1.0, "after": 1.0, "limit": 1.0}
+    lack: dict[str, float | None] = {"before": None, "after": None, "limit": None}  # where no balance could be made
     if worst is not None:
         n = worst.naming.balance
         count = max(int((~n.train & n.steady).sum()) or int(n.steady.sum()), 1)
@@ -212,9 +212,10 @@ def _reason(log_evidence: float) -> str:
 
 
 def _protocol(stations: list[Station]) -> dict[str, Any]:
+    """What the first motor's recordings can tell apart: how many, rows a second, commanded speeds, and pairs of effects."""
     drives = [s for s in stations if s.signal == "current"]
     if not drives:
-        return {}
+        return {"repeats": 0, "rate_hz": None, "speeds": 0, "isolable": [], "not_isolable": []}
     states = drives[0].naming.balance.states
     speeds = {v for s in states if "speed" in s.extra for v in np.unique(s.extra["speed"]).tolist()}
     step = sample_interval(states)

@@ -25,7 +25,16 @@ from .locate.channel import ChannelDelay, apart, channel_delay
 from .locate.command import CommandFacts, command_facts, command_findings, refused, with_lateness
 from .locate.course import FingerCourses
 from .locate.decoupled import while_driven, without_excursions
-from .locate.drive import drive_states, drive_trials, echoes_command, is_measured, opposes, rests_on_command, with_gives
+from .locate.drive import (
+    drive_states,
+    drive_trials,
+    echoes_command,
+    is_measured,
+    opposes,
+    rests_on_command,
+    too_short,
+    with_gives,
+)
 from .locate.gravity import with_gravity
 from .locate.preload import preload_findings
 from .locate.stamps import Stamps, stamps
@@ -46,17 +55,19 @@ DELAY_TOLD = 2.0  # log likelihood that a shift of a drive's current must bring:
 @single_threaded()
 def diagnose(session: Session | str | Path, model: Any = None, output: str | Path | None = None,
              say: Callable[[str], None] | None = None, progress: Callable[[float], None] | None = None) -> Findings:
-    """Say what physics is missing from the declared model of a recorded hand.
+    """Say what physics is missing from the declared model of a recorded hand, or of a rig (findings: `RigFindings`).
 
     session: a session or its folder. model: a Hand, a .hand file or a compiled folder into which the effects are written
     (what is missing is judged by the declared model fitted to the session itself); None identifies the session's own, False
-    writes none. output: folder that gets `findings.json`, `report.html` and, where physics was named, `model_before` and `model`,
+    writes none; a rig brings its own. output: folder that gets `findings.json`, `report.html` and, where physics was named, `model_before` and `model`,
     compiled; where the recording was put right, `corrected`, a session. say: called with one line per result as it comes. progress:
     called with the share of the work that is done, 0 to 1.
-    Raises SessionError for a session that breaks its format, HandFileError for a model that is none or of another hand, HandModelError for an output
-    that is a file or holds a `corrected` that no diagnosis wrote.
+    Raises SessionError for a session that breaks its format or a rig with a model, HandFileError for a model that is none or of another
+    hand, HandModelError for an output that is a file or holds a `corrected` that no diagnosis wrote.
     """
     session = session if isinstance(session, Session) else read_session(session)
+    if session.rig is not None:
+        return _diagnosed_rig(session, model, output, say)
     hand = read_model(model) if model not in (None, False) else None
     if hand is not None:
         refuse_other(hand, session)
@@ -99,12 +110,25 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
     return findings
 
 
+def _diagnosed_rig(session: Session, model: Any, output: str | Path | None, say: Callable[[str], None] | None) -> Findings:
+    """A rig's findings, its report written beside them."""
+    from ..report.rig_findings import write_rig_findings
+    from ..rig.diagnose import diagnose_rig
+
+    if model not in (None, False):
+        raise SessionError(f"{session.path}: a rig session brings its own model; another one is for sessions of a hand")
+    findings = diagnose_rig(session, output, say, model is not False)
+    if output is not None:
+        write_rig_findings(session, findings, output)
+    return findings
+
+
 class _Heard:
     """What a session has said so far. found: findings with their weight. tell: called with a line per result; step: with nothing, after each."""
 
     def __init__(self, session: Session, tell: Callable[[str], None], step: Callable[[], None]) -> None:
         self.session, self.tell, self.step = session, tell, step
-        self.notes = list(check_session(session, dead=True))
+        self.notes = [*check_session(session, dead=True), *too_short(session)]
         self.fingers: dict[str, FingerAngles] = {}
         self.courses: dict[str, FingerCourses] = {}
         self.stations: list[Station] = []

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..diagnose.findings import Finding, Findings
+from ..diagnose.findings import FILES, Finding, Findings
+from ..output import new_file
 
 __all__ = ["CouplingResidual", "Finding", "Findings", "RigFindings"]
 Array = NDArray[np.float64]
@@ -54,13 +55,16 @@ class RigFindings(Findings):
         """The whole as the format has it, with the session's name and the declared parameters."""
         return {**super().to_dict(), "session": self.session, "declared": dict(self.declared)}
 
-    def write(self, folder: str | Path) -> None:
-        """Write rig.xml (improved), rig_declared.xml (fitted, nothing added) and findings.json, each whole or not at all."""
+    def write(self, folder: str | Path, model: bool = True) -> None:
+        """Write findings.json and, with `model`, rig.xml (improved) and rig_declared.xml (fitted, nothing added), each whole or not at
+        all; without, those of an earlier run go.
+        """
         path = Path(folder)
-        path.mkdir(parents=True, exist_ok=True)
+        earlier = (path / FILES[0]).is_file()
         for name, content in (("rig.xml", self.xml), ("rig_declared.xml", self.declared_xml)):
-            if content:
-                part = path / f".{name}.part"
-                part.write_bytes(content)
-                part.replace(path / name)
+            if content and model:
+                with new_file(path / name) as staging:
+                    staging.write_bytes(content)
+            elif earlier:
+                (path / name).unlink(missing_ok=True)
         self.save(path)

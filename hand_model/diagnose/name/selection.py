@@ -296,7 +296,6 @@ def _findings(pair: Pair, effects: tuple[Any, ...], fit: Fit) -> tuple[Named, ..
     """Each term with its rivals (every candidate in its place, small terms aside that may stand for one of them), its share and
     its probability; largest share first."""
     balance, found, terms = pair.state, [], fit.terms
-    explained = max(balance.fit().rss - fit.rss, 1e-12)
     losses = [max(balance.fit(tuple(t for i, t in enumerate(terms) if i != which)).rss - fit.rss, 0.0)
               for which in range(len(terms))]
     large = [loss >= SMALL * sum(losses) for loss in losses]
@@ -312,7 +311,7 @@ def _findings(pair: Pair, effects: tuple[Any, ...], fit: Fit) -> tuple[Named, ..
         rivals.sort(key=lambda r: -r.evidence)
         weights = np.exp(np.array([r.evidence for r in rivals] + [0.0]) - max(rivals[0].evidence, 0.0))
         mine = [r.name for r in rivals].index(term.effect.name)
-        share = losses[which] / max(sum(losses), 1e-12) * min(explained / max(explained, 1e-12), 1.0)
+        share = losses[which] / max(sum(losses), 1e-12)
         found.append(Named(term, dict(fit.amplitudes[which]), tuple(rivals), float(share), _size(balance, fit, which),
                            float(weights[mine] / weights.sum())))
     return tuple(sorted(found, key=lambda f: -f.share))

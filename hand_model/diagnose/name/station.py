@@ -229,7 +229,7 @@ def finding_of(station: Station, named: Named, share: float, size: float) -> tup
         "signal": getattr(effect, "signal", station.signal),
         "marker": None,
         "trials": [s.trial for s in naming.balance.states],
-        "region": effect.region(naming.balance.states, named.term.shape),
+        "region": effect.region(naming.balance.states, station.reading.fit.terms[which].shape),  # of the figures that the statement tells
         "share_of_mismatch": share * station.claimed,
     }
     top = named.rivals[0].evidence
@@ -272,7 +272,9 @@ def unrepeated_of(station: Station) -> dict[str, Any]:
 
 
 def channel_of(station: Station) -> dict[str, Any]:
-    n = station.naming
+    """The channel's row of the findings. effects: those that stand in it; p_before, p_after: of the lack-of-fit test; noise: in the unit of
+    its effort."""
+    n, stands = station.naming, station.kept if station.believed else ()
     return {"finger": station.finger, "joint": station.joint, "signal": station.signal, "p_before": n.before.p,
             "p_after": n.after.p, "varies_with": n.before.telling, "noise": n.balance.sigma,
-            "effects": [f.term.effect.name for f in n.found], "explained": station.explained}
+            "effects": [f.term.effect.name for f in stands], "explained": station.explained}
