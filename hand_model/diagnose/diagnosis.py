@@ -21,7 +21,6 @@ from .assemble import assemble
 from .findings import FILES, FOLDERS, Finding, Findings
 from .finger import FingerReading, finger_calls
 from .locate.angles import FingerAngles
-from .locate.channel import ChannelDelay, apart, channel_delay
 from .locate.command import CommandFacts, command_facts, command_findings, refused, with_lateness
 from .locate.course import FingerCourses
 from .locate.decoupled import while_driven, without_excursions
@@ -37,6 +36,7 @@ from .locate.drive import (
 )
 from .locate.gravity import with_gravity
 from .locate.preload import preload_findings
+from .locate.simulated import SimulatedDrive, delays_apart, simulated_drive
 from .locate.stamps import Stamps, stamps
 from .name.balance import Balance
 from .name.evidence import gain, typical_coefficients
@@ -84,14 +84,15 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
     heard = _Heard(session, tell, step)
     owned = output is not None and model is None
     read = [a for a in drive_trials(session) if a not in heard.unread]
-    beside = [partial(channel_delay, session, a) for a in read] + ([partial(_identified, session)] if owned else [])
-    *delays, identified = heard.listen_to_fingers(tuple(beside)) if owned else (*heard.listen_to_fingers(tuple(beside)), None)
-    drives = heard.drives()
+    beside = (*(partial(simulated_drive, session, a) for a in read), *((partial(_identified, session),) if owned else ()))
+    told = heard.listen_to_fingers(beside)
+    simulated = delays_apart({d.actuator: d for d in told[:len(read)] if d is not None})
+    drives = heard.drives(simulated)
     facts = _command(session, drives)
     heard.found += command_findings(facts, {a: _finger_of(session, a) for a in facts})
     for _, finding in heard.found:
         tell(finding.statement)
-    heard.listen_to_drives(*_timed(drives, facts, apart({d.actuator: d for d in delays if d is not None and d.actuator in drives})))
+    heard.listen_to_drives(*_timed(drives, facts, simulated))
     stations = heard.stations
     findings = assemble(stations, heard.found, heard.notes, heard.unexplained)
     listed, written = reread(findings.findings, stations)
@@ -100,7 +101,7 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
         replays: tuple[Replay, ...] = ()
         forget(output, FOLDERS, FILES[0])
         if model is not False:
-            known = identified if owned else hand
+            known = told[-1] if owned else hand
             with Pair((findings, session, known, written, heard.courses, Path(output), tell)) as pair:
                 (findings, replays), _ = pair.map(_written, ("model", "corrected"))
         write_page(findings, stations, replays, session.path.name, Path(output))
@@ -159,14 +160,14 @@ class _Heard:
                 self.courses[reading.finger] = reading.courses
         return done
 
-    def drives(self) -> dict[str, tuple[DriveState, ...]]:
+    def drives(self, simulated: dict[str, SimulatedDrive]) -> dict[str, tuple[DriveState, ...]]:
         """The drives' balances while they carry their fingers, encoders put right; those whose current is no measurement are refused.
 
         Raises SessionError where a drive's signs contradict each other.
         """
         session = self.session
         drives = {a: with_gravity(session, self.fingers, states)
-                  for a, states in drive_states(session, _encoder_corrections(self.stations), self.unread).items()}
+                  for a, states in drive_states(session, _encoder_corrections(self.stations), self.unread, simulated).items()}
         for station in (s for s in self.stations if s.believed and s.actuator in drives):
             for term in (f.term for f in station.kept if f.term.effect.name == "spring_decoupling"):
                 states = drives[station.actuator]
@@ -205,13 +206,13 @@ def _without_settled_sags(found: list[tuple[float, Finding]], stations: Sequence
 
 
 def _timed(drives: dict[str, tuple[DriveState, ...]], facts: dict[str, CommandFacts],
-           delays: dict[str, ChannelDelay]) -> tuple[dict[str, tuple[DriveState, ...]], dict[str, bool]]:
+           simulated: dict[str, SimulatedDrive]) -> tuple[dict[str, tuple[DriveState, ...]], dict[str, bool]]:
     """The drives with what is known of their current's lateness, and whether each may be late."""
-    timed = with_lateness(drives, facts, delays)
+    timed = with_lateness(drives, facts, simulated)
     late = _delays_apart(timed)
     in_time = [a for a in drives if not late[a]]
     if 0 < len(in_time) < len(drives):  # at a reversal a late current looks like a give, an early one like none
-        timed = with_lateness(with_gives(drives, in_time), facts, delays)
+        timed = with_lateness(with_gives(drives, in_time), facts, simulated)
     return timed, late
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...effects.base import DriveState
 from ..findings import UNWRITTEN, Finding, weighed
 from .answers import Answers, answers_of, lateness
-from .channel import ChannelDelay
+from .simulated import SimulatedDrive
 
 Array = NDArray[np.float64]
 
@@ -162,11 +162,11 @@ def command_findings(facts: dict[str, CommandFacts], fingers: dict[str, str | No
 
 
 def with_lateness(drives: Mapping[str, tuple[DriveState, ...]], facts: Mapping[str, CommandFacts],
-                  delays: Mapping[str, ChannelDelay]) -> dict[str, tuple[DriveState, ...]]:
-    """The states with what is known of their current channel: "late" (2,) [s], by how much and its doubt, by the simulated drive (`delays`) or
+                  simulated: Mapping[str, SimulatedDrive]) -> dict[str, tuple[DriveState, ...]]:
+    """The states with what is known of their current channel: "late" (2,) [s], by how much and its doubt, by the simulated drive or
     by answers to commands; a late current shows starts and stops late as well, whatever model it is held against."""
     told = {a: (x.channel_s, float(np.hypot(x.doubt_s, UNLIKE * x.channel_s))) for a, x in lateness({a: f.answers for a, f in facts.items()}).items()}
-    told |= {a: (d.delay_s, d.doubt_s) for a, d in delays.items()}
+    told |= {a: (d.delay_s, d.doubt_s) for a, d in simulated.items() if a in drives}
     out = dict(drives)
     for actuator, late in told.items():
         out[actuator] = tuple(replace(s, extra={**s.extra, "late": np.array(late), "sigma": _lasting(s, late[0])}) for s in drives[actuator])

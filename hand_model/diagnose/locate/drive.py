@@ -12,6 +12,7 @@ from ...effects.base import DriveState
 from ...effects.path import dahl, from_rest
 from ...session import Log, Session, Trial
 from .motion import Motion, estimate_motion, sure_acceleration
+from .simulated import SimulatedDrive, with_simulated
 
 Array = NDArray[np.float64]
 
@@ -26,6 +27,7 @@ UNFOLLOWED = 0.25  # of the range: commands that end farther than this from wher
 ECHO = 0.003  # of the range: a third of what a fast motion covers in one sample
 UNMOVED = 0.95  # of a current's standard deviation: more than this left by the motion, and it measures nothing
 FEWEST_RESTS, FINE = 10, 200  # rests that are looked at, and different readings of an encoder that is no coarse one
+TOLD_S = 2e-3  # to which the instants of a simulated motion are known
 SETTLE_TRAVEL = 4.0  # [%] some six bristle lengths of a healthy drive
 
 
@@ -60,14 +62,15 @@ def _extremes(logs: list[Log], name: str) -> tuple[float, float]:
 
 
 def drive_states(session: Session, corrections: Mapping[str, Callable[[Array], Array]] | None = None,
-                 unread: Collection[str] = ()) -> dict[str, tuple[DriveState, ...]]:
+                 unread: Collection[str] = (), simulated: Mapping[str, SimulatedDrive] | None = None) -> dict[str, tuple[DriveState, ...]]:
     """DriveStates of every actuator, [%] of its range and raw current; with the bristle length of its friction.
 
-    corrections: actuator -> function that takes its position [%] to what it should have read. unread: actuators to leave out. A
-    current that measures nothing says nothing of friction either: other drives are not compared with it.
+    corrections: actuator -> function that takes its position [%] to what it should have read. unread: actuators to leave out. simulated:
+    drives whose simulated motion stands for the recorded one where that is not corrected and nothing is missing. A current that measures nothing says nothing of friction either: other drives are not compared with it.
     """
     raw = {a: [(t, t.log()) for t in trials] for a, trials in drive_trials(session).items() if a not in unread}
-    prepared = {a: _prepare(a, entries, (corrections or {}).get(a)) for a, entries in raw.items()}
+    trusted = {a: d for a, d in (simulated or {}).items() if a not in (corrections or {})}
+    prepared = {a: _prepare(a, entries, (corrections or {}).get(a), trusted.get(a)) for a, entries in raw.items()}
     prepared = {a: tuple(states) for a, states in prepared.items() if states}
     return with_gives(prepared, [a for a, states in prepared.items() if is_measured(states)])
 
@@ -79,7 +82,7 @@ def with_gives(drives: Mapping[str, tuple[DriveState, ...]], trusted: Collection
 
 
 def _prepare(
-    actuator: str, entries: list[tuple[Trial, Log]], correct: Callable[[Array], Array] | None = None
+    actuator: str, entries: list[tuple[Trial, Log]], correct: Callable[[Array], Array] | None = None, simulated: SimulatedDrive | None = None
 ) -> list[DriveState]:
     low, high = count_range([log for _, log in entries])
     history: list[tuple[float, float]] = []  # of all bouts before a trial: time in motion, rest until the next one [s]
@@ -93,6 +96,8 @@ def _prepare(
             continue
         time_s, position = log.time_s[seen], 100 * (counts[seen] - low) / (high - low)
         motion = estimate_motion(time_s, position if correct is None else correct(position))
+        if simulated is not None and trial.name in simulated.motions:
+            motion = with_simulated(motion, time_s, simulated.motions[trial.name]) or motion
         extra = {name: _held(log.columns[name])[seen] for name in ("setpoint", "speed", "current_limit", "temperature")
                  if name in log.columns and np.isfinite(log.columns[name]).any()}
         extra["elapsed"] = time_s - first
@@ -108,6 +113,7 @@ def _prepare(
         extra["bandwidth_s"] = np.full(len(time_s), motion.bandwidth_s)
         extra["position_noise"] = np.full(len(time_s), motion.noise)
         extra["steady"] = steady(time_s, motion).astype(float)
+        extra["smoothed"] = np.full(len(time_s), float(motion.smoothed))
         declared = np.stack([sure_acceleration(motion, time_s), motion.velocity, np.sign(motion.velocity), motion.position,
                              np.ones(len(time_s))], axis=-1)
         states.append(DriveState(trial.name, actuator, time_s, motion.position, motion.velocity, motion.acceleration,
@@ -210,7 +216,9 @@ def steady(time_s: Array, motion: Motion) -> NDArray[np.bool_]:
     several bristle lengths, friction has turned over."""
     step = float(np.median(np.diff(time_s)))
     after, before = SETTLE_SAMPLES
-    settled = motion.moving & (motion.since_start_s > after * step) & (motion.until_stop_s > before * step)
+    settled = motion.moving
+    if motion.smoothed:
+        settled = settled & (motion.since_start_s > after * step) & (motion.until_stop_s > before * step)
     return settled & (from_rest(motion.position, motion.moving) > SETTLE_TRAVEL)
 
 
@@ -235,7 +243,8 @@ def with_timing(state: DriveState) -> DriveState:
     slope = np.abs(np.gradient(state.declared @ beta, state.time_s))
     slope = np.maximum.reduce([np.roll(slope, k) for k in (-2, -1, 0, 1, 2)])
     turning = state.extra["steady"] <= 0
-    sigma = np.where(turning, np.hypot(0.5 * step * slope, START_DOUBT * beta[2]), 0.0)
+    timing = 0.5 * step * turning if state.extra["smoothed"][0] else TOLD_S
+    sigma = np.hypot(timing * slope, START_DOUBT * beta[2] * turning)
     near = np.minimum(from_rest(state.position, seen), from_rest(state.position[::-1], seen[::-1])[::-1])
     held = near < max(2 * float(state.extra["granted"][0]), 6 * float(state.extra["position_noise"][0]))
     sigma = np.where(held, np.hypot(sigma, beta[2]), sigma)

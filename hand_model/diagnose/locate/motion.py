@@ -20,7 +20,7 @@ SURE = 3.0  # standard deviations
 class Motion:
     """position, velocity, acceleration: (n,) smoothed. noise: standard deviation of the raw position;
     bandwidth_s: of the kernel [s];
-    moving: (n,) bool; since_start_s, until_stop_s: (n,) [s] to the nearest rest before and after (inf where none)."""
+    smoothed: whether by the kernel (not simulated); moving: (n,) bool; since_start_s, until_stop_s: (n,) [s] to the nearest rest before and after (inf where none)."""
 
     position: Array
     velocity: Array
@@ -30,6 +30,7 @@ class Motion:
     moving: NDArray[np.bool_]
     since_start_s: Array
     until_stop_s: Array
+    smoothed: bool = True
 
 
 def local_quadratic(time_s: Array, values: Array, bandwidth_s: float) -> Array:
@@ -67,7 +68,7 @@ def estimate_motion(time_s: Array, position: Array, bandwidth_s: float | None = 
         h *= 1.4
     moving = np.abs(v) > max(5 * velocity_noise, 0.03 * fastest)
     moving = _drop_short(moving, 3)
-    return Motion(x, v, a, noise, h, moving, _since(time_s, moving), _since(-time_s[::-1], moving[::-1])[::-1])
+    return Motion(x, v, a, noise, h, moving, *since_rest(time_s, moving))
 
 
 def position_at(motion: Motion, time_s: Array, then: Array) -> Array:
@@ -84,6 +85,8 @@ def sure_acceleration(motion: Motion, time_s: Array) -> Array:
     """Acceleration (n,) without what may be noise of the position: that would be found again, with the other sign, in whatever the
     position is held against, and as an error of a regressor would take off its coefficient (Fuller 1987). The noise is that of the
     kernel's second derivative, step / h^5 int ((u^2 - 1) phi)^2 du = 0.2116 step / h^5; what exceeds it stays as it is."""
+    if not motion.smoothed:
+        return motion.acceleration
     step = float(np.median(np.diff(time_s)))
     noise = motion.noise * np.sqrt(0.2116 * step / motion.bandwidth_s**5)
     return np.where(np.abs(motion.acceleration) > SURE * noise, motion.acceleration, 0.0)
@@ -97,6 +100,11 @@ def _drop_short(flag: NDArray[np.bool_], shortest: int) -> NDArray[np.bool_]:
         if b - a < shortest:
             out[a:b] = False
     return out
+
+
+def since_rest(time_s: Array, moving: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Time [s] (n,) since the last sample at rest and until the next one, inf where there is none."""
+    return _since(time_s, moving), _since(-time_s[::-1], moving[::-1])[::-1]
 
 
 def _since(time_s: Array, moving: NDArray[np.bool_]) -> Array:

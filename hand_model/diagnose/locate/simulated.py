@@ -1,0 +1,115 @@
+"""A drive as its commands explain it: how late its current is logged, and its motion without the noise of its encoder.
+
+Where a controller explains the recorded motion but for what changes slowly, the simulated motion and that slow rest are a better estimate of the
+state than any smoothing of the recorded motion: velocity and acceleration carry little noise, starts and stops are not smeared.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import HandModelError
+from ...session import Log, Session
+from .motion import Motion, local_quadratic, since_rest
+
+if TYPE_CHECKING:
+    from ...identify.motor import MotorFit
+
+Array = NDArray[np.float64]
+
+TRUE_TO = 1.1  # times the noise of the encoder: a simulated motion that is farther from the recorded one, beside what is slow, lacks something
+SLOW_S, SLOW_SAMPLES = 0.1, 4.0  # width of the kernel, at least, by which the rest is smoothed
+FEWEST = 8  # samples in a row of which something slow can be told
+COVERED = 0.9  # of the samples in motion that the simulated moves must hold
+MOVES = 0.01  # of the fastest speed
+DIFFERENCE_S = 2e-3  # half width of the differences that make velocity and acceleration of a simulated position
+
+
+@dataclass(frozen=True)
+class SimulatedDrive:
+    """delay_s: by how much the current of `actuator` is late, negative where its position is; doubt_s: standard deviation. motions: trial ->
+    time (n,) [s], position, velocity and acceleration (n,) [% and per second], nan between moves; none where the simulation lacks something."""
+
+    actuator: str
+    delay_s: float
+    doubt_s: float
+    motions: Mapping[str, tuple[Array, Array, Array, Array]] = field(default_factory=dict)
+
+
+def simulated_drive(session: Session, actuator: str) -> SimulatedDrive | None:
+    """One drive simulated from its commands; None where no controller explains its motion."""
+    from ...identify.motor import identify_motor
+    from ...identify.motor.channel import channel_delay
+    from ...identify.motor.fit import BOUNDS
+    from .drive import drive_trials
+
+    try:
+        fit = identify_motor(session, actuator)
+        if not fit.predictive or fit.output_error is None:
+            return None
+        delay_s, doubt_s = channel_delay(fit.output_error, BOUNDS)
+        logs = {t.name: t.log() for t in drive_trials(session)[actuator]}
+        motions = {name: _motion(fit, name, log) for name, log in logs.items()}
+    except HandModelError:
+        return None
+    whole = all(m is not None for m in motions.values())
+    return SimulatedDrive(actuator, delay_s, doubt_s, {n: m for n, m in motions.items() if m is not None} if whole else {})
+
+
+def _motion(fit: MotorFit, name: str, log: Log) -> tuple[Array, Array, Array, Array] | None:
+    """Time, position, velocity and acceleration of a log's simulated moves; None where they are farther from the recorded ones than noise."""
+    from ...identify.motor.fit import white_noise
+    from ...identify.motor.output_error import simulate_moves
+    from ...identify.motor.predict import aligned_moves
+    from ...identify.motor.recording import motor_trial
+
+    trial, found = motor_trial(name, log, fit.scale), fit.output_error
+    data, own = aligned_moves(fit, trial)
+    if not data or found is None:
+        return None
+    early, now, late = ([y[:, 0] for y in simulate_moves([replace(m, time_s=m.time_s + d) for m in data], found.values, own, found.controller)]
+                        for d in (-DIFFERENCE_S, 0.0, DIFFERENCE_S))
+    x, v, a = (np.full(len(trial.time_s), np.nan) for _ in range(3))
+    for m, before, at, after in zip(data, early, now, late, strict=True):
+        k = slice(m.index + 1, m.index + 1 + len(m.time_s))
+        x[k], v[k], a[k] = at, (after - before) / (2 * DIFFERENCE_S), (after - 2 * at + before) / DIFFERENCE_S**2
+    slow = _slow(trial.time_s, trial.position - x)
+    noise = max(white_noise(trial.position, trial.time_s), 0.3 / fit.scale.counts_per_percent)
+    if np.sqrt(np.nanmean((trial.position - x - slow[0]) ** 2)) > TRUE_TO * noise:
+        return None
+    first = log.time_s[np.isfinite(log.time_s) & np.isfinite(log.columns["position"]) & np.isfinite(log.columns["current"])][0]
+    return trial.time_s + first, x + slow[0], v + slow[1], a + slow[2]
+
+
+def _slow(time_s: Array, rest: Array) -> Array:
+    """What is slow of the recorded less the simulated motion (n,), nan between moves, and its two derivatives, (3, n)."""
+    width_s = max(SLOW_S, SLOW_SAMPLES * float(np.median(np.diff(time_s))))
+    out, known = np.full((3, len(rest)), np.nan), np.isfinite(rest)
+    edges = np.flatnonzero(np.diff(np.r_[False, known, False].astype(int)))
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        k = slice(begin, end)
+        out[:, k] = local_quadratic(time_s[k], rest[k], width_s) if end - begin > FEWEST else 0.0
+    return out
+
+
+def with_simulated(motion: Motion, time_s: Array, simulated: tuple[Array, Array, Array, Array]) -> Motion | None:
+    """The motion at times (n,) [s] with the simulated state, at rest between the moves; None where these hold too little of it."""
+    at = np.searchsorted(simulated[0], time_s).clip(0, len(simulated[0]) - 1)
+    x, v, a = (np.where(np.abs(simulated[0][at] - time_s) < 1e-9, y[at], np.nan) for y in simulated[1:])
+    known = np.isfinite(x)
+    if not known.any() or np.mean(known[motion.moving]) < COVERED:
+        return None
+    moving = known & (np.abs(v) > MOVES * np.nanpercentile(np.abs(v), 98))
+    x, v, a = np.where(known, x, motion.position), np.where(known, v, 0.0), np.where(known, a, 0.0)
+    return Motion(x, v, a, motion.noise, motion.bandwidth_s, moving, *since_rest(time_s, moving), smoothed=False)
+
+
+def delays_apart(drives: Mapping[str, SimulatedDrive]) -> dict[str, SimulatedDrive]:
+    """The drives with the delays of their currents beside the least one of the session: what all drives share is how the log is read."""
+    common = min((d.delay_s for d in drives.values()), key=abs, default=0.0) if len(drives) > 1 else 0.0
+    return {a: replace(d, delay_s=d.delay_s - common) for a, d in drives.items()}
