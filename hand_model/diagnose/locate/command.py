@@ -166,7 +166,7 @@ def with_lateness(drives: Mapping[str, tuple[DriveState, ...]], facts: Mapping[s
     """The states with what is known of their current channel: "late" (2,) [s], by how much and its doubt, by the simulated drive or
     by answers to commands; a late current shows starts and stops late as well, whatever model it is held against."""
     told = {a: (x.channel_s, float(np.hypot(x.doubt_s, UNLIKE * x.channel_s))) for a, x in lateness({a: f.answers for a, f in facts.items()}).items()}
-    told |= {a: (d.delay_s, d.doubt_s) for a, d in simulated.items() if a in drives}
+    told |= {a: (d.delay_s, d.doubt_s) for a, d in simulated.items() if a in drives and np.isfinite(d.doubt_s)}
     out = dict(drives)
     for actuator, late in told.items():
         out[actuator] = tuple(replace(s, extra={**s.extra, "late": np.array(late), "sigma": _lasting(s, late[0])}) for s in drives[actuator])

@@ -32,7 +32,8 @@ DIFFERENCE_S = 2e-3  # half width of the differences that make velocity and acce
 
 @dataclass(frozen=True)
 class SimulatedDrive:
-    """delay_s: by how much the current of `actuator` is late, negative where its position is; doubt_s: standard deviation. motions: trial ->
+    """delay_s: by how much the current of `actuator` is late, negative where its position is; doubt_s: standard deviation, infinite where
+    the current is not explained. motions: trial ->
     time (n,) [s], position, velocity and acceleration (n,) [% and per second], nan between moves; none where the simulation lacks something."""
 
     actuator: str
@@ -42,7 +43,7 @@ class SimulatedDrive:
 
 
 def simulated_drive(session: Session, actuator: str) -> SimulatedDrive | None:
-    """One drive simulated from its commands; None where no controller explains its motion."""
+    """One drive simulated from its commands; None where these are not known."""
     from ...identify.motor import identify_motor
     from ...identify.motor.channel import channel_delay
     from ...identify.motor.fit import BOUNDS
@@ -50,9 +51,9 @@ def simulated_drive(session: Session, actuator: str) -> SimulatedDrive | None:
 
     try:
         fit = identify_motor(session, actuator)
-        if not fit.predictive or fit.output_error is None:
+        if fit.output_error is None:
             return None
-        delay_s, doubt_s = channel_delay(fit.output_error, BOUNDS)
+        delay_s, doubt_s = channel_delay(fit.output_error, BOUNDS) if fit.predictive else (0.0, np.inf)
         logs = {t.name: t.log() for t in drive_trials(session)[actuator]}
         motions = {name: _motion(fit, name, log) for name, log in logs.items()}
     except HandModelError:
@@ -111,5 +112,6 @@ def with_simulated(motion: Motion, time_s: Array, simulated: tuple[Array, Array,
 
 def delays_apart(drives: Mapping[str, SimulatedDrive]) -> dict[str, SimulatedDrive]:
     """The drives with the delays of their currents beside the least one of the session: what all drives share is how the log is read."""
-    common = min((d.delay_s for d in drives.values()), key=abs, default=0.0) if len(drives) > 1 else 0.0
+    told = [d.delay_s for d in drives.values() if np.isfinite(d.doubt_s)]
+    common = min(told, key=abs) if len(told) > 1 else 0.0
     return {a: replace(d, delay_s=d.delay_s - common) for a, d in drives.items()}
