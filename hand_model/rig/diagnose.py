@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..background import single_threaded
+from ..errors import SessionError
 from ..session import Session
 from .channels import ChannelIssue, check_balance, check_channels
 from .couplings import coupling_terms, with_couplings
@@ -51,6 +52,8 @@ def diagnose_rig(session: Session, output: str | Path | None = None,
     """
     say = progress or (lambda _: None)
     rig = with_couplings(load_rig(session))
+    if not rig.select(validate=False):
+        raise SessionError(f'{session.path}: every trial has purpose = "validate"; at least one must be left to fit to')
     fit, issues = trusted_fit(rig)
     found = [_channel_finding(i) for i in issues]
     refused = {(t, i.joint) for i in issues if i.refuse for t in i.trials}
