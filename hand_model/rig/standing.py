@@ -1,0 +1,121 @@
+"""Which effects of a balance stand: each is held to validation recordings beside those before it, all in the shapes that suit them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .declared import DeclaredFit
+from .findings import NOT_BORNE_OUT, Finding
+from .horizon import open_loop
+from .model import RigModel
+from .name.compete import LEAST_SHARE, Step
+from .name.problem import Term, pose, resampled, solution
+from .name.refit import refit
+from .name.settled import settled
+from .proof import Bench
+from .words import statement
+
+Array = NDArray[np.float64]
+FITS = 1.6**0.5  # an error within so many noise floors is taken to be noise: a variance 1.6 times as large
+SHAPE_UNITS = {"delay": "s", "lag": "s", "gap": "rad"}
+
+
+def proved(bench: Bench, fit: DeclaredFit, stories: Sequence[tuple[Step, Term]], kept: Sequence[Term],
+           rejected: list[dict[str, Any]]) -> tuple[list[Finding], list[Term]]:  # fmt: skip
+    """Findings that hold on the validation recordings, one after the other beside `kept`, all in the shapes that are best without the
+    later ones; the rest goes to rejected. Returns them and the terms that hold."""
+    kept, found = list(kept), []
+    whole = Counter(t.candidate.joint for t in [*kept, *(t for _, t in stories)])
+    plain, terms, few = (fit, *solved(bench, fit, [])), kept, solved(bench, fit, kept)
+    for step, term in stories:
+        more = _shaped(fit, [*kept, term], whole)
+        many = solved(bench, fit, more)
+        proof = bench.proof(term.candidate.joint, (fit, *few), (fit, *many))
+        reason = _withdrawn(bench, proof, plain, (fit, *few), (fit, *many))
+        if reason is not None:
+            rejected.append({"effect": term.candidate.key, "reason": reason})
+            continue
+        kept, terms, few = [*kept, term], more, many
+        told, theta = solved(bench, fit, kept)  # its size in the shapes that it has beside the later ones
+        last = slice(len(theta) - len(term.candidate.amplitudes), None)
+        spread = None
+        if proof["after"] <= FITS * proof["noise_floor"]:  # beside what does not fit, an interval would promise too much
+            spread = resampled(pose(fit), told)[:, last]
+        found.append(_joint_finding(bench.rig, fit, step, term, theta[last], proof, spread))
+    return found, terms
+
+
+def _shaped(fit: DeclaredFit, terms: Sequence[Term], whole: Mapping[str, int]) -> list[Term]:
+    """Terms, the last one's joint last, in their best shapes beside each other: as they were found where a joint has them all (whole: joint
+    -> how many), else those without the others."""
+    last, out = terms[-1].candidate.joint, []
+    for joint in sorted({t.candidate.joint for t in terms}, key=lambda j: j == last):
+        mine = [t for t in terms if t.candidate.joint == joint]
+        out += mine if joint != last or len(mine) == whole[joint] else refit(pose(fit, joint), mine)
+    return out
+
+
+def _withdrawn(bench: Bench, proof: Mapping[str, Any], plain: tuple, before: tuple, after: tuple) -> str | None:
+    """Why an effect does not hold on the validation recordings (its proof; fits of the declared model, without it and with it), or None
+    where it does."""
+    if proof["before"] <= proof["noise_floor"]:
+        return "without it the error is within the sensors' noise already"
+    if proof["after"] ** 2 > (1 - LEAST_SHARE) * proof["before"] ** 2:
+        return NOT_BORNE_OUT
+    if bench.mujoco and bench.ratio(plain, after) >= bench.ratio(plain, before):
+        return "what it takes off at its joint it adds at others"
+    if bench.mujoco and _moves_worse(bench, before, after):
+        return "the motion of the training trials, simulated from the commands, gets worse"
+    return None
+
+
+def _moves_worse(bench: Bench, before: tuple, after: tuple) -> bool:
+    """Whether the file with one term more moves further from the training recordings, by as much as would be worth a name; never where
+    efforts are recorded.
+
+    Where they are not, the balance holds what the drives' declared law makes of their commands: only the motion can tell
+    whether they act so. Where it hardly depends on the term it says nothing against it.
+    """
+    if any(t.effort for t in bench.rig.trials) or not bench.rig.drives:
+        return False
+    ratio = open_loop(bench.rig, bench.file(*before), bench.file(*after), validate=False).get("ratio", np.inf)
+    return bool(ratio**2 > 1 + LEAST_SHARE)
+
+
+def solved(bench: Bench, fit: DeclaredFit, terms: Sequence[Term]) -> tuple[list[Term], Array]:
+    """Terms and solution, at its own loads where there are any (angles of couplings have none)."""
+    return settled(bench.rig, fit, terms)[:2] if bench.mujoco else (list(terms), solution(pose(fit), terms))
+
+
+def first_of(fit: DeclaredFit, terms: Sequence[Term], count: int) -> list[Term]:
+    """The first so many terms of every joint, in their best shapes without the others."""
+    out: list[Term] = []
+    for joint in dict.fromkeys(t.candidate.joint for t in terms):
+        mine = [t for t in terms if t.candidate.joint == joint]
+        out += refit(pose(fit, joint), mine[:count]) if len(mine) > count else mine
+    return out
+
+
+def _joint_finding(rig: RigModel, fit: DeclaredFit, step: Step, term: Term, amplitude: Array, proof: dict,
+                   spread: Array | None) -> Finding:  # fmt: skip
+    c = term.candidate
+    parameters = {}
+    for k, ((name, unit, _, _), v) in enumerate(zip(c.amplitudes, amplitude, strict=True)):
+        ends = None if spread is None else [float(x) for x in np.percentile(spread[:, k], [2.5, 97.5])]
+        parameters[name] = {"value": float(v), "unit": unit, "ci95": ends}
+    parameters |= {k: {"value": float(v), "unit": SHAPE_UNITS.get(k, ""), "ci95": None} for k, v in term.shape.items()}
+    drive = rig.drive(c.joint)
+    rivals = [(key, p) for key, p in step.rivals if not key.startswith(c.effect)]
+    where = {"finger": None, "joint": c.joint, "actuator": drive.name if drive else None, "signal": "effort", "marker": None,
+             "trials": proof["held_out"], "share_of_mismatch": max(proof["before"] ** 2 - proof["after"] ** 2, 0.0)}  # fmt: skip
+    return Finding(
+        c.effect, (c.effect, *(e for e in step.equals if e != c.effect)), step.probability,
+        tuple((k.split("@")[0], p) for k, p in rivals), where,
+        statement(c.effect, c.variant, c.joint, {k: v["value"] for k, v in parameters.items()}, proof), parameters, proof,
+        {"native": False, "mjcf": 'custom/text[@name="hand_model"]', "urdf": "not expressible: kept in rig.xml"},
+    )  # fmt: skip
