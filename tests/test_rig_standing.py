@@ -64,3 +64,11 @@ def test_a_motion_that_hardly_depends_on_an_effect_says_nothing_against_it(monke
     monkeypatch.setattr(standing, "open_loop", lambda *args, **more: {"ratio": ratio})
     bench = SimpleNamespace(rig=SimpleNamespace(trials=[SimpleNamespace(effort={})], drives=(1,)), file=lambda *side: b"")
     assert standing._moves_worse(bench, (), ()) is worse
+
+
+@pytest.mark.parametrize(("delay", "beyond"), [(-0.0399, True), (0.02, False)])
+def test_a_delay_at_the_end_of_those_tried_is_none(delay: float, beyond: bool) -> None:
+    """What is best there may lie beyond it."""
+    grid = tuple({"delay": s * d} for d in (0.01, 0.04) for s in (-1.0, 1.0))
+    late = Candidate("current_channel_delay", "", "j1", (), grid, lambda r, s: np.zeros((0, 0)), True)
+    assert standing._beyond_reach(Term(late, {"delay": delay})) is beyond and not standing._beyond_reach(term("j1", "a", 1.0))

@@ -22,6 +22,7 @@ from .words import statement
 
 Array = NDArray[np.float64]
 FITS = 1.6**0.5  # an error within so many noise floors is taken to be noise: a variance 1.6 times as large
+END = 0.99  # of the longest delay that is tried
 SHAPE_UNITS = {"delay": "s", "lag": "s", "gap": "rad"}
 
 
@@ -63,6 +64,8 @@ def _shaped(fit: DeclaredFit, terms: Sequence[Term], whole: Mapping[str, int]) -
 def _withdrawn(bench: Bench, proof: Mapping[str, Any], plain: tuple, before: tuple, after: tuple) -> str | None:
     """Why an effect does not hold on the validation recordings (its proof; fits of the declared model, without it and with it), or None
     where it does."""
+    if _beyond_reach(after[1][-1]):
+        return "its delay is the longest that is asked: what is best may lie beyond"
     if proof["before"] <= proof["noise_floor"]:
         return "without it the error is within the sensors' noise already"
     if proof["after"] ** 2 > (1 - LEAST_SHARE) * proof["before"] ** 2:
@@ -72,6 +75,12 @@ def _withdrawn(bench: Bench, proof: Mapping[str, Any], plain: tuple, before: tup
     if bench.mujoco and _moves_worse(bench, before, after):
         return "the motion of the training trials, simulated from the commands, gets worse"
     return None
+
+
+def _beyond_reach(term: Term) -> bool:
+    """Whether a delay lies at the end of those that are tried: there it stands in for what no delay is."""
+    tried = [abs(g["delay"]) for g in term.candidate.grid if "delay" in g]
+    return bool(tried) and abs(term.shape["delay"]) > END * max(tried)
 
 
 def _moves_worse(bench: Bench, before: tuple, after: tuple) -> bool:
