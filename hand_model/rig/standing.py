@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .declared import DeclaredFit
 from .findings import NOT_BORNE_OUT, Finding
-from .horizon import open_loop
+from .horizon import NO_LAW, open_loop
 from .model import RigModel
 from .name.compete import LEAST_SHARE, Step
 from .name.problem import Term, pose, resampled, solution
@@ -72,9 +72,7 @@ def _withdrawn(bench: Bench, proof: Mapping[str, Any], plain: tuple, before: tup
         return NOT_BORNE_OUT
     if bench.mujoco and bench.ratio(plain, after) >= bench.ratio(plain, before):
         return "what it takes off at its joint it adds at others"
-    if bench.mujoco and _moves_worse(bench, before, after):
-        return "the motion of the training trials, simulated from the commands, gets worse"
-    return None
+    return _motion_says(bench, before, after) if bench.mujoco else None
 
 
 def _beyond_reach(term: Term) -> bool:
@@ -83,17 +81,20 @@ def _beyond_reach(term: Term) -> bool:
     return bool(tried) and abs(term.shape["delay"]) > END * max(tried)
 
 
-def _moves_worse(bench: Bench, before: tuple, after: tuple) -> bool:
-    """Whether the file with one term more moves further from the training recordings, by as much as would be worth a name; never where
-    efforts are recorded.
+def _motion_says(bench: Bench, before: tuple, after: tuple) -> str | None:
+    """What the motion of the training recordings says against the file with one term more: that it moves further from them, by as much as
+    would be worth a name, or that it cannot be simulated; never anything where efforts are recorded.
 
     Where they are not, the balance holds what the drives' declared law makes of their commands: only the motion can tell
     whether they act so. Where it hardly depends on the term it says nothing against it.
     """
     if any(t.effort for t in bench.rig.trials) or not bench.rig.drives:
-        return False
-    ratio = open_loop(bench.rig, bench.file(*before), bench.file(*after), validate=False).get("ratio", np.inf)
-    return bool(ratio**2 > 1 + LEAST_SHARE)
+        return None
+    told = open_loop(bench.rig, bench.file(*before), bench.file(*after), validate=False, known=bench.moved)
+    if told.get("not_run", "").startswith(NO_LAW):
+        return f"no effort is recorded, and only a simulated motion could tell: {told['not_run']}"
+    worse = told.get("ratio", 0.0) ** 2 > 1 + LEAST_SHARE
+    return "the motion of the training trials, simulated from the commands, gets worse" if worse else None
 
 
 def solved(bench: Bench, fit: DeclaredFit, terms: Sequence[Term]) -> tuple[list[Term], Array]:
