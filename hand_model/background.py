@@ -4,6 +4,8 @@ for; not for threads within a matrix product."""
 from __future__ import annotations
 
 import multiprocessing
+import os
+import signal
 import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -42,7 +44,7 @@ class Background:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", DeprecationWarning)
                 workers = min(WORKERS, len(self._arguments))
-                self._pool = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("fork"))
+                self._pool = ProcessPoolExecutor(workers, multiprocessing.get_context("fork"), _leave_interrupts)
                 self._futures = [self._pool.submit(function, *call) for call in self._arguments]
 
     def results(self) -> Iterator[Any]:
@@ -52,8 +54,11 @@ class Background:
             return
         try:
             yield from (future.result() for future in self._futures)
-        finally:  # a pool that has done its work is waited for: its thread would keep the next one from forking
-            self._pool.shutdown(wait=all(f.done() for f in self._futures), cancel_futures=True)
+        finally:
+            if not all(f.done() for f in self._futures):  # nobody wants what is under way, and its processes would outlive this one
+                for process in list(self._pool._processes.values()):
+                    process.terminate()
+            self._pool.shutdown(cancel_futures=True)  # waited for: its thread would keep the next one from forking
 
 
 class Pair:
@@ -75,9 +80,11 @@ class Pair:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if self._process is not None:
             self._pipe.close()  # at which the other one ends
+            if kind is not None and not issubclass(kind, Exception):
+                self._process.kill()
             self._process.join()
             self._process = None
 
@@ -115,14 +122,30 @@ def _shared_out(costs: Sequence[float]) -> tuple[list[int], list[int]]:
     return shares
 
 
+def _leave_interrupts() -> None:
+    """A terminal sends Ctrl-C to every process in it: the one that was called answers, and ends the others, which end what they began."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, _end)
+
+
+def _end(*_: object) -> None:
+    """End this process at once, and those that it began: they would wait for it for good."""
+    for process in multiprocessing.active_children():
+        process.terminate()
+    os._exit(1)
+
+
 def _serve(pipe: Connection, inherited: Connection, state: Any) -> None:
+    _leave_interrupts()
     inherited.close()  # held open here, it would never tell that the other side has ended
     while True:
         try:
             function, items, rest = pipe.recv()
-        except EOFError:
+        except (EOFError, ConnectionError):
             return
         try:
             pipe.send([function(state, item, *rest) for item in items])
+        except BrokenPipeError:  # who asked has ended
+            return
         except Exception as error:  # noqa: BLE001, raised where it was asked for
             pipe.send(error)

@@ -185,7 +185,7 @@ def load_hand(path: str | Path) -> Hand:
     """Read a `.hand` file; raises HandFileError where it is missing, foreign or incomplete."""
     file = Path(path)
     if not file.is_file():
-        raise HandFileError(f"{file}: no such file")
+        raise HandFileError(f"{file}: no such file; a .hand file, from identify, or a compiled folder with its hand.json is needed")
     try:
         table = json.loads(file.read_text())
     except (json.JSONDecodeError, UnicodeDecodeError) as error:

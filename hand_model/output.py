@@ -63,12 +63,19 @@ def new_folder(folder: str | Path, ours: Collection[str]) -> Iterator[Path]:
         shutil.rmtree(staging, ignore_errors=True)
 
 
-@contextmanager
-def new_file(file: str | Path) -> Iterator[Path]:
-    """A file to write, which takes the place of `file` when the block ends well; raises HandModelError for a folder."""
+def refuse_folder(file: str | Path) -> None:
+    """Raise HandModelError where a folder stands where a file is to be written, or a file where its folder is to be."""
     target = Path(file)
     if target.is_dir():
         raise HandModelError(f"{target}: is a folder; name a file")
+    refuse_file(target.parent)
+
+
+@contextmanager
+def new_file(file: str | Path) -> Iterator[Path]:
+    """A file to write, which takes the place of `file` when the block ends well; raises HandModelError as `refuse_folder` does."""
+    target = Path(file)
+    refuse_folder(target)
     target.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
     os.close(handle)

@@ -146,3 +146,10 @@ def test_a_loss_of_speed_is_named_once_and_not_where_the_current_is_cut(named: s
     mine, other = (1.0, finding("drive_sag", "index", "command", sag=0.1)), (1.0, finding("drive_sag", "ring", "command", sag=0.1))
     late = (1.0, finding("command_delay", "index", "command", delay=0.05))
     assert _without_settled_sags([mine, other, late], [station]) == ([mine] if stays else []) + [other, late]
+
+
+def test_a_session_without_a_balance_claims_no_figures() -> None:
+    found = assemble([], [], [])
+    assert found.verdict == "consistent"
+    assert found.lack_of_fit == {"before": None, "after": None, "limit": None}
+    assert found.protocol == {"repeats": 0, "rate_hz": None, "speeds": 0, "isolable": [], "not_isolable": []}

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -74,3 +76,37 @@ def test_a_pair_whose_other_process_is_ended_goes_on_alone():
     with Pair(None) as pair:
         assert pair.map(_ended, [1, 2, 3]) == [1, 2, 3]
         assert pair.map(_ended, [4, 2]) == [4, 2]
+
+
+def _nested(seconds: float) -> float:
+    """Sleeps in a process of a process where it is long."""
+    if seconds:
+        list(Background(time.sleep, [(seconds,)]).results())
+    return seconds
+
+
+def test_calls_under_way_end_with_the_one_who_asked():
+    begin = time.perf_counter()
+    calls = Background(_nested, [(0.0,), (60.0,)])
+    results = calls.results()
+    assert next(results) == 0.0
+    time.sleep(0.5)  # the other one has begun
+    inner = _children(next(p.pid for p in multiprocessing.active_children()))
+    results.close()  # as an interrupt does
+    assert time.perf_counter() - begin < 30
+    assert not multiprocessing.active_children()
+    assert not [pid for pid in inner if _runs(pid)]
+
+
+def _children(pid: int) -> list[int]:
+    try:
+        return [int(x) for x in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+    except OSError:  # no such file on this system
+        return []
+
+
+def _runs(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().split()[2] != "Z"
+    except OSError:
+        return False

@@ -182,6 +182,7 @@ def test_outputs_replace_their_own_kind_only(loop, recorded, tmp_path, capsys):
     refused(capsys, "compile", loop / "left.hand", "--output", foreign)
     assert "chapter.tex" in refused(capsys, "demo", "--output", foreign)
     assert "is a folder" in refused(capsys, "identify", recorded, "--output", foreign)
+    assert "is a file" in refused(capsys, "identify", recorded, "--output", foreign / "chapter.tex" / "left.hand")
     assert "not a .hand file" in refused(capsys, "identify", recorded, "--output", foreign / "chapter.tex")
     assert [f.name for f in foreign.iterdir()] == ["chapter.tex"] and (
         foreign / "chapter.tex"
@@ -219,6 +220,8 @@ def test_record(tmp_path, capsys):
     ] == 4
     assert "not an empty folder" in refused(capsys, *argv)
     assert 'did you mean "index"' in refused(capsys, "record", tmp_path / "t", "--fingers", "indx")
+    assert "named twice" in refused(capsys, "record", tmp_path / "t", "--fingers", "index,index")
+    assert "is a folder" in refused(capsys, "record", tmp_path / "t", "--answer", tmp_path)
     message = refused(capsys, "record", tmp_path / "t", "--effect", "stribek_friction")
     assert 'did you mean "stribeck_friction"' in message and not (tmp_path / "t").exists()
 
@@ -418,6 +421,45 @@ def test_replay_of_a_rig_needs_no_description(rig, tmp_path, capsys):
     assert [r["trial"] for r in rows] == ["log/a.csv", "log/b.csv"] and [r["held_out"] for r in rows] == [False, True]
     assert all(r["position_rmse"] < 0.05 for r in rows)
     assert "<svg" in (tmp_path / "report" / "report.html").read_text()
+
+
+def test_a_rig_without_a_position_is_refused(rig, tmp_path, capsys):
+    out = tmp_path / "out"
+    edit(rig / "session.toml", "joint:hinge:position", "joint:hinge:velocity")
+    assert "joint:NAME:position" in refused(capsys, "diagnose", rig, "--output", out)
+    edit(rig / "session.toml", "joint:hinge:velocity", "joint:hinge:position")
+    (rig / "log" / "a.csv").write_text("time,position\n" + "".join(f"{0.01 * i},\n" for i in range(500)))
+    message = refused(capsys, "diagnose", rig, "--output", out)
+    assert "a.csv" in message and "position" in message
+    assert not out.exists()
+
+
+def test_what_is_not_meant_for_a_rig_or_a_folder_is_refused(rig, loop, tmp_path, capsys):
+    """And at once, before minutes of work are lost."""
+    (tmp_path / "file").write_text("x")
+    assert "is a file" in refused(capsys, "diagnose", rig, "--output", tmp_path / "file")
+    assert "session itself" in refused(capsys, "diagnose", rig, "--output", rig)
+    assert "brings its own model" in refused(capsys, "diagnose", rig, "--output", tmp_path / "o", "--model", loop / "left.hand")
+    assert not (tmp_path / "o").exists() and (rig / "pendulum.xml").read_text() == PENDULUM
+    assert "--fix" in refused(capsys, "check", loop / "compiled", "--fix", tmp_path / "fixed")
+    assert "--json" in refused(capsys, "check", loop / "compiled", "--json")
+
+
+def test_the_python_call_diagnoses_a_rig_as_the_command_does(rig):
+    import hand_model
+    from hand_model.rig.findings import RigFindings
+
+    findings = hand_model.diagnose(rig)
+    assert isinstance(findings, RigFindings)
+    assert findings.protocol["held_out"] == ["log/b.csv"]
+
+
+def test_a_diagnosis_of_a_rig_without_a_model_leaves_none(rig, tmp_path):
+    out = tmp_path / "out"
+    assert main(["diagnose", str(rig), "--output", str(out)]) == 0
+    assert sorted(f.name for f in out.iterdir()) == ["findings.json", "report.html", "rig.xml", "rig_declared.xml"]
+    assert main(["diagnose", str(rig), "--output", str(out), "--no-model"]) == 0
+    assert sorted(f.name for f in out.iterdir()) == ["findings.json", "report.html"]
 
 
 def test_what_hands_and_rigs_need(rig, loop, recorded, tmp_path, capsys):

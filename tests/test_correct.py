@@ -82,6 +82,22 @@ def test_nothing_is_written_where_nothing_is_to_be_put_right(session: Path, tmp_
     assert not list(tmp_path.iterdir())
 
 
+def test_a_copy_that_cannot_be_written_leaves_the_earlier_one(session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    read = read_session(session)
+    trial = next(t for t in read.trials if t.kind == "flexion")
+    drift = finding("clock_drift", [trial.name], rate_minus_one={"value": 0.002, "unit": "1"})
+    before = digests(write_corrected(read, [drift], {}, tmp_path))
+
+    def full(*_: object) -> None:
+        raise OSError("no space left")
+
+    monkeypatch.setattr("hand_model.diagnose.prove.correct.write_csv", full)
+    with pytest.raises(OSError, match="no space"):
+        write_corrected(read, [drift], {}, tmp_path)
+    assert [f.name for f in tmp_path.iterdir()] == ["corrected"]
+    assert digests(tmp_path / "corrected") == before
+
+
 def test_the_copy_names_its_files_however_the_manifest_spells_them_and_may_lie_in_the_session(session: Path, tmp_path: Path) -> None:
     folder = tmp_path / "it's mine"
     shutil.copytree(session, folder)

@@ -12,7 +12,7 @@ import pytest
 from hand_model.diagnose import Finding, Findings, diagnose
 from hand_model.diagnose.locate.motion import estimate_motion, local_quadratic
 from hand_model.diagnose.name.balance import Balance, Term
-from hand_model.diagnose.name.interval import Reading, held_out, parameter_intervals, undisturbed
+from hand_model.diagnose.name.interval import _quantile, Reading, held_out, parameter_intervals, undisturbed
 from hand_model.diagnose.name.least_squares import bounded_least_squares
 from hand_model.diagnose.name.selection import name_effects
 from hand_model.diagnose.name.shapes import polish
@@ -95,19 +95,35 @@ def test_planted_effect_is_named_alone_with_its_parameters(name, shape, amplitud
     assert proof["held_out"] == ["trial_3"]
 
 
-def _read_as(form: float, amplitude: float, seed: int) -> dict[str, float]:
-    """Yield load and half width of its interval, of a gradual build-up read as one of form `form`."""
+def _read_as(form: float, amplitude: float, seed: int) -> list[float]:
+    """Interval of the yield load of a gradual build-up read as one of form `form`."""
     balance = Balance(drive(seed, planted("elastoplastic_hysteresis", {"form": 1.0, "reach": 30.0}, [amplitude])))
     fit = polish(balance, balance.fit((Term(effect("elastoplastic_hysteresis"), {"form": form, "reach": 15.0}),)), 0)
-    entry = parameter_intervals(Reading(balance, balance.fit(), fit), 0)["yield_load"]
-    return {"value": entry["value"], "half": 0.5 * (entry["ci95"][1] - entry["ci95"][0])}
+    return parameter_intervals(Reading(balance, balance.fit(), fit), 0)["yield_load"]["ci95"]
 
 
 def test_an_interval_knows_of_the_other_form_as_far_as_it_is_likely() -> None:
-    told = _read_as(1.0, 12.0, 2)
-    assert abs(told["value"] - 12.0) < told["half"] < 1.5  # the strong one is told by its form: no wider than noise makes it
+    low, high = _read_as(1.0, 12.0, 2)
+    assert low < 12.0 < high < low + 3.0  # the strong one is told by its form: no wider than noise makes it
     weak = [_read_as(0.0, 5.0, seed) for seed in range(4)]
-    assert sum(abs(f["value"] - 5.0) < f["half"] for f in weak) >= 3  # read as the wrong form, but the right one has a say
+    assert sum(low < 5.0 < high for low, high in weak) >= 3  # read as the wrong form, but the right one has a say
+
+
+def test_an_interval_is_that_of_the_mixture_of_forms() -> None:
+    rng = np.random.default_rng(0)
+    parts = [(0.2, 9.0, 4.0), (0.8, 3.0, 0.25)]
+    drawn = np.where(rng.random(400000) < 0.2, rng.normal(9.0, 2.0, 400000), rng.normal(3.0, 0.5, 400000))
+    for at in (0.025, 0.5, 0.975):
+        assert abs(_quantile(parts, at) - np.quantile(drawn, at)) < 0.05
+    assert abs(_quantile([(1.0, 2.0, 9.0)], 0.975) - (2.0 + 1.96 * 3.0)) < 1e-3
+
+
+def test_a_form_that_does_not_tell_a_parameter_does_not_widen_its_interval_and_a_choice_has_none() -> None:
+    balance = Balance(drive(5, planted("stribeck_friction", {"stribeck_speed": 22.0, "form": 0.0}, [20.0])))
+    fit = polish(balance, balance.fit((Term(effect("stribeck_friction"), {"stribeck_speed": 22.0, "form": 0.0}),)), 0)
+    told = parameter_intervals(Reading(balance, balance.fit(), fit), 0)
+    low, high = told["static_excess"]["ci95"]
+    assert 0 < low < told["static_excess"]["value"] < high and "ci95" not in told["exponent"]
 
 
 @pytest.mark.parametrize("share", [0.08, 0.25, 0.45])

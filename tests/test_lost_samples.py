@@ -12,7 +12,7 @@ from session_writers import write_log, write_session
 
 from hand_model.diagnose import diagnose
 from hand_model.diagnose.diagnosis import _current_at, _no_measurement
-from hand_model.diagnose.locate.drive import _held, count_range, drive_states, opposes
+from hand_model.diagnose.locate.drive import _held, count_range, drive_states, opposes, too_short
 from hand_model.errors import HandFileError, SessionError
 from hand_model.identify.clock import align
 from hand_model.session import Log, read_session
@@ -44,6 +44,18 @@ def test_a_lost_command_is_the_one_before_it_and_a_lost_current_no_zero() -> Non
     current = np.full(400, 20.0)
     current[100:110] = np.nan
     np.testing.assert_allclose(_current_at(np.arange(400) / 50, log(MOTION, current=current)), 20.0)
+
+
+def test_a_recording_too_short_for_a_motion_is_told() -> None:
+    lost = MOTION.copy()
+    lost[40:] = np.nan
+    logs = {"a.csv": log(MOTION), "b.csv": log(MOTION[:30]), "c.csv": log(lost)}
+    trials = [SimpleNamespace(kind="excitation", log_path=Path(name), finger="index", name=name, log=lambda one=one: one)
+              for name, one in logs.items()]
+    session = SimpleNamespace(trials=trials, finger=lambda name: SimpleNamespace(actuator=name))
+    said = too_short(session)
+    assert [line.split(" rows")[0] for line in said] == ["b.csv: 30", "c.csv: 40"]
+    assert "50 are needed" in said[0]
 
 
 def test_a_position_that_never_moves_or_is_the_command_is_no_measurement() -> None:

@@ -11,8 +11,9 @@ import pytest
 from hand_model.errors import IdentificationError
 from hand_model.identify.motor import identify_motor, identify_motors
 from hand_model.identify.motor.balance import NAMES, friction_state
+from hand_model.identify.motor.channel import channel_delay
 from hand_model.identify.motor.drive import Moves, profile, run, simulate
-from hand_model.identify.motor.fit import fit_motor, white_noise
+from hand_model.identify.motor.fit import BOUNDS, fit_motor, white_noise
 from hand_model.identify.motor.moves import levelled, moves_from_rest, speed_levels
 from hand_model.identify.motor.predict import predict, reference, replay_table
 from hand_model.identify.motor.published import MODELS, fit_published, smear_share
@@ -53,6 +54,14 @@ def test_plant_is_found(fit) -> None:
         assert estimate.ci95[0] < estimate.value < estimate.ci95[1]
     assert not fit.stribeck  # the drive has none
     assert fit.motor.current_noise_raw == pytest.approx(5.0, rel=0.1)
+
+
+@pytest.mark.parametrize("delay_s", [0.012, -0.02, 0.0])
+def test_a_current_logged_late_is_told_to_a_fraction_of_a_sample(trials, fit, delay_s: float) -> None:
+    late = [dataclasses.replace(t, current=np.interp(t.time_s - delay_s, t.time_s, t.current)) for t in trials]
+    found = (fit if delay_s == 0 else fit_motor(late, fit.scale)).output_error
+    value, doubt = channel_delay(found, BOUNDS)
+    assert abs(value - delay_s) < 3 * doubt and doubt < 0.003
 
 
 def test_regression_without_controller(trials) -> None:

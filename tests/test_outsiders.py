@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from test_kinematic_stations import MAP, joint
 
 from hand_model.diagnose.assemble import assemble
 from hand_model.diagnose.locate.drive import with_required
-from hand_model.diagnose.name.station import Station, judged
+from hand_model.diagnose.name.station import Station, channel_of, judged
 from hand_model.effects import catalogue, effect, outsiders
 from hand_model.effects.base import DriveState
 
@@ -60,27 +61,37 @@ def test_no_outsider_is_a_row_of_the_table() -> None:
     assert not any(e.listed for e in BY_NAME.values()) and all(e.listed for e in catalogue())
 
 
-def weighed(states: tuple[DriveState, ...], poses: list[tuple[float, float] | None]) -> tuple[DriveState, ...]:
-    """The states with a weight of 20 raw whose poses (along, across) are recorded, or not."""
+def weighed(states: tuple[DriveState, ...], poses: list[tuple[float, float] | None], load_raw: float = 20.0) -> tuple[DriveState, ...]:
+    """The states with a weight of `load_raw` whose poses (along, across) are recorded, or not."""
     out = []
     for state, pose in zip(states, poses, strict=True):
         along, across = pose or (9.0, -3.0)
         n = np.ones(len(state.time_s))
         seen = replace(state, extra={**state.extra, "gravity_along": along * n, "gravity_across": across * n, "pose_seen": n})
-        load = effect("gravity_load").columns(seen, {"sweep": 1.4}) @ np.array([20.0, 0.0, 0.0, 0.0])
+        load = effect("gravity_load").columns(seen, {"sweep": 1.4}) @ np.array([load_raw, 0.0, 0.0, 0.0])
         bare = {**state.extra, "pose_unseen": n}
         out.append(replace(seen if pose else replace(state, extra=bare), effort=state.effort + load))
     return tuple(out)
 
 
-def test_a_weight_is_named_where_only_the_recording_kept_out_shows_another_pose() -> None:
-    states = drive(8, trials=5)
-    states = weighed(tuple(replace(s, validate=k > 2) for k, s in enumerate(states)), [(9.81, 0.0), None, None, (-8.0, 5.0), None])
-    station = heard(states)
+@pytest.mark.parametrize(("load_raw", "noise", "within"), [(20.0, 5.0, 0.15), (1.5, 8.0, 0.9)])
+def test_a_weight_is_named_where_only_the_recording_kept_out_shows_another_pose(load_raw: float, noise: float, within: float) -> None:
+    states = drive(8, noise=noise, trials=5)
+    poses = [(9.81, 0.0), None, None, (-8.0, 5.0), None]
+    station = heard(weighed(tuple(replace(s, validate=k > 2) for k, s in enumerate(states)), poses, load_raw))
     assert [f.term.effect.name for f in station.kept] == ["gravity_load"]
     size = station.parameters[station.naming.fit.terms.index(station.kept[0].term)]
     assert set(size) == {"sweep", "along", "across"}
-    assert abs(np.hypot(size["along"]["value"], size["across"]["value"]) / 20.0 - 1) < 0.15
+    assert abs(np.hypot(size["along"]["value"], size["across"]["value"]) / load_raw - 1) < within
+
+
+@pytest.mark.parametrize(("shares", "p", "scattered"), [
+    ((0.3, 0.3, 0.2, 0.1, 0.1), 1e-4, True), ((0.6, 0.1, 0.1, 0.1, 0.1), 1e-4, False),
+    ((0.3, 0.3, 0.2, 0.1, 0.1), 0.2, False), ((0.4, 0.3, 0.3), 1e-4, False)])  # fmt: skip
+def test_many_pieces_that_do_not_do_are_no_explanation(shares: tuple[float, ...], p: float, scattered: bool) -> None:
+    station = object.__new__(Station)
+    station.naming = SimpleNamespace(after=SimpleNamespace(p=p), found=[SimpleNamespace(share=s) for s in shares])
+    assert station._scattered is scattered
 
 
 def test_the_share_that_a_ceiling_cuts_is_what_the_motion_requires_beyond_it() -> None:
@@ -160,7 +171,10 @@ def test_the_only_effect_needs_no_steady_motion_where_it_is_plain_and_a_faint_on
     plain = heard(drive(3, planted(*PLANTED[0])))
     assert [f.term.effect.name for f in plain.kept] == [PLANTED[0][0]]
     faint = replace(plain.naming, found=(plain.naming.found[0],) * 2)
-    assert not Station("current", "index", "index", None, faint).proven
+    overlooked = Station("current", "index", "index", None, faint)
+    assert not overlooked.proven
+    assert channel_of(overlooked)["effects"] == []  # what does not stand is not told
+    assert channel_of(plain)["effects"] == [PLANTED[0][0]]
 
 
 @pytest.mark.parametrize(("count", "p", "left", "overwhelmed"), [(5, 1e-9, 0.5, True), (4, 1e-9, 0.5, False), (5, 0.2, 0.5, False), (5, 1e-9, 0.1, False)])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -56,6 +58,44 @@ def test_page_says_what_where_how_sure_and_where_it_is_put_right() -> None:
     assert page.count("<svg") == 2
 
 
+def test_every_section_with_maps_says_what_its_colours_mean() -> None:
+    x, v = np.tile(np.linspace(0, 100, 400), 2), np.repeat([1.0, -1.0], 400)
+    replay = Replay(_finding(), x, v, np.sin(x), np.zeros(800), "%", "raw", 5.0, ("log/b.csv",))
+    for _ in range(2):  # of a second page, too
+        page = render(Findings("mismatch", {}, {}, (_finding(),)), (), (replay, replay), "a session").decode()
+        assert page.count("position rises") == 2
+
+
+def test_moves_at_one_speed_are_one_cell_of_a_map() -> None:
+    from hand_model.diagnose.page import CELLS, _means
+
+    rng = np.random.default_rng(4)
+    speed = np.concatenate([s + rng.normal(0, 0.2, 400) for s in (15.0, 30.0, 55.0, 110.0)])
+    (middle, mean), = _means(speed, np.ones(len(speed)), rng.normal(0, 1, len(speed)))
+    assert np.diff(middle).min() > 0.25 * np.ptp(speed) / CELLS
+    assert len(middle) < 15
+    assert np.abs(mean[np.searchsorted(middle, [14.0, 54.0])]).max() < 0.3
+    (level, _), = _means(np.full(10, 7.0), np.ones(10), np.ones(10))  # all at one place
+    assert level == pytest.approx([7.0])
+    (even, _), = _means(np.linspace(0, 100, 4000), np.ones(4000), np.ones(4000))
+    assert len(even) == CELLS
+
+
+def test_a_choice_among_forms_is_no_figure_of_the_page() -> None:
+    gap = replace(_finding(), parameters={"gap": {"value": 1.2, "unit": "deg"}, "form": {"value": 0.0, "unit": "1"}})
+    page = render(Findings("mismatch", {}, {}, (gap,)), (), (), "a session").decode()
+    assert ">gap<" in page
+    assert ">form<" not in page
+
+
+def test_a_page_without_channels_claims_no_residual() -> None:
+    bent = {"where": {"finger": None, "joint": None, "actuator": "thumb", "signal": "log"}, "share_of_mismatch": 1.0, "shape": "stamps"}
+    page = render(Findings("unexplained", {"before": 1.0, "after": 1.0, "limit": 1.0}, {}, unexplained=(bent,)), (), (), "a session").decode()
+    assert "thumb log: stamps" in page
+    assert "residual over noise" not in page
+    assert "Every channel" not in page
+
+
 def test_a_refused_channel_is_in_no_copy_and_every_parameter_says_its_interval() -> None:
     refused = _finding(finding="command_as_measurement", model=None, correction="the channel is refused")
     findings = Findings("mismatch", {}, {}, (refused,))
@@ -97,6 +137,13 @@ def test_a_model_that_holds_an_effect_already_gets_it_once() -> None:
     after = with_effects(before, [_finding()])
     assert [e.where["actuator"] for e in before.effects] == ["little"]
     assert [(e.where["actuator"], e.parameters["centre"].value) for e in after.effects] == [("little", 60.0), ("index", 40.0)]
+
+
+def test_a_finding_whose_finger_the_model_lacks_is_in_no_file(tmp_path) -> None:
+    from hand_model.diagnose.prove.improve import written
+
+    told = written(tmp_path, tmp_path, _finding(), {"ring"})
+    assert told == {"native": False, "mjcf": None, "urdf": "not expressible", "callback": None, "note": "the model has no index"}
 
 
 def test_joints_go_where_newly_fitted_maps_take_them() -> None:

@@ -56,6 +56,8 @@ def test_what_is_no_finding_is_not_in_the_sizes_of_the_others() -> None:
     station = judged("current", "index", "index", None, drive(3, add), catalogue("drive"))
     assert {f.term.effect.name for f in station.kept} == {"stribeck_friction", "detent_load"}
     both = tuple(finding_of(station, f, 0.5, f.size)[1] for f in station.kept)
+    rising = next(f for f in both if f.effect == "stribeck_friction")
+    assert rising.where["region"]["speed"][1] == pytest.approx(2 * rising.parameters["stribeck_speed"]["value"])
     same, (whole,) = reread(both, [station])
     assert [f.parameters for f in same] == [f.parameters for f in both]
     assert whole.reading.fit is station.reading.fit

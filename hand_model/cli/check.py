@@ -34,6 +34,11 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace, say: Callable[[str], None]) -> int:
     """0 where everything passes, 1 where something differs."""
     if Path(options.first).is_dir():
+        given = [f"--{name}" for name in ("pair", "fix", "json", "accept") if getattr(options, name)]
+        if given:
+            from ..errors import HandModelError
+
+            raise HandModelError(f"{given[0]} is for two descriptions, and {options.first} is a folder; name A.urdf B.xml")
         return _folder(options.first, options.second)
     if options.second is None:
         from ..errors import DescriptionError

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .progress import Progress
@@ -17,7 +18,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("session", metavar="SESSION", help="folder with a session.toml, of a hand or a rig")
     which = parser.add_mutually_exclusive_group()
-    which.add_argument("--model", metavar="DIR", help="a compiled hand or a .hand file into which the effects are written (default: identified here)")
+    which.add_argument("--model", metavar="DIR", help="a compiled hand or a .hand file into which the effects are written (default: identified here); "
+                                                      "a rig brings its own")
     which.add_argument("--no-model", action="store_true", help="write no model: findings and report only")
     parser.add_argument("--output", required=True, metavar="DIR", help="folder for findings.json, report.html and the improved model")
 
@@ -28,14 +30,7 @@ def run(options: Namespace, say: Progress) -> int:
     from ..session import read_session
 
     session = read_session(options.session)
-    if session.rig is not None:
-        from ..report.rig_findings import write_rig_findings
-        from ..rig.diagnose import diagnose_rig
-
-        findings = diagnose_rig(session, options.output, say)
-        write_rig_findings(session, findings, options.output)
-    else:
-        findings = diagnose(session, False if options.no_model else options.model, options.output, say, say.share)
+    findings = diagnose(session, False if options.no_model else options.model, options.output, say, say.share)
     say.clear()
     print(f"verdict: {findings.verdict}")
     for finding in findings.findings:
@@ -49,7 +44,7 @@ def run(options: Namespace, say: Progress) -> int:
         print(f"note: {note}")
     if findings.next_experiment:
         print(f"next: {findings.next_experiment}")
-    print(f"\n{options.output}/findings.json")
+    print(f"\n{Path(options.output) / 'findings.json'}")
     return 0
 
 

@@ -20,12 +20,13 @@ def run(options: Namespace, say: Callable[[str], None]) -> int:
     from ..errors import HandModelError
     from ..hand import load_hand
     from ..identify import identify
-    from ..output import new_file
+    from ..output import new_file, refuse_folder
     from ..report.text import hand_text
 
     target = Path(options.output)
     if target.is_dir():
         raise HandModelError(f"{target}: is a folder; name a file such as {target / 'left.hand'}")
+    refuse_folder(target)
     if target.exists():
         load_hand(target)  # only a .hand file may be replaced
     hand = identify(options.session, say)

@@ -28,12 +28,14 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace, say: Callable[[str], None]) -> int:
     """Record and name the folder."""
     from ..errors import HandModelError, did_you_mean
-    from ..output import new_file
+    from ..output import new_file, refuse_folder
     from ..twin import CATALOGUE, bebionic, record
 
     for name in options.effect:
         if name not in CATALOGUE:
             raise HandModelError(f'the twin has no effect "{name}"; {did_you_mean(name, CATALOGUE)}')
+    if options.answer:
+        refuse_folder(options.answer)  # before a session is written whose answer could not be
     fingers = options.fingers.split(",") if options.fingers else None
     truth = bebionic(options.side, options.seed, fingers)
     answer = record(truth, options.folder, options.seed, tuple(options.effect), mocap_format=options.format)

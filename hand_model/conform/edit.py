@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import numpy as np
 from lxml import etree
 
 from ..errors import DescriptionError
+from ..output import new_file
 from .tree import Array, Tree, inverse
 from .urdf import parse_xml
 
@@ -190,7 +190,5 @@ def _child(element: etree._Element, tag: str, attributes: dict[str, str]) -> Non
 
 
 def _write(document: etree._ElementTree, path: Path) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(path.name + ".part")
-    document.write(str(temporary), xml_declaration=True, encoding="utf-8")
-    os.replace(temporary, path)
+    with new_file(path) as staging:
+        document.write(str(staging), xml_declaration=True, encoding="utf-8")

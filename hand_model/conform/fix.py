@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import DescriptionError
+from ..output import new_file
 from .align import Features, Fit, align, features
 from .check import conform, read
 from .edit import MjcfEditor, UrdfEditor, editor, relative
@@ -227,7 +227,5 @@ def _write_pair(path: Path, a: Tree, b: Tree, p: Pairing) -> None:
     rows = [f'base = {{ {keys[0]} = "{p.base[0]}", {keys[1]} = "{p.base[1]}" }}']
     for table, pairs in (("joints", p.joints), ("links", p.links)):
         rows += ["", f"[{table}]"] + [f'"{x}" = "{y}"' if left_is_a else f'"{y}" = "{x}"' for x, y in pairs]
-    temporary = path.with_name(path.name + ".part")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary.write_text("\n".join(rows) + "\n")
-    os.replace(temporary, path)
+    with new_file(path) as staging:
+        staging.write_text("\n".join(rows) + "\n")

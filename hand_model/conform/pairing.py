@@ -52,7 +52,7 @@ def read_pair(path: str | Path, a: Tree, b: Tree) -> Pairing:
     try:
         table = tomllib.loads(file.read_text())
     except OSError:
-        raise DescriptionError(f"{file}: no such file") from None
+        raise DescriptionError(f"{file}: no such file; a pair.toml is needed") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise DescriptionError(f"{file}: not TOML ({error})") from None
     key_a, key_b = (a.format, b.format) if a.format != b.format else ("a", "b")

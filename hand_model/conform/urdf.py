@@ -83,7 +83,7 @@ def read_urdf(path: str | Path, root: etree._Element | None = None) -> Tree:
 def parse_xml(file: Path) -> etree._ElementTree:
     """Parse XML without network or entities; raises DescriptionError with the line that is wrong."""
     if not file.is_file():
-        raise DescriptionError(f"{file}: no such file")
+        raise DescriptionError(f"{file}: no such file; a URDF or MJCF file is needed")
     try:
         return etree.parse(str(file), etree.XMLParser(remove_comments=False, resolve_entities=False, no_network=True))
     except etree.XMLSyntaxError as error:

@@ -34,7 +34,7 @@ NAMES = {e.name for e in catalogue()}
 
 def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding]], notes: list[str],
              unexplained: Sequence[dict[str, Any]] = ()) -> Findings:
-    """One ranked list from all stations: by what a finding shows in its channel (its weight, `findings.weighed`) and, twice as much, by how
+    """One ranked list from all stations: by what a finding shows in its channel (its weight, `findings.weighed`) and, three times as much, by how
     large it is for its kind (weighted geometric mean). unexplained: of the markers."""
     ranked: list[tuple[float, Finding]] = _heaviest(marker_findings, _palm_marker)
     rejected: list[dict[str, str]] = []
@@ -60,7 +60,7 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
     ranked = _without_tilts(_without_shadows(_one_clock(_of_hinges(ranked, unexplained))))
     # how far a hinge that is none moves is told only beside what another hinge would explain: that it is none is sure all the same
     sized = [(_magnitude(f, stations, _value if f.effect in HINGE else _sure), weight, f) for weight, f in ranked]
-    ranked = sorted(((float(np.cbrt(m**2 * weight)), f) for m, weight, f in sized), key=lambda item: -item[0])
+    ranked = sorted(((float((m**3 * weight) ** 0.25), f) for m, weight, f in sized), key=lambda item: -item[0])
     ranked = _heaviest(ranked, _same_place)
     trifles = _trifles(ranked, {id(f): m for m, _, f in sized})
     rejected += [{"effect": f.effect, "where": str(f.where["finger"]), "reason": reason} for f, reason in trifles]
@@ -68,7 +68,7 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
     found = _shared(ranked)
     verdict = "mismatch" if found else "unexplained" if unexplained else "consistent"
     worst = max(stations, key=lambda s: variance_ratio(s.naming, s.naming.declared), default=None)
-    lack = {"before": 1.0, "after": 1.0, "limit": 1.0}
+    lack: dict[str, float | None] = {"before": None, "after": None, "limit": None}  # where no balance could be made
     if worst is not None:
         n = worst.naming.balance
         count = max(int((~n.train & n.steady).sum()) or int(n.steady.sum()), 1)
@@ -212,9 +212,10 @@ def _reason(log_evidence: float) -> str:
 
 
 def _protocol(stations: list[Station]) -> dict[str, Any]:
+    """What the first motor's recordings can tell apart: how many, rows a second, commanded speeds, and pairs of effects."""
     drives = [s for s in stations if s.signal == "current"]
     if not drives:
-        return {}
+        return {"repeats": 0, "rate_hz": None, "speeds": 0, "isolable": [], "not_isolable": []}
     states = drives[0].naming.balance.states
     speeds = {v for s in states if "speed" in s.extra for v in np.unique(s.extra["speed"]).tolist()}
     step = sample_interval(states)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..background import Background, Pair, single_threaded
 from ..effects import catalogue, outsiders
-from ..effects.base import DriveState
+from ..effects.base import DriveState, least_delay
 from ..errors import HandModelError, SessionError
 from ..hand import Hand
 from ..output import forget
@@ -21,10 +21,20 @@ from .assemble import assemble
 from .findings import FILES, FOLDERS, Finding, Findings
 from .finger import FingerReading, finger_calls
 from .locate.angles import FingerAngles
+from .locate.channel import ChannelDelay, apart, channel_delay
 from .locate.command import CommandFacts, command_facts, command_findings, refused, with_lateness
 from .locate.course import FingerCourses
 from .locate.decoupled import while_driven, without_excursions
-from .locate.drive import drive_states, drive_trials, echoes_command, is_measured, opposes, rests_on_command, with_gives
+from .locate.drive import (
+    drive_states,
+    drive_trials,
+    echoes_command,
+    is_measured,
+    opposes,
+    rests_on_command,
+    too_short,
+    with_gives,
+)
 from .locate.gravity import with_gravity
 from .locate.preload import preload_findings
 from .locate.stamps import Stamps, stamps
@@ -45,17 +55,19 @@ DELAY_TOLD = 2.0  # log likelihood that a shift of a drive's current must bring:
 @single_threaded()
 def diagnose(session: Session | str | Path, model: Any = None, output: str | Path | None = None,
              say: Callable[[str], None] | None = None, progress: Callable[[float], None] | None = None) -> Findings:
-    """Say what physics is missing from the declared model of a recorded hand.
+    """Say what physics is missing from the declared model of a recorded hand, or of a rig (findings: `RigFindings`).
 
     session: a session or its folder. model: a Hand, a .hand file or a compiled folder into which the effects are written
     (what is missing is judged by the declared model fitted to the session itself); None identifies the session's own, False
-    writes none. output: folder that gets `findings.json`, `report.html` and, where physics was named, `model_before` and `model`,
+    writes none; a rig brings its own. output: folder that gets `findings.json`, `report.html` and, where physics was named, `model_before` and `model`,
     compiled; where the recording was put right, `corrected`, a session. say: called with one line per result as it comes. progress:
     called with the share of the work that is done, 0 to 1.
-    Raises SessionError for a session that breaks its format, HandFileError for a model that is none or of another hand, HandModelError for an output
-    that is a file or holds a `corrected` that no diagnosis wrote.
+    Raises SessionError for a session that breaks its format or a rig with a model, HandFileError for a model that is none or of another
+    hand, HandModelError for an output that is a file or holds a `corrected` that no diagnosis wrote.
     """
     session = session if isinstance(session, Session) else read_session(session)
+    if session.rig is not None:
+        return _diagnosed_rig(session, model, output, say)
     hand = read_model(model) if model not in (None, False) else None
     if hand is not None:
         refuse_other(hand, session)
@@ -71,13 +83,15 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
         refuse_output(Path(output))
     heard = _Heard(session, tell, step)
     owned = output is not None and model is None
-    identified = heard.listen_to_fingers(beside=(partial(_identified, session),) if owned else ())
+    read = [a for a in drive_trials(session) if a not in heard.unread]
+    beside = [partial(channel_delay, session, a) for a in read] + ([partial(_identified, session)] if owned else [])
+    *delays, identified = heard.listen_to_fingers(tuple(beside)) if owned else (*heard.listen_to_fingers(tuple(beside)), None)
     drives = heard.drives()
     facts = _command(session, drives)
     heard.found += command_findings(facts, {a: _finger_of(session, a) for a in facts})
     for _, finding in heard.found:
         tell(finding.statement)
-    heard.listen_to_drives(*_timed(drives, facts))
+    heard.listen_to_drives(*_timed(drives, facts, apart({d.actuator: d for d in delays if d is not None and d.actuator in drives})))
     stations = heard.stations
     findings = assemble(stations, heard.found, heard.notes, heard.unexplained)
     listed, written = reread(findings.findings, stations)
@@ -86,7 +100,7 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
         replays: tuple[Replay, ...] = ()
         forget(output, FOLDERS, FILES[0])
         if model is not False:
-            known = identified[0] if owned else hand
+            known = identified if owned else hand
             with Pair((findings, session, known, written, heard.courses, Path(output), tell)) as pair:
                 (findings, replays), _ = pair.map(_written, ("model", "corrected"))
         write_page(findings, stations, replays, session.path.name, Path(output))
@@ -96,12 +110,25 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
     return findings
 
 
+def _diagnosed_rig(session: Session, model: Any, output: str | Path | None, say: Callable[[str], None] | None) -> Findings:
+    """A rig's findings, its report written beside them."""
+    from ..report.rig_findings import write_rig_findings
+    from ..rig.diagnose import diagnose_rig
+
+    if model not in (None, False):
+        raise SessionError(f"{session.path}: a rig session brings its own model; another one is for sessions of a hand")
+    findings = diagnose_rig(session, output, say, model is not False)
+    if output is not None:
+        write_rig_findings(session, findings, output)
+    return findings
+
+
 class _Heard:
     """What a session has said so far. found: findings with their weight. tell: called with a line per result; step: with nothing, after each."""
 
     def __init__(self, session: Session, tell: Callable[[str], None], step: Callable[[], None]) -> None:
         self.session, self.tell, self.step = session, tell, step
-        self.notes = list(check_session(session, dead=True))
+        self.notes = [*check_session(session, dead=True), *too_short(session)]
         self.fingers: dict[str, FingerAngles] = {}
         self.courses: dict[str, FingerCourses] = {}
         self.stations: list[Station] = []
@@ -177,14 +204,14 @@ def _without_settled_sags(found: list[tuple[float, Finding]], stations: Sequence
     return [i for i in found if i[1].effect != "drive_sag" or i[1].where["actuator"] not in settled]
 
 
-def _timed(drives: dict[str, tuple[DriveState, ...]],
-           facts: dict[str, CommandFacts]) -> tuple[dict[str, tuple[DriveState, ...]], dict[str, bool]]:
+def _timed(drives: dict[str, tuple[DriveState, ...]], facts: dict[str, CommandFacts],
+           delays: dict[str, ChannelDelay]) -> tuple[dict[str, tuple[DriveState, ...]], dict[str, bool]]:
     """The drives with what is known of their current's lateness, and whether each may be late."""
-    timed = with_lateness(drives, facts)
+    timed = with_lateness(drives, facts, delays)
     late = _delays_apart(timed)
     in_time = [a for a in drives if not late[a]]
     if 0 < len(in_time) < len(drives):  # at a reversal a late current looks like a give, an early one like none
-        timed = with_lateness(with_gives(drives, in_time), facts)
+        timed = with_lateness(with_gives(drives, in_time), facts, delays)
     return timed, late
 
 
@@ -302,6 +329,8 @@ def _delays_apart(drives: dict[str, tuple[DriveState, ...]]) -> dict[str, bool]:
         x, bound = best[actuator] - common, least * step[actuator]
         if actuator not in late:
             return abs(x) > bound
+        if (told_to := least_delay(drives[actuator])) < bound:
+            return abs(float(late[actuator][0])) > told_to
         if late[actuator][0] < -max(bound, EARLY * late[actuator][1]):
             return True
         if x >= -bound:

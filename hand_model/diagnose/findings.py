@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ..output import new_file
+
 FORMAT = "hand-findings/1"
 FILES, FOLDERS = ("findings.json", "report.html"), ("model_before", "model", "corrected")  # what a diagnosis writes
 UNWRITTEN = {"native": False, "mjcf": None, "urdf": "not expressible"}  # `model` of a finding until a file holds it
@@ -56,7 +58,7 @@ class Findings:
     """The diagnosis of a session. verdict: "consistent", "mismatch" or "unexplained"."""
 
     verdict: str
-    lack_of_fit: Mapping[str, float]
+    lack_of_fit: Mapping[str, float | None]
     protocol: Mapping[str, Any]
     findings: tuple[Finding, ...] = ()
     rejected: tuple[Mapping[str, str], ...] = ()
@@ -86,11 +88,9 @@ class Findings:
 
     def save(self, folder: str | Path) -> Path:
         """Write `findings.json` into a folder (made if needed), whole or not at all; returns its path."""
-        target = Path(folder) / "findings.json"
-        target.parent.mkdir(parents=True, exist_ok=True)
-        sibling = target.with_name(".findings.json.part")
-        sibling.write_text(self.to_json())
-        sibling.replace(target)
+        target = Path(folder) / FILES[0]
+        with new_file(target) as staging:
+            staging.write_text(self.to_json())
         return target
 
 

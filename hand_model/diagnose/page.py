@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..output import new_file
 from ..report.page import Cell, Section, figures, key, listing, note, page, table
 from ..report.style import INK, MUTED, SERIES, drawing
-from .findings import Finding, Findings
+from .findings import FILES, Finding, Findings
+from .name.balance import DISCRETE
 from .prove.replays import Replay
 
 Array = NDArray[np.float64]
@@ -19,6 +21,7 @@ Array = NDArray[np.float64]
 POINTS = 700
 CELLS = 40
 BY_SPEED = ("quadratic_damping", "asymmetric_viscous_friction")
+BY_TIME = ("clock_drift", "thermal_friction_drift")
 VERDICTS = {
     "consistent": "Nothing is missing: the declared model explains the recordings within their noise.",
     "mismatch": "Something is missing, and it is named below.",
@@ -29,10 +32,9 @@ VERDICTS = {
 def write_page(findings: Findings, stations: Sequence[Any], replays: Sequence[Replay], title: str, folder: Path) -> Path:
     """Write `report.html` into `folder`, whole or not at all; stations: those of the diagnosis, with their balances. replays: of
     the compiled files, before and after."""
-    folder.mkdir(parents=True, exist_ok=True)
-    target, sibling = folder / "report.html", folder / ".report.html.part"
-    sibling.write_bytes(render(findings, stations, replays, title))
-    sibling.replace(target)
+    target = folder / FILES[1]
+    with new_file(target) as staging:
+        staging.write_bytes(render(findings, stations, replays, title))
     return target
 
 
@@ -40,7 +42,7 @@ def render(findings: Findings, stations: Sequence[Any], replays: Sequence[Replay
     """The page as UTF-8."""
     count = len(findings.findings)
     tiles = [(findings.verdict, "verdict"), (str(count), "finding" if count == 1 else "findings")]
-    if "before" in findings.lack_of_fit:
+    if findings.channels and "before" in findings.lack_of_fit:  # without a channel nothing was balanced
         tiles += [(f"{findings.lack_of_fit[k]:.2f}", f"residual over noise variance, {k}") for k in ("before", "after")]
     sections = [Section("findings", "Findings", _lead(findings), tuple(_ranked(findings)))]
     sections += [_replayed(replay, f"replay-{i}") for i, replay in enumerate(replays)]
@@ -51,9 +53,10 @@ def render(findings: Findings, stations: Sequence[Any], replays: Sequence[Replay
     calm = [s for s, own in zip(stations, apart, strict=True) if not own]
     if calm:
         sections.append(Section("consistent", "Consistent channels", "Nothing is missing here; residual of the declared model, mean over strokes.",
-                                (figures(*(_first_map(s) for s in calm)), KEY)))
-    sections.append(Section("channels", "Every channel", "p: probability of residuals as structured as these if nothing is missing.",
-                            (_channels(findings),)))
+                                (figures(*(_first_map(s) for s in calm)), _key())))
+    if findings.channels:
+        sections.append(Section("channels", "Every channel", "p: probability of residuals as structured as these if nothing is missing.",
+                                (_channels(findings),)))
     return page(f"Diagnosis of {title}", VERDICTS[findings.verdict], tiles, sections)
 
 
@@ -61,7 +64,7 @@ def _lead(findings: Findings) -> str:
     if findings.findings:
         return findings.findings[0].statement
     if findings.unexplained:
-        return "; ".join(f"{u['where']['finger']} {u['where']['signal']}: {u['shape']}" for u in findings.unexplained) + "."
+        return "; ".join(f"{_place(u['where'])}: {u['shape']}" for u in findings.unexplained) + "."
     return "No finding."
 
 
@@ -71,12 +74,14 @@ def _ranked(findings: Findings) -> list[Any]:
     rows = []
     for f in findings.findings:
         unit, scale = _unit(f.fit.get("unit"))
-        rows.append([_words(f.effect), str(f.where.get("finger") or "all"), unit, f"{f.where.get('share_of_mismatch', 0):.0%}", f"{f.probability:.3f}",
+        place, share = str(f.where.get("finger") or f.where.get("actuator") or "all"), f"{f.where.get('share_of_mismatch', 0):.0%}"
+        rows.append([_words(f.effect), place, unit, share, f"{f.probability:.3f}",
                      *(_number(f.fit.get(k), scale) for k in ("before", "after", "noise_floor")), _interval(f.fit.get("ci95_reduction"), scale)])
     columns = ("effect", "finger", "unit", "share", "probability", "error before", "after", "noise", "95 % of the reduction")
     out = [table(columns, rows, text_columns=3), note("; ".join(sorted({_proof(f) for f in findings.findings})) + ".")]
     held = []
-    for effect, name, value in ((f.effect, *item) for f in findings.findings for item in f.parameters.items()):
+    sized = ((f.effect, *item) for f in findings.findings for item in f.parameters.items() if item[0] not in DISCRETE)
+    for effect, name, value in sized:
         unit, scale = _unit(value.get("unit"))
         held.append([_words(effect), str(name), unit, _number(value["value"], scale), _interval(value.get("ci95"), scale)])
     if held:
@@ -87,7 +92,7 @@ def _ranked(findings: Findings) -> list[Any]:
     more = [f"Not told apart from {', '.join(_words(m) for m in f.members if m != f.effect)}: {_words(f.effect)}."
             for f in findings.findings if len(f.members) > 1]
     more += [f"Next experiment: {findings.next_experiment}."] if findings.next_experiment else []
-    more += [f"Unexplained: {u['where']['finger']} {u['where']['signal']}, {u['shape']}." for u in findings.unexplained]
+    more += [f"Unexplained: {_place(u['where'])}, {u['shape']}." for u in findings.unexplained]
     out = [listing(said), *out] if said else out
     return [*out, listing([*more, *findings.notes])] if more or findings.notes else out
 
@@ -130,25 +135,27 @@ def _interval(value: Any, scale: float = 1.0) -> str:
 
 
 def _channels(findings: Findings) -> Any:
-    rows = [[str(c["finger"]), str(c["joint"] or ""), str(c["signal"]), ", ".join(c["effects"]).replace("_", " "),
+    rows = [[str(c["finger"] or ""), str(c["joint"] or ""), str(c["signal"]), ", ".join(c["effects"]).replace("_", " "),
              f"{c['p_before']:.2g}", f"{c['p_after']:.2g}"] for c in findings.channels]
     return table(("finger", "joint", "signal", "named", "p before", "p after"), rows, text_columns=4)
 
 
-KEY = key(("c1", "position rises"), ("c2", "position falls"), ("muted", "noise of one sample"))
+def _key() -> Any:
+    """What the colours mean; made anew for each section, for an element stands in one place only."""
+    return key(("c1", "position rises"), ("c2", "position falls"), ("muted", "noise of one sample"))
 
 
 def _replayed(replay: Replay, name: str) -> Section:
     """The compiled files' residual map before and after, on recordings that took no part."""
     fit = replay.finding.fit
-    place = " ".join(str(replay.finding.where[k]) for k in ("finger", "joint") if replay.finding.where.get(k))
+    place = _place({**replay.finding.where, "signal": None})
     at, axis = _axis(replay.finding.effect, replay.finding.where.get("region"), replay.position, replay.velocity, replay.position_unit)
     largest = _largest(at, replay.velocity, replay.before)
     drawn = [(f"{label} [{replay.unit}]", _map(at, replay.velocity, residual, replay.noise, axis, replay.unit, largest))
              for label, residual in (("model as it was: recorded minus replayed", replay.before), ("model with its effects", replay.after))]
     said = (f"{_words(replay.finding.effect)}, {place}: {fit['before']:.4g} to {fit['after']:.4g} {replay.unit}, noise {fit['noise_floor']:.4g}, "
             f"replayed by MuJoCo on {', '.join(replay.trials)}.")
-    return Section(name, f"Replay: {place} {_words(replay.finding.effect)}", said, (figures(*drawn), KEY))
+    return Section(name, f"Replay: {place} {_words(replay.finding.effect)}", said, (figures(*drawn), _key()))
 
 
 def _maps(station: Any) -> tuple[Array, Array, list[Array], float, str, str]:
@@ -160,13 +167,14 @@ def _maps(station: Any) -> tuple[Array, Array, list[Array], float, str, str]:
             balance.states[0].position_unit, balance.states[0].effort_unit)
 
 
-def _place(station: Any) -> str:
-    return " ".join(x for x in (station.finger, station.joint, station.signal) if x)
+def _place(where: Mapping[str, Any]) -> str:
+    """Finger (or its motor), joint and signal, as far as they are known."""
+    return " ".join(str(x) for x in (where.get("finger") or where.get("actuator"), where.get("joint"), where.get("signal")) if x)
 
 
 def _first_map(station: Any) -> tuple[str, bytes]:
     position, velocity, residuals, sigma, unit, effort = _maps(station)
-    return f"{_place(station)} [{effort}]", _map(position, velocity, residuals[0], sigma, f"position [{unit}]", effort)
+    return f"{_place(vars(station))} [{effort}]", _map(position, velocity, residuals[0], sigma, f"position [{unit}]", effort)
 
 
 def _where(where: Mapping[str, Any]) -> tuple[Any, ...]:
@@ -185,8 +193,8 @@ def _station(station: Any, name: str, unexplained: str) -> Section:
              for label, residual in zip(("declared model, fitted: residual", "with what was named"), residuals, strict=True)]
     drawn += [(f"{_words(f.term.effect.name)}: its part through the data less the rest [{effort}]", _curve(station.naming, f, unit, effort))
               for f in stands[:3]]
-    said = f"{_place(station)}: unexplained, {unexplained}" if unexplained and not station.missing else station.line().replace("_", " ")
-    return Section(name, _place(station), said + ".", (figures(*drawn), KEY))
+    said = f"{_place(vars(station))}: unexplained, {unexplained}" if unexplained and not station.missing else station.line().replace("_", " ")
+    return Section(name, _place(vars(station)), said + ".", (figures(*drawn), _key()))
 
 
 def _axis(effect: str, region: Mapping[str, Any] | None, position: Array, velocity: Array, unit: str) -> tuple[Array, str]:
@@ -202,16 +210,28 @@ def _largest(at: Array, velocity: Array, residual: Array) -> float:
 
 
 def _means(at: Array, velocity: Array, residual: Array) -> list[tuple[Array, Array]]:
-    """Middle and mean residual (k,) of cells of equal occupation along `at` (n,), for rising and for falling positions."""
-    edges = np.quantile(at, np.linspace(0, 1, CELLS + 1))
+    """Middle and mean residual (k,) of cells along `at` (n,), for rising and for falling positions."""
+    edges = _edges(at)
+    cells = len(edges) - 1
     out = []
     for way in (velocity > 0, velocity <= 0):
-        cell = np.clip(np.searchsorted(edges, at[way], side="right") - 1, 0, CELLS - 1)
-        count = np.bincount(cell, minlength=CELLS)
-        mean = np.bincount(cell, residual[way], minlength=CELLS) / np.maximum(count, 1)
+        cell = np.clip(np.searchsorted(edges, at[way], side="right") - 1, 0, cells - 1)
+        count = np.bincount(cell, minlength=cells)
+        mean = np.bincount(cell, residual[way], minlength=cells) / np.maximum(count, 1)
         seen = count > 2
         out.append(((0.5 * (edges[1:] + edges[:-1]))[seen], mean[seen]))
     return [o for o in out if len(o[0])]
+
+
+def _edges(at: Array) -> Array:
+    """Edges (k,) of cells of equal occupation, or wider where many samples share a value: moves at one speed are one cell, not a zigzag."""
+    quantiles = np.quantile(at, np.linspace(0, 1, CELLS + 1))
+    least = 0.5 * (quantiles[-1] - quantiles[0]) / CELLS
+    edges = [quantiles[0]]
+    for edge in quantiles[1:]:
+        if edge - edges[-1] >= least:
+            edges.append(edge)
+    return np.array([*edges[: max(len(edges) - 1, 1)], quantiles[-1]])
 
 
 def _map(at: Array, velocity: Array, residual: Array, sigma: float, axis: str, effort: str, largest: float = 0.0) -> bytes:
@@ -234,9 +254,7 @@ def _curve(naming: Any, named: Any, unit: str, effort: str) -> bytes:
     balance, fit = naming.balance, naming.fit
     rest = balance.fit(tuple(t for t in fit.terms if t is not named.term))
     use = np.flatnonzero(balance.steady)
-    region = named.term.effect.region(balance.states, named.term.shape) or {}
-    speed = "speed" in region or named.term.effect.name in BY_SPEED
-    at = balance.gather(lambda s: s.velocity if speed else s.position)
+    at, axis = _along(balance, named.term, unit)
     shown = use[:: max(1, len(use) // POINTS)]
     way = balance.gather(lambda s: s.velocity) > 0
     part = fit.prediction - rest.prediction
@@ -245,6 +263,15 @@ def _curve(naming: Any, named: Any, unit: str, effort: str) -> bytes:
         for colour, mine in ((SERIES[0], way), (SERIES[1], ~way)):
             index = shown[mine[shown]]
             d.axes.plot(at[index], part[index], ".", color=colour, markersize=3)
-        d.axes.set_xlabel(f"velocity [{unit}/s]" if speed else f"position [{unit}]")
+        d.axes.set_xlabel(axis)
         d.axes.set_ylabel(f"[{effort}]")
     return d.svg
+
+
+def _along(balance: Any, term: Any, unit: str) -> tuple[Array, str]:
+    """The variable (n,) in which an effect acts, with its sign, and its name."""
+    if term.effect.name in BY_TIME:
+        return balance.gather(lambda s: s.elapsed_s), "time [s]"
+    if "speed" in (term.effect.region(balance.states, term.shape) or {}) or term.effect.name in BY_SPEED:
+        return balance.gather(lambda s: s.velocity), f"velocity [{unit}/s]"
+    return balance.gather(lambda s: s.position), f"position [{unit}]"

@@ -23,6 +23,8 @@ from numpy.typing import NDArray
 
 from .law import Law
 
+UNSEEN_DELAY, SURE_DELAY = 0.75, 4.0  # sample intervals, and standard deviations, from which a delay is told
+
 Array = NDArray[np.float64]
 Amplitude = tuple[str, str, float, float]
 
@@ -249,6 +251,14 @@ def figure(value: float) -> str:
 def sample_interval(states: Sequence[DriveState]) -> float:
     """Median time [s] between neighbouring samples of all states."""
     return float(np.median(np.concatenate([np.diff(s.time_s) for s in states])))
+
+
+def least_delay(states: Sequence[DriveState]) -> float:
+    """Least delay [s] of a channel that these recordings tell: three quarters of a sample interval, or what is known better of the current's
+    lateness ("late" in `extra`: value and standard deviation)."""
+    late = states[0].extra.get("late")
+    least = UNSEEN_DELAY * sample_interval(states)
+    return least if late is None else min(least, SURE_DELAY * float(late[1]))
 
 
 def position_range(states: tuple[DriveState, ...]) -> tuple[float, float]:

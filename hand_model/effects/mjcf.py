@@ -38,8 +38,9 @@ def lugre_friction(root: Any, where: Mapping[str, Any], parameters: Mapping[str,
     """Give the motor joint the LuGre friction of a passive `dcmotor`, in place of its `frictionloss` or of such an element that is
     there; its path, or None without friction.
 
-    parameters: bristle_length (give before sliding) and stribeck_speed in the joint's unit; bristle_time [s]: damping over stiffness; coulomb_ratio and static_ratio (sliding
-    and static friction over the Coulomb friction that is there). What is not given stays, or is a short bristle without excess.
+    parameters: bristle_length (give before sliding) and stribeck_speed in the joint's unit; bristle_time [s]: damping over stiffness;
+    coulomb_ratio and static_ratio (sliding and static friction over the Coulomb friction that is there). What is not given stays, or is a
+    short bristle without excess.
     """
     found = motor_joint(root, where)
     if found is None:

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rig.findings import NOT_TAKEN, CouplingResidual, Finding, RigFindings
+from ..output import new_file
+from ..rig.findings import NOT_TAKEN, CouplingResidual, RigFindings
 from ..rig.inverse import EffortResidual, effort_residuals
 from ..rig.model import RigModel, load_rig
 from ..rig.replay import simulate_trial
 from ..session import Session
-from .page import Element, Section, figures, key, listing, note, page, table
+from .page import Cell, Element, Section, figures, key, listing, note, page, table
 from .pictures import POINTS
 from .style import INK, SERIES, drawing
 from .words import count
@@ -32,10 +33,8 @@ Pair = tuple[EffortResidual, EffortResidual]
 def write_rig_findings(session: Session, findings: RigFindings, folder: str | Path) -> Path:
     """Write `report.html` beside the findings, whole or not at all; returns its path."""
     target = Path(folder) / "report.html"
-    target.parent.mkdir(parents=True, exist_ok=True)
-    part = target.with_name(".report.html.part")
-    part.write_bytes(rig_findings_page(session, findings))
-    part.replace(target)
+    with new_file(target) as staging:
+        staging.write_bytes(rig_findings_page(session, findings))
     return target
 
 
@@ -51,7 +50,7 @@ def rig_findings_page(session: Session, findings: RigFindings) -> bytes:
         sections += _motion(rig, findings)
     if findings.couplings:
         sections.append(_couplings(findings.couplings))
-    sections.append(Section("next", "Next", f"{findings.next_experiment or 'Nothing more is asked for.'}", _rest(findings)))
+    sections.append(Section("next", "Next", (findings.next_experiment or "Nothing more is asked for.").replace("_", " "), _rest(findings)))
     lead = (f"{session.path.name}: the declared model, fitted, against {count(len(rig.trials), 'trial')}; what is named below "
             "was chosen on the training trials and measured on the others, by MuJoCo on the written files.")  # fmt: skip
     return page(session.hand or session.path.name, lead, _tiles(findings), sections)
@@ -78,11 +77,11 @@ def _conclusion(findings: RigFindings) -> str:
 def _findings(findings: RigFindings) -> list[Element]:
     rows = []
     for f in findings.findings:
-        known = "before" in f.fit
+        known = f.fit["before"] is not None
         rows.append([f.where.get("joint") or "", f.effect.replace("_", " "),
-                     ", ".join(m.replace("_", " ") for m in f.members if m != f.effect) or "–", f"{f.probability:.2f}",
+                     Cell(", ".join(m.replace("_", " ") for m in f.members if m != f.effect) or "–", "wrap"), f"{f.probability:.2f}",
                      f"{f.fit['before']:.4g}" if known else "–", f"{f.fit['after']:.4g}" if known else "–",
-                     f.fit.get("unit", "")])  # fmt: skip
+                     f.fit.get("unit") or ""])  # fmt: skip
     head = ("joint", "effect", "not told from", "probability", "held-out error before", "after", "unit")
     parts = [table(head, rows, "By share of the mismatch; each was measured beside those found before it", text_columns=3)] if rows else []
     return [*parts, listing([f.statement for f in findings.findings])] if rows else []
@@ -141,30 +140,33 @@ def _field(q: Array, v: Array, error: Array, limit: float, across: str, up: str)
 
 def _effects(rig: RigModel, findings: RigFindings, pairs: Sequence[Pair]) -> Section:
     drawn = []
-    for f in [f for f in findings.findings if f.fit.get("metric") == "effort_rmse"][:PICTURES]:
-        mine = [p for p in pairs if p[0].joint == f.where["joint"]]
+    acting: dict[tuple[str, str], list[str]] = {}  # joint and variable -> effects that act through it: one picture
+    for f in (f for f in findings.findings if f.fit.get("metric") == "effort_rmse"):
+        acting.setdefault((f.where["joint"], _variable(f.effect)), []).append(f.effect.replace("_", " "))
+    for (joint, variable), effects in list(acting.items())[:PICTURES]:
+        mine = [p for p in pairs if p[0].joint == joint]
         held = [p for p in mine if p[0].validate] or mine
         if held:
-            drawn.append((f"{f.where['joint']}: {f.effect.replace('_', ' ')}", _through(f, held, rig)))
+            drawn.append((f"{joint}: {', '.join(dict.fromkeys(effects))}", _through(joint, variable, held, rig)))
     words = "Residual effort on held-out trials against what each effect acts through, mean and middle 80 % in bins."
     body = (key(("c1", "declared model"), ("ink", "with what was found")), figures(*drawn)) if drawn else ()
     return Section("effects", "Effects through the data", words if drawn else "No effect to show.", body)
 
 
-def _through(finding: Finding, held: Sequence[Pair], rig: RigModel) -> bytes:
-    joint, effect = finding.where["joint"], finding.effect
+def _variable(effect: str) -> str:
+    """What an effect acts through."""
+    return "position" if effect in BY_POSITION else "time" if effect in BY_TIME else "load" if effect == "load_dependent_friction" else "velocity"
+
+
+def _through(joint: str, variable: str, held: Sequence[Pair], rig: RigModel) -> bytes:
+    """Residual before and after against the variable."""
     q, v, before = (np.concatenate(x) for x in zip(*[_states(a) for a, _ in held], strict=True))
     after = np.concatenate([b.error for _, b in held])
     time_s = np.concatenate([a.row.time_s[:: a.row.step][a.row.moving] for a, _ in held])
     load = np.concatenate([a.expected[a.row.moving] for a, _ in held])
-    if effect in BY_POSITION:
-        x, label = q, f"position [{rig.unit(joint)}]"
-    elif effect in BY_TIME:
-        x, label = time_s, "time [s]"
-    elif effect == "load_dependent_friction":
-        x, label = load * np.sign(v), f"declared effort along the motion [{rig.effort_unit(joint)}]"
-    else:
-        x, label = v, f"velocity [{rig.unit(joint)}/s]"
+    x, label = {"position": (q, f"position [{rig.unit(joint)}]"), "time": (time_s, "time [s]"),
+                "load": (load * np.sign(v), f"declared effort along the motion [{rig.effort_unit(joint)}]"),
+                "velocity": (v, f"velocity [{rig.unit(joint)}/s]")}[variable]  # fmt: skip
     return _sides(x, label, before, after, f"residual [{rig.effort_unit(joint)}]")
 
 
@@ -181,8 +183,13 @@ def _sides(x: Array, label: str, before: Array, after: Array, up: str) -> bytes:
 
 
 def _binned(x: Array, y: Array) -> tuple[Array, Array, Array, Array]:
-    """Centres of bins with as many samples each, tenth percentile, mean and ninetieth of y."""
-    parts = [p for p in np.array_split(np.argsort(x), BINS) if len(p)]
+    """Centres of bins with as many samples each, or more where many share a value; tenth percentile, mean and ninetieth of y."""
+    parts: list[Array] = []
+    for part in (p for p in np.array_split(np.argsort(x), BINS) if len(p)):
+        if parts and x[part].mean() - x[parts[-1]].mean() < 0.5 * np.ptp(x) / BINS:
+            parts[-1] = np.concatenate([parts[-1], part])
+        else:
+            parts.append(part)
     low, high = (np.array([np.percentile(y[p], k) for p in parts]) for k in (10, 90))
     return np.array([x[p].mean() for p in parts]), low, np.array([y[p].mean() for p in parts]), high
 
@@ -195,12 +202,16 @@ def _validation(rig: RigModel, findings: RigFindings, pairs: Sequence[Pair]) -> 
     for a, b in list({a.joint: (a, b) for a, b in held}.values())[:PICTURES]:
         grid = a.row.time_s[:: a.row.step]
         keep = slice(None, None, max(1, len(grid) // POINTS))
-        with drawing() as d:
+        with drawing(height=3.3, panels=(2.2, 1)) as d:
             d.axes.plot(grid[keep], a.row.effort[keep], color=SERIES[1], linewidth=1.6)
-            d.axes.plot(grid[keep], a.expected[keep], color=SERIES[0], linewidth=0.9)
-            d.axes.plot(grid[keep], b.expected[keep], color=INK, linewidth=0.9)
-            d.axes.set_xlabel("time [s]")
+            for side, colour in ((a, SERIES[0]), (b, INK)):
+                d.axes.plot(grid[keep], side.expected[keep], color=colour, linewidth=0.9)
+                left = np.full(len(grid), np.nan)  # at rest friction is unknown: no error there
+                left[a.row.moving] = side.error
+                d.panels[1].plot(grid[keep], left[keep], color=colour, linewidth=0.9)
             d.axes.set_ylabel(f"effort [{rig.effort_unit(a.joint)}]")
+            d.panels[1].set_ylabel("left")
+            d.panels[1].set_xlabel("time [s]")
         drawn.append((f"{a.trial}, {a.joint}", d.svg))
     head = ("trial", "joint", "declared", "with what was found", "ratio", "unit")
     words = f"Effort by inverse dynamics of the two files on {count(len({a.trial for a, _ in held}), 'trial')} held out."
@@ -289,17 +300,17 @@ def _motion(rig: RigModel, findings: RigFindings) -> list[Section]:
         key(("c2", "recorded"), ("c1", "declared model"), ("ink", "with what was found")), figures(*drawn[:PICTURES])))]  # fmt: skip
 
 
-def _place(key: str) -> str:
-    """effect@joint in words."""
-    effect, _, joint = key.partition("@")
-    return effect.replace("_", " ") + (f" at {joint}" if joint else "")
+def _tried(rejected: Mapping[str, str]) -> str:
+    """Effect and variant in words."""
+    variant = rejected.get("variant")
+    return rejected["effect"].replace("_", " ") + (f" ({variant})" if variant else "")
 
 
 def _rest(findings: RigFindings) -> tuple[Element, ...]:
     said = [f"{u['where']['joint'] or 'the joint'}: {100 * u['share_of_mismatch']:.0f} % of the mismatch stays unexplained."
             for u in findings.unexplained]  # fmt: skip
-    withdrawn = [f"{_place(r['effect'])}: {r['reason']}." for r in findings.rejected if r["reason"] != NOT_TAKEN]
-    tried = sorted({r["effect"].split("@")[0].replace("_", " ") for r in findings.rejected if r["reason"] == NOT_TAKEN})
+    withdrawn = [f"{_tried(r)}{' at ' + r['where'] if 'where' in r else ''}: {r['reason']}." for r in findings.rejected if r["reason"] != NOT_TAKEN]
+    tried = sorted({_tried(r) for r in findings.rejected if r["reason"] == NOT_TAKEN})
     parts = [listing(said)] if said else []
     if withdrawn:
         parts += [note("Chosen on the training recordings, then withdrawn:"), listing(withdrawn)]

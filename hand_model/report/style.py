@@ -18,8 +18,9 @@ _VARIABLES = {INK: "--ink", MUTED: "--muted", LINE: "--line", PAPER: "--paper"} 
 }
 # Inches of a small picture; on a phone it is as wide as the screen.
 WIDTH, HEIGHT = 4.2, 2.7
-# Inches left, right, below (with and without a name of the axis) and above the panels.
-MARGINS = (0.52, 0.08, 0.42, 0.24, 0.08)
+# Inches left, right, below (with and without a name of the axis) and above the panels: "-15000" and the axis' name beside each
+# other on the left, half a "15000" on the right.
+MARGINS = (0.68, 0.18, 0.42, 0.24, 0.08)
 
 _SETTINGS: dict[str, Any] = {
     "svg.fonttype": "none",
@@ -79,7 +80,7 @@ def drawing(width: float = WIDTH, height: float = HEIGHT, panels: Sequence[float
         grid = figure.subplots(len(panels), sharex=True, squeeze=False, height_ratios=list(panels))
         done = Drawing(figure, tuple(grid[:, 0]))
         yield done
-        # Fixed margins: pictures side by side line up,.
+        # Fixed margins: pictures side by side line up.
         left, right, named, unnamed, top = MARGINS
         bottom = named if done.panels[-1].get_xlabel() else unnamed
         figure.subplots_adjust(left / width, bottom / height, 1 - right / width, 1 - top / height, hspace=0.08)

@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..background import single_threaded
-from ..errors import SessionError
+from ..errors import HandModelError, SessionError
+from ..output import refuse_file
 from ..session import Session
 from .channels import ChannelIssue, check_balance, check_channels
 from .couplings import coupling_terms, with_couplings
 from .declared import DeclaredFit, fit_declared
-from .findings import NOT_TAKEN, CouplingResidual, Finding, RigFindings
+from .findings import NOT_TAKEN, CouplingResidual, Finding, RigFindings, whereabouts
 from .horizon import open_loop
 from .model import RigModel, load_rig
 from .name.candidates import Candidate, candidates
@@ -30,23 +31,30 @@ from .states import fill_gaps
 from .swing.build import can_swing
 from .swing.diagnose import diagnose_swing
 from .transmission import angle_residual
-from .words import shares
+from .words import rejection, shares
 
 Array = NDArray[np.float64]
 PROBABILITY = (
     "of an effect: share of resampled blocks of the training recordings, each left out of the fit, on which it lowers the "
     "error against nothing; of an alternative: share on which it is the best of all"
 )
+UNMEASURED = {"metric": None, "unit": None, "before": None, "after": None, "noise_floor": None, "ci95_reduction": None, "held_out": [],
+              "engine": None}  # fmt: skip
 TIED_TO_POSITION = frozenset({"nonlinear_spring", "end_stop_contact", "detent_load", "torque_ripple"})
 
 
 @single_threaded()
-def diagnose_rig(session: Session, output: str | Path | None = None,
-                 progress: Callable[[str], None] | None = None) -> RigFindings:  # fmt: skip
-    """Diagnose a rig session; with `output`, also write findings.json and the improved rig.xml there.
+def diagnose_rig(session: Session, output: str | Path | None = None, progress: Callable[[str], None] | None = None,
+                 model: bool = True) -> RigFindings:  # fmt: skip
+    """Diagnose a rig session; with `output`, also write findings.json there and, with `model`, the improved rig.xml.
 
-    Raises SessionError or DescriptionError where the session or its MJCF cannot be read.
+    Raises SessionError or DescriptionError where the session or its MJCF cannot be read, HandModelError for an output that is a file
+    or the session's own folder, whose model would be lost.
     """
+    if output is not None:
+        refuse_file(output)
+        if Path(output).resolve() == session.path.resolve():
+            raise HandModelError(f"{output}: is the session itself, whose model would be written over; name another folder")
     say = progress or (lambda _: None)
     rig = with_couplings(load_rig(session))
     if not rig.select(validate=False):
@@ -79,12 +87,12 @@ def diagnose_rig(session: Session, output: str | Path | None = None,
         session=rig.name,
         verdict=_verdict(found, lack),
         lack_of_fit=lack,
-        protocol={"repeats": len(rig.select(False)), "rate_hz": _rate(rig), "held_out": [t.name for t in rig.select(True)],
+        protocol={"repeats": len(rig.select(False)), "rate_hz": _rate(rig), "speeds": None, "isolable": [], "held_out": [t.name for t in rig.select(True)],
                   "held_out_repeats_the_training_trajectory": again,
                   "probability": PROBABILITY,
                   "not_isolable": [list(f.members) for f in found if len(f.members) > 1]},
         findings=tuple(sorted(found, key=_rank)),
-        rejected=tuple(rejected),
+        rejected=tuple(rejection(r["effect"], r["reason"]) for r in rejected),
         unexplained=unexplained,
         next_experiment=_next(found, issues, again),
         declared=declared,
@@ -93,7 +101,7 @@ def diagnose_rig(session: Session, output: str | Path | None = None,
         couplings=tuple(angles),
     )  # fmt: skip
     if output is not None:
-        findings.write(output)
+        findings.write(output, model)
     return findings
 
 
@@ -140,8 +148,8 @@ def _channel_finding(issue: ChannelIssue) -> Finding:
         "it is refused, nothing is fitted to it" if issue.refuse else "samples there say only that it is at least that"
     )
     return Finding(
-        issue.kind, (issue.kind,), 1.0, (), {"joint": issue.joint, "signal": issue.channel, "trials": list(issue.trials)},
-        f"{issue.reason}: {action}.", {"share_left": {"value": issue.share, "unit": "1"}}, {}, None,
+        issue.kind, (issue.kind,), 1.0, (), whereabouts(issue.joint, None, issue.channel, issue.trials, 1.0 if issue.refuse else 0.0),
+        f"{issue.reason}: {action}.", {"share_left": {"value": issue.share, "unit": "1"}}, UNMEASURED, None,
         "channel refused" if issue.refuse else "channel clipped",
     )  # fmt: skip
 
@@ -207,8 +215,7 @@ def _off_axis(bench: Bench, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple[
         return None
     moved = {c.label: {"value": float(v), "unit": "kg m"} for c, v in zip(freed.columns, after)
              if c.kind == "inertial" and c.value == 0}  # fmt: skip
-    where = {"finger": None, "joint": best, "actuator": None, "signal": "effort", "marker": None,
-             "trials": proofs[best]["held_out"], "share_of_mismatch": proofs[best]["before"] ** 2 - proofs[best]["after"] ** 2}  # fmt: skip
+    where = whereabouts(best, None, "effort", proofs[best]["held_out"], proofs[best]["before"] ** 2 - proofs[best]["after"] ** 2)
     words = (
         f"Centres of mass lie off the axes on which they are declared: held-out effort error falls to "
         f"{100 * ratio:.0f} % over all joints (most at {best}: {proofs[best]['before']:.4g} to {proofs[best]['after']:.4g})."
@@ -239,14 +246,9 @@ def _diagnose_coupling(
     found, kept = proved(Bench(rig, mujoco=False), fit, list(zip(steps, taken, strict=True)), [], rejected)
     named = []
     for f in found:
-        proof = {**f.fit, "metric": "angle_rmse", "unit": rig.unit(coupling.dependent)}
         where = {**f.where, "actuator": None, "signal": "position", "coupling": coupling.name}
-        words = f.statement.replace("effort rmse", "angle rmse").replace(
-            rig.effort_unit(coupling.dependent), proof["unit"]
-        )
-        if moved:
-            words += " The zero between the two encoders differs between recordings and was taken out of each."
-        named.append(replace(f, fit=proof, where=where, statement=words))
+        zero = " The zero between the two encoders differs between recordings and was taken out of each." if moved else ""
+        named.append(replace(f, where=where, statement=f.statement + zero))
     declared = {f.where["joint"]: f.fit for f in reversed(named)}  # the first was held to nothing else
     return shares(named, declared), rejected, angle_residual(rig, coupling, fit, kept)
 
@@ -270,7 +272,8 @@ def _unexplained(lack: Mapping[str, Any], found: Sequence[Finding]) -> tuple[Map
         floor = p.get("noise_floor") or 0.0
         excess, whole = p["after"] ** 2 - floor**2, p["before"] ** 2 - floor**2
         if whole > 0 and excess > 0.02 * whole and p["after"] > FITS * floor:
-            out.append({"where": {"joint": joint or None}, "share_of_mismatch": float(min(excess / whole, 1.0)),
+            signal = "position" if lack.get("metric") == "position_rmse" else "effort"
+            out.append({"where": {"finger": None, "joint": joint or None, "signal": signal}, "share_of_mismatch": float(min(excess / whole, 1.0)),
                         "shape": "what no effect known here lowers on recordings held out"})  # fmt: skip
     return tuple(out)
 
@@ -282,7 +285,7 @@ def _next(found: Sequence[Finding], issues: Sequence[ChannelIssue], again: bool)
         return "record another trajectory: the held-out recording repeats the fitted one, so what is tied to time or place passes"
     for f in found:
         if len(f.members) > 1:
-            return f"repeat the motion at other speeds and loads: that separates {' from '.join(f.members)}"
+            return f"repeat the motion at other speeds and loads: that separates {', '.join(f.members[:-1])} and {f.members[-1]}"
     return "repeat one trial three times unchanged: that shows the noise floor"
 
 

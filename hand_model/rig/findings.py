@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -10,13 +10,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..diagnose.findings import Finding, Findings
+from ..diagnose.findings import FILES, Finding, Findings
+from ..output import new_file
+from .model import Drive
 
 __all__ = ["CouplingResidual", "Finding", "Findings", "RigFindings"]
 Array = NDArray[np.float64]
 NOT_TAKEN = "error on training recordings left out of the fit does not fall enough"
 NOT_TOLD = "interval of its size holds zero"
 NOT_BORNE_OUT = "error on validation recordings does not fall enough"
+
+
+def whereabouts(joint: str | None, drive: Drive | None, signal: str, trials: Sequence[str], share: float) -> dict[str, Any]:
+    """Where a finding of a rig is; share: of the mismatch, squared [effort or position unit] until `shares` divides it."""
+    return {"finger": None, "joint": joint, "actuator": drive.name if drive else None, "signal": signal, "marker": None,
+            "trials": list(trials), "region": None, "share_of_mismatch": share}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -54,13 +62,16 @@ class RigFindings(Findings):
         """The whole as the format has it, with the session's name and the declared parameters."""
         return {**super().to_dict(), "session": self.session, "declared": dict(self.declared)}
 
-    def write(self, folder: str | Path) -> None:
-        """Write rig.xml (improved), rig_declared.xml (fitted, nothing added) and findings.json, each whole or not at all."""
+    def write(self, folder: str | Path, model: bool = True) -> None:
+        """Write findings.json and, with `model`, rig.xml (improved) and rig_declared.xml (fitted, nothing added), each whole or not at
+        all; without, those of an earlier run go.
+        """
         path = Path(folder)
-        path.mkdir(parents=True, exist_ok=True)
+        earlier = (path / FILES[0]).is_file()
         for name, content in (("rig.xml", self.xml), ("rig_declared.xml", self.declared_xml)):
-            if content:
-                part = path / f".{name}.part"
-                part.write_bytes(content)
-                part.replace(path / name)
+            if content and model:
+                with new_file(path / name) as staging:
+                    staging.write_bytes(content)
+            elif earlier:
+                (path / name).unlink(missing_ok=True)
         self.save(path)

@@ -128,6 +128,8 @@ def load_rig(session: Session, xml: bytes | None = None) -> RigModel:
     joints = tuple(model.joint(j).name for j in range(model.njnt))
     drives = _drives(model, mujoco)
     quantity = {c: _parse(session, c, q, joints, tuple(d.name for d in drives)) for c, q in session.rig.signals.items()}
+    if all(attribute != "position" for _, _, attribute in quantity.values()):
+        raise SessionError(f'{session.path}: [signals] names no position; a log column with "joint:NAME:position" is needed')
     chosen = [t for t in session.trials if t.kind == "motion"]
     if not chosen:
         raise SessionError(f'{session.path}: a rig needs trials of kind "motion"; there is none')
@@ -203,6 +205,9 @@ def _map_trial(trial: Trial, quantity: Mapping[str, tuple], drives: tuple[Drive,
         values = log.columns[column][keep]
         if np.isfinite(values).any():
             maps[attribute][name if kind == "joint" else by_drive[name].joint] = values
+    if not maps["position"]:
+        named = ", ".join(f'"{c}"' for c, (_, _, attribute) in quantity.items() if attribute == "position")
+        raise SessionError(f"{log.path}: no sample of a position in {named}; a log with one is needed")
     gears = {k.split(":")[1]: np.atleast_1d(v)[0] for k, v in trial.set.items() if k.endswith(":gear")}
     live = tuple(d.joint for d in drives if gears.get(d.name, d.gear) != 0)
     effort, voltage = {}, {}

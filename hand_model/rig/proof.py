@@ -28,8 +28,8 @@ PARTS = 24  # blocks that the held-out recordings of a joint are cut into
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """Measures fits. mujoco: by inverse dynamics of the file that holds them (each file once); else by the columns. floor: joint -> noise in
-    its residual, where that is known; moved: what `open_loop` keeps of files."""
+    """Measures fits. mujoco: efforts by inverse dynamics of the file that holds them (each file once); else angles of a coupling by the
+    columns. floor: joint -> noise in its residual, where that is known; moved: what `open_loop` keeps of files."""
 
     rig: RigModel
     mujoco: bool = True
@@ -75,7 +75,8 @@ class Bench:
         rms = np.sqrt(squares[:, draw].sum(2) / count[draw].sum(1))
         fall = np.percentile(rms[0] - rms[1], [2.5, 97.5])
         whole = np.sqrt(squares.sum(1) / count.sum())
-        return {"metric": "effort_rmse", "unit": self.rig.effort_unit(joint), "before": float(whole[0]),
+        metric, unit = ("effort_rmse", self.rig.effort_unit(joint)) if self.mujoco else ("angle_rmse", self.rig.unit(joint))
+        return {"metric": metric, "unit": unit, "before": float(whole[0]),
                 "after": float(whole[1]), "noise_floor": self._floor(before[0], joint),
                 "ci95_reduction": [float(fall[0]), float(fall[1])], "held_out": [t for t, _ in a],
                 "engine": self.engine}  # fmt: skip

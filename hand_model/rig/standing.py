@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .declared import DeclaredFit
-from .findings import NOT_BORNE_OUT, Finding
+from .findings import NOT_BORNE_OUT, Finding, whereabouts
 from .horizon import NO_LAW, open_loop
 from .model import RigModel
 from .name.compete import LEAST_SHARE, Step
@@ -18,12 +18,11 @@ from .name.problem import Term, pose, resampled, solution
 from .name.refit import refit
 from .name.settled import settled
 from .proof import Bench
-from .words import statement
+from .words import alternatives, joint_unit, shape_unit, statement
 
 Array = NDArray[np.float64]
 FITS = 1.6**0.5  # an error within so many noise floors is taken to be noise: a variance 1.6 times as large
 END = 0.99  # of the longest delay that is tried
-SHAPE_UNITS = {"delay": "s", "lag": "s", "gap": "rad"}
 
 
 def proved(bench: Bench, fit: DeclaredFit, stories: Sequence[tuple[Step, Term]], kept: Sequence[Term],
@@ -114,18 +113,18 @@ def first_of(fit: DeclaredFit, terms: Sequence[Term], count: int) -> list[Term]:
 def _joint_finding(rig: RigModel, fit: DeclaredFit, step: Step, term: Term, amplitude: Array, proof: dict,
                    spread: Array | None) -> Finding:  # fmt: skip
     c = term.candidate
+    position, effort = rig.unit(c.joint), rig.effort_unit(c.joint)
     parameters = {}
     for k, ((name, unit, _, _), v) in enumerate(zip(c.amplitudes, amplitude, strict=True)):
         ends = None if spread is None else [float(x) for x in np.percentile(spread[:, k], [2.5, 97.5])]
-        parameters[name] = {"value": float(v), "unit": unit, "ci95": ends}
-    parameters |= {k: {"value": float(v), "unit": SHAPE_UNITS.get(k, ""), "ci95": None} for k, v in term.shape.items()}
-    drive = rig.drive(c.joint)
-    rivals = [(key, p) for key, p in step.rivals if not key.startswith(c.effect)]
-    where = {"finger": None, "joint": c.joint, "actuator": drive.name if drive else None, "signal": "effort", "marker": None,
-             "trials": proof["held_out"], "share_of_mismatch": max(proof["before"] ** 2 - proof["after"] ** 2, 0.0)}  # fmt: skip
+        parameters[name] = {"value": float(v), "unit": joint_unit(unit, position, effort), "ci95": ends}
+    sign = -1.0 if c.effect == "command_delay" else 1.0  # what a late drive leaves comes early in the balance: its command is ahead
+    parameters |= {k: {"value": sign * float(v) if k == "delay" else float(v), "unit": shape_unit(k, position), "ci95": None}
+                   for k, v in term.shape.items()}  # fmt: skip
+    fall = max(proof["before"] ** 2 - proof["after"] ** 2, 0.0)
+    where = whereabouts(c.joint, rig.drive(c.joint), "effort", proof["held_out"], fall)
     return Finding(
         c.effect, (c.effect, *(e for e in step.equals if e != c.effect)), step.probability,
-        tuple((k.split("@")[0], p) for k, p in rivals), where,
-        statement(c.effect, c.variant, c.joint, {k: v["value"] for k, v in parameters.items()}, proof), parameters, proof,
+        alternatives(step.rivals, c.effect), where, statement(c.effect, c.variant, c.joint, parameters, proof), parameters, proof,
         {"native": False, "mjcf": 'custom/text[@name="hand_model"]', "urdf": "not expressible: kept in rig.xml"},
     )  # fmt: skip

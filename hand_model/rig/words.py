@@ -1,4 +1,4 @@
-"""Words and shares of findings, for joints and couplings alike."""
+"""Words, units and shares of findings, for joints and couplings alike."""
 
 from __future__ import annotations
 
@@ -6,7 +6,47 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from ..diagnose.name.balance import DISCRETE
 from .findings import Finding
+
+# Shapes of effects at a joint, by what they measure; all others are plain numbers.
+POSITIONS = frozenset({"begin", "centre", "end", "gap", "inward", "knee", "period", "reach", "width"})
+SPEEDS = frozenset({"stribeck_speed"})
+TIMES = frozenset({"cooling_time", "delay", "lag", "relaxation_time", "unseen", "warm_up_time"})
+
+
+def shape_unit(name: str, position: str) -> str:
+    """Unit of an effect's shape at a joint whose position is in the unit `position`."""
+    return position if name in POSITIONS else f"{position}/s" if name in SPEEDS else "s" if name in TIMES else "1"
+
+
+def joint_unit(unit: str, position: str, effort: str) -> str:
+    """A unit with the words "effort" and "position" put as the joint has them: "effort s/position" is "N m s/rad" at a hinge."""
+    below = f"/({effort})" if " " in effort else f"/{effort}"
+    return unit.replace("/effort", below).replace("effort", effort).replace("position", position)
+
+
+def alternatives(rivals: Sequence[tuple[str, float]], effect: str) -> tuple[tuple[str, float], ...]:
+    """Other effects with their probability, the likeliest variant of each: rivals are keys "effect/variant@joint" with theirs."""
+    out: dict[str, float] = {}
+    for key, probability in rivals:
+        name, _, _ = named(key)
+        if name != effect:
+            out[name] = max(out.get(name, 0.0), probability)
+    return tuple(sorted(out.items(), key=lambda item: -item[1]))
+
+
+def rejection(key: str, reason: str) -> dict[str, str]:
+    """What was tried and not taken, as the format has it. key: "effect/variant@joint"."""
+    name, variant, joint = named(key)
+    return {"effect": name, **({"variant": variant} if variant else {}), **({"where": joint} if joint else {}), "reason": reason}
+
+
+def named(key: str) -> tuple[str, str, str]:
+    """Effect, variant and joint of a key "effect/variant@joint"; "" for what it does not say."""
+    name, _, joint = key.partition("@")
+    effect, _, variant = name.partition("/")
+    return effect, variant, joint
 
 
 def shares(found: Sequence[Finding], declared: Mapping[str, Mapping[str, Any]]) -> list[Finding]:
@@ -21,8 +61,10 @@ def shares(found: Sequence[Finding], declared: Mapping[str, Mapping[str, Any]]) 
     return [replace(f, where={**f.where, "share_of_mismatch": f.where["share_of_mismatch"] / whole[f.where["joint"]]}) for f in found]
 
 
-def statement(effect: str, variant: str, joint: str, parameters: Mapping[str, float], proof: Mapping[str, Any]) -> str:
-    """One plain sentence: what, where, how much, and what it is worth on recordings held out."""
-    listed = ", ".join(f"{k.replace('_', ' ')}{': ' if k[-1].isdigit() else ' '}{v:.4g}" for k, v in parameters.items())
+def statement(effect: str, variant: str, joint: str, parameters: Mapping[str, Mapping[str, Any]], proof: Mapping[str, Any]) -> str:
+    """One plain sentence: what, where, how much, and what it is worth on recordings held out. parameters: name -> value and unit, as in a
+    finding; which form of an effect it is, is no figure."""
+    figures = {k: f"{v['value']:.4g}{'' if v['unit'] == '1' else ' ' + v['unit']}" for k, v in parameters.items() if k not in DISCRETE}
+    listed = ", ".join(f"{k.replace('_', ' ')}{': ' if k[-1].isdigit() else ' '}{v}" for k, v in figures.items())
     return (f"{joint}: {effect.replace('_', ' ')}{f' ({variant})' if variant else ''}: {listed}; held-out "
             f"{proof['metric'].replace('_', ' ')} falls from {proof['before']:.4g} to {proof['after']:.4g} {proof['unit']}.")  # fmt: skip

@@ -29,6 +29,7 @@ def existing(node: Node, key: str, root: Path) -> Path:
     """As `inside`, and something is there; raises SessionError with a near file name where nothing is."""
     path = inside(node, key, root)
     if not path.exists():
-        siblings = [file.relative_to(root).as_posix() for file in root.glob("*/*")] + [f.name for f in root.glob("*.*")]
+        there = [*path.parent.glob("*")] or [*root.glob("*/*"), *root.glob("*.*")]
+        siblings = [file.relative_to(root).as_posix() for file in there]
         node.refuse(f'{key} "{node.table[key]}" does not exist; {did_you_mean(node.table[key], siblings)}')
     return path

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import HandModelError
 from .geometry import random_turn, rotate, unit
 from .published import FINGERS, published_joint
 from .streams import stream
@@ -32,9 +33,12 @@ def bebionic(side: str, seed: int | None = None, fingers: Iterable[str] | None =
 
     seed: perturbs geometry by a few degrees and millimetres, couplings, motors, controller, encoder range and the
     noise of the laboratory; None leaves every value at its nominal figure. fingers: any of thumb_0, thumb_1, index,
-    middle, ring, little (default: all). Raises HandModelError for names that were not published.
+    middle, ring, little (default: all). Raises HandModelError for names that were not published or are given twice.
     """
     names = tuple(fingers) if fingers is not None else FINGERS
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise HandModelError(f'the finger "{twice[0]}" is named twice; each finger once is needed')
     sign = 1.0 if side == "left" else -1.0
     spread = 0.0 if seed is None else 1.0
     motors = {actuator: _motor(actuator, seed) for actuator in dict.fromkeys(_actuator(name) for name in names)}

@@ -73,7 +73,7 @@ def record(
     """
     target, plan = Path(folder), plan or Plan()
     if target.exists() and (not target.is_dir() or any(target.iterdir())):
-        raise HandModelError(f"{target}: already exists and is not an empty folder")
+        raise HandModelError(f"{target}: already exists and is not an empty folder; name a new or an empty one")
     hidden = tuple(Hidden(e) if isinstance(e, str) else e for e in effects)
     if any(h.effect == "gravity_load" for h in hidden):
         plan = replace(plan, mocap_excitation=True)  # without markers nobody could know how the palm was turned

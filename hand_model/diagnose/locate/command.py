@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...effects.base import DriveState
 from ..findings import UNWRITTEN, Finding, weighed
 from .answers import Answers, answers_of, lateness
+from .channel import ChannelDelay
 
 Array = NDArray[np.float64]
 
@@ -27,8 +28,9 @@ UNLIKE = 0.1  # of a delay by which answers may miss it: controllers of other ga
 
 @dataclass(frozen=True)
 class CommandFacts:
-    """answers: to commands. sag: loss of speed per unit of load, its standard error, and the range of loads; nan where strokes do not tell. ceiling: current [raw] at which the drive is at its limit, or nan;
-    cut: the weight of what it takes away. strokes: how many tell the sag."""
+    """answers: to commands. sag, sag_se, load_range: loss of speed per load [1/raw], its standard error [1/raw] and the range of loads [raw];
+    nan where strokes do not tell. ceiling: current [raw] at which the drive is at its limit, or nan; cut: the weight of what it takes
+    away. strokes: how many tell the sag. trials: names of the recordings."""
 
     answers: Answers
     sag: float
@@ -105,8 +107,9 @@ def _sag(strokes: list[Stroke]) -> tuple[float, float, float]:
 
 
 def _ceiling(strokes: list[Stroke]) -> tuple[float, float]:
-    """Current [raw] at which the drive is at its limit, nan where it is at none, and the weight of what that cuts: in the fastest flexing strokes speed falls by just what keeps the current from exceeding it. What
-    current each place would need at full speed is told by the slower strokes."""
+    """Current [raw] at which the drive is at its limit, nan where it is at none, and the weight of what that cuts: in the fastest flexing
+    strokes speed falls by just what keeps the current from exceeding it. What current each place would need at full speed is told by the
+    slower strokes."""
     none = np.nan, 0.0
     fast = max((s.commanded for s in strokes), default=0.0)
     mine = [s for s in strokes if s.way > 0 and s.commanded == fast]
@@ -158,14 +161,15 @@ def command_findings(facts: dict[str, CommandFacts], fingers: dict[str, str | No
     return out
 
 
-def with_lateness(drives: Mapping[str, tuple[DriveState, ...]], facts: Mapping[str, CommandFacts]) -> dict[str, tuple[DriveState, ...]]:
-    """The states with what answers to commands say of their current channel: "late" (2,) [s], by how much and its doubt; a late
-    current shows starts and stops late as well, whatever model it is held against."""
+def with_lateness(drives: Mapping[str, tuple[DriveState, ...]], facts: Mapping[str, CommandFacts],
+                  delays: Mapping[str, ChannelDelay]) -> dict[str, tuple[DriveState, ...]]:
+    """The states with what is known of their current channel: "late" (2,) [s], by how much and its doubt, by the simulated drive (`delays`) or
+    by answers to commands; a late current shows starts and stops late as well, whatever model it is held against."""
+    told = {a: (x.channel_s, float(np.hypot(x.doubt_s, UNLIKE * x.channel_s))) for a, x in lateness({a: f.answers for a, f in facts.items()}).items()}
+    told |= {a: (d.delay_s, d.doubt_s) for a, d in delays.items()}
     out = dict(drives)
-    for actuator, told in lateness({a: f.answers for a, f in facts.items()}).items():
-        late = np.array([told.channel_s, float(np.hypot(told.doubt_s, UNLIKE * told.channel_s))])
-        out[actuator] = tuple(replace(s, extra={**s.extra, "late": late, "sigma": _lasting(s, told.channel_s)})
-                              for s in drives[actuator])
+    for actuator, late in told.items():
+        out[actuator] = tuple(replace(s, extra={**s.extra, "late": np.array(late), "sigma": _lasting(s, late[0])}) for s in drives[actuator])
     return out
 
 
@@ -222,6 +226,6 @@ def _sag_finding(actuator: str, finger: str | None, fact: CommandFacts) -> tuple
     fit = {"metric": "speed_loss", "unit": "1", "before": loss, "after": 0.0, "noise_floor": fact.sag_se * fact.load_range,
            "ci95_reduction": None, "held_out": [], "engine": "strokes"}
     text = f"The {actuator} motor loses {100 * loss:.1f} % of its speed over the recorded loads."
-    model = {"native": False, "mjcf": None, "urdf": "not expressible: kept in hand.json"}
     per_stroke = fact.sag / fact.sag_se / np.sqrt(fact.strokes)
-    return weighed(per_stroke, per_stroke / max(loss, 1e-9)), Finding("drive_sag", ("drive_sag",), 0.999, (), _where(actuator, finger), text, parameters, fit, model)
+    where, weight = _where(actuator, finger), weighed(per_stroke, per_stroke / max(loss, 1e-9))
+    return weight, Finding("drive_sag", ("drive_sag",), 0.999, (), where, text, parameters, fit, dict(UNWRITTEN))

@@ -16,6 +16,7 @@ from .motion import Motion, estimate_motion, sure_acceleration
 Array = NDArray[np.float64]
 
 KINDS = ("flexion", "excitation")
+LEAST_ROWS = 50  # of a recording: fewer, and no motion is read from it
 START_DOUBT = 0.1  # of the Coulomb friction: what the give of other bristles than the session's would change
 GIVE_LEAST, GIVE_MOST = 0.02, 1.2  # [%] of the declared Coulomb friction's bristles; beyond, give is presliding
 GIVE_UNSEEN = 0.12  # [%] differences of bristles below this are within what starts tell
@@ -87,8 +88,8 @@ def _prepare(
     states = []
     for index, (trial, log) in enumerate(entries):
         counts, current = log.column("position"), log.column("current")
-        seen = np.isfinite(counts) & np.isfinite(log.time_s) & np.r_[True, np.diff(log.time_s) > 0]
-        if seen.sum() < 50:
+        seen = _readable(log)
+        if seen.sum() < LEAST_ROWS:
             continue
         time_s, position = log.time_s[seen], 100 * (counts[seen] - low) / (high - low)
         motion = estimate_motion(time_s, position if correct is None else correct(position))
@@ -114,6 +115,18 @@ def _prepare(
                                  declared_names=("inertia", "viscous", "coulomb", "spring", "preload")))
     total = max((float(s.elapsed_s[-1]) for s in states), default=0.0)
     return [replace(s, extra={**s.extra, "session_s": np.full(len(s.time_s), total)}) for s in states]
+
+
+def _readable(log: Log) -> NDArray[np.bool_]:
+    """Rows (n,) that hold a position at a time after that of the row before."""
+    return np.isfinite(log.column("position")) & np.isfinite(log.time_s) & np.r_[True, np.diff(log.time_s) > 0]
+
+
+def too_short(session: Session) -> list[str]:
+    """What is to be said of recordings that are left out, for they have too few rows to read a motion from."""
+    rows = {t.name: int(_readable(t.log()).sum()) for trials in drive_trials(session).values() for t in trials}
+    return [f"{name}: {n} rows with a position; {LEAST_ROWS} are needed to read a motion, so its current was left out"
+            for name, n in rows.items() if n < LEAST_ROWS]
 
 
 def _held(values: Array) -> Array:
@@ -211,8 +224,9 @@ def with_coulomb(state: DriveState, give: float, granted: float) -> DriveState:
 
 
 def with_timing(state: DriveState) -> DriveState:
-    """Adds "slides", zero where the drive rests or has not left its place, and "sigma" around starts and stops, zero in steady motion: what half a sample interval of timing means for the
-    declared prediction, what is not known of friction while it turns over, and all that it may hold where the drive rests or has not left its place."""
+    """Adds "slides", zero where the drive rests or has not left its place, and "sigma" [effort] around starts and stops, zero in steady
+    motion: what half a sample interval of timing means for the declared prediction, what is not known of friction while it turns over,
+    and all that it may hold where the drive rests or has not left its place."""
     seen = np.isfinite(state.effort)
     if seen.sum() < 20:
         return state

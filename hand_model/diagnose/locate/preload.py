@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ...effects import effect
-from ..findings import Finding, weighed
+from ..findings import UNWRITTEN, Finding, weighed
 from ..name.station import Station
 
 SPREAD, HANDS = 0.15, 3.0  # mean absolute deviation of the logarithm of a drive's preload within one hand, as sure as from so many comparisons
@@ -104,6 +104,5 @@ def _finding(station: Station, half_difference: float, error: float, spread: flo
     text = effect(CLASS[0]).statement(where, {"half_difference": half_difference})
     fit = {"metric": "current_rmse", "unit": unit, "before": None, "after": None, "noise_floor": station.naming.balance.sigma,
            "ci95_reduction": None, "held_out": [], "engine": "comparison of the hand's motors"}
-    model = {"native": True, "mjcf": f"joint[@name='{station.actuator}']/@springref", "urdf": "kept in hand.json"}
     sure = max(abs(half_difference) - doubt, SURE_LEAST * abs(half_difference))
-    return weighed(sure / station.naming.balance.sigma, station.contrast), Finding(CLASS[0], CLASS, probability, (), where, text, parameters, fit, model)
+    return weighed(sure / station.naming.balance.sigma, station.contrast), Finding(CLASS[0], CLASS, probability, (), where, text, parameters, fit, dict(UNWRITTEN))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...identify.chain import propagate
 from ...identify.likelihood import OUTLIER_LIMIT
 from ...rotation import kabsch
-from ..findings import Finding, weighed
+from ..findings import UNWRITTEN, Finding, weighed
 from .angles import FingerAngles
 from .blocks import Blocks
 from .displacement import NO_HINGE, NOT_RIGID, UNNAMED, MarkerEffect
@@ -114,7 +114,7 @@ def _finding(angles: FingerAngles, naming: MarkerNaming, name: str, body: int, l
     fit = {"metric": "marker_rmse", "unit": "m", **_proof(naming), "noise_floor": naming.sigma_m,
            "held_out": [], "engine": "chain fitted to the markers, in-sample"}
     correction = CORRECTION.get(name)
-    model = None if correction else {"native": False, "mjcf": None, "urdf": "not expressible"}
+    model = None if correction else dict(UNWRITTEN)
     return Finding(name, (name,), float(1 - np.exp(-min(main.evidence, 700))), (), where, text, parameters, fit, model, correction)
 
 

@@ -46,7 +46,8 @@ class Term:
 @dataclass(frozen=True)
 class Fit:
     """declared: coefficients by name. amplitudes: one mapping per term. prediction: (n,) over all compared samples.
-    rss: weighted residual sum of squares over the training samples, what wider errors cost, and what answers to commands hold against it. size: number of effect parameters."""
+    rss: weighted residual sum of squares over the training samples, what wider errors cost, and what answers to commands hold against
+    it. size: number of effect parameters."""
 
     terms: tuple[Term, ...]
     declared: Mapping[str, float]
@@ -87,8 +88,8 @@ def _warped_columns(effect: Any, shape: Mapping[str, float], warps: tuple[Term, 
 class Balance:
     """The compared samples of several DriveStates, stacked.
 
-    effort, weight (1 / standard deviation), timing (the part of that deviation that starts and stops bring), train (bool): (n,). sigma: noise of the effort; inflation: integrated
-    autocorrelation of that noise (1 where it is white): a sum of squares counts divided by it. untouched: whether some recordings take no
+    effort, weight (1 / standard deviation), timing (the part of that deviation that starts and stops bring), train (bool): (n,). sigma:
+    noise of the effort; inflation: integrated autocorrelation of that noise (1 where it is white): a sum of squares counts divided by it. untouched: whether some recordings take no
     part in learning. typical: declared coefficients of other balances of the same kind, by name.
     """
 

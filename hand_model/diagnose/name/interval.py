@@ -42,14 +42,26 @@ def parameter_intervals(reading: Reading, which: int) -> dict[str, dict[str, Any
         return out
     variance = _variances(balance, fit, which, scale)
     said = [(p, *_figures(balance, f, which), _variances(balance, f, which, scale)) for p, f in _forms(balance, fit, which, scale)]
-    for name in (k for k in out if k not in DISCRETE):
-        others = [(p, v[name], s2[name]) for p, v, unit, s2 in said if name in v and unit.get(name) == units.get(name)]
-        apart = sum(p * ((v - values[name]) ** 2 + s2) for p, v, s2 in others if np.isfinite(v + s2))
-        within = (1 - sum(p for p, _, _ in others)) * variance[name]
-        sd = float(np.sqrt(within + apart))
-        if np.isfinite(sd):
-            out[name]["ci95"] = [values[name] - 1.96 * sd, values[name] + 1.96 * sd]
+    for name in (k for k in out if k not in DISCRETE and variance[k] > 0):  # a choice has none
+        parts = [(p, v[name], s2[name]) for p, v, unit, s2 in said if name in v and unit.get(name) == units.get(name)]
+        # a form that hardly tells the parameter at all says nothing of it
+        parts = [(p, v, s2) for p, v, s2 in parts if np.isfinite(v + s2) and s2 <= max(v**2, variance[name])]
+        parts.append((1 - sum(p for p, _, _ in parts), values[name], variance[name]))
+        if np.isfinite(values[name] + variance[name]):
+            out[name]["ci95"] = [_quantile(parts, at) for at in (0.025, 0.975)]
     return out
+
+
+def _quantile(parts: list[tuple[float, float, float]], at: float) -> float:
+    """Quantile of a mixture of normal distributions, each (share, mean, variance)."""
+    from scipy.optimize import brentq
+    from scipy.stats import norm
+
+    share, mean, sd = (np.array(x) for x in zip(*((p, v, max(np.sqrt(s2), 1e-300)) for p, v, s2 in parts), strict=True))
+    ends = [float(f(mean + sign * 8 * sd)) for f, sign in ((np.min, -1), (np.max, 1))]
+    if not ends[1] > ends[0]:
+        return ends[0]
+    return float(brentq(lambda x: float(share @ norm.cdf((x - mean) / sd)) - at, *ends, xtol=1e-9 * (ends[1] - ends[0])))
 
 
 def _figures(balance: Balance, fit: Fit, which: int) -> tuple[dict[str, float], dict[str, str]]:

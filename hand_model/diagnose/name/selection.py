@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...background import Pair
-from ...effects.base import sample_interval
+from ...effects.base import least_delay
 from .balance import Balance, Fit, Term, additive
 from .evidence import evidence, gain, rough_evidence, scale_of
 from .lack_of_fit import LackOfFit, lack_of_fit
@@ -214,12 +214,11 @@ def _likelihood(balance: Balance, fit: Fit, wander: Wander | None) -> float:
 
 
 def _resolved(balance: Balance, term: Term) -> bool:
-    """Whether a delay exceeds three quarters of a sample interval and answers to commands do not refute it; true of anything else."""
+    """Whether a delay exceeds what is told of one and nothing that is known of it refutes it; true of anything else."""
     if "delay" not in term.shape:
         return True
-    step = sample_interval(balance.states)
     refuted = balance.unanswered((term,)) > REFUTED**2 * balance.inflation
-    return abs(term.shape["delay"]) > 0.75 * step and not refuted
+    return abs(term.shape["delay"]) > least_delay(balance.states) and not refuted
 
 
 def rank(pair: Pair, effects: Iterable[Any], terms: tuple[Term, ...], fit: Fit, refine: int = 6, least: float = 0.0) -> list[Rival]:
@@ -297,7 +296,6 @@ def _findings(pair: Pair, effects: tuple[Any, ...], fit: Fit) -> tuple[Named, ..
     """Each term with its rivals (every candidate in its place, small terms aside that may stand for one of them), its share and
     its probability; largest share first."""
     balance, found, terms = pair.state, [], fit.terms
-    explained = max(balance.fit().rss - fit.rss, 1e-12)
     losses = [max(balance.fit(tuple(t for i, t in enumerate(terms) if i != which)).rss - fit.rss, 0.0)
               for which in range(len(terms))]
     large = [loss >= SMALL * sum(losses) for loss in losses]
@@ -313,7 +311,7 @@ def _findings(pair: Pair, effects: tuple[Any, ...], fit: Fit) -> tuple[Named, ..
         rivals.sort(key=lambda r: -r.evidence)
         weights = np.exp(np.array([r.evidence for r in rivals] + [0.0]) - max(rivals[0].evidence, 0.0))
         mine = [r.name for r in rivals].index(term.effect.name)
-        share = losses[which] / max(sum(losses), 1e-12) * min(explained / max(explained, 1e-12), 1.0)
+        share = losses[which] / max(sum(losses), 1e-12)
         found.append(Named(term, dict(fit.amplitudes[which]), tuple(rivals), float(share), _size(balance, fit, which),
                            float(weights[mine] / weights.sum())))
     return tuple(sorted(found, key=lambda f: -f.share))

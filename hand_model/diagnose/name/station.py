@@ -9,7 +9,7 @@ import numpy as np
 
 from ..findings import UNWRITTEN, Finding, weighed
 from .interval import brought_held_out, held_out, parameter_intervals, sized, undisturbed, variance_ratio
-from .naming import ALPHA, EXPLAINED_LEAST, Named, Naming
+from .naming import ALPHA, EXPLAINED_LEAST, MOST_TERMS, Named, Naming
 from .selection import EVIDENCE_LEAST, SMALL, name_effects
 
 # How before and after were computed, said in the findings: no compiled file is involved until one is replayed.
@@ -21,6 +21,7 @@ ALIKE = 1 / 3  # of the size of a larger effect of the same family: below, no fi
 UNREST = 0.3  # of the noise: wander that every machine is granted; more is no explanation
 WORSE = 1.5  # times the mean square of training recordings
 KEPT_OUT, EXPLAINED_MOST = 1.05, 2 / 3  # times the noise of recordings kept out, and the share of what is above it that true names take
+MAIN = 0.5  # of what names explain together: what one of them must hold where they do not do
 PLAINLY = 1 / 3  # of the mean square of recordings kept out before, at most, is noise
 EXPLAINED_SOME = 1 / 3  # of a mismatch that the lack-of-fit test sees: below, they are not what is missing, whatever is left to see
 
@@ -71,10 +72,16 @@ class Station:
     def believed(self) -> bool:
         """Whether the names stand: the final model passes the test, or takes most of the mismatch away, or all that recordings kept out
         show. Names that take little of a plain mismatch away do not, however little is left to see, nor names of nothing where more than
-        the noise does not repeat."""
+        the noise does not repeat, nor as many as may be, none of them the main one, beside which the test fails."""
         idle = self.explained < (EXPLAINED_SOME if self.naming.before.p < ALPHA else SMALL if self.wander > 1 else 0.0)
         most = self.naming.after.p >= ALPHA or self.explained >= EXPLAINED_LEAST or self._predicted
-        return bool(self.proven) and not idle and not self._short and most
+        return bool(self.proven) and not idle and not self._short and not self._scattered and most
+
+    @property
+    def _scattered(self) -> bool:
+        """Whether as many names as may be leave something that the test sees, and none of them holds the better part of what they explain: each
+        describes a piece of what is something else."""
+        return self.naming.after.p < ALPHA and len(self.naming.found) >= MOST_TERMS and max(f.share for f in self.naming.found) < MAIN
 
     @property
     def _predicted(self) -> bool:
@@ -158,6 +165,23 @@ def _elsewhere(naming: Naming) -> bool:
     return bool(outside.any() and inside.any() and np.mean(square[outside]) > WORSE * np.mean(square[inside]))
 
 
+def _altered(naming: Naming) -> bool:
+    """Whether a recording kept out is plainly that of a machine with other declared coefficients, as in another pose of the hand: what their own
+    fit gains there in log likelihood, less the penalty of Schwarz (1978). A change of level alone is spread too thin for tests of cells."""
+    balance = naming.balance
+    residual, matrix = balance.effort - naming.fit.prediction, balance.gather(lambda s: s.declared)
+    recording = balance.gather(lambda s: np.full(len(s.time_s), s.trial))
+    outside = balance.steady & ~balance.train
+    for name in np.unique(recording[outside]):
+        weight = balance.weight * (outside & (recording == name))
+        columns, left = (balance.whiten(v, weight) for v in (matrix * weight[:, None], residual * weight))
+        own = columns @ np.linalg.lstsq(columns, left, rcond=None)[0]
+        count = max(np.count_nonzero(weight) / balance.inflation, 2.0)
+        if float(own @ own) / (2 * balance.inflation) - matrix.shape[1] / 2 * np.log(count) > EVIDENCE_LEAST:
+            return True
+    return False
+
+
 def judged(signal: str, finger: str | None, actuator: str | None, joint: str | None, states: tuple[Any, ...], effects: Iterable[Any],
            typical: Mapping[str, float] | None = None) -> Station:
     """The station of the balance of `states`, named among `effects`. Where a name does not stand, or is another's form, the others are
@@ -175,8 +199,9 @@ def judged(signal: str, finger: str | None, actuator: str | None, joint: str | N
         if other.weight <= station.weight:
             break
         station = other
-    unknown = not station.believed or elsewhere and station.naming.after.p < ALPHA
-    if station.missing and unknown and not station.naming.overwhelmed and any(s.validate for s in states):
+    untold = not station.believed or elsewhere and station.naming.after.p < ALPHA
+    hopeless = station.naming.overwhelmed and not elsewhere  # in the training recordings already
+    if (station.missing and untold and not hopeless or not station.proven and _altered(station.naming)) and any(s.validate for s in states):
         # what the training recordings cannot tell, a pose that one of the others alone has may tell
         lasting = tuple(e for e in every if e.of_the_hand)  # what one recording had explains no other
         other = Station(signal, finger, actuator, joint, name_effects(states, lasting, typical=typical, whole=True))
@@ -204,7 +229,7 @@ def finding_of(station: Station, named: Named, share: float, size: float) -> tup
         "signal": getattr(effect, "signal", station.signal),
         "marker": None,
         "trials": [s.trial for s in naming.balance.states],
-        "region": effect.region(naming.balance.states, named.term.shape),
+        "region": effect.region(naming.balance.states, station.reading.fit.terms[which].shape),  # of the figures that the statement tells
         "share_of_mismatch": share * station.claimed,
     }
     top = named.rivals[0].evidence
@@ -247,7 +272,9 @@ def unrepeated_of(station: Station) -> dict[str, Any]:
 
 
 def channel_of(station: Station) -> dict[str, Any]:
-    n = station.naming
+    """The channel's row of the findings. effects: those that stand in it; p_before, p_after: of the lack-of-fit test; noise: in the unit of
+    its effort."""
+    n, stands = station.naming, station.kept if station.believed else ()
     return {"finger": station.finger, "joint": station.joint, "signal": station.signal, "p_before": n.before.p,
             "p_after": n.after.p, "varies_with": n.before.telling, "noise": n.balance.sigma,
-            "effects": [f.term.effect.name for f in n.found], "explained": station.explained}
+            "effects": [f.term.effect.name for f in stands], "explained": station.explained}

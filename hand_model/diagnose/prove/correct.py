@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import HandModelError
-from ...output import refuse_file
+from ...output import new_folder, refuse_file
 from ...session import Mocap, Session, Trial
 from ..findings import FILES, FOLDERS, Finding
 from ..locate.angles import FingerAngles, finger_angles
@@ -35,7 +35,7 @@ def write_corrected(session: Session, findings: Sequence[Finding], encoders: Map
     """Write the session with every correction of `findings` applied into `output`/corrected; None where there is none to apply.
 
     encoders: actuator -> correction of its encoder counts. Marker files become QTM TSV, logs CSV, where they are changed; the
-    manifest names them, everything else is copied as it is, but for `output` itself. Replaces an earlier copy.
+    manifest names them, everything else is copied as it is, but for `output` itself. Replaces an earlier copy, whole or not at all.
     """
     markers = {finger.name: {f.effect for f in findings if f.effect == "palm_marker_slip" or f.where["finger"] == finger.name}
                & {*SLIPS, "marker_swap"} for finger in session.fingers}
@@ -44,19 +44,20 @@ def write_corrected(session: Session, findings: Sequence[Finding], encoders: Map
     if not any(markers.values()) and not drifts and not turned:
         return None
     target = output / FOLDER
-    if target.exists():
-        shutil.rmtree(target)
-    ours = {output.resolve(), *(output.resolve() / name for name in (*FILES, *FOLDERS))}  # the output may lie in the session
-    shutil.copytree(session.path, target, ignore=lambda folder, names: [n for n in names if (Path(folder) / n).resolve() in ours])
-    renamed: dict[str, str] = {}
-    for path, mocap in _corrected_files(session, markers).items():
-        renamed |= _replace(session, path, target, ".tsv", lambda file, m=mocap: write_tsv(file, m))
-    for trial in session.trials:
-        actuator = session.finger(trial.finger).actuator if trial.finger is not None else None
-        if trial.log_path is not None and (trial.name in drifts or actuator in turned):
-            correct = encoders[actuator] if actuator in turned else None
-            renamed |= _write_log(session, trial, drifts.get(trial.name, 0.0), correct, target)
-    _rename(target / "session.toml", renamed)
+    earlier = [entry.name for entry in target.iterdir()] if target.is_dir() else []  # `refuse_output` knows that a diagnosis wrote it
+    with new_folder(target, earlier) as staging:
+        ours = {output.resolve(), *(output.resolve() / name for name in (*FILES, *FOLDERS, staging.name))}  # the output may lie in the session
+        shutil.copytree(session.path, staging, dirs_exist_ok=True,
+                        ignore=lambda folder, names: [n for n in names if (Path(folder) / n).resolve() in ours])
+        renamed: dict[str, str] = {}
+        for path, mocap in _corrected_files(session, markers).items():
+            renamed |= _replace(session, path, staging, ".tsv", lambda file, m=mocap: write_tsv(file, m))
+        for trial in session.trials:
+            actuator = session.finger(trial.finger).actuator if trial.finger is not None else None
+            if trial.log_path is not None and (trial.name in drifts or actuator in turned):
+                correct = encoders[actuator] if actuator in turned else None
+                renamed |= _write_log(session, trial, drifts.get(trial.name, 0.0), correct, staging)
+        _rename(staging / "session.toml", renamed)
     return target
 
 

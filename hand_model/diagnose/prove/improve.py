@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from ...effects import effect
 from ...errors import HandFileError
 from ...hand import Coupling, Effect, EncoderMap, Estimate, Finger, Hand, Joint, Motor, load_hand
 from ...session import Session
-from ..findings import Finding
+from ..findings import UNWRITTEN, Finding
 from ..locate.course import FingerCourses
 from ..locate.markers import HINGE
 from .markers import COMPILED, marker_fit, of_folder
@@ -139,11 +139,13 @@ def _estimate(entry: Mapping[str, Any]) -> Estimate:
     return Estimate(float(entry["value"]), None if ci is None else (float(ci[0]), float(ci[1])), str(entry["unit"]), "diagnosis")
 
 
-def written(before: Path, after: Path, finding: Finding) -> dict[str, Any]:
+def written(before: Path, after: Path, finding: Finding, fingers: Collection[str]) -> dict[str, Any]:
     """`model` of a finding, {"native", "mjcf", "urdf", "callback"}: where the files of the folder `before`, which hold no effect, get it, or
-    where those of `after` have what comes from hand.json (a course)."""
+    where those of `after` have what comes from hand.json (a course). fingers: of the model, which may lack the finding's."""
     from lxml import etree
 
+    if finding.where.get("finger") not in fingers:
+        return {**UNWRITTEN, "callback": None, "note": _absent(finding)}
     values = {k: v["value"] for k, v in finding.parameters.items()}
     kind = effect(finding.effect)
     urdf = "not expressible: kept in hand.json"
@@ -159,6 +161,10 @@ def written(before: Path, after: Path, finding: Finding) -> dict[str, Any]:
             return {"native": True, "mjcf": place, "urdf": urdf, "callback": None}
     return {"native": False, "mjcf": None, "urdf": urdf, "callback": None,
             "note": kind.unwritten or "no element of MJCF holds it: kept in hand.json"}
+
+
+def _absent(finding: Finding) -> str:
+    return f"the model has no {finding.where.get('finger') or 'finger of it'}"
 
 
 def write_improved(hand: Hand, findings: Sequence[Finding], stations: Sequence[Any], counts: Mapping[str, tuple[float, float]],
@@ -186,16 +192,17 @@ def write_improved(hand: Hand, findings: Sequence[Finding], stations: Sequence[A
     compile(before, output / "model_before")
     compile(after, output / "model")
     named = [(f, next((s for s in stations if s.names(f)), None)) for f in findings]
-    errors = errors_along([(s, untouched(f, s)) for f, s in named if f.correction is None], output / "model_before", output / "model")
     files = output / "model_before", output / "model"
+    errors = errors_along([(s, untouched(f, s)) for f, s in named if f.correction is None], *files)
     fits = {name: marker_fit(c, *(of_folder(f, name, c.labels) for f in files), COMPILED) for name, c in crooked.items()}
     out, replays = [], []
     for finding, station in named:
         if finding.correction is None:
-            finding = replace(finding, model=written(output / "model_before", output / "model", finding))
+            finding = replace(finding, model=written(*files, finding, known))
             fit, replay = proved(finding, station, errors)
             if finding.effect in HINGE:
-                fit = fits.get(finding.where["finger"], {**finding.fit, "note": OTHER_MARKERS})
+                note = OTHER_MARKERS if finding.where["finger"] in known else _absent(finding)
+                fit = fits.get(finding.where["finger"], {**finding.fit, "note": note})
             finding = replace(finding, fit=fit)
             replays += [] if replay is None else [replace(replay, finding=finding)]
         out.append(finding)

@@ -173,9 +173,17 @@ def _with_speed(derivative: Array, own: Array, q: Mapping[str, float], names: Se
 
 def _misfit(residual: list[Array], data: Sequence[MoveData], own: Array, q: Mapping[str, float]) -> float:
     """Sum of squares of whitened residuals, of what the moves' own unknowns are off their measured values, and of the priors."""
-    total = sum(((q[n] - mean) / sd) ** 2 for n, (mean, sd) in PRIOR.items() if n in q)
+    total = sum(held(q, n) for n in PRIOR)
     total += sum(float(e @ e) + float(np.sum(((m.own - x) / m.own_sd) ** 2)) for m, e, x in zip(data, residual, own, strict=True))
     return float(total) if np.isfinite(total) else np.inf
+
+
+def held(q: Mapping[str, float], name: str) -> float:
+    """What the prior of a parameter adds to the misfit."""
+    if name not in q or name not in PRIOR:
+        return 0.0
+    mean, sd = PRIOR[name]
+    return ((q[name] - mean) / sd) ** 2
 
 
 def _costs(

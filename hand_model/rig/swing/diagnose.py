@@ -13,11 +13,11 @@ import numpy as np
 from ...background import Background
 from ...session import Session
 from ..declared import DeclaredFit
-from ..findings import NOT_BORNE_OUT, NOT_TOLD, Finding
+from ..findings import NOT_BORNE_OUT, NOT_TOLD, Finding, whereabouts
 from ..model import RigModel, load_rig
 from ..replay import RigResiduals, replay_rig
 from ..states import fill_gaps, noise_std
-from ..words import shares, statement
+from ..words import alternatives, shares, statement
 from .build import build_swing, search_step_s, thinned, windows_s
 from .compete import LEAST_GAIN, Round, Variant, all_free, begun, compete_swing, fit_apart, fit_stages, free_declared
 from .fit import Fitted, Task
@@ -253,14 +253,13 @@ def _swing_finding(rig: RigModel, variant: Variant, round_: Round, ends: Ends, l
     units = parameter_units(rig.unit(joint), rig.effort_unit(joint))
     parameters = {n: {"value": float(link.fit.theta[INDEX[n]]), "unit": units.get(n, "1"), "ci95": list(ends[n])}
                   for n in variant.start}  # fmt: skip
-    where = {"finger": None, "joint": joint, "actuator": (rig.drive(joint).name if rig.drive(joint) else None),
-             "signal": "position", "marker": None, "trials": proof["held_out"],
-             "share_of_mismatch": max(proof["before"] ** 2 - proof["after"] ** 2, 0.0)}  # fmt: skip
+    fall = max(proof["before"] ** 2 - proof["after"] ** 2, 0.0)
+    where = whereabouts(joint, rig.drive(joint), "position", proof["held_out"], fall)
     native = set(variant.start) <= {"drag"}
     return Finding(
         variant.effect, (variant.effect, *(e for e in round_.equals if e != variant.effect)), round_.probability,
-        tuple((k, p) for k, p in round_.rivals if k != variant.key), where,
-        statement(variant.effect, variant.name, joint, {k: v["value"] for k, v in parameters.items()}, proof), parameters, proof,
+        alternatives(round_.rivals, variant.effect), where,
+        statement(variant.effect, variant.name, joint, parameters, proof), parameters, proof,
         {"native": native, "mjcf": f"joint[@name='{joint}']/@damping" if native else 'custom/text[@name="hand_model"]',
          "urdf": "not expressible: kept in rig.xml"},
     )  # fmt: skip
