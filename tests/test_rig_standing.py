@@ -36,6 +36,15 @@ class Bench:
         return self.whole[_reaches(after)]
 
 
+def _table_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is fitted: without another the best shape is 5; a finding is its effect and reach."""
+    monkeypatch.setattr(standing, "pose", lambda fit, joint=None: None)
+    monkeypatch.setattr(standing, "refit", lambda problem, terms: tuple(Term(t.candidate, {"reach": 5.0}) for t in terms))
+    monkeypatch.setattr(standing, "solved", lambda bench, fit, terms: (list(terms), np.zeros(0)))
+    monkeypatch.setattr(standing, "_motion_says", lambda bench, before, after: None)
+    monkeypatch.setattr(standing, "_joint_finding", lambda rig, fit, step, term, *more: (term.candidate.effect, term.shape["reach"]))
+
+
 def _reaches(side: tuple) -> tuple[float, ...]:
     return tuple(t.shape["reach"] for t in side[1])
 
@@ -47,15 +56,21 @@ def _reaches(side: tuple) -> tuple[float, ...]:
 ], ids=["both help", "the first does as well in a shape of its own", "others pay for it"])  # fmt: skip
 def test_an_effect_is_held_to_what_stands_at_its_best_without_it(monkeypatch: pytest.MonkeyPatch, errors: dict, whole: dict, holds: list) -> None:
     """Two effects of one joint, found with shapes 1 and 2 beside each other; the first alone has shape 5."""
-    monkeypatch.setattr(standing, "pose", lambda fit, joint=None: None)
-    monkeypatch.setattr(standing, "refit", lambda problem, terms: tuple(Term(t.candidate, {"reach": 5.0}) for t in terms))
-    monkeypatch.setattr(standing, "solved", lambda bench, fit, terms: (list(terms), np.zeros(0)))
-    monkeypatch.setattr(standing, "_motion_says", lambda bench, before, after: None)
-    monkeypatch.setattr(standing, "_joint_finding", lambda rig, fit, step, term, *more: term.candidate.effect)
+    _table_alone(monkeypatch)
     stories = [(None, term("elbow", "a", 1.0)), (None, term("elbow", "b", 2.0))]
     found, kept = standing.proved(Bench(errors, whole), None, stories, [], rejected := [])
-    assert [t.shape["reach"] for t in kept] == holds and found == ["a", "b"][: len(holds)]
+    assert [t.shape["reach"] for t in kept] == holds and found == list(zip("ab", holds))
     assert [r["effect"] for r in rejected] == ["b@elbow"][: 2 - len(holds)]
+
+
+def test_what_stands_at_a_joint_keeps_its_shape_when_another_joint_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The elbow's first effect, found with shape 1 beside one that is withdrawn, stands with its own, 5: in the file and as it is told."""
+    _table_alone(monkeypatch)
+    errors = {(): 1.0, (5.0,): 0.5, (5.0, 3.0): 0.4, (1.0, 2.0): 0.6}
+    stories = [(None, term(*t)) for t in (("elbow", "a", 1.0), ("elbow", "b", 2.0), ("wrist", "c", 3.0))]
+    found, kept = standing.proved(Bench(errors, errors), None, stories, [], rejected := [])
+    assert [t.shape["reach"] for t in kept] == [5.0, 3.0] and found == [("a", 5.0), ("c", 3.0)]
+    assert [r["effect"] for r in rejected] == ["b@elbow"]
 
 
 @pytest.mark.parametrize(("told", "against"), [({"ratio": 0.9}, False), ({"ratio": 1.001}, False), ({"ratio": 1.2}, True), ({"not_run": "no law in open loop for x"}, True),

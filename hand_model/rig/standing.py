@@ -29,35 +29,50 @@ def proved(bench: Bench, fit: DeclaredFit, stories: Sequence[tuple[Step, Term]],
            rejected: list[dict[str, Any]]) -> tuple[list[Finding], list[Term]]:  # fmt: skip
     """Findings that hold on the validation recordings, one after the other beside `kept`, all in the shapes that are best without the
     later ones; the rest goes to rejected. Returns them and the terms that hold."""
-    kept, found = list(kept), []
+    terms, found = list(kept), list(kept)
+    proofs: list[tuple[Step, dict[str, Any]]] = []
     whole = Counter(t.candidate.joint for t in [*kept, *(t for _, t in stories)])
-    plain, terms, few = (fit, *solved(bench, fit, [])), kept, solved(bench, fit, kept)
+    plain, few = (fit, *solved(bench, fit, [])), solved(bench, fit, kept)
     for step, term in stories:
-        more = _shaped(fit, [*kept, term], whole)
+        more = _shaped(fit, terms, [*found, term], whole)
         many = solved(bench, fit, more)
         proof = bench.proof(term.candidate.joint, (fit, *few), (fit, *many))
         reason = _withdrawn(bench, proof, plain, (fit, *few), (fit, *many))
         if reason is not None:
             rejected.append({"effect": term.candidate.key, "reason": reason})
             continue
-        kept, terms, few = [*kept, term], more, many
-        told, theta = solved(bench, fit, kept)  # its size in the shapes that it has beside the later ones
+        found, terms, few = [*found, term], more, many
+        proofs.append((step, proof))
+    return _told(bench, fit, _in_order(terms, found), proofs), terms
+
+
+def _shaped(fit: DeclaredFit, standing: Sequence[Term], found: Sequence[Term], whole: Mapping[str, int]) -> list[Term]:
+    """Terms with the last of `found`, its joint last: there in their best shapes beside each other, as they were found where the joint has
+    them all (whole: joint -> how many), else those without the others; at other joints as they stand."""
+    joint = found[-1].candidate.joint
+    mine = [t for t in found if t.candidate.joint == joint]
+    best = mine if len(mine) == whole[joint] else refit(pose(fit, joint), mine)
+    return [*(t for t in standing if t.candidate.joint != joint), *best]
+
+
+def _in_order(terms: Sequence[Term], found: Sequence[Term]) -> list[Term]:
+    """Terms in the order in which they were found: each joint has them in that order already."""
+    left = {j: iter([t for t in terms if t.candidate.joint == j]) for j in {t.candidate.joint for t in terms}}
+    return [next(left[t.candidate.joint]) for t in found]
+
+
+def _told(bench: Bench, fit: DeclaredFit, terms: Sequence[Term], proofs: Sequence[tuple[Step, dict[str, Any]]]) -> list[Finding]:
+    """Findings of the last terms, one for each proof: the size of each beside those before it, in the shapes that stand in the end."""
+    found, first = [], len(terms) - len(proofs)
+    for k, (step, proof) in enumerate(proofs, first + 1):
+        told, theta = solved(bench, fit, terms[:k])
+        term = terms[k - 1]
         last = slice(len(theta) - len(term.candidate.amplitudes), None)
         spread = None
         if proof["after"] <= FITS * proof["noise_floor"]:  # beside what does not fit, an interval would promise too much
             spread = resampled(pose(fit), told)[:, last]
         found.append(_joint_finding(bench.rig, fit, step, term, theta[last], proof, spread))
-    return found, terms
-
-
-def _shaped(fit: DeclaredFit, terms: Sequence[Term], whole: Mapping[str, int]) -> list[Term]:
-    """Terms, the last one's joint last, in their best shapes beside each other: as they were found where a joint has them all (whole: joint
-    -> how many), else those without the others."""
-    last, out = terms[-1].candidate.joint, []
-    for joint in sorted({t.candidate.joint for t in terms}, key=lambda j: j == last):
-        mine = [t for t in terms if t.candidate.joint == joint]
-        out += mine if joint != last or len(mine) == whole[joint] else refit(pose(fit, joint), mine)
-    return out
+    return found
 
 
 def _withdrawn(bench: Bench, proof: Mapping[str, Any], plain: tuple, before: tuple, after: tuple) -> str | None:
