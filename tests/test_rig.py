@@ -17,13 +17,13 @@ from hand_model.report.rig_findings import write_rig_findings
 from hand_model.rig import diagnose_rig, fit_declared, load_rig, replay_rig
 from hand_model.rig.balance import Column
 from hand_model.rig.consistent import BASIS, consistent, is_physical, pseudo_inertia
-from hand_model.rig.diagnose import _joint_finding
 from hand_model.rig.dynamics import INERTIAL, inertial_columns, inertial_parameters
 from hand_model.rig.findings import NOT_BORNE_OUT, NOT_TAKEN
 from hand_model.rig.mjcf import read_effects, write_effects
 from hand_model.rig.name.candidates import Candidate
 from hand_model.rig.physical import physical
 from hand_model.rig.solve import solve_bounded
+from hand_model.rig.standing import _joint_finding
 from hand_model.rig.states import local_states
 from hand_model.rig.swing.fit import Task, fit_together
 from hand_model.rig.swing.simulation import Lane, Swing, errors, simulate, vector

@@ -10,7 +10,8 @@ from rig_bench import ARM, HEAD, Motion, recorded
 from scipy.signal import butter, filtfilt
 
 from hand_model.effects.path import jenkins
-from hand_model.rig import fit_declared, load_rig, replay_rig
+from hand_model.errors import SessionError
+from hand_model.rig import diagnose_rig, fit_declared, load_rig, replay_rig
 from hand_model.rig.channels import check_channels, sinusoids_left
 from hand_model.rig.diagnose import trusted_fit
 from hand_model.rig.name.candidates import candidates
@@ -153,3 +154,17 @@ def test_the_low_pass_is_that_of_scipy(shape: tuple[int, ...]) -> None:
     x = np.cumsum(np.random.default_rng(1).standard_normal(shape), 0)
     pad = min(len(x) - 2, int(3 * 100 / 4.0))
     assert low_pass(x, 100.0, 4.0) == pytest.approx(filtfilt(*butter(2, 4.0 / 50.0), x, axis=0, padlen=pad), abs=1e-9)
+
+
+def test_a_joint_that_no_training_recording_moves_is_left_alone(tmp_path: Path) -> None:
+    """What stands in all recordings but the one that is held out has nothing fitted to it, and a session that holds out all says so."""
+    folder = recorded(tmp_path / "s", ARM, 3, balance, 0.0)
+    text = (folder / "session.toml").read_text()
+    table = np.loadtxt(folder / "log/0.csv", delimiter=",", skiprows=1)
+    for k in (0, 1):
+        np.savetxt(folder / f"log/{k}.csv", table * [1, 0, 1], delimiter=",", header="time,position,torque", comments="")
+    (folder / "session.toml").write_text(text + 'purpose = "validate"\n')
+    assert diagnose_rig(read_session(folder)).verdict in ("consistent", "unexplained")
+    (folder / "session.toml").write_text(text.replace('kind = "motion"', 'kind = "motion"\npurpose = "validate"'))
+    with pytest.raises(SessionError, match="at least one must be left to fit to"):
+        diagnose_rig(read_session(folder))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,9 +22,9 @@ from hand_model.rig.name.problem import Term, extended, normal, pose
 from hand_model.rig.swing import compete as swing_compete
 from hand_model.rig.swing.build import ENOUGH_STEPS, thinned
 from hand_model.rig.swing.compete import PARTS, Variant, _folds
-from hand_model.rig.swing.diagnose import _searched, _standing
+from hand_model.rig.swing.diagnose import _figures, _searched, _standing, _starts
 from hand_model.rig.swing.fit import Fitted
-from hand_model.rig.swing.simulation import PARAMETERS, Lane, Swing, errors, simulate, vector
+from hand_model.rig.swing.simulation import INDEX, PARAMETERS, Lane, Swing, errors, simulate, vector
 from hand_model.rig.swing.start import freed, started
 from hand_model.session import read_session
 
@@ -142,7 +143,8 @@ def test_an_effect_whose_size_cannot_be_told_leaves_its_place_to_the_next() -> N
 
     def search(kept, without):
         asked.append(([v.key for v, _ in kept], set(without)))
-        return [(a, None), (c if "b" in without else b, None)]
+        second = c if "b" in without else b
+        return [(a, SimpleNamespace(taken=(a,))), (second, SimpleNamespace(taken=(a, second)))]
 
     def chain(some):
         return [SimpleNamespace(error=1.0 / (k + 1)) for k in range(len(some) + 1)]
@@ -150,9 +152,39 @@ def test_an_effect_whose_size_cannot_be_told_leaves_its_place_to_the_next() -> N
     def ends(link):
         return {"a": (0.5, 1.5), "b": (-1.0, 1.0), "c": (0.1, 0.2)}
 
-    kept, _, _, rejected = _searched(search, chain, ends)
+    kept, _, _, rejected = _searched(search, chain, ends, lambda sets: [])
     assert [v.key for v, _ in kept] == ["a", "c"] and [r["effect"] for r in rejected] == ["b"]
     assert asked == [([], set()), (["a"], {"b"})]
+
+
+def test_what_stood_before_a_later_round_comes_back_where_that_holds_no_better() -> None:
+    """A variant that suits the first effect alone, another that the last round exchanged it for: what all predict decides which stands, and
+    the figure with one effect is that of the one that suits it alone."""
+    alone, beside, other = (SimpleNamespace(key=k, effect=k[0], start={k: 0.0}) for k in ("a1", "a2", "b"))
+    found = [(beside, SimpleNamespace(taken=(alone,))), (other, SimpleNamespace(taken=(beside, other)))]
+    for error, stands in (({"": 1.0, "a1": 0.4, "a2": 0.9, "a2b": 0.5}, ["a1"]), ({"": 1.0, "a1": 0.4, "a2": 0.9, "a2b": 0.2}, ["a2", "b"])):
+
+        def links(sets: list, table: dict = error) -> list[SimpleNamespace]:
+            return [SimpleNamespace(error=table["".join(v.key for v, _ in some)]) for some in sets]
+
+        def chain(some: list, links: Any = links) -> list[SimpleNamespace]:
+            return links([some[:k] for k in range(len(some) + 1)])
+
+        ends = {k: (0.5, 1.5) for k in ("a1", "a2", "b")}
+        kept, link, _, _ = _searched(lambda kept, without: found, chain, lambda _, ends=ends: ends, links)
+        assert [v.key for v, _ in kept] == stands
+        assert _figures(kept, link, links)[:2] == [1.0, 0.4]
+
+
+def test_a_fit_with_a_variant_that_was_exchanged_starts_from_both_sides() -> None:
+    """Its round knows nothing of it: from what the last round says, and from where it begins beside the declared model."""
+    variant = Variant("load_dependent_friction", "external", {"load_external": 0.0})
+    own, last, declared = (vector({"inertia": i, **more}) for i, more in ((1.0, {"load_gear": 0.3}), (2.0, {"load_external": 0.2}), (3.0, {})))
+    free = ("inertia", "load_external")
+    starts = _starts(free, [(variant, SimpleNamespace(fit=SimpleNamespace(theta=own)))], declared, last)
+    assert [[s[INDEX[n]] for n in ("inertia", "load_external", "load_gear")] for s in starts] == [[1.0, 0.2, 0.0], [3.0, 0.0, 0.0]]
+    known = [(variant, SimpleNamespace(fit=SimpleNamespace(theta=last)))]
+    assert len(_starts(free, known, declared, last)) == 1 and _starts(free, [], declared, last)[0] is declared
 
 
 @pytest.mark.parametrize(("cost", "named"), [(0.5, True), (0.99, False)])

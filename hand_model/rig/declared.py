@@ -201,7 +201,8 @@ def _robust_fit(columns: tuple[Column, ...], rows: tuple[Rows, ...], cutoff: flo
     for r in rows:
         m = r.moving
         quality[r.trial, r.joint] = _rms((r.effort - r.columns @ theta)[m]) / (_rms(_known(r, columns)[m]) + 1e-300)
-    return DeclaredFit(columns, theta, scale, rows, cutoff, quality, anchored=anchored)
+    fitted = tuple(r for r in rows if r.joint in scale)  # of a joint that no training recording moves there is nothing to hold out
+    return DeclaredFit(columns, theta, scale, fitted, cutoff, quality, anchored=anchored)
 
 
 def _known(row: Rows, columns: Sequence[Column]) -> Array:

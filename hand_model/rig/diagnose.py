@@ -11,31 +11,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..background import single_threaded
-from ..errors import HandModelError
+from ..errors import HandModelError, SessionError
 from ..output import refuse_file
 from ..session import Session
 from .channels import ChannelIssue, check_balance, check_channels
 from .couplings import coupling_terms, with_couplings
 from .declared import DeclaredFit, fit_declared
-from .findings import NOT_BORNE_OUT, NOT_TAKEN, CouplingResidual, Finding, RigFindings
+from .findings import NOT_TAKEN, CouplingResidual, Finding, RigFindings, whereabouts
 from .horizon import open_loop
-from .model import Drive, RigModel, load_rig
+from .model import RigModel, load_rig
 from .name.candidates import Candidate, candidates
 from .name.compete import LEAST_SHARE, Score, Step, judge, score
 from .name.joint_search import as_term, offsets_first, search_joints
-from .name.problem import Term, held_out, normal, pose, resampled, solution
-from .name.refit import refit
-from .name.settled import settled
+from .name.problem import Term, held_out, normal, pose, solution
 from .noise import effort_noise
 from .proof import Bench
+from .standing import FITS, first_of, proved, solved
 from .states import fill_gaps
 from .swing.build import can_swing
 from .swing.diagnose import diagnose_swing
 from .transmission import angle_residual
-from .words import alternatives, joint_unit, rejection, shape_unit, shares, statement
+from .words import rejection, shares
 
 Array = NDArray[np.float64]
-FITS = 1.6**0.5  # an error within so many noise floors is taken to be noise: a variance 1.6 times as large
 PROBABILITY = (
     "of an effect: share of resampled blocks of the training recordings, each left out of the fit, on which it lowers the "
     "error against nothing; of an alternative: share on which it is the best of all"
@@ -59,6 +57,8 @@ def diagnose_rig(session: Session, output: str | Path | None = None, progress: C
             raise HandModelError(f"{output}: is the session itself, whose model would be written over; name another folder")
     say = progress or (lambda _: None)
     rig = with_couplings(load_rig(session))
+    if not rig.select(validate=False):
+        raise SessionError(f'{session.path}: every trial has purpose = "validate"; at least one must be left to fit to')
     fit, issues = trusted_fit(rig)
     found = [_channel_finding(i) for i in issues]
     refused = {(t, i.joint) for i in issues if i.refuse for t in i.trials}
@@ -148,7 +148,7 @@ def _channel_finding(issue: ChannelIssue) -> Finding:
         "it is refused, nothing is fitted to it" if issue.refuse else "samples there say only that it is at least that"
     )
     return Finding(
-        issue.kind, (issue.kind,), 1.0, (), _where(issue.joint, None, issue.channel, issue.trials, 1.0 if issue.refuse else 0.0),
+        issue.kind, (issue.kind,), 1.0, (), whereabouts(issue.joint, None, issue.channel, issue.trials, 1.0 if issue.refuse else 0.0),
         f"{issue.reason}: {action}.", {"share_left": {"value": issue.share, "unit": "1"}}, UNMEASURED, None,
         "channel refused" if issue.refuse else "channel clipped",
     )  # fmt: skip
@@ -177,71 +177,17 @@ def _diagnose_balance(rig: RigModel, fit: DeclaredFit, say: Callable[[str], None
         say(f"{rig.name}: {joint}: {', '.join(w.key for w in (first[joint], *won) if w) or 'nothing'}")
     base, bench = solution(pose(base_fit), []), Bench(rig, floor=floor)
     plain = (base_fit, (), base)
-    found, kept = _prove(bench, base_fit, offsets, [], rejected)
+    found, kept = proved(bench, base_fit, offsets, [], rejected)
     if off_axis is not None:
         found.append(finding)
-    later, kept = _prove(bench, fit, stories, kept, rejected)
+    later, kept = proved(bench, fit, stories, kept, rejected)
     found += later
-    one, two, every = ((fit, *_settled(bench, fit, _first(fit, kept, k))) for k in (1, 2, len(kept)))
+    one, two, every = ((fit, *solved(bench, fit, first_of(fit, kept, k))) for k in (1, 2, len(kept)))
     lack = {"metric": "effort_rmse", "unit": "share of the declared model's", "before": 1.0,
             "after": bench.ratio(plain, every), "one_effect": bench.ratio(plain, one),
             "two_effects": bench.ratio(plain, two), "engine": bench.engine,
             "joints": {j: bench.proof(j, plain, every) for j in joints}}  # fmt: skip
     return shares(found, lack["joints"]), rejected, lack, bench.file(*every), bench.file(*plain)
-
-
-def _prove(bench: Bench, fit: DeclaredFit, stories: Sequence[tuple[Step, Term]], kept: Sequence[Term],
-           rejected: list[dict[str, Any]]) -> tuple[list[Finding], list[Term]]:  # fmt: skip
-    """Findings that hold on the validation recordings, one after the other beside `kept`; the rest goes to rejected."""
-    kept, found = list(kept), []
-    few = _settled(bench, fit, kept)
-    for step, term in stories:
-        many = _settled(bench, fit, [*kept, term])
-        proof = bench.proof(term.candidate.joint, (fit, *few), (fit, *many))
-        reason = None
-        if proof["before"] <= proof["noise_floor"]:
-            reason = "without it the error is within the sensors' noise already"
-        elif proof["after"] ** 2 > (1 - LEAST_SHARE) * proof["before"] ** 2:
-            reason = NOT_BORNE_OUT
-        elif bench.mujoco and not _moves_better(bench, (fit, *few), (fit, *many)):
-            reason = "the motion of the training trials, simulated from the commands, gets no better"
-        if reason is not None:
-            rejected.append({"effect": term.candidate.key, "reason": reason})
-            continue
-        kept.append(term)
-        few = many
-        last = slice(len(many[1]) - len(term.candidate.amplitudes), None)
-        spread = None
-        if proof["after"] <= FITS * proof["noise_floor"]:  # beside what does not fit, an interval would promise too much
-            spread = resampled(pose(fit), many[0])[:, last]
-        found.append(_joint_finding(bench.rig, fit, step, term, many[1][last], proof, spread))
-    return found, kept
-
-
-def _moves_better(bench: Bench, before: tuple, after: tuple) -> bool:
-    """Whether the file with one term more moves closer to the training recordings; True where efforts are recorded.
-
-    Where they are not, the balance holds what the drives' declared law makes of their commands: only the motion can tell
-    whether they act so.
-    """
-    if any(t.effort for t in bench.rig.trials) or not bench.rig.drives:
-        return True
-    ratio = open_loop(bench.rig, bench.file(*before), bench.file(*after), validate=False).get("ratio", 0.0)
-    return ratio < 1.0
-
-
-def _settled(bench: Bench, fit: DeclaredFit, terms: Sequence[Term]) -> tuple[list[Term], Array]:
-    """Terms and solution, at its own loads where there are any (angles of couplings have none)."""
-    return settled(bench.rig, fit, terms)[:2] if bench.mujoco else (list(terms), solution(pose(fit), terms))
-
-
-def _first(fit: DeclaredFit, terms: Sequence[Term], count: int) -> list[Term]:
-    """The first so many terms of every joint, in their best shapes without the others."""
-    out: list[Term] = []
-    for joint in dict.fromkeys(t.candidate.joint for t in terms):
-        mine = [t for t in terms if t.candidate.joint == joint]
-        out += refit(pose(fit, joint), mine[:count]) if len(mine) > count else mine
-    return out
 
 
 def _off_axis(bench: Bench, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple[DeclaredFit, Finding] | None:
@@ -269,7 +215,7 @@ def _off_axis(bench: Bench, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple[
         return None
     moved = {c.label: {"value": float(v), "unit": "kg m"} for c, v in zip(freed.columns, after)
              if c.kind == "inertial" and c.value == 0}  # fmt: skip
-    where = _where(best, None, "effort", proofs[best]["held_out"], proofs[best]["before"] ** 2 - proofs[best]["after"] ** 2)
+    where = whereabouts(best, None, "effort", proofs[best]["held_out"], proofs[best]["before"] ** 2 - proofs[best]["after"] ** 2)
     words = (
         f"Centres of mass lie off the axes on which they are declared: held-out effort error falls to "
         f"{100 * ratio:.0f} % over all joints (most at {best}: {proofs[best]['before']:.4g} to {proofs[best]['after']:.4g})."
@@ -286,31 +232,6 @@ def _better_alone(rig: RigModel, fit: DeclaredFit, terms: Sequence[Term], error:
     return any(score(problem, terms, c, parts).error.sum() < error for c in every)
 
 
-def _where(joint: str | None, drive: Drive | None, signal: str, trials: Sequence[str], share: float) -> dict[str, Any]:
-    """Where a finding of a rig is; share: of the mismatch, squared [effort or position unit] until `shares` divides it."""
-    return {"finger": None, "joint": joint, "actuator": drive.name if drive else None, "signal": signal, "marker": None,
-            "trials": list(trials), "region": None, "share_of_mismatch": share}  # fmt: skip
-
-
-def _joint_finding(rig: RigModel, fit: DeclaredFit, step: Step, term: Term, amplitude: Array, proof: dict,
-                   spread: Array | None) -> Finding:  # fmt: skip
-    c = term.candidate
-    position, effort = rig.unit(c.joint), rig.effort_unit(c.joint)
-    parameters = {}
-    for k, ((name, unit, _, _), v) in enumerate(zip(c.amplitudes, amplitude, strict=True)):
-        ends = None if spread is None else [float(x) for x in np.percentile(spread[:, k], [2.5, 97.5])]
-        parameters[name] = {"value": float(v), "unit": joint_unit(unit, position, effort), "ci95": ends}
-    sign = -1.0 if c.effect == "command_delay" else 1.0  # what a late drive leaves comes early in the balance: its command is ahead
-    parameters |= {k: {"value": sign * float(v) if k == "delay" else float(v), "unit": shape_unit(k, position), "ci95": None}
-                   for k, v in term.shape.items()}  # fmt: skip
-    where = _where(c.joint, rig.drive(c.joint), "effort", proof["held_out"], max(proof["before"] ** 2 - proof["after"] ** 2, 0.0))
-    return Finding(
-        c.effect, (c.effect, *(e for e in step.equals if e != c.effect)), step.probability,
-        alternatives(step.rivals, c.effect), where, statement(c.effect, c.variant, c.joint, parameters, proof), parameters, proof,
-        {"native": False, "mjcf": 'custom/text[@name="hand_model"]', "urdf": "not expressible: kept in rig.xml"},
-    )  # fmt: skip
-
-
 # --- couplings -------------------------------------------------------------------------------------------------------
 
 
@@ -322,7 +243,7 @@ def _diagnose_coupling(
         return [], [], None
     fit, taken, steps, scores, moved = known
     rejected = [{"effect": s.term.candidate.key, "reason": NOT_TAKEN} for s in scores]
-    found, kept = _prove(Bench(rig, mujoco=False), fit, list(zip(steps, taken, strict=True)), [], rejected)
+    found, kept = proved(Bench(rig, mujoco=False), fit, list(zip(steps, taken, strict=True)), [], rejected)
     named = []
     for f in found:
         where = {**f.where, "actuator": None, "signal": "position", "coupling": coupling.name}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,12 +12,19 @@ from numpy.typing import NDArray
 
 from ..diagnose.findings import FILES, Finding, Findings
 from ..output import new_file
+from .model import Drive
 
 __all__ = ["CouplingResidual", "Finding", "Findings", "RigFindings"]
 Array = NDArray[np.float64]
 NOT_TAKEN = "error on training recordings left out of the fit does not fall enough"
 NOT_TOLD = "interval of its size holds zero"
 NOT_BORNE_OUT = "error on validation recordings does not fall enough"
+
+
+def whereabouts(joint: str | None, drive: Drive | None, signal: str, trials: Sequence[str], share: float) -> dict[str, Any]:
+    """Where a finding of a rig is; share: of the mismatch, squared [effort or position unit] until `shares` divides it."""
+    return {"finger": None, "joint": joint, "actuator": drive.name if drive else None, "signal": signal, "marker": None,
+            "trials": list(trials), "region": None, "share_of_mismatch": share}  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -21,15 +21,17 @@ from .states import fill_gaps
 
 Array = NDArray[np.float64]
 HORIZONS_S = (np.inf, 4.0, 2.0, 1.0, 0.5, 0.25, 0.1)
+NO_LAW = "no law in open loop"
 CARRIES = 0.5  # an error below this share of the recorded motion's standard deviation still predicts it
 
 
 def open_loop(rig: RigModel, before: bytes, after: bytes, refused: Collection[tuple[str, str]] = (),
-              validate: bool = True) -> dict[str, Any]:  # fmt: skip
+              validate: bool = True, known: dict[tuple[bytes, float, bool], Array] | None = None) -> dict[str, Any]:  # fmt: skip
     """Position error of both files on the trials held out (on all where none is), at the longest horizon that carries.
 
-    refused: (trial, joint) whose effort cannot be trusted; their trials are left out. validate: False for the training trials. Returns {"not_run": reason} where
-    the files cannot be simulated so, else the horizon ("whole" or [s]), the ratio and each joint's figures.
+    refused: (trial, joint) whose effort cannot be trusted; their trials are left out. validate: False for the training trials; known:
+    errors of files kept from one call to the next, of one rig and one `refused`. Returns {"not_run": reason} where the files cannot
+    be simulated so, else the horizon ("whole" or [s]), the ratio and each joint's figures.
     """
     wrong = {t for t, _ in refused}
     trials = [t for t in (rig.select(validate) or rig.trials) if t.name not in wrong and can_simulate(rig, t)]
@@ -39,14 +41,20 @@ def open_loop(rig: RigModel, before: bytes, after: bytes, refused: Collection[tu
         return {"not_run": "no recording held out has all of its efforts or controls"}
     unknown = EffectStepper(compile_model(replace(rig, xml=after)), read_effects(after)).unknown
     if unknown:
-        return {"not_run": f"no law in open loop for {', '.join(sorted(set(unknown)))}"}
-    states = [recorded_states(rig, t) for t in trials]
+        return {"not_run": f"{NO_LAW} for {', '.join(sorted(set(unknown)))}"}
+    states, known = [recorded_states(rig, t) for t in trials], {} if known is None else known
+
+    def error(xml: bytes, horizon_s: float) -> Array:
+        if (xml, horizon_s, validate) not in known:
+            known[xml, horizon_s, validate] = _error(replace(rig, xml=xml), trials, states, horizon_s)
+        return known[xml, horizon_s, validate]
+
     for horizon in HORIZONS_S:
-        old = _error(replace(rig, xml=before), trials, states, horizon)
+        old = error(before, horizon)
         spread = np.sqrt(np.mean([np.nanvar(np.stack([t.position[j] for j in rig.joints], 1), 0) for t in trials], 0))
         if not (old < CARRIES * spread).all():
             continue
-        new = _error(replace(rig, xml=after), trials, states, horizon)
+        new = error(after, horizon)
         if np.isfinite(new).all():
             joints = {j: {"before": float(a), "after": float(b), "unit": rig.unit(j)}
                       for j, a, b in zip(rig.joints, old, new, strict=True)}  # fmt: skip

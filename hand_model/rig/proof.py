@@ -28,13 +28,14 @@ PARTS = 24  # blocks that the held-out recordings of a joint are cut into
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """Measures fits. mujoco: efforts by inverse dynamics of the file that holds them (each file once); else angles of a coupling by the columns. floor: joint -> noise in
-    its residual, where that is known."""
+    """Measures fits. mujoco: efforts by inverse dynamics of the file that holds them (each file once); else angles of a coupling by the
+    columns. floor: joint -> noise in its residual, where that is known; moved: what `open_loop` keeps of files."""
 
     rig: RigModel
     mujoco: bool = True
     floor: Mapping[str, float] = field(default_factory=dict)
     known: dict[bytes, tuple[EffortResidual, ...]] = field(default_factory=dict, repr=False)
+    moved: dict[tuple[bytes, float, bool], Array] = field(default_factory=dict, repr=False)
 
     @property
     def engine(self) -> str:

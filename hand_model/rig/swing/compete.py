@@ -42,7 +42,8 @@ class Variant:
 
 @dataclass(frozen=True)
 class Round:
-    """A round of the competition. error of "none" and of the winner (blocks,), winner, rivals with probabilities."""
+    """A round of the competition: the winner, its probability against "none" and what it takes away, rivals with probabilities; all
+    that is taken after it, in the variants of then, and the fit of that."""
 
     variant: Variant
     probability: float
@@ -50,6 +51,7 @@ class Round:
     rivals: tuple[tuple[str, float], ...]
     equals: tuple[str, ...]
     fit: Fitted | None = None
+    taken: tuple[Variant, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -169,12 +171,13 @@ def compete_swing(
             rivals = _round(stages, (first.variant,), first.fit, test, folds, without)[2]
             found = _judged(current, none, rivals, test, folds, floor, BEYOND_DOUBT)
             if found is not None:
-                taken, rounds = (first.variant,), [replace(found[1], variant=first.variant, fit=first.fit)]
+                taken = (first.variant,)
+                rounds = [replace(found[1], variant=first.variant, fit=first.fit, taken=taken)]
         if found is None:
             break
         won = rivals[found[0]]
         taken, current = _exchanged(stages, (*taken, won.variant), won.fit)
-        rounds.append(replace(found[1], fit=current))
+        rounds.append(replace(found[1], fit=current, taken=taken))
     return list(zip(taken, rounds, strict=True))
 
 
@@ -184,7 +187,7 @@ def _round(stages: Sequence[Swing], taken: tuple[Variant, ...], current: Fitted,
     swing, train = stages[-1], tuple(int(i) for i in stages[-1].train())
     free = all_free(swing, taken)
     others = [v for v in variants(swing) if not set(v.start) <= set(free) and v.effect not in without]
-    tasks = [Task(all_free(swing, (*taken, v)), _started(current.theta, v), ()) for v in others]
+    tasks = [Task(all_free(swing, (*taken, v)), begun(current.theta, v), ()) for v in others]
     fits = fit_stages(stages, tasks, 8)
     order = _shortlist(others, fits)
     same = Task(free, current.theta, train)  # nothing more has the same starts as they have, or they would win by theirs
@@ -236,7 +239,7 @@ def _exchanged(
         for name in {n for v in taken for n in v.start} - {n for v in group for n in v.start}:
             theta[INDEX[name]] = vector({})[INDEX[name]]
         for v in group:
-            theta = _started(theta, v) if v not in taken else theta
+            theta = begun(theta, v) if v not in taken else theta
         tasks.append(Task(all_free(swing, group), theta, ()))
     fits = fit_stages(stages, tasks, 12)
     size = len(swing.train())
@@ -293,7 +296,8 @@ def all_free(swing: Swing, taken: Sequence[Variant]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
-def _started(theta: Array, variant: Variant) -> Array:
+def begun(theta: Array, variant: Variant) -> Array:
+    """Parameters with what the variant frees where it begins."""
     out = theta.copy()
     for name, value in variant.start.items():
         if name != "stribeck_speed" or out[INDEX[name]] == 1.0:

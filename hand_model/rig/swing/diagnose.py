@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -12,13 +13,13 @@ import numpy as np
 from ...background import Background
 from ...session import Session
 from ..declared import DeclaredFit
-from ..findings import NOT_BORNE_OUT, NOT_TOLD, Finding
+from ..findings import NOT_BORNE_OUT, NOT_TOLD, Finding, whereabouts
 from ..model import RigModel, load_rig
 from ..replay import RigResiduals, replay_rig
 from ..states import fill_gaps, noise_std
 from ..words import alternatives, shares, statement
 from .build import build_swing, search_step_s, thinned, windows_s
-from .compete import LEAST_GAIN, Round, Variant, all_free, compete_swing, fit_apart, fit_stages, free_declared
+from .compete import LEAST_GAIN, Round, Variant, all_free, begun, compete_swing, fit_apart, fit_stages, free_declared
 from .fit import Fitted, Task
 from .interval import intervals
 from .patch import write_swing
@@ -48,8 +49,12 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
     fine = [(build_swing(rig, fit, step_s, window_s), most) for step_s, window_s, most in last_stages]
     known: dict[tuple[str, ...], Link] = {}
 
+    def links_of(sets: Sequence[Sequence[Taken]]) -> list[Link]:
+        last = next((some[-1][1].fit.theta for some in reversed(sets) if some), declared.theta)
+        return _links(rig, session, held, fine, declared.theta, sets, last, known)
+
     def chain_of(some: Sequence[Taken]) -> list[Link]:
-        return _chain(rig, session, held, fine, declared.theta, some, known)
+        return links_of([some[:k] for k in range(len(some) + 1)])
 
     def ends_of(link: Link) -> Ends:
         return intervals(freed(build_swing(rig, fit, STEP_S, windows[-1]), link.fit.theta), link.free, link.fit.theta)
@@ -59,8 +64,8 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
         say(f"{rig.name}: {', '.join(v.key for v, _ in taken) or 'nothing'}")
         return taken
 
-    kept, chain, ends, rejected = _searched(search, chain_of, ends_of)
-    figures = [c.error for c in chain]
+    kept, chain, ends, rejected = _searched(search, chain_of, ends_of, links_of)
+    figures = _figures(kept, chain, links_of)
     found = []
     for k, (variant, round_) in enumerate(kept):
         before, after = _sides(kept, chain, k, chain_of)
@@ -79,8 +84,7 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
 
 @dataclass(frozen=True)
 class Link:
-    """The declared model with the first so many effects: free parameters, their fit, the file, its replay, and the held-out
-    error of that."""
+    """The declared model with some effects: free parameters, their fit, the file, its replay, and the held-out error of that."""
 
     free: tuple[str, ...]
     fit: Fitted
@@ -90,20 +94,44 @@ class Link:
 
 
 def _searched(search: Callable[[list[Taken], frozenset[str]], list[Taken]], chain_of: Callable[[Sequence[Taken]], list[Link]],
-              ends_of: Callable[[Link], Ends]) -> tuple[list[Taken], list[Link], Ends, list[dict[str, Any]]]:  # fmt: skip
-    """What `_told` leaves of a search; an effect that came last and whose size cannot be told leaves its place to what came next to it."""
+              ends_of: Callable[[Link], Ends], links_of: Callable[[Sequence[Sequence[Taken]]], list[Link]],
+              ) -> tuple[list[Taken], list[Link], Ends, list[dict[str, Any]]]:  # fmt: skip
+    """What `_told` leaves of a search; an effect that came last and whose size cannot be told leaves its place to what came next to it. Where
+    all that a search found predicts no better than what stood after one of its rounds, that stands."""
     kept: list[Taken] = []
     vague: frozenset[str] = frozenset()
     rejected: list[dict[str, Any]] = []
     for _ in range(MOST_SEARCHES):
         taken = search(kept, vague)
         kept, chain, ends, more = _told(taken, chain_of, ends_of)
+        earlier = _states(taken)[:-1]
+        errors = [link.error for link in links_of(earlier)]
+        if errors and not chain[-1].error < (1.0 - LEAST_GAIN) * min(errors):
+            gone = [v for v, _ in kept]
+            kept, chain, ends, _ = _told(earlier[int(np.argmin(errors))], chain_of, ends_of)
+            more += [{"effect": v.key, "reason": NOT_BORNE_OUT} for v in gone]
         rejected += [r for r in more if r not in rejected]
         told = vague | {v.effect for v, _ in taken if {"effect": v.key, "reason": NOT_TOLD} in more}
         if told == vague or kept != taken[: len(kept)]:
             break
         vague = told
     return kept, chain, ends, [r for r in rejected if r["effect"] not in {v.key for v, _ in kept}]
+
+
+def _states(taken: Sequence[Taken]) -> list[list[Taken]]:
+    """What stood after every round, in the variants of then: a later round may exchange them."""
+    rounds = [r for _, r in taken]
+    return [list(zip(r.taken, rounds, strict=False)) for r in rounds]
+
+
+def _figures(kept: Sequence[Taken], chain: Sequence[Link], links_of: Callable[[Sequence[Sequence[Taken]]], list[Link]]) -> list[float]:
+    """Held-out error of the declared model and with one, two, ... of the effects, in the variants that suited them before the later ones
+    came; in those of the last round, one after the other, where the search had others then."""
+    figures, every = [c.error for c in chain], Counter(v.effect for v, _ in kept)
+    own = {len(s): s for s in _states(kept) if len(s) < len(kept) and Counter(v.effect for v, _ in s) <= every}
+    for count, link in zip(own, links_of(list(own.values())), strict=True):
+        figures[count] = link.error
+    return figures
 
 
 def _told(kept: list[Taken], chain_of: Callable[[Sequence[Taken]], list[Link]],
@@ -157,30 +185,41 @@ def _falls(chain: Sequence[Link]) -> list[bool]:
     return [b.error < (1.0 - LEAST_GAIN) * a.error for a, b in pairwise(chain)]
 
 
-def _chain(rig: RigModel, session: Session, held: bool, stages: Sequence[tuple[Swing, int]], declared: np.ndarray,
-           kept: Sequence[Taken], known: dict[tuple[str, ...], Link]) -> list[Link]:  # fmt: skip
-    """The declared model, with the first effect, with the first two, ...: fitted in one batch, written and replayed; stages:
-    each with its most iterations; known holds those that were before, by the effects in them."""
-    keys = [tuple(v.key for v, _ in kept[:k]) for k in range(len(kept) + 1)]
-    new = [k for k, key in enumerate(keys) if key not in known]
-    free = [all_free(stages[0][0], [v for v, _ in kept[:k]]) for k in new]
-    starts = [_start(names, kept[k - 1][1].fit.theta, kept[-1][1].fit.theta) if k else declared for k, names in zip(new, free, strict=True)]
-    fits: list[Fitted] = []
+def _links(rig: RigModel, session: Session, held: bool, stages: Sequence[tuple[Swing, int]], declared: np.ndarray,
+           sets: Sequence[Sequence[Taken]], last: np.ndarray, known: dict[tuple[str, ...], Link]) -> list[Link]:  # fmt: skip
+    """The declared model with every set of effects: fitted in one batch, written and replayed; stages: each with its most iterations;
+    last: parameters that know all effects; known holds those that were before, by the effects in them."""
+    keys = [tuple(v.key for v, _ in some) for some in sets]
+    new = {key: some for key, some in zip(keys, sets, strict=True) if key not in known}
+    free = [all_free(stages[0][0], [v for v, _ in some]) for some in new.values()]
+    tries = [(k, start) for k, some in enumerate(new.values()) for start in _starts(free[k], some, declared, last)]
     for stage, most in stages if new else ():
-        starts = [f.theta for f in fits] or starts
-        swing, stretches = started_each(stage, starts)
-        fits = fit_apart(swing, [Task(*task) for task in zip(free, starts, stretches, strict=True)], most)
-    files = [write_swing(rig, stages[0][0], f.theta) for f in fits]
-    replays = Background(_replayed, [(session, x, held) for x in files]).results()
-    for k, names, f, x, r in zip(new, free, fits, files, replays, strict=True):
-        known[keys[k]] = Link(names, f, x, r, r.figure("position_rmse", held))
+        swing, stretches = started_each(stage, [start for _, start in tries])
+        fits = fit_apart(swing, [Task(free[k], start, some) for (k, start), some in zip(tries, stretches, strict=True)], most)
+        best = [min((f for (i, _), f in zip(tries, fits, strict=True) if i == k), key=lambda f: f.cost) for k in range(len(free))]
+        tries = [(k, f.theta) for k, f in enumerate(best)]
+    files = [write_swing(rig, stages[0][0], theta) for _, theta in tries]
+    replays = Background(_replayed, [(session, x, held) for x in files]).results() if files else ()
+    for k, (key, x, r) in enumerate(zip(new, files, replays, strict=True)):
+        known[key] = Link(free[k], best[k], x, r, r.figure("position_rmse", held))
     return [known[key] for key in keys]
 
 
-def _start(free: Sequence[str], own: np.ndarray, last: np.ndarray) -> np.ndarray:
-    """Parameters to start a fit from: those of its own round; where an effect has since been exchanged, of the last round."""
+def _starts(free: Sequence[str], some: Sequence[Taken], declared: np.ndarray, last: np.ndarray) -> list[np.ndarray]:
+    """Parameters to start a fit of some effects from: those of the last one's own round. Where a variant has since been exchanged for
+    another, what that round does not know as the `last` one has it, which knew later effects; and, for that may lead astray, what
+    the variants begin from beside the declared model."""
     neutral = vector({})
-    return np.where(np.isin(PARAMETERS, free), np.where(own == neutral, last, own), neutral)
+    if not some:
+        return [declared]
+    own, effects = some[-1][1].fit.theta, [v for v, _ in some]
+    starts = [np.where(np.isin(PARAMETERS, free), np.where(own == neutral, last, own), neutral)]
+    if any(own[INDEX[n]] == neutral[INDEX[n]] for v in effects for n in v.start):
+        fresh = declared.copy()
+        for v in effects:
+            fresh = begun(fresh, v)
+        starts.append(fresh)
+    return starts
 
 
 def _replayed(session: Session, xml: bytes, held: bool) -> RigResiduals:
@@ -214,9 +253,8 @@ def _swing_finding(rig: RigModel, variant: Variant, round_: Round, ends: Ends, l
     units = parameter_units(rig.unit(joint), rig.effort_unit(joint))
     parameters = {n: {"value": float(link.fit.theta[INDEX[n]]), "unit": units.get(n, "1"), "ci95": list(ends[n])}
                   for n in variant.start}  # fmt: skip
-    where = {"finger": None, "joint": joint, "actuator": (rig.drive(joint).name if rig.drive(joint) else None),
-             "signal": "position", "marker": None, "trials": proof["held_out"], "region": None,
-             "share_of_mismatch": max(proof["before"] ** 2 - proof["after"] ** 2, 0.0)}  # fmt: skip
+    fall = max(proof["before"] ** 2 - proof["after"] ** 2, 0.0)
+    where = whereabouts(joint, rig.drive(joint), "position", proof["held_out"], fall)
     native = set(variant.start) <= {"drag"}
     return Finding(
         variant.effect, (variant.effect, *(e for e in round_.equals if e != variant.effect)), round_.probability,

@@ -1,0 +1,145 @@
+"""Which effects of a balance stand: each is held to validation recordings beside those before it, all in the shapes that suit them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .declared import DeclaredFit
+from .findings import NOT_BORNE_OUT, Finding, whereabouts
+from .horizon import NO_LAW, open_loop
+from .model import RigModel
+from .name.compete import LEAST_SHARE, Step
+from .name.problem import Term, pose, resampled, solution
+from .name.refit import refit
+from .name.settled import settled
+from .proof import Bench
+from .words import alternatives, joint_unit, shape_unit, statement
+
+Array = NDArray[np.float64]
+FITS = 1.6**0.5  # an error within so many noise floors is taken to be noise: a variance 1.6 times as large
+END = 0.99  # of the longest delay that is tried
+
+
+def proved(bench: Bench, fit: DeclaredFit, stories: Sequence[tuple[Step, Term]], kept: Sequence[Term],
+           rejected: list[dict[str, Any]]) -> tuple[list[Finding], list[Term]]:  # fmt: skip
+    """Findings that hold on the validation recordings, one after the other beside `kept`, all in the shapes that are best without the
+    later ones; the rest goes to rejected. Returns them and the terms that hold."""
+    terms, found = list(kept), list(kept)
+    proofs: list[tuple[Step, dict[str, Any]]] = []
+    whole = Counter(t.candidate.joint for t in [*kept, *(t for _, t in stories)])
+    plain, few = (fit, *solved(bench, fit, [])), solved(bench, fit, kept)
+    for step, term in stories:
+        more = _shaped(fit, terms, [*found, term], whole)
+        many = solved(bench, fit, more)
+        proof = bench.proof(term.candidate.joint, (fit, *few), (fit, *many))
+        reason = _withdrawn(bench, proof, plain, (fit, *few), (fit, *many))
+        if reason is not None:
+            rejected.append({"effect": term.candidate.key, "reason": reason})
+            continue
+        found, terms, few = [*found, term], more, many
+        proofs.append((step, proof))
+    return _told(bench, fit, _in_order(terms, found), proofs), terms
+
+
+def _shaped(fit: DeclaredFit, standing: Sequence[Term], found: Sequence[Term], whole: Mapping[str, int]) -> list[Term]:
+    """Terms with the last of `found`, its joint last: there in their best shapes beside each other, as they were found where the joint has
+    them all (whole: joint -> how many), else those without the others; at other joints as they stand."""
+    joint = found[-1].candidate.joint
+    mine = [t for t in found if t.candidate.joint == joint]
+    best = mine if len(mine) == whole[joint] else refit(pose(fit, joint), mine)
+    return [*(t for t in standing if t.candidate.joint != joint), *best]
+
+
+def _in_order(terms: Sequence[Term], found: Sequence[Term]) -> list[Term]:
+    """Terms in the order in which they were found: each joint has them in that order already."""
+    left = {j: iter([t for t in terms if t.candidate.joint == j]) for j in {t.candidate.joint for t in terms}}
+    return [next(left[t.candidate.joint]) for t in found]
+
+
+def _told(bench: Bench, fit: DeclaredFit, terms: Sequence[Term], proofs: Sequence[tuple[Step, dict[str, Any]]]) -> list[Finding]:
+    """Findings of the last terms, one for each proof: the size of each beside those before it, in the shapes that stand in the end."""
+    found, first = [], len(terms) - len(proofs)
+    for k, (step, proof) in enumerate(proofs, first + 1):
+        told, theta = solved(bench, fit, terms[:k])
+        term = terms[k - 1]
+        last = slice(len(theta) - len(term.candidate.amplitudes), None)
+        spread = None
+        if proof["after"] <= FITS * proof["noise_floor"]:  # beside what does not fit, an interval would promise too much
+            spread = resampled(pose(fit), told)[:, last]
+        found.append(_joint_finding(bench.rig, fit, step, term, theta[last], proof, spread))
+    return found
+
+
+def _withdrawn(bench: Bench, proof: Mapping[str, Any], plain: tuple, before: tuple, after: tuple) -> str | None:
+    """Why an effect does not hold on the validation recordings (its proof; fits of the declared model, without it and with it), or None
+    where it does."""
+    if _beyond_reach(after[1][-1]):
+        return "its delay is the longest that is asked: what is best may lie beyond"
+    if proof["before"] <= proof["noise_floor"]:
+        return "without it the error is within the sensors' noise already"
+    if proof["after"] ** 2 > (1 - LEAST_SHARE) * proof["before"] ** 2:
+        return NOT_BORNE_OUT
+    if bench.mujoco and bench.ratio(plain, after) >= bench.ratio(plain, before):
+        return "what it takes off at its joint it adds at others"
+    return _motion_says(bench, before, after) if bench.mujoco else None
+
+
+def _beyond_reach(term: Term) -> bool:
+    """Whether a delay lies at the end of those that are tried: there it stands in for what no delay is."""
+    tried = [abs(g["delay"]) for g in term.candidate.grid if "delay" in g]
+    return bool(tried) and abs(term.shape["delay"]) > END * max(tried)
+
+
+def _motion_says(bench: Bench, before: tuple, after: tuple) -> str | None:
+    """What the motion of the training recordings says against the file with one term more: that it moves further from them, by as much as
+    would be worth a name, or that it cannot be simulated; never anything where efforts are recorded.
+
+    Where they are not, the balance holds what the drives' declared law makes of their commands: only the motion can tell
+    whether they act so. Where it hardly depends on the term it says nothing against it.
+    """
+    if any(t.effort for t in bench.rig.trials) or not bench.rig.drives:
+        return None
+    told = open_loop(bench.rig, bench.file(*before), bench.file(*after), validate=False, known=bench.moved)
+    if told.get("not_run", "").startswith(NO_LAW):
+        return f"no effort is recorded, and only a simulated motion could tell: {told['not_run']}"
+    worse = told.get("ratio", 0.0) ** 2 > 1 + LEAST_SHARE
+    return "the motion of the training trials, simulated from the commands, gets worse" if worse else None
+
+
+def solved(bench: Bench, fit: DeclaredFit, terms: Sequence[Term]) -> tuple[list[Term], Array]:
+    """Terms and solution, at its own loads where there are any (angles of couplings have none)."""
+    return settled(bench.rig, fit, terms)[:2] if bench.mujoco else (list(terms), solution(pose(fit), terms))
+
+
+def first_of(fit: DeclaredFit, terms: Sequence[Term], count: int) -> list[Term]:
+    """The first so many terms of every joint, in their best shapes without the others."""
+    out: list[Term] = []
+    for joint in dict.fromkeys(t.candidate.joint for t in terms):
+        mine = [t for t in terms if t.candidate.joint == joint]
+        out += refit(pose(fit, joint), mine[:count]) if len(mine) > count else mine
+    return out
+
+
+def _joint_finding(rig: RigModel, fit: DeclaredFit, step: Step, term: Term, amplitude: Array, proof: dict,
+                   spread: Array | None) -> Finding:  # fmt: skip
+    c = term.candidate
+    position, effort = rig.unit(c.joint), rig.effort_unit(c.joint)
+    parameters = {}
+    for k, ((name, unit, _, _), v) in enumerate(zip(c.amplitudes, amplitude, strict=True)):
+        ends = None if spread is None else [float(x) for x in np.percentile(spread[:, k], [2.5, 97.5])]
+        parameters[name] = {"value": float(v), "unit": joint_unit(unit, position, effort), "ci95": ends}
+    sign = -1.0 if c.effect == "command_delay" else 1.0  # what a late drive leaves comes early in the balance: its command is ahead
+    parameters |= {k: {"value": sign * float(v) if k == "delay" else float(v), "unit": shape_unit(k, position), "ci95": None}
+                   for k, v in term.shape.items()}  # fmt: skip
+    fall = max(proof["before"] ** 2 - proof["after"] ** 2, 0.0)
+    where = whereabouts(c.joint, rig.drive(c.joint), "effort", proof["held_out"], fall)
+    return Finding(
+        c.effect, (c.effect, *(e for e in step.equals if e != c.effect)), step.probability,
+        alternatives(step.rivals, c.effect), where, statement(c.effect, c.variant, c.joint, parameters, proof), parameters, proof,
+        {"native": False, "mjcf": 'custom/text[@name="hand_model"]', "urdf": "not expressible: kept in rig.xml"},
+    )  # fmt: skip
