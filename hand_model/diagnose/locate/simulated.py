@@ -56,7 +56,7 @@ def simulated_drive(session: Session, actuator: str) -> SimulatedDrive | None:
         delay_s, doubt_s = channel_delay(fit.output_error, BOUNDS) if fit.predictive else (0.0, np.inf)
         logs = {t.name: t.log() for t in drive_trials(session)[actuator]}
         motions = {name: _motion(fit, name, log) for name, log in logs.items()}
-    except HandModelError:
+    except (HandModelError, np.linalg.LinAlgError):  # a drive that cannot be simulated is judged by its recorded motion
         return None
     whole = all(m is not None for m in motions.values())
     return SimulatedDrive(actuator, delay_s, doubt_s, {n: m for n, m in motions.items() if m is not None} if whole else {})

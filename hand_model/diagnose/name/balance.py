@@ -31,6 +31,7 @@ Array = NDArray[np.float64]
 DECLARED_LOW = {"inertia": 0.0, "viscous": 0.0, "coulomb": 0.0, "spring": 0.0}
 MOST_KEPT = 3e8  # bytes of columns that one balance keeps
 AT_ONCE = 60  # shapes of a grid whose columns are made together
+SETTLED = 0.25  # of the noise: more of what starts and stops bring, and motion is not steady
 UNSETTLED = 1e-3  # weight left to a start or stop where steady motion alone is asked
 DISCRETE = ("side", "trial", "form", "end")  # shapes that choose among few cases: no continuous parameter is spent on them
 
@@ -109,7 +110,7 @@ class Balance:
         self.sigma, self.inflation = noise(self)
         self.timing = self.gather(lambda s: s.extra.get("sigma", np.zeros(len(s.time_s))))
         self.weight = 1 / np.hypot(self.sigma, self.timing)
-        self.steady = self.timing <= 0.25 * self.sigma
+        self.steady = self.timing <= SETTLED * self.sigma
         self.wander: Wander | None = None
         self._grids: dict[Any, Grid] = {}
         self._kept: dict[Any, GridColumns] = {}

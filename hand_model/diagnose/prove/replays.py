@@ -15,6 +15,7 @@ from ...effects import effect
 from ...effects.base import DriveState
 from ...effects.path import strokes
 from ..findings import Finding
+from ..name.balance import SETTLED
 from ..name.reread import of_recording
 
 Array = NDArray[np.float64]
@@ -75,7 +76,7 @@ def proved(finding: Finding, station: Any, errors: Errors) -> tuple[dict[str, An
     if any(e is None for pair in pairs for e in pair):
         return {**finding.fit, "note": "no compiled file has its motor or its joint"}, None
     every = bool(kind.warps or kind.replaces)
-    used = [_used(s, every) for s in states]
+    used = [_used(s, every, station.naming.balance.sigma) for s in states]
     r0, r1 = ([pair[k][u] for pair, u in zip(pairs, used, strict=True)] for k in (0, 1))
     blocks = [_blocks(s)[u] for s, u in zip(states, used, strict=True)]
     granted = np.concatenate([s.extra.get("sigma", np.zeros(len(s.time_s)))[u] for s, u in zip(states, used, strict=True)])
@@ -114,9 +115,12 @@ def kept_out(states: Sequence[DriveState]) -> tuple[DriveState, ...]:
     return tuple(s for s in states if s.validate) or tuple(states)
 
 
-def _used(state: DriveState, every: bool) -> NDArray[np.bool_]:
-    """Samples (n,) that are compared: steady ones, or every sliding one for what acts at starts and stops."""
-    return np.isfinite(state.effort) & (state.extra.get("slides" if every else "steady", np.ones(len(state.time_s))) > 0)
+def _used(state: DriveState, every: bool, noise: float) -> NDArray[np.bool_]:
+    """Samples (n,) that are compared: steady ones, as a balance of that noise has them, or every sliding one for what acts at starts and stops."""
+    if every:
+        return np.isfinite(state.effort) & (state.extra.get("slides", np.ones(len(state.time_s))) > 0)
+    seen = np.isfinite(state.effort) & (state.extra.get("steady", np.ones(len(state.time_s))) > 0)
+    return seen & (state.extra.get("sigma", np.zeros(len(seen))) <= SETTLED * noise)
 
 
 def _blocks(state: DriveState) -> NDArray[np.int64]:
