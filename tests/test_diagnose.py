@@ -12,7 +12,7 @@ import pytest
 from hand_model.diagnose import Finding, Findings, diagnose
 from hand_model.diagnose.locate.motion import estimate_motion, local_quadratic
 from hand_model.diagnose.name.balance import Balance, Term
-from hand_model.diagnose.name.interval import _quantile, Reading, held_out, parameter_intervals, undisturbed
+from hand_model.diagnose.name.interval import Reading, _quantile, held_out, parameter_intervals, undisturbed
 from hand_model.diagnose.name.least_squares import bounded_least_squares
 from hand_model.diagnose.name.selection import name_effects
 from hand_model.diagnose.name.shapes import polish
@@ -116,6 +116,7 @@ def test_an_interval_is_that_of_the_mixture_of_forms() -> None:
     for at in (0.025, 0.5, 0.975):
         assert abs(_quantile(parts, at) - np.quantile(drawn, at)) < 0.05
     assert abs(_quantile([(1.0, 2.0, 9.0)], 0.975) - (2.0 + 1.96 * 3.0)) < 1e-3
+    assert abs(_quantile([(0.1, 0.418, 0.0), (0.9, 0.408, 1e-30)], 0.975) - 0.418) < 1e-6  # parameters that are as good as exact
 
 
 def test_a_form_that_does_not_tell_a_parameter_does_not_widen_its_interval_and_a_choice_has_none() -> None:

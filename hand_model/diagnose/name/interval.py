@@ -16,6 +16,7 @@ from .shapes import likeliest, polish, refit
 Array = NDArray[np.float64]
 
 REFUTED = 1.1  # held-out variance over that of the fit as named, from which a reading is none
+EXACT = 1e-9  # of a parameter's value: a smaller standard deviation is rounding
 MISFIT_LIMIT = 1.5  # residual variance over pure error above which no interval is given
 
 
@@ -42,7 +43,7 @@ def parameter_intervals(reading: Reading, which: int) -> dict[str, dict[str, Any
         return out
     variance = _variances(balance, fit, which, scale)
     said = [(p, *_figures(balance, f, which), _variances(balance, f, which, scale)) for p, f in _forms(balance, fit, which, scale)]
-    for name in (k for k in out if k not in DISCRETE and variance[k] > 0):  # a choice has none
+    for name in (k for k in out if k not in DISCRETE and np.sqrt(variance[k]) > EXACT * abs(values[k])):  # what is chosen has none
         parts = [(p, v[name], s2[name]) for p, v, unit, s2 in said if name in v and unit.get(name) == units.get(name)]
         # a form that hardly tells the parameter at all says nothing of it
         parts = [(p, v, s2) for p, v, s2 in parts if np.isfinite(v + s2) and s2 <= max(v**2, variance[name])]
@@ -57,11 +58,10 @@ def _quantile(parts: list[tuple[float, float, float]], at: float) -> float:
     from scipy.optimize import brentq
     from scipy.stats import norm
 
-    share, mean, sd = (np.array(x) for x in zip(*((p, v, max(np.sqrt(s2), 1e-300)) for p, v, s2 in parts), strict=True))
-    ends = [float(f(mean + sign * 8 * sd)) for f, sign in ((np.min, -1), (np.max, 1))]
-    if not ends[1] > ends[0]:
-        return ends[0]
-    return float(brentq(lambda x: float(share @ norm.cdf((x - mean) / sd)) - at, *ends, xtol=1e-9 * (ends[1] - ends[0])))
+    share, mean, variance = np.array(parts).T
+    sd = np.maximum(np.sqrt(variance), EXACT * np.abs(mean).max() + np.finfo(float).tiny)
+    low, high = float(np.min(mean - 9 * sd)), float(np.max(mean + 9 * sd))
+    return float(brentq(lambda x: float(share @ norm.cdf((x - mean) / sd)) - at, low, high, xtol=1e-9 * (high - low)))
 
 
 def _figures(balance: Balance, fit: Fit, which: int) -> tuple[dict[str, float], dict[str, str]]:
