@@ -10,7 +10,14 @@ import pytest
 
 from hand_model.diagnose.locate.drive import drive_states
 from hand_model.diagnose.locate.motion import estimate_motion
-from hand_model.diagnose.locate.simulated import SimulatedDrive, _motion, _slow, delays_apart, simulated_drive, with_simulated
+from hand_model.diagnose.locate.simulated import (
+    SimulatedDrive,
+    _motion,
+    _slow,
+    delays_apart,
+    simulated_drive,
+    with_simulated,
+)
 from hand_model.effects.base import least_delay
 from hand_model.identify.motor import identify_motor
 from hand_model.session import Session, read_session
@@ -68,6 +75,8 @@ def test_moves_that_hold_too_little_of_a_motion_are_not_taken() -> None:
     x = 50 - 50 * np.cos(t)
     motion, v, a = estimate_motion(t, x), 50 * np.sin(t), 50 * np.cos(t)
     assert with_simulated(motion, t, (t, x, v, a)) is not None
+    epoch = 1.7e9 + t  # seconds since 1970 are known to a fraction of a microsecond
+    assert with_simulated(motion, epoch, (t + epoch[0] + 1e-7, x, v, a)) is not None
     assert with_simulated(motion, t, (t, np.where(t < 10, x, np.nan), v, a)) is None
 
 

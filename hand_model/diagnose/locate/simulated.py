@@ -27,6 +27,7 @@ SLOW_S, SLOW_SAMPLES = 0.1, 4.0  # width of the kernel, at least, by which the r
 FEWEST = 8  # samples in a row of which something slow can be told
 COVERED = 0.9  # of the samples in motion that the simulated moves must hold
 MOVES = 0.01  # of the fastest speed
+SAME_S = 1e-5  # times of one row of a log agree to this, whatever the clock counts from
 DIFFERENCE_S = 2e-3  # half width of the differences that make velocity and acceleration of a simulated position
 
 
@@ -100,8 +101,8 @@ def _slow(time_s: Array, rest: Array) -> Array:
 
 def with_simulated(motion: Motion, time_s: Array, simulated: tuple[Array, Array, Array, Array]) -> Motion | None:
     """The motion at times (n,) [s] with the simulated state, at rest between the moves; None where these hold too little of it."""
-    at = np.searchsorted(simulated[0], time_s).clip(0, len(simulated[0]) - 1)
-    x, v, a = (np.where(np.abs(simulated[0][at] - time_s) < 1e-9, y[at], np.nan) for y in simulated[1:])
+    at = np.searchsorted(simulated[0], time_s - SAME_S).clip(0, len(simulated[0]) - 1)
+    x, v, a = (np.where(np.abs(simulated[0][at] - time_s) < SAME_S, y[at], np.nan) for y in simulated[1:])
     known = np.isfinite(x)
     if not known.any() or np.mean(known[motion.moving]) < COVERED:
         return None
