@@ -74,6 +74,12 @@ def travelled(position: Array, threshold: float | None = None) -> Array:
     return out
 
 
+def runs(flag: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First sample, and the one after the last, of every run of True in a flag (n,)."""
+    edges = np.flatnonzero(np.diff(np.r_[False, flag, False].astype(int))).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))
+
+
 def from_rest(position: Array, moving: NDArray[np.bool_]) -> Array:
     """Distance (n,) from where the drive rested last, zero at rest."""
     begin = np.maximum.accumulate(np.where(~moving, np.arange(len(position)), 0))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, figure, position_range
+from .path import runs
 
 
 class SpringDecoupling(Effect):
@@ -68,8 +69,7 @@ class SpringDecoupling(Effect):
 def spans(state: DriveState) -> list[list[float]]:
     """[begin, end] [s of the trial] of every while in which the finger is ahead."""
     here = state.extra.get("ahead", np.zeros(len(state.time_s))) > 0
-    edges = np.flatnonzero(np.diff(np.r_[False, here, False].astype(int)))
-    return [[float(state.time_s[a]), float(state.time_s[b - 1])] for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    return [[float(state.time_s[a]), float(state.time_s[b - 1])] for a, b in runs(here)]
 
 
 EFFECT = SpringDecoupling()

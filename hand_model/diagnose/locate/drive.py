@@ -232,9 +232,9 @@ def with_coulomb(state: DriveState, give: float, granted: float) -> DriveState:
 
 
 def with_timing(state: DriveState) -> DriveState:
-    """Adds "slides", zero where the drive rests or has not left its place, and "sigma" [effort] around starts and stops, zero in steady
-    motion: what half a sample interval of timing means for the declared prediction, what is not known of friction while it turns over,
-    and all that it may hold where the drive rests or has not left its place."""
+    """Adds "slides", zero where the drive rests or has not left its place, and "sigma" [effort], zero in steady motion where that is
+    smoothed: what timing means for the declared prediction (half a sample interval around starts and stops; TOLD_S all along a simulated motion),
+    what is not known of friction while it turns over, and all that it may hold where the drive rests or has not left its place."""
     seen = np.isfinite(state.effort)
     if seen.sum() < 20:
         return state

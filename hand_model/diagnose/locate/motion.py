@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...effects.path import runs
+
 Array = NDArray[np.float64]
 
 SURE = 3.0  # standard deviations
@@ -18,9 +20,8 @@ SURE = 3.0  # standard deviations
 
 @dataclass(frozen=True)
 class Motion:
-    """position, velocity, acceleration: (n,) smoothed. noise: standard deviation of the raw position;
-    bandwidth_s: of the kernel [s];
-    smoothed: whether by the kernel (not simulated); moving: (n,) bool; since_start_s, until_stop_s: (n,) [s] to the nearest rest before and after (inf where none)."""
+    """position, velocity, acceleration: (n,). noise: standard deviation of the raw position; bandwidth_s: of the kernel [s]. moving: (n,) bool;
+    since_start_s, until_stop_s: (n,) [s] to the nearest rest before and after (inf where none). smoothed: whether by the kernel; else simulated."""
 
     position: Array
     velocity: Array
@@ -95,8 +96,7 @@ def sure_acceleration(motion: Motion, time_s: Array) -> Array:
 def _drop_short(flag: NDArray[np.bool_], shortest: int) -> NDArray[np.bool_]:
     """Runs of True shorter than `shortest` samples become False."""
     out = flag.copy()
-    edges = np.flatnonzero(np.diff(np.r_[False, flag, False].astype(int)))
-    for a, b in zip(edges[::2], edges[1::2], strict=True):
+    for a, b in runs(flag):
         if b - a < shortest:
             out[a:b] = False
     return out

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ...effects.path import runs
 from ...errors import HandModelError
 from ...session import Log, Session
 from .motion import Motion, local_quadratic, since_rest
@@ -59,14 +60,14 @@ def simulated_drive(session: Session, actuator: str) -> SimulatedDrive | None:
         motions = {name: _motion(fit, name, log) for name, log in logs.items()}
     except (HandModelError, np.linalg.LinAlgError):  # a drive that cannot be simulated is judged by its recorded motion
         return None
-    whole = all(m is not None for m in motions.values())
-    return SimulatedDrive(actuator, delay_s, doubt_s, {n: m for n, m in motions.items() if m is not None} if whole else {})
+    told = {name: m for name, m in motions.items() if m is not None}
+    return SimulatedDrive(actuator, delay_s, doubt_s, told if len(told) == len(motions) else {})  # one kind of state in one balance
 
 
 def _motion(fit: MotorFit, name: str, log: Log) -> tuple[Array, Array, Array, Array] | None:
     """Time, position, velocity and acceleration of a log's simulated moves; None where they are farther from the recorded ones than noise."""
     from ...identify.motor.fit import white_noise
-    from ...identify.motor.output_error import simulate_moves
+    from ...identify.motor.output_error import simulate_states
     from ...identify.motor.predict import aligned_moves
     from ...identify.motor.recording import motor_trial
 
@@ -74,26 +75,22 @@ def _motion(fit: MotorFit, name: str, log: Log) -> tuple[Array, Array, Array, Ar
     data, own = aligned_moves(fit, trial)
     if not data or found is None:
         return None
-    early, now, late = ([y[:, 0] for y in simulate_moves([replace(m, time_s=m.time_s + d) for m in data], found.values, own, found.controller)]
-                        for d in (-DIFFERENCE_S, 0.0, DIFFERENCE_S))
-    x, v, a = (np.full(len(trial.time_s), np.nan) for _ in range(3))
-    for m, before, at, after in zip(data, early, now, late, strict=True):
-        k = slice(m.index + 1, m.index + 1 + len(m.time_s))
-        x[k], v[k], a[k] = at, (after - before) / (2 * DIFFERENCE_S), (after - 2 * at + before) / DIFFERENCE_S**2
-    slow = _slow(trial.time_s, trial.position - x)
+    state = np.full((3, len(trial.time_s)), np.nan)
+    for m, rows in zip(data, simulate_states(data, found.values, own, found.controller, DIFFERENCE_S), strict=True):
+        state[:, m.index + 1 : m.index + 1 + len(m.time_s)] = rows.T
+    slow = _slow(trial.time_s, trial.position - state[0])
     noise = max(white_noise(trial.position, trial.time_s), 0.3 / fit.scale.counts_per_percent)
-    if np.sqrt(np.nanmean((trial.position - x - slow[0]) ** 2)) > TRUE_TO * noise:
+    if np.sqrt(np.nanmean((trial.position - state[0] - slow[0]) ** 2)) > TRUE_TO * noise:
         return None
     first = log.time_s[np.isfinite(log.time_s) & np.isfinite(log.columns["position"]) & np.isfinite(log.columns["current"])][0]
-    return trial.time_s + first, x + slow[0], v + slow[1], a + slow[2]
+    return (trial.time_s + first, *(state + slow))
 
 
 def _slow(time_s: Array, rest: Array) -> Array:
     """What is slow of the recorded less the simulated motion (n,), nan between moves, and its two derivatives, (3, n)."""
     width_s = max(SLOW_S, SLOW_SAMPLES * float(np.median(np.diff(time_s))))
     out, known = np.full((3, len(rest)), np.nan), np.isfinite(rest)
-    edges = np.flatnonzero(np.diff(np.r_[False, known, False].astype(int)))
-    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+    for begin, end in runs(known):
         k = slice(begin, end)
         out[:, k] = local_quadratic(time_s[k], rest[k], width_s) if end - begin > FEWEST else 0.0
     return out

@@ -84,6 +84,14 @@ def simulate_moves(
     return _split(_one(_single(data, q, own, controller, step_s, calm), data, (1.0, 1.0))[0], data)
 
 
+def simulate_states(data: Sequence[MoveData], q: Mapping[str, float], own: Array, controller: str, half_s: float) -> list[Array]:
+    """Simulated position [%], velocity and acceleration [% per second], (n, 3) per move, by differences over half_s [s] to either side."""
+    longer = [dataclasses.replace(m, time_s=m.time_s + half_s) for m in data]
+    found = _single(longer, q, own, controller, STEP_S, calm=False)
+    before, at, after = (found.sample([m.time_s + x for m in data])[0][:, 0] for x in (-half_s, 0.0, half_s))
+    return _split(np.stack([at, (after - before) / (2 * half_s), (after - 2 * at + before) / half_s**2], axis=1), data)
+
+
 def whitened(
     data: Sequence[MoveData], q: Mapping[str, float], own: Array, sigma: tuple[float, float], controller: str, step_s: float = STEP_S
 ) -> list[Array]:
