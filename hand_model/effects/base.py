@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from .law import Law
 
+FRICTION = "coulomb"  # the declared column whose sign friction has
 UNSEEN_DELAY, SURE_DELAY = 0.75, 4.0  # sample intervals, and standard deviations, from which a delay is told
 
 Array = NDArray[np.float64]
@@ -58,8 +59,8 @@ class DriveState:
     @property
     def direction(self) -> Array:
         """Friction's direction (n,) in [-1, 1]: the declared Coulomb column where there is one, else sign(velocity)."""
-        if "coulomb" in self.declared_names:
-            return self.declared[:, self.declared_names.index("coulomb")]
+        if FRICTION in self.declared_names:
+            return self.declared[:, self.declared_names.index(FRICTION)]
         return np.sign(self.velocity)
 
     @property
@@ -132,6 +133,7 @@ class Effect:
     warps: ClassVar[bool] = False
     asks: ClassVar[bool] = False  # its columns are of what is asked of a drive, "required" in `extra`, which it changes itself
     clips: ClassVar[bool] = False
+    rubs: ClassVar[bool] = False  # its columns carry friction's direction, which bristles turn over
     needs: ClassVar[str | None] = None  # declared column without which the effect is none (a ratio to a friction of zero)
     of_the_hand: ClassVar[bool] = True  # False of what only one recording had, such as an obstacle
     recorded: ClassVar[bool] = False  # of the recording, not of the machine: the machine is compared with what is left without it

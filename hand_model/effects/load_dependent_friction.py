@@ -15,6 +15,7 @@ class LoadDependentFriction(Effect):
     """F = sign(v) mu |load|; the load is the logged one, or spring and preload, of which position is the measure."""
 
     name = "load_dependent_friction"
+    rubs = True
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Friction per load (or per position, where the load is the declared spring's), never negative."""

@@ -16,6 +16,7 @@ class PositionDependentFriction(Effect):
     """F = sign(v) A exp(-((x - c) / w)^2 / 2)."""
 
     name = "position_dependent_friction"
+    rubs = True
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """Centre over the range, width from 2 % to 25 % of it."""

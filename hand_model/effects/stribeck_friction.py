@@ -18,6 +18,7 @@ class StribeckFriction(Effect):
     """F(v) = sign(v) (Fc + (Fs - Fc) exp(-(|v| / vs)^n)), n = 1 (form 0) or 2 (form 1)."""
 
     name = "stribeck_friction"
+    rubs = True
     needs = "coulomb"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:

@@ -21,6 +21,7 @@ class ThermalFrictionDrift(Effect):
     """
 
     name = "thermal_friction_drift"
+    rubs = True
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """Warm-up time between 5 s and four times the session, cooling time at rest, form."""

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
-from ...effects.base import DriveState
+from ...effects.base import FRICTION, DriveState
 from ...effects.path import strokes
 from .grid import Grid, GridColumns, stacked
 from .least_squares import from_products
@@ -60,7 +60,7 @@ class Fit:
     def added(self, which: int, state: DriveState) -> Array:
         """What the columns of one term add to the effort (n,) along a recording."""
         term = self.terms[which]
-        return term.effect.columns(state, term.shape) @ np.array(list(self.amplitudes[which].values()))
+        return term.effect.columns(rubbed(state, self.terms), term.shape) @ np.array(list(self.amplitudes[which].values()))
 
 
 def additive(effect: Any) -> bool:
@@ -82,8 +82,18 @@ def _warped(state: DriveState, columns: Array, warps: tuple[Term, ...]) -> Array
     return columns
 
 
-def _warped_columns(effect: Any, shape: Mapping[str, float], warps: tuple[Term, ...]) -> Callable[[DriveState], Array]:
-    return lambda state: _warped(state, effect.columns(state, shape), warps)
+def bending(terms: tuple[Term, ...], effect: Any) -> tuple[Term, ...]:
+    """Those of `terms` that change the columns of an effect: delays of any, bristles of what is friction."""
+    return tuple(t for t in terms if t.effect.warps or effect.rubs and t.effect.replaces == FRICTION)
+
+
+def rubbed(state: DriveState, terms: tuple[Term, ...]) -> DriveState:
+    """The state with friction's direction as `terms` leave it: steady friction, whatever it depends on, is that of the bristles (Canudas de Wit
+    1995, eq. 3)."""
+    for term in terms:
+        if term.effect.replaces == FRICTION:
+            state = replace(state, declared=term.effect.declared(state, term.shape))
+    return state
 
 
 class Balance:
@@ -113,8 +123,7 @@ class Balance:
         self.steady = self.timing <= SETTLED * self.sigma
         self.wander: Wander | None = None
         self._grids: dict[Any, Grid] = {}
-        self._kept: dict[Any, GridColumns] = {}
-        self._warped: tuple[Any, ...] = ()
+        self._kept: dict[Any, tuple[Any, GridColumns]] = {}
         self._last = Memory()
         self._apart: Any = None
         self._learning: Balance | None = None
@@ -193,9 +202,21 @@ class Balance:
             out.append(label)
         return np.concatenate([label[m] for label, m in zip(out, self.masks, strict=True)])
 
-    def columns(self, effect: Any, shape: Mapping[str, float], warps: tuple[Term, ...] = ()) -> Array:
-        """An effect's columns (n, j), shifted by those of `warps`, unweighted. To be read only: the last ones are kept."""
-        return self._remembered((effect, _key(shape), _keys(warps)), _warped_columns(effect, shape, warps))
+    def columns(self, effect: Any, shape: Mapping[str, float], bends: tuple[Term, ...] = ()) -> Array:
+        """An effect's columns (n, j), as those of `bends` make them, unweighted. To be read only: the last ones are kept."""
+        def bent(state: DriveState) -> Array:
+            return _warped(state, effect.columns(self._rubbed(state, bends), shape), bends)
+
+        return self._remembered((effect, _key(shape), _keys(bends)), bent)
+
+    def _rubbed(self, state: DriveState, bends: tuple[Term, ...]) -> DriveState:
+        """`rubbed`, its columns kept: every candidate beside the same bristles asks."""
+        rubbing = tuple(t for t in bends if not t.effect.warps)
+        if not rubbing:
+            return state
+        key = ("rubbed", id(state), _keys(rubbing))
+        found = self._last.get(key)
+        return replace(state, declared=self._last.put(key, rubbed(state, rubbing).declared) if found is None else found)
 
     def _remembered(self, key: Any, value: Callable[[DriveState], Array]) -> Array:
         """What `gather` makes of `value`; while one term's shape is optimised the other terms' columns stay."""
@@ -208,33 +229,33 @@ class Balance:
             self._grids[effect] = Grid(effect, effect.grid(self.states))
         return self._grids[effect]
 
-    def grid_columns(self, grid: Grid, weight: Array, warps: tuple[Term, ...] = ()) -> GridColumns:
-        """The columns of every shape of a grid, weighted by `weight` (n,) and whitened; kept under the balance's own weight, for
-        each step of a search asks again. What a term clips is left out of these: near enough to choose a start by."""
+    def grid_columns(self, grid: Grid, weight: Array, terms: tuple[Term, ...] = ()) -> GridColumns:
+        """The columns beside `terms` of every shape of a grid, weighted by `weight` (n,) and whitened; kept under the balance's own weight,
+        for each step of a search asks again. What a term clips is left out of these: near enough to choose a start by."""
+        bends = bending(terms, grid.effect)
         own = self.weight * self.train
         inside = (weight != 0) | (own == 0)
         if not np.array_equal(weight, own * inside):
-            return self._stacked(grid, weight, warps)
-        if self._warped != _keys(warps):
-            self._kept, self._warped = {}, _keys(warps)
-        out = self._kept.get(grid.effect)
-        if out is None:
-            out = self._stacked(grid, own, warps)
-            if out.bytes + sum(c.bytes for c in self._kept.values()) < MOST_KEPT:
-                self._kept[grid.effect] = out
+            return self._stacked(grid, weight, bends)
+        beside, out = self._kept.get(grid.effect, ((), None))
+        if out is None or beside != _keys(bends):
+            self._kept.pop(grid.effect, None)
+            out = self._stacked(grid, own, bends)
+            if out.bytes + sum(c.bytes for _, c in self._kept.values()) < MOST_KEPT:
+                self._kept[grid.effect] = _keys(bends), out
         return out if inside.all() else out.within(inside)
 
-    def _stacked(self, grid: Grid, weight: Array, warps: tuple[Term, ...]) -> GridColumns:
+    def _stacked(self, grid: Grid, weight: Array, bends: tuple[Term, ...]) -> GridColumns:
         chunks = [grid.shapes[i:i + AT_ONCE] for i in range(0, len(grid.shapes), AT_ONCE)]
-        return stacked(part for chunk in chunks for part in self._acting(grid.effect, chunk, weight, warps))
+        return stacked(part for chunk in chunks for part in self._acting(grid.effect, chunk, weight, bends))
 
-    def _acting(self, effect: Any, shapes: Sequence[Mapping[str, float]], weight: Array, warps: tuple[Term, ...]) -> list[Array]:
+    def _acting(self, effect: Any, shapes: Sequence[Mapping[str, float]], weight: Array, bends: tuple[Term, ...]) -> list[Array]:
         """The columns (n, j) of each shape that are not zero, weighted and whitened; what shifts them shifts all of them at once. Not
         remembered, for whole grids would push out what is asked for again."""
-        plain = {id(state): np.concatenate([effect.columns(state, shape) for shape in shapes], axis=1)
+        plain = {id(state): np.concatenate([effect.columns(self._rubbed(state, bends), shape) for shape in shapes], axis=1)
                  for state, rows in zip(self.states, self._rows, strict=True) if len(rows)}
         acting = np.any([columns.any(0) for columns in plain.values()], axis=0)
-        together = self.gather(lambda state: _warped(state, plain[id(state)][:, acting], warps)) * weight[:, None]
+        together = self.gather(lambda state: _warped(state, plain[id(state)][:, acting], bends)) * weight[:, None]
         return np.split(self.whiten(together, weight), np.cumsum(acting.reshape(len(shapes), -1).sum(1))[:-1], axis=1)
 
     def design(self, terms: tuple[Term, ...]) -> tuple[Array, Array, Array]:
@@ -253,7 +274,7 @@ class Balance:
         low = [DECLARED_LOW.get(name, -np.inf) for name in self.names]
         high = [np.inf] * len(self.names)
         for term in terms:
-            parts.append(self.columns(term.effect, term.shape, warps))
+            parts.append(self.columns(term.effect, term.shape, bending(terms, term.effect)))
             low += [a[2] for a in term.effect.amplitudes()]
             high += [a[3] for a in term.effect.amplitudes()]
         return np.concatenate(parts, axis=1), np.array(low), np.array(high)
@@ -326,11 +347,11 @@ class Balance:
         if not rest.regular:
             return fitted
         more = self.vagueness(self.weights(terms)) + self.unanswered(terms)
-        warps = tuple(t for t in terms if t.effect.warps)
+        bends = bending(terms, effect)
         low, high = (np.array([a[i] for a in effect.amplitudes()]) for i in (2, 3))
 
         def projected(shape: Mapping[str, float]) -> float:
-            columns = self.columns(effect, shape, warps)
+            columns = self.columns(effect, shape, bends)
             rss = rest.rss(self.whiten(columns * rest.weight[:, None], rest.weight), low, high)
             return fitted(shape) if rss is None else rss + more
 

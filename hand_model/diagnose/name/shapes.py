@@ -39,7 +39,7 @@ def scan(balance: Balance, effect: Any, terms: tuple[Term, ...], least: float = 
 def _project(balance: Balance, grid: Grid, terms: tuple[Term, ...], least: float) -> list[dict[str, float]]:
     """The two best shapes of a grid by the fall of the RSS, more than `least`, that its columns, orthogonal to the design, bring."""
     rest = balance.apart(terms)
-    columns = balance.grid_columns(grid, rest.weight, tuple(t for t in terms if t.effect.warps))
+    columns = balance.grid_columns(grid, rest.weight, terms)
     inside = columns.products(rest.basis)
     left = np.sqrt(np.maximum(columns.length**2 - np.sum(inside**2, axis=1), 0.0))
     right = columns.products(rest.left)

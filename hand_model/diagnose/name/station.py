@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ..findings import UNWRITTEN, Finding, weighed
 from .interval import brought_held_out, held_out, parameter_intervals, sized, undisturbed, variance_ratio
+from .lack_of_fit import LackOfFit
 from .naming import ALPHA, EXPLAINED_LEAST, MOST_TERMS, Named, Naming
 from .selection import EVIDENCE_LEAST, SMALL, name_effects
 
@@ -182,6 +184,10 @@ def _altered(naming: Naming) -> bool:
     return False
 
 
+def _excess(lack: LackOfFit) -> float:
+    return lack.excess
+
+
 def judged(signal: str, finger: str | None, actuator: str | None, joint: str | None, states: tuple[Any, ...], effects: Iterable[Any],
            typical: Mapping[str, float] | None = None) -> Station:
     """The station of the balance of `states`, named among `effects`. Where a name does not stand, or is another's form, the others are
@@ -204,9 +210,10 @@ def judged(signal: str, finger: str | None, actuator: str | None, joint: str | N
     if (station.missing and untold and not hopeless or not station.proven and _altered(station.naming)) and any(s.validate for s in states):
         # what the training recordings cannot tell, a pose that one of the others alone has may tell
         lasting = tuple(e for e in every if e.of_the_hand)  # what one recording had explains no other
-        other = Station(signal, finger, actuator, joint, name_effects(states, lasting, typical=typical, whole=True))
-        known = other.believed and other.naming.after.p >= ALPHA and other.wander <= max(station.wander, UNREST)
-        station = other if known else station
+        learned = name_effects(states, lasting, typical=typical, whole=True)
+        other = Station(signal, finger, actuator, joint, replace(learned, before=max(station.naming.before, learned.before, key=_excess)))
+        seen = other.naming.after.p >= ALPHA or _altered(station.naming)  # another pose is plain to see, whatever small is left
+        station = other if seen and other.believed and other.wander <= max(station.wander, UNREST) else station
     if station.forms:
         left = tuple(e for e in left if e.name not in {f.term.effect.name for f in station.forms})
         other = Station(signal, finger, actuator, joint, name_effects(states, left, typical=typical))

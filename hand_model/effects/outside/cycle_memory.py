@@ -19,6 +19,7 @@ class CycleMemory(Outsider):
     """F = A sign(v) in the passes of a rhythm, everywhere or times exp(-((x - centre) / width)^2 / 2); counted from each recording's start."""
 
     name = "cycle_memory"
+    rubs = True
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """The rhythm, and where in the range: a width beyond it means everywhere."""

@@ -18,6 +18,7 @@ class DwellFriction(Outsider):
     it approaches 1 with the time constant of healing (Dieterich 1979)."""
 
     name = "dwell_friction"
+    rubs = True
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """The way on which it is worn off, and the time in which it heals."""

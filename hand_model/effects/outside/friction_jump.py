@@ -15,6 +15,7 @@ class FrictionJump(Outsider):
     """F = A sign(v) from a moment on."""
 
     name = "friction_jump"
+    rubs = True
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """The moment within the session."""

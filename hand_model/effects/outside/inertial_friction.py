@@ -15,6 +15,7 @@ class InertialFriction(Outsider):
     """F = A |a| sign(v)."""
 
     name = "inertial_friction"
+    rubs = True
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Either sign."""

@@ -1,0 +1,55 @@
+"""All friction acts through the bristles, where there are any."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_diagnose import drive
+
+from hand_model.diagnose.name.balance import Balance, Term, rubbed
+from hand_model.diagnose.name.shapes import refit
+from hand_model.effects import catalogue, effect, outsiders
+
+BRISTLES = Term(effect("presliding_friction"), {"bristle_length": 6.0, "bristle_time": 0.0, "form": 0.0})
+OF_A_DRIVE = [*catalogue("drive"), *outsiders("drive")]
+
+
+@pytest.mark.parametrize("candidate", OF_A_DRIVE, ids=[e.name for e in OF_A_DRIVE])
+def test_what_has_the_direction_of_friction_says_so(candidate) -> None:
+    states = tuple(replace(s, extra={**s.extra, "required": s.declared[:, 2], "load": np.ones(len(s.time_s))}) for s in drive(1, trials=2))
+    for shape in candidate.grid(states)[:40:8]:
+        as_it_is, turned = (candidate.columns(s, shape) for s in (states[0], rubbed(states[0], (BRISTLES,))))
+        assert candidate.rubs or np.array_equal(as_it_is, turned)
+
+
+def test_bristles_turn_over_what_is_friction_and_nothing_else() -> None:
+    balance = Balance(drive(1, trials=2))
+    warm = Term(effect("thermal_friction_drift"), {"form": 0.0, "warm_up_time": 60.0, "cooling_time": 5.0})
+    drag = Term(effect("quadratic_damping"), {})
+    matrix, _, _ = balance.design((BRISTLES, warm, drag))
+    z, elapsed = matrix[:, balance.names.index("coulomb")], balance.gather(lambda s: s.elapsed_s)
+    assert np.mean(np.abs(z) < 0.9) > 0.05  # bristles give
+    np.testing.assert_allclose(matrix[:, 5], z * np.exp(-elapsed / 60.0), atol=1e-12)
+    np.testing.assert_array_equal(matrix[:, 6], balance.design((drag,))[0][:, 5])
+
+
+def test_columns_of_a_grid_are_those_of_a_fit() -> None:
+    balance = Balance(drive(1, trials=2))
+    warm = effect("thermal_friction_drift")
+    weight = balance.weight * balance.train
+    grid = balance.grid(warm)
+    for terms in ((), (BRISTLES,), ()):
+        stacked = balance.grid_columns(grid, weight, terms).matrix
+        wanted = np.concatenate([balance.design((*terms, Term(warm, shape)))[0][:, -1:] for shape in grid.shapes], axis=1) * weight[:, None]
+        np.testing.assert_allclose(np.asarray(stacked if isinstance(stacked, np.ndarray) else stacked.toarray()), wanted, atol=1e-12)
+
+
+def test_bristles_and_a_slow_warm_up_are_no_hysteresis() -> None:
+    """A warm-up of many times the session is friction that does not change: it must not stand in for the friction that bristles took over."""
+    hysteresis = Term(effect("elastoplastic_hysteresis"), {"form": 0.0, "reach": 12.0})
+    balance = Balance(drive(5, lambda s: hysteresis.effect.columns(s, hysteresis.shape) @ [18.0]))
+    warm = Term(effect("thermal_friction_drift"), {"form": 0.0, "warm_up_time": 600.0, "cooling_time": 5.0})
+    nothing, true, both = (refit(balance, balance.fit(terms)).rss for terms in ((), (hysteresis,), (BRISTLES, warm)))
+    assert nothing - both < 0.1 * (nothing - true)
