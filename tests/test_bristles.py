@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from test_diagnose import drive
 
-from hand_model.diagnose.name.balance import Balance, Term, rubbed
+from hand_model.diagnose.name.balance import Balance
 from hand_model.diagnose.name.shapes import refit
+from hand_model.diagnose.name.term import Term, rubbed
 from hand_model.effects import catalogue, effect, outsiders
 
 BRISTLES = Term(effect("presliding_friction"), {"bristle_length": 6.0, "bristle_time": 0.0, "form": 0.0})
@@ -41,6 +42,7 @@ def test_columns_of_a_grid_are_those_of_a_fit() -> None:
     weight = balance.weight * balance.train
     grid = balance.grid(warm)
     for terms in ((), (BRISTLES,), ()):
+        terms = tuple(t.coarse for t in terms)
         stacked = balance.grid_columns(grid, weight, terms).matrix
         wanted = np.concatenate([balance.design((*terms, Term(warm, shape)))[0][:, -1:] for shape in grid.shapes], axis=1) * weight[:, None]
         np.testing.assert_allclose(np.asarray(stacked if isinstance(stacked, np.ndarray) else stacked.toarray()), wanted, atol=1e-12)

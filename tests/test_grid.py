@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from test_diagnose import drive, planted
 
-from hand_model.diagnose.name.balance import Balance, Term
+from hand_model.diagnose.name.balance import Balance
 from hand_model.diagnose.name.grid import stacked
 from hand_model.diagnose.name.shapes import scan
+from hand_model.diagnose.name.term import Term
 from hand_model.diagnose.name.wander import Wander
 from hand_model.effects import effect
 
@@ -51,7 +52,7 @@ def test_beside_a_term_that_clips_kept_columns_serve() -> None:
     assert 0 < (~balance.unclipped(clips)).mean() < 0.5
     balance.apart(())
     scan(balance, kind, ())  # keeps the columns
-    assert kind in balance._kept
+    assert (kind, False) in balance._kept
     kept = scan(balance, kind, clips)
     anew = scan(Balance(balance.states), kind, clips)
     assert kept.terms == anew.terms and kept.rss == pytest.approx(anew.rss, rel=1e-9)

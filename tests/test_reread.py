@@ -9,11 +9,12 @@ import pytest
 from test_diagnose import drive, planted
 from test_kinematic_stations import MAP, joint
 
-from hand_model.diagnose.name.balance import Balance, Term
+from hand_model.diagnose.name.balance import Balance
 from hand_model.diagnose.name.reread import of_recording, reread
 from hand_model.diagnose.name.selection import name_effects
 from hand_model.diagnose.name.shapes import polish
 from hand_model.diagnose.name.station import finding_of, judged
+from hand_model.diagnose.name.term import Term
 from hand_model.effects import catalogue, effect
 
 COMPLIANCE = 0.04  # % per raw

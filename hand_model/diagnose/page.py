@@ -13,7 +13,7 @@ from ..output import new_file
 from ..report.page import Cell, Section, figures, key, listing, note, page, table
 from ..report.style import INK, MUTED, SERIES, drawing
 from .findings import FILES, Finding, Findings
-from .name.balance import DISCRETE
+from .name.term import DISCRETE
 from .prove.replays import Replay
 
 Array = NDArray[np.float64]

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from ..diagnose.name.balance import DISCRETE
+from ..diagnose.name.term import DISCRETE
 from .findings import Finding
 
 # Shapes of effects at a joint, by what they measure; all others are plain numbers.

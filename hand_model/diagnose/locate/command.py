@@ -30,7 +30,8 @@ UNLIKE = 0.1  # of a delay by which answers may miss it: controllers of other ga
 class CommandFacts:
     """answers: to commands. sag, sag_se, load_range: loss of speed per load [1/raw], its standard error [1/raw] and the range of loads [raw];
     nan where strokes do not tell. ceiling: current [raw] at which the drive is at its limit, or nan; cut: the weight of what it takes
-    away. strokes: how many tell the sag. trials: names of the recordings."""
+    away; share_cut: of the time at steady speed in which more would be needed. strokes: how many tell the sag. trials: names of the
+    recordings."""
 
     answers: Answers
     sag: float
@@ -38,6 +39,7 @@ class CommandFacts:
     load_range: float
     ceiling: float = float("nan")
     cut: float = 0.0
+    share_cut: float = 0.0
     strokes: int = 0
     trials: tuple[str, ...] = ()
 
@@ -106,11 +108,11 @@ def _sag(strokes: list[Stroke]) -> tuple[float, float, float]:
     return -float(beta[-1]), float(np.sqrt(covariance[-1, -1])), float(np.ptp(load))
 
 
-def _ceiling(strokes: list[Stroke]) -> tuple[float, float]:
-    """Current [raw] at which the drive is at its limit, nan where it is at none, and the weight of what that cuts: in the fastest flexing
-    strokes speed falls by just what keeps the current from exceeding it. What current each place would need at full speed is told by the
-    slower strokes."""
-    none = np.nan, 0.0
+def _ceiling(strokes: list[Stroke]) -> tuple[float, float, float]:
+    """Current [raw] at which the drive is at its limit, nan where it is at none, the weight of what that cuts and the share of time in which
+    it does: in the fastest flexing strokes speed falls by just what keeps the current from exceeding it. What current each place would need
+    at full speed is told by the slower strokes."""
+    none = np.nan, 0.0, 0.0
     fast = max((s.commanded for s in strokes), default=0.0)
     mine = [s for s in strokes if s.way > 0 and s.commanded == fast]
     slower = [s for s in strokes if s.way > 0 and s.commanded < fast]
@@ -138,7 +140,8 @@ def _ceiling(strokes: list[Stroke]) -> tuple[float, float]:
         return none
     noise = max(float(np.std(np.concatenate([s.current for s in slower]) - _load_design(slower) @ beta)), 1e-9)
     every = np.concatenate([s.current for s in strokes])
-    return limit, weighed(float(np.sqrt(y @ y / len(every))) / noise, float(np.std(every)) / noise)
+    weight = weighed(float(np.sqrt(y @ y / len(every))) / noise, float(np.std(every)) / noise)
+    return limit, weight, np.count_nonzero(over) / len(every)
 
 
 def _load_design(strokes: list[Stroke]) -> Array:
@@ -188,7 +191,7 @@ def _ceiling_finding(actuator: str, finger: str | None, fact: CommandFacts) -> t
     text = (f"The {actuator} motor is at its limit of {fact.ceiling:.0f} raw in its fastest strokes: the current stays, and speed falls "
             "as the load rises.")
     return fact.cut, Finding("current_saturation", ("current_saturation",), 0.999, (), where, text,
-                        {"limit": {"value": fact.ceiling, "unit": "raw"}}, fit, dict(UNWRITTEN))
+                        {"limit": {"value": fact.ceiling, "unit": "raw"}, "share_cut": {"value": fact.share_cut, "unit": "1"}}, fit, dict(UNWRITTEN))
 
 
 def refused(actuator: str, finger: str | None, trials: tuple[str, ...], signal: str = "current",

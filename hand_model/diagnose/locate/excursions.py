@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from ...effects import effect
 from ...effects.base import DriveState
-from ..name.balance import Balance, Term
+from ..name.balance import Balance
+from ..name.term import Term
 from .motion import local_quadratic
 
 Array = NDArray[np.float64]

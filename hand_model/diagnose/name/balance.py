@@ -13,13 +13,14 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
-from ...effects.base import FRICTION, DriveState
+from ...effects.base import DriveState
 from ...effects.path import strokes
 from .grid import Grid, GridColumns, stacked
 from .least_squares import from_products
 from .memory import Memory
 from .noise import noise
 from .projection import Projection
+from .term import DISCRETE, Term, additive, bending, key_of, keys, rubbed, warped
 
 if TYPE_CHECKING:
     from .wander import Wander
@@ -29,19 +30,10 @@ Array = NDArray[np.float64]
 
 # What physics allows of a declared coefficient, by its column's name.
 DECLARED_LOW = {"inertia": 0.0, "viscous": 0.0, "coulomb": 0.0, "spring": 0.0}
-MOST_KEPT = 3e8  # bytes of columns that one balance keeps
+MOST_KEPT = 6e8  # bytes of columns that one balance keeps
 AT_ONCE = 60  # shapes of a grid whose columns are made together
 SETTLED = 0.25  # of the noise: more of what starts and stops bring, and motion is not steady
 UNSETTLED = 1e-3  # weight left to a start or stop where steady motion alone is asked
-DISCRETE = ("side", "trial", "form", "end")  # shapes that choose among few cases: no continuous parameter is spent on them
-
-
-@dataclass(frozen=True)
-class Term:
-    """One effect with its shape."""
-
-    effect: Any
-    shape: Mapping[str, float]
 
 
 @dataclass(frozen=True)
@@ -61,39 +53,6 @@ class Fit:
         """What the columns of one term add to the effort (n,) along a recording."""
         term = self.terms[which]
         return term.effect.columns(rubbed(state, self.terms), term.shape) @ np.array(list(self.amplitudes[which].values()))
-
-
-def additive(effect: Any) -> bool:
-    """Whether an effect adds its columns and leaves all others as they are."""
-    return effect.replaces is None and not effect.warps and not effect.clips
-
-
-def _key(shape: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
-    return tuple(sorted((k, float(v)) for k, v in shape.items()))
-
-
-def _keys(terms: tuple[Term, ...]) -> tuple[Any, ...]:
-    return tuple((t.effect, _key(t.shape)) for t in terms)
-
-
-def _warped(state: DriveState, columns: Array, warps: tuple[Term, ...]) -> Array:
-    for term in warps:
-        columns = term.effect.warp(state, columns, term.shape)
-    return columns
-
-
-def bending(terms: tuple[Term, ...], effect: Any) -> tuple[Term, ...]:
-    """Those of `terms` that change the columns of an effect: delays of any, bristles of what is friction."""
-    return tuple(t for t in terms if t.effect.warps or effect.rubs and t.effect.replaces == FRICTION)
-
-
-def rubbed(state: DriveState, terms: tuple[Term, ...]) -> DriveState:
-    """The state with friction's direction as `terms` leave it: steady friction, whatever it depends on, is that of the bristles (Canudas de Wit
-    1995, eq. 3)."""
-    for term in terms:
-        if term.effect.replaces == FRICTION:
-            state = replace(state, declared=term.effect.declared(state, term.shape))
-    return state
 
 
 class Balance:
@@ -205,16 +164,16 @@ class Balance:
     def columns(self, effect: Any, shape: Mapping[str, float], bends: tuple[Term, ...] = ()) -> Array:
         """An effect's columns (n, j), as those of `bends` make them, unweighted. To be read only: the last ones are kept."""
         def bent(state: DriveState) -> Array:
-            return _warped(state, effect.columns(self._rubbed(state, bends), shape), bends)
+            return warped(state, effect.columns(self._rubbed(state, bends), shape), bends)
 
-        return self._remembered((effect, _key(shape), _keys(bends)), bent)
+        return self._remembered((effect, key_of(shape), keys(bends)), bent)
 
     def _rubbed(self, state: DriveState, bends: tuple[Term, ...]) -> DriveState:
         """`rubbed`, its columns kept: every candidate beside the same bristles asks."""
         rubbing = tuple(t for t in bends if not t.effect.warps)
         if not rubbing:
             return state
-        key = ("rubbed", id(state), _keys(rubbing))
+        key = ("rubbed", id(state), keys(rubbing))
         found = self._last.get(key)
         return replace(state, declared=self._last.put(key, rubbed(state, rubbing).declared) if found is None else found)
 
@@ -231,18 +190,20 @@ class Balance:
 
     def grid_columns(self, grid: Grid, weight: Array, terms: tuple[Term, ...] = ()) -> GridColumns:
         """The columns beside `terms` of every shape of a grid, weighted by `weight` (n,) and whitened; kept under the balance's own weight,
-        for each step of a search asks again. What a term clips is left out of these: near enough to choose a start by."""
-        bends = bending(terms, grid.effect)
+        for each step of a search asks again. What a term clips is left out of these, and delays and bristles are as nearly as need be: near
+        enough to choose a start by."""
+        bends = tuple(t.coarse for t in bending(terms, grid.effect))
         own = self.weight * self.train
         inside = (weight != 0) | (own == 0)
         if not np.array_equal(weight, own * inside):
             return self._stacked(grid, weight, bends)
-        beside, out = self._kept.get(grid.effect, ((), None))
-        if out is None or beside != _keys(bends):
-            self._kept.pop(grid.effect, None)
+        place = grid.effect, bool(bends)  # a search asks by turns beside what bends and without
+        beside, out = self._kept.get(place, ((), None))
+        if out is None or beside != keys(bends):
+            self._kept.pop(place, None)
             out = self._stacked(grid, own, bends)
             if out.bytes + sum(c.bytes for _, c in self._kept.values()) < MOST_KEPT:
-                self._kept[grid.effect] = _keys(bends), out
+                self._kept[place] = keys(bends), out
         return out if inside.all() else out.within(inside)
 
     def _stacked(self, grid: Grid, weight: Array, bends: tuple[Term, ...]) -> GridColumns:
@@ -255,7 +216,7 @@ class Balance:
         plain = {id(state): np.concatenate([effect.columns(self._rubbed(state, bends), shape) for shape in shapes], axis=1)
                  for state, rows in zip(self.states, self._rows, strict=True) if len(rows)}
         acting = np.any([columns.any(0) for columns in plain.values()], axis=0)
-        together = self.gather(lambda state: _warped(state, plain[id(state)][:, acting], bends)) * weight[:, None]
+        together = self.gather(lambda state: warped(state, plain[id(state)][:, acting], bends)) * weight[:, None]
         return np.split(self.whiten(together, weight), np.cumsum(acting.reshape(len(shapes), -1).sum(1))[:-1], axis=1)
 
     def design(self, terms: tuple[Term, ...]) -> tuple[Array, Array, Array]:
@@ -267,10 +228,10 @@ class Balance:
             for term in terms:
                 if term.effect.replaces is not None:
                     columns = term.effect.declared(replace(state, declared=columns), term.shape)
-            return _warped(state, columns, warps)
+            return warped(state, columns, warps)
 
         changing = tuple(t for t in terms if t.effect.replaces is not None)
-        parts = [self._remembered(("declared", _keys(changing), _keys(warps)), declared)]
+        parts = [self._remembered(("declared", keys(changing), keys(warps)), declared)]
         low = [DECLARED_LOW.get(name, -np.inf) for name in self.names]
         high = [np.inf] * len(self.names)
         for term in terms:

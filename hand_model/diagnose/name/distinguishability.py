@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .balance import Balance, Fit, Term
+from .balance import Balance, Fit
 from .naming import CLASS_WIDTH
+from .term import Term
 
 Array = NDArray[np.float64]
 

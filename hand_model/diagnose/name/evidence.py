@@ -12,7 +12,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...effects.base import Shape
-from .balance import DISCRETE, Balance, Fit, Term
+from .balance import Balance, Fit
+from .term import DISCRETE, Term
 
 SPREAD = 0.3  # mean absolute deviation of the logarithm of a motor's coefficients within one hand
 

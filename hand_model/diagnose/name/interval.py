@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .balance import DISCRETE, Balance, Fit, Term
+from .balance import Balance, Fit
 from .evidence import gain, oddity
 from .naming import Naming
 from .shapes import likeliest, polish, refit
+from .term import DISCRETE, Term
 
 Array = NDArray[np.float64]
 

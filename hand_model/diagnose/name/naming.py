@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .balance import Balance, Fit, Term
+from .balance import Balance, Fit
 from .lack_of_fit import LackOfFit
+from .term import Term
 from .wander import Wander
 
 ALPHA = 0.003  # false alarms per channel: 5 % over some fifteen channels of a session

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from ...effects.base import DriveState
 from ..findings import Finding
-from .balance import Balance, Fit, Term
+from .balance import Balance, Fit
 from .interval import Reading, parameter_intervals, undisturbed
 from .shapes import refit, reform
 from .station import Station, finding_of
+from .term import Term
 
 Array = NDArray[np.float64]
 

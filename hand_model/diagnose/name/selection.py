@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 
 from ...background import Pair
 from ...effects.base import least_delay
-from .balance import Balance, Fit, Term, additive
+from .balance import Balance, Fit
 from .evidence import evidence, gain, rough_evidence, scale_of
 from .lack_of_fit import LackOfFit, lack_of_fit
 from .naming import ALPHA, MOST_TERMS, Named, Naming, Rival, overwhelmed
 from .shapes import polish, refit, reform, scan
+from .term import Term, additive
 from .wander import Wander, estimate_wander
 
 Array = NDArray[np.float64]

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from .balance import DISCRETE, Balance, Fit, Term, additive
+from .balance import Balance, Fit
 from .grid import Grid
+from .term import DISCRETE, Term, additive
 
 Array = NDArray[np.float64]
 

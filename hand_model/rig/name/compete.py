@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...diagnose.name.balance import DISCRETE
+from ...diagnose.name.term import DISCRETE
 from ..evidence import BEYOND_DOUBT, weigh
 from .candidates import Candidate
 from .problem import (

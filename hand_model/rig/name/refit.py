@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ...diagnose.name.balance import DISCRETE
+from ...diagnose.name.term import DISCRETE
 from .problem import Problem, Term, extended, normal, training_error
 
 Array = NDArray[np.float64]
