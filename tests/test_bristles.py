@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,9 @@ from test_diagnose import drive
 from hand_model.diagnose.name.balance import Balance
 from hand_model.diagnose.name.shapes import refit
 from hand_model.diagnose.name.term import Term, rubbed
+from hand_model.diagnose.prove.improve import as_fitted
 from hand_model.effects import catalogue, effect, outsiders
+from hand_model.hand import Hand
 
 BRISTLES = Term(effect("presliding_friction"), {"bristle_length": 6.0, "bristle_time": 0.0, "form": 0.0})
 OF_A_DRIVE = [*catalogue("drive"), *outsiders("drive")]
@@ -55,3 +58,15 @@ def test_bristles_and_a_slow_warm_up_are_no_hysteresis() -> None:
     warm = Term(effect("thermal_friction_drift"), {"form": 0.0, "warm_up_time": 600.0, "cooling_time": 5.0})
     nothing, true, both = (refit(balance, balance.fit(terms)).rss for terms in ((), (hysteresis,), (BRISTLES, warm)))
     assert nothing - both < 0.1 * (nothing - true)
+
+
+def test_a_written_motor_has_the_bristles_that_were_named() -> None:
+    """Every law of friction in the written model is turned over by them, as it was in the fit."""
+    states = tuple(replace(s, extra={**s.extra, "give": np.full(len(s.time_s), 0.7)}) for s in drive(1, trials=2))
+    balance = Balance(states)
+    station = SimpleNamespace(signal="current", actuator="index", naming=SimpleNamespace(balance=balance, declared=balance.fit(), fit=balance.fit((BRISTLES,))))
+    station.reading = station.naming
+    hand = Hand("h", "left", {}, {}, (), 1e-4, {}, (), ())
+    before, after = (as_fitted(hand, [station], {"index": (0.0, 4000.0)}, lambda source, w=which: getattr(source, w)).motors[0] for which in ("declared", "fit"))
+    assert before.parameters["presliding"].value == 0.7
+    assert after.parameters["presliding"].value == BRISTLES.shape["bristle_length"]

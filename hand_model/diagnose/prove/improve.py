@@ -60,7 +60,7 @@ def as_fitted(hand: Hand, stations: Sequence[Any], counts: Mapping[str, tuple[fl
         declared = dict(fit(station.reading).declared)
         if station.signal == "current":
             declared["inertia"] = fit(station.naming).declared["inertia"]  # told by starts and stops alone
-            motors[station.actuator] = _motor(station, declared, counts[station.actuator], motors.get(station.actuator))
+            motors[station.actuator] = _motor(station, declared, fit(station.reading).terms, counts[station.actuator], motors.get(station.actuator))
         elif station.signal == "encoder":
             fingers[station.finger] = _with_map(fingers[station.finger], station, declared, counts[station.actuator])
         elif station.joint is not None:
@@ -68,13 +68,14 @@ def as_fitted(hand: Hand, stations: Sequence[Any], counts: Mapping[str, tuple[fl
     return replace(hand, motors=tuple(motors.values()), fingers=tuple(fingers.values()))
 
 
-def _motor(station: Any, declared: Mapping[str, float], counts: tuple[float, float], was: Motor | None) -> Motor:
+def _motor(station: Any, declared: Mapping[str, float], terms: Sequence[Any], counts: tuple[float, float], was: Motor | None) -> Motor:
     states = station.naming.balance.states
     values = {MOTOR[k][0]: Estimate(float(v), None, MOTOR[k][1], "diagnosis") for k, v in declared.items() if k in MOTOR}
     values |= {k: replace(values[k], value=least, origin="least that can be simulated") for k, least in LEAST.items() if values[k].value < least}
     if values["coulomb"].value > 0:
-        give = float(np.max(states[0].extra.get("give", np.zeros(1))))
-        values["presliding"] = Estimate(give, None, "%", "diagnosis, common to the session's drives")
+        named = [t.shape["bristle_length"] for t in terms if t.effect.name == "presliding_friction"]  # all friction acts through these bristles
+        give = named[0] if named else float(np.max(states[0].extra.get("give", np.zeros(1))))
+        values["presliding"] = Estimate(give, None, "%", "diagnosis" if named else "diagnosis, common to the session's drives")
     if was is not None:
         values |= {k: was.parameters[k] for k in DRIVE_KEPT if k in was.parameters}
     return Motor(station.actuator, *counts, values, station.naming.balance.sigma, tuple(s.trial for s in states))
