@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from test_diagnose import drive
 
 from hand_model.diagnose.locate.preload import preload_findings
 from hand_model.diagnose.name.station import judged
+from hand_model.diagnose.name.term import Term
 from hand_model.effects import effect
 
 
@@ -64,3 +68,13 @@ def test_a_motor_of_which_something_is_missing_accuses_no_other() -> None:
     one = judged("current", "ring", "ring", None, drive(9, lambda s: 25.0 * spot.columns(s, {"centre": 50.0, "width": 6.0})[:, 0]), [spot])
     assert one.missing and one.believed
     assert preload_findings(hand(25.0, 0.0)) and not preload_findings([*hand(25.0), one])
+
+
+@pytest.mark.parametrize(("below", "accused"), [(4.0, ["finger_0"]), (40.0, [])])
+def test_only_a_finger_that_is_plainly_pulled_off_its_drive_keeps_its_drive_from_being_compared(below: float, accused: list[str]) -> None:
+    states = tuple(replace(s, effort=80.0 * s.position / 100, effort_unit="deg") for s in drive(11))
+    term = Term(effect("spring_decoupling"), {"form": 1.0, "below": below})
+    naming = SimpleNamespace(balance=SimpleNamespace(states=states), fit=SimpleNamespace(terms=(term,)))
+    named = SimpleNamespace(believed=True, signal="encoder", actuator="motor_0", naming=naming, kept=[SimpleNamespace(term=term)],
+                            parameters={0: {"form": {"value": 1.0}, "below": {"value": below}, "lead": {"value": 0.3}}})
+    assert [f.where["finger"] for _, f in preload_findings([*hand(-12.0, 0.0), named])] == accused

@@ -13,7 +13,7 @@ from ..effects.base import sample_interval
 from .findings import Finding, Findings
 from .locate.displacement import NO_HINGE, NOT_RIGID
 from .locate.markers import HINGE, SLIPS
-from .magnitude import channel_figures, magnitude
+from .magnitude import SLIGHT, channel_figures, magnitude
 from .name.distinguishability import protocol_pairs
 from .name.interval import variance_ratio
 from .name.naming import ALPHA, Named
@@ -25,7 +25,7 @@ SHADOW = 0.5  # of an encoder error's size: less, in the current of the same mot
 TILT = 0.2  # the same, of a wobble's or a travelling centre's, in the angles of the finger
 ANGULAR = {e.name for station in ("encoder", "linkage") for e in catalogue(station)} - {"clock_drift"}
 REFUSED = "command_as_measurement"  # a channel that tells nothing: no other finding is small beside it
-TRIFLE, SLIGHT = 0.01, 0.25  # of the square of the heaviest weight, and of the magnitude at which an effect is plain
+TRIFLE = 0.01  # of the square of the heaviest weight
 MINUTE = 0.15  # of that magnitude: less, where the lack-of-fit test sees nothing, is left to the imperfections of reading angles and speeds
 SIGNALS = {"drive": "current", "motors": "current", "command": "current", "encoder": "encoder", "linkage": "markers"}
 SHOWN_IN = {e.name: SIGNALS[e.station] for e in catalogue() if e.station in SIGNALS}

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..effects.base import DriveState, position_range, speed_range
 
+SLIGHT = 0.25  # of the size at which an effect is plain
 LEAST, MOST = 1e-3, 3.0  # beyond, a figure says nothing more about its kind
 
 
@@ -76,7 +77,7 @@ def _apart(p: Mapping[str, float], c: Channel) -> float:
 
 
 def _give(p: Mapping[str, float], c: Channel) -> float:
-    return p["compliance"] * c.load / (0.01 * (c.span if p.get("form") == 0.0 else 3.5 * c.effort))
+    return p["compliance"] * c.load / (0.017 * (c.span if p.get("form") == 0.0 else 3.5 * c.effort))
 
 
 PLAIN: Mapping[str, Rule] = {
@@ -96,8 +97,8 @@ PLAIN: Mapping[str, Rule] = {
     "viscoelastic_spring": lambda p, c: p["stiffness"] * c.span / (0.6 * c.effort),
     "end_stop_contact": _depth,
     "external_contact": _depth,
-    "drive_backlash": lambda p, c: p["gap"] / (0.018 * c.span),
-    "linkage_backlash": lambda p, c: p["gap"] / (0.018 * c.span),
+    "drive_backlash": lambda p, c: p["gap"] / (0.03 * c.span),
+    "linkage_backlash": lambda p, c: p["gap"] / (0.03 * c.span),
     "spring_decoupling": _apart,
     "series_elasticity": _give,
     "linkage_compliance": _give,

@@ -13,6 +13,7 @@ import numpy as np
 
 from ...effects import effect
 from ..findings import UNWRITTEN, Finding, weighed
+from ..magnitude import SLIGHT, channel_figures, magnitude
 from ..name.station import Station
 
 SPREAD, HANDS = 0.15, 3.0  # mean absolute deviation of the logarithm of a drive's preload within one hand, as sure as from so many comparisons
@@ -30,7 +31,7 @@ def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]
     The other drives' median is the reference; one of which something is missing is none. What pulls a finger off its drive pulls at its
     preload. A drive of which something else is missing must be unlike the others both with and without its name.
     """
-    pulled = {s.actuator for s in stations if s.believed and any(f.term.effect.name == "spring_decoupling" for f in s.kept)}
+    pulled = {s.actuator for s in stations if _pulls(s)}
     drives = [s for s in stations if s.signal == "current" and s.actuator not in pulled and "preload" in s.naming.fit.declared and _tells(s)]
     healthy = [s for s in drives if not s.missing]
     spread = _spread([s.naming.fit.declared for s in healthy])
@@ -52,6 +53,15 @@ def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]
             larger = own / (own + usual) if len(others) == 1 and own > usual else 1.0
             out.append(_finding(station, own - usual, error, spread * usual, (1 - p) * larger))
     return out
+
+
+def _pulls(station: Station) -> bool:
+    """Whether a finger is pulled off its drive by more than a trifle."""
+    if not station.believed:
+        return False
+    named = [station.naming.fit.terms.index(f.term) for f in station.kept if f.term.effect.name == "spring_decoupling"]
+    figures = channel_figures(station.naming.balance.states)
+    return any(magnitude("spring_decoupling", {k: v["value"] for k, v in station.parameters[i].items()}, figures) >= SLIGHT for i in named)
 
 
 def _tells(station: Station) -> bool:
