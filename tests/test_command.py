@@ -66,7 +66,10 @@ def test_a_drive_that_loses_no_more_than_a_healthy_controller_is_at_no_limit(beg
 @pytest.mark.parametrize("seed", range(3))
 def test_a_drive_at_its_limit_in_part_of_its_strokes_is_seen(seed: int) -> None:
     state, current = strokes(limited, seed)
-    assert command_facts((state,), (current,)).ceiling == pytest.approx(LIMIT, rel=0.06)
+    facts = command_facts((state,), (current,))
+    assert facts.ceiling == pytest.approx(LIMIT, rel=0.06)
+    (_, finding), = command_findings({"index": facts}, {"index": "index"})
+    assert finding.parameters["share_cut"]["value"] == facts.share_cut and 0 < facts.share_cut < 0.5
 
 
 @pytest.mark.parametrize("profile", [healthy, sagging, braking])

@@ -41,3 +41,9 @@ def test_every_effect_of_a_hand_has_a_figure_and_what_has_none_counts_as_plain()
                                              ({"value": None, "ci95": None}, None)])
 def test_what_is_sure_of_a_figure_is_the_end_of_its_interval_nearer_to_zero(entry, sure) -> None:
     assert _sure(entry) == sure
+
+
+def test_bristles_count_by_what_they_are_longer_than_any_drive_is_granted() -> None:
+    states = tuple(replace(s, extra={**s.extra, "granted": np.full(len(s.time_s), 0.9)}) for s in drive(0))
+    sizes = [magnitude("presliding_friction", {"bristle_length": length}, channel_figures(states)) for length in (0.9, 1.9, 2.9)]
+    assert sizes[0] == LEAST and sizes[2] == pytest.approx(2 * sizes[1])

@@ -21,7 +21,7 @@ LEAST, MOST = 1e-3, 3.0  # beyond, a figure says nothing more about its kind
 @dataclass(frozen=True)
 class Channel:
     """What magnitudes refer to. effort, load: standard deviations; low, high: range of positions; fastest: speed; ahead: farthest that
-    a joint ran ahead of its drive."""
+    a joint ran ahead of its drive; granted: length of bristles that any drive of the session may have."""
 
     effort: float = 1.0
     load: float = 0.0
@@ -29,6 +29,7 @@ class Channel:
     high: float = 100.0
     fastest: float = 100.0
     ahead: float = 0.0
+    granted: float = 0.0
 
     @property
     def span(self) -> float:
@@ -39,10 +40,10 @@ class Channel:
 def channel_figures(states: tuple[DriveState, ...]) -> Channel:
     """The figures of one balance's recordings."""
     effort = np.concatenate([s.effort[np.isfinite(s.effort)] for s in states])
-    load, ahead = (np.concatenate([s.extra.get(name, np.zeros(1)) for s in states]) for name in ("load", "ahead"))
+    load, ahead, granted = (np.concatenate([s.extra.get(name, np.zeros(1)) for s in states]) for name in ("load", "ahead", "granted"))
     low, high = position_range(states)
     return Channel(max(float(np.std(effort)), 1e-12), float(np.nanstd(load)), low, high, speed_range(states)[1],
-                   float(np.nanmax(ahead)))
+                   float(np.nanmax(ahead)), float(np.max(granted)))
 
 
 def magnitude(effect: str, parameters: Mapping[str, float], channel: Channel | None = None) -> float:
@@ -87,7 +88,7 @@ PLAIN: Mapping[str, Rule] = {
     "load_dependent_friction": lambda p, _: p["load_coefficient"] / 0.4,
     "position_dependent_friction": lambda p, c: p["extra_friction"] / (0.4 * c.effort),
     "quadratic_damping": lambda p, c: p["drag"] * c.fastest**2 / (0.6 * c.effort),
-    "presliding_friction": lambda p, c: p["bristle_length"] / (0.02 * c.span),
+    "presliding_friction": lambda p, c: max(p["bristle_length"] - c.granted, 0.0) / (0.02 * c.span),
     "thermal_friction_drift": lambda p, c: p["cold_excess"] / (0.3 * c.effort),
     "detent_load": lambda p, c: p["load"] / (0.35 * c.effort),
     "nonlinear_spring": lambda p, c: p["bend"] / (0.15 * c.effort),
