@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rig_bench import ARM, Motion, recorded
+from rig_bench import ARM, HEAD, Motion, recorded
 
 from hand_model.rig import diagnose_rig, load_rig
 from hand_model.rig.diagnose import trusted_fit
@@ -145,3 +145,24 @@ def test_what_stood_in_for_a_later_friction_by_load_goes(tmp_path: Path) -> None
     kept, stays = _resettled(pose(fit, "hinge"), terms, 0, set(), settle)
     assert [t.candidate.variant for t in kept] == [MOTOR] and stays == [False, True]
     assert _resettled(pose(fit, "hinge"), terms, 0, {(terms[1].candidate.key,)}, settle)[1] == [True, True]
+
+
+def test_no_stribeck_speed_lies_where_the_joint_stands(tmp_path: Path) -> None:
+    """A joint that stands most of the time, its encoder noisy: what is tried acts on what moves, for friction at rest is unknown."""
+    folder, t = tmp_path / "s", np.arange(0, 12, 0.004)
+    (folder / "log").mkdir(parents=True)
+    (folder / "rig.xml").write_text(ARM)
+    text = HEAD
+    for k in range(4):
+        q = 0.4 * np.where(t < 7, 1.0, np.cos(2 * np.pi * (0.3 + 0.1 * k) * (t - 7)))
+        v = np.gradient(q, t)
+        torque = 0.6 * 0.2 * 9.81 * np.sin(q) + 0.026 * np.gradient(v, t) + 0.03 * v + 0.1 * np.sign(v)
+        table = np.stack([t, q + 1e-4 * np.random.default_rng(k).standard_normal(len(t)), torque], 1)
+        np.savetxt(folder / f"log/{k}.csv", table, delimiter=",", header="time,position,torque", comments="", fmt="%.8g")
+        text += f'[[trial]]\nkind = "motion"\nlog = "log/{k}.csv"\n'
+    (folder / "session.toml").write_text(text)
+    rig = load_rig(read_session(folder))
+    fit = trusted_fit(rig)[0]
+    assert np.mean([np.mean(np.abs(r.velocity) < r.rest_speed) for r in fit.rows]) > 0.5
+    speeds = [g["stribeck_speed"] for c in candidates(rig, fit, "hinge") for g in c.grid if "stribeck_speed" in g]
+    assert speeds and min(speeds) > max(r.rest_speed for r in fit.rows)

@@ -162,9 +162,10 @@ def _turning_round(
 
 
 def _knees(rows: list[Rows], count: int = 4) -> tuple[dict[str, float], ...]:
-    """Stribeck speeds between the slow and the fast ones of the recordings."""
-    speeds = np.concatenate([np.abs(r.velocity) for r in rows])
-    return tuple({"stribeck_speed": float(s)} for s in np.geomspace(*np.percentile(speeds[speeds > 0], [10, 90]), count))
+    """Stribeck speeds between the slow and the fast ones of what moves: at rest friction is unknown, and one that acts there alone would be
+    named for what holds the joint while it stands."""
+    speeds = np.concatenate([v[v > r.rest_speed] for r in rows for v in [np.abs(r.velocity)]])
+    return tuple({"stribeck_speed": float(s)} for s in np.geomspace(*np.percentile(speeds, [10, 90]), count))
 
 
 def _by_load(fit: DeclaredFit, joint: str, rows: list[Rows], driven: bool) -> list[Candidate]:
