@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...effects import DriveState, catalogue, effect
 from ..balance import Rows
 from ..declared import DeclaredFit
-from ..laws import GEAR, GEAR_LOW, LINE, LOW, MOTOR, MOTOR_LOW, TURNING
+from ..laws import GEAR, GEAR_LOW, GEAR_MORE, LINE, LOW, MORE, MOTOR, MOTOR_LOW, MOTOR_MORE, TURNING
 from ..model import RigModel
 
 Array = NDArray[np.float64]
@@ -183,7 +183,12 @@ def _by_load(fit: DeclaredFit, joint: str, rows: list[Rows], driven: bool) -> li
         return Candidate("load_dependent_friction", variant, joint, (("per_load", "1", 0.0, np.inf),), knees,
                          lambda r, s: (r.direction * by[r.trial] * np.exp(-((r.velocity / s["stribeck_speed"]) ** 2)))[:, None])  # fmt: skip
 
-    found = [at_low_speed(LOW, load),
+    def more(variant: str, by: Mapping[str, Array]) -> Candidate:
+        slow = at_low_speed(variant, by)
+        return replace(slow, amplitudes=(*slow.amplitudes, ("per_load_low", "1", 0.0, np.inf)),
+                       columns=lambda r, s: np.column_stack([r.direction * by[r.trial], slow.columns(r, s)]))  # fmt: skip
+
+    found = [at_low_speed(LOW, load), more(MORE, load),
              Candidate("load_dependent_friction", "with speed", joint, (("per_load_speed", "s", 0.0, np.inf),), ({},),
                        lambda r, s: (r.velocity * load[r.trial])[:, None])]  # fmt: skip
     if driven:
@@ -191,7 +196,7 @@ def _by_load(fit: DeclaredFit, joint: str, rows: list[Rows], driven: bool) -> li
         motor = {t: np.abs(e) for t, e in expected.items()}
         gear = {r.trial: 0.5 * np.abs(expected[r.trial] + r.bias(fit.theta)) for r in mine}
         found += [friction(MOTOR, "per_effort", motor), friction(GEAR, "per_load", gear),
-                  at_low_speed(MOTOR_LOW, motor), at_low_speed(GEAR_LOW, gear)]
+                  at_low_speed(MOTOR_LOW, motor), at_low_speed(GEAR_LOW, gear), more(MOTOR_MORE, motor), more(GEAR_MORE, gear)]
     return found
 
 

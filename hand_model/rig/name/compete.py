@@ -184,15 +184,22 @@ def score(problem: Problem, terms: Sequence[Term], candidate: Candidate, parts: 
 def judge(none: Array, scores: Sequence[Score], problem: Problem) -> tuple[int, Step] | None:
     """Index of the winner and what the round says, or None where no candidate beats "nothing" (none (B,)) beyond doubt and by
     enough of its error. Of few recordings the splits have said what is no chance."""
-    if not scores:
+    able = [k for k, s in enumerate(scores) if not any(_as_good(r, s) for r in scores)]
+    if not able:
         return None
-    many = left_out_whole(problem)
-    said = weigh(none, np.array([s.error for s in scores]), [_size(s.term) for s in scores], problem.group, by_chance=many, worth=LEAST_SHARE)
+    many, some = left_out_whole(problem), [scores[k] for k in able]
+    said = weigh(none, np.array([s.error for s in some]), [_size(s.term) for s in some], problem.group, by_chance=many, worth=LEAST_SHARE)
     if said is None:
         return None
-    rivals = tuple((scores[i].term.candidate.key, float(said.wins[i])) for i in np.argsort(-said.wins) if said.wins[i] > 0.005)
-    equals = tuple(dict.fromkeys(scores[k].term.candidate.effect for k in said.close))
-    return said.chosen, Step(said.probability, rivals, said.gain, equals, said.close)
+    rivals = tuple((some[i].term.candidate.key, float(said.wins[i])) for i in np.argsort(-said.wins) if said.wins[i] > 0.005)
+    equals = tuple(dict.fromkeys(some[k].term.candidate.effect for k in said.close))
+    return able[said.chosen], Step(said.probability, rivals, said.gain, equals, tuple(able[k] for k in said.close))
+
+
+def _as_good(simple: Score, rich: Score) -> bool:
+    """Whether a form of the same effect with fewer parameters leaves so little more that the rest would be worth no name of its own."""
+    return (simple.term.candidate.effect == rich.term.candidate.effect and _size(simple.term) < _size(rich.term)
+            and (1 - LEAST_SHARE) * simple.error.sum() <= rich.error.sum())  # fmt: skip
 
 
 def _size(term: Term) -> int:
