@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hand_model.rig.states import recorded_states
+from hand_model.rig.states import low_pass, recorded_states
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
 from rig_recorder.compose import make_set
 from rig_recorder.law import Law
-from rig_recorder.moves import play
+from rig_recorder.moves import cycles, follow, play
 from rig_recorder.record import Logger
 from rig_recorder.steps import Drive, one_joint
 
@@ -52,3 +52,19 @@ def test_a_set_is_the_same_for_a_seed_and_says_nothing_in_its_sessions(tmp_path:
     assert one == two
     names = {p.name for p in (tmp_path / "a" / "rig_00").iterdir()}
     assert names == {"session.toml", "rig.xml", "log"}
+
+
+@pytest.mark.parametrize(("rate_hz", "late_s"), [(250.0, 6.5e-4), (333.0, 3e-4), (500.0, 6.5e-4), (1000.0, 6.5e-4)])
+def test_a_held_torque_comes_late_in_a_log(rate_hz: float, late_s: float) -> None:
+    """Inertia and damping alone, no channel late and no noise: the shift of the effort at which they explain it best is what `rig_trial` takes
+    for there, since a value holds for a millisecond and a log that keeps step with it reads it at the end."""
+    law, stiff = Law(60.0, viscous=80.0), 60.0 * (2 * np.pi * 12) ** 2
+    track = one_joint(law, Drive(), follow(cycles(6, 0.0, 0.3, 2, 0.25), stiff, 1.2 * stiff / (2 * np.pi * 12), 1e5), 6.0, (0.0, 0.0),
+                      np.random.default_rng(0))  # fmt: skip
+    at = np.arange(1, int(5.9 * rate_hz)) / rate_hz
+    filtered = lambda x: low_pass(x, rate_hz, 20.0)
+    velocity = np.gradient(np.interp(at, track.time_s, track.position[:, 0]), at)
+    columns = np.stack([filtered(np.gradient(velocity, at)), filtered(velocity)], 1)
+    effort, shifts = np.interp(at, track.time_s, track.effort[:, 0]), np.arange(-5e-4, 2e-3, 5e-5)
+    left = [np.linalg.lstsq(columns, filtered(np.interp(at + s, at, effort)))[1][0] for s in shifts]
+    assert shifts[int(np.argmin(left))] == pytest.approx(late_s, abs=1.5e-4)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from rig_bench import ARM, Motion, recorded
 from hand_model.rig import load_rig
 from hand_model.rig.diagnose import _rank, trusted_fit
 from hand_model.rig.findings import Finding
-from hand_model.rig.name.candidates import candidates
+from hand_model.rig.name.candidates import Candidate, candidates
 from hand_model.rig.name.compete import LEAST_SHARE, _met, compete, score
 from hand_model.rig.name.problem import Term, held_out, normal, pose
 from hand_model.rig.name.refit import refit
@@ -60,6 +61,43 @@ def test_a_form_that_was_chosen_without_a_later_effect_is_chosen_again_beside_it
     both = {t.candidate.effect: t.shape for t in compete(pose(fit), some)[0]}
     assert first.shape["form"] == 0.0 and both["stribeck_friction"]["form"] == 1.0
     assert both["stribeck_friction"]["stribeck_speed"] == pytest.approx(SPEED, rel=0.1)
+
+
+def with_load(folder: Path, load: Callable[[np.ndarray], np.ndarray]) -> Any:
+    """A hinge that its drive pushes against a load [N m] by position [rad], and its declared fit."""
+
+    def torque(motion: Motion) -> np.ndarray:
+        _, q, v, a = motion
+        return (0.6 * 0.04 + 0.002) * a + 0.6 * 0.2 * 9.81 * np.sin(q) + 0.02 * v + 0.065 * np.sign(v) + load(q)
+
+    rig = load_rig(read_session(recorded(folder, ARM, 5, torque, 0.01)))
+    return rig, trusted_fit(rig)[0]
+
+
+def test_a_rival_is_held_to_the_others_at_its_best_place_not_at_that_of_a_grid(tmp_path: Path) -> None:
+    """A detent between two places of its grid: there it leaves most of itself, and another effect would take its name."""
+    rig, fit = with_load(tmp_path / "s", lambda q: 0.3 * np.exp(-0.5 * ((q - 0.13) / 0.09) ** 2))
+    detent = next(c for c in candidates(rig, fit, "hinge") if c.effect == "detent_load")
+    places = np.unique([g["centre"] for g in detent.grid])
+    near = places[np.argsort(np.abs(places - 0.13))[:1]]
+    coarse = replace(detent, grid=tuple(g for g in detent.grid if g["form"] == 0.0 and g["centre"] not in near))
+    problem = pose(fit, "hinge")
+    parts = normal(problem, ())
+    frozen = score(problem, (), coarse, parts)
+    best = _met(problem, (), parts, [frozen], 0)[0]
+    assert best.error.sum() < 0.5 * frozen.error.sum()
+    assert (best.term.shape["centre"], best.term.shape["width"]) == pytest.approx((0.13, 0.09), rel=0.1)
+
+
+def test_two_effects_of_which_neither_alone_is_worth_a_name(tmp_path: Path) -> None:
+    """What is left is the difference of two columns that are nearly one: both are found, in whichever order; one of them alone is not."""
+    columns = {"detent_load": lambda q: np.sin(7 * q), "torque_ripple": lambda q: np.sin(7 * q) + 0.1 * np.cos(19 * q)}
+    _, fit = with_load(tmp_path / "s", lambda q: columns["torque_ripple"](q) - columns["detent_load"](q))
+    rivals = [Candidate(name, "", "hinge", (("size", "effort", -np.inf, np.inf),), ({},), lambda r, s, c=column: c(r.position)[:, None])
+              for name, column in columns.items()]  # fmt: skip
+    terms, steps, _ = compete(pose(fit, "hinge"), rivals)
+    assert {t.candidate.effect for t in terms} == set(columns) and len(steps) == 2
+    assert not any(compete(pose(fit, "hinge"), [rival])[0] for rival in rivals)
 
 
 def found(joint: str, before: float, after: float) -> Finding:

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from hand_model.rig import standing
+from hand_model.rig.findings import Finding
 from hand_model.rig.name.candidates import Candidate
 from hand_model.rig.name.problem import Term
+from hand_model.rig.same_path import one_load_each
 
 
 def term(joint: str, effect: str, reach: float) -> Term:
@@ -88,3 +90,25 @@ def test_a_delay_at_the_end_of_those_tried_is_none(delay: float, beyond: bool) -
     grid = tuple({"delay": s * d} for d in (0.01, 0.04) for s in (-1.0, 1.0))
     late = Candidate("current_channel_delay", "", "j1", (), grid, lambda r, s: np.zeros((0, 0)), True)
     assert standing._beyond_reach(Term(late, {"delay": delay})) is beyond and not standing._beyond_reach(term("j1", "a", 1.0))
+
+
+def _load(effect: str, joint: str, before: float, after: float, share: float, signal: str = "effort") -> Finding:
+    fit = {"before": before, "after": after, "ci95_reduction": [0.1, 0.4]}
+    value = {"value": 1.0, "unit": "N m", "ci95": None}
+    return Finding(effect, (effect, "stribeck_friction"), 0.98, (), {"joint": joint, "signal": signal, "share_of_mismatch": share},
+                   f"{effect} at {joint}.", {"load": value}, fit, {"native": False})  # fmt: skip
+
+
+def test_on_one_path_all_loads_tied_to_a_joint_are_one_name() -> None:
+    """A spring, a detent and a ripple at one joint bend one curve; other joints, other effects and angles of couplings stay as they are."""
+    found = [_load("nonlinear_spring", "a", 5.0, 4.0, 0.5), _load("asymmetric_friction", "a", 4.0, 3.5, 0.2), _load("detent_load", "b", 1.0, 0.5, 0.9),
+             _load("detent_load", "a", 3.5, 2.5, 0.2), _load("torque_ripple", "a", 2.5, 2.0, 0.1), _load("torque_ripple", "a", 2.0, 1.0, 0.1, "position")]  # fmt: skip
+    merged = one_load_each(found)
+    assert [(f.effect, f.where["joint"]) for f in merged] == [("nonlinear_spring", "a"), ("asymmetric_friction", "a"), ("detent_load", "b"), ("torque_ripple", "a")]
+    one = merged[0]
+    assert one.members == ("nonlinear_spring", "stribeck_friction", "detent_load", "torque_ripple", "gravity_load")
+    assert one.where["share_of_mismatch"] == pytest.approx(0.8)
+    assert one.fit["after"] ** 2 == pytest.approx(25 - (25 - 16) - (3.5**2 - 2.5**2) - (2.5**2 - 4.0))
+    assert one.fit["ci95_reduction"] == pytest.approx([0.3, 1.2]) and len(one.parameters) == 3
+    assert merged[1] is found[1] and merged[3] is found[5]
+    assert merged[2].members == ("detent_load", "stribeck_friction", "gravity_load")

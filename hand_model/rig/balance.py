@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from .dynamics import INERTIAL, inertial_columns, inertial_parameters
 from .model import RigModel, RigTrial
 from .overrides import body_names, compile_model
-from .states import PASSED, choose_cutoff, differentiate, fill_gaps, low_pass, uniform_time, velocity_noise
+from .states import PASSED, STEEP, choose_cutoff, differentiate, fill_gaps, low_pass, uniform_time, velocity_noise
 
 Array = NDArray[np.float64]
 MAX_RATE_HZ = 250.0  # faster recordings are thinned to this: joints move below 50 Hz
@@ -158,7 +158,7 @@ def trial_rows(
     cutoff = cutoff_hz or min(choose_cutoff(raw[j], rate) for j in rig.independent)
     # Columns pass the balance's filter as the effort does; the states they are made of must not lose that band before.
     wide = STATE_CUTOFF * cutoff
-    q = np.stack([low_pass(raw[j], rate, wide) for j in rig.joints], 1)
+    q = np.stack([low_pass(raw[j], rate, wide, STEEP) for j in rig.joints], 1)
     v = differentiate(q, rate, wide < PASSED * rate)
     a = differentiate(v, rate, wide < PASSED * rate)
     rest = np.array([max(3 * velocity_noise(raw[j], rate, min(wide, PASSED * rate)), RINGING * float(np.std(v[:, i])))

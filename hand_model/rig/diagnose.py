@@ -26,8 +26,8 @@ from .name.joint_search import as_term, offsets_first, search_joints
 from .name.problem import Term, held_out, normal, pose, solution
 from .noise import effort_noise
 from .proof import Bench
+from .same_path import one_load_each, repeated_trajectory
 from .standing import FITS, first_of, proved, solved
-from .states import fill_gaps
 from .swing.build import can_swing
 from .swing.diagnose import diagnose_swing
 from .transmission import angle_residual
@@ -40,7 +40,6 @@ PROBABILITY = (
 )
 UNMEASURED = {"metric": None, "unit": None, "before": None, "after": None, "noise_floor": None, "ci95_reduction": None, "held_out": [],
               "engine": None}  # fmt: skip
-TIED_TO_POSITION = frozenset({"nonlinear_spring", "end_stop_contact", "detent_load", "torque_ripple"})
 
 
 @single_threaded()
@@ -81,8 +80,7 @@ def diagnose_rig(session: Session, output: str | Path | None = None, progress: C
     declared = lack.pop("declared", {c.label: float(t) for c, t in zip(fit.columns, fit.theta, strict=True)})
     unexplained = _unexplained(lack, found)
     again = repeated_trajectory(rig)
-    if again and len(rig.joints) > 1:  # on one and the same path a load tied to position is as well a weight elsewhere
-        found = [replace(f, members=(*f.members, "gravity_load")) if f.effect in TIED_TO_POSITION else f for f in found]
+    found = one_load_each(found) if again and len(rig.joints) > 1 else found
     findings = RigFindings(
         session=rig.name,
         verdict=_verdict(found, lack),
@@ -122,21 +120,6 @@ def trusted_fit(rig: RigModel) -> tuple[DeclaredFit, tuple[ChannelIssue, ...]]:
         if not more:
             return fit, tuple(issues)
         issues += more
-
-
-def repeated_trajectory(rig: RigModel) -> bool:
-    """Whether every validation recording follows a training recording so closely (1 % of the range) that it repeats it."""
-
-    def path(trial: Any, joint: str) -> Array:
-        q = fill_gaps(trial.time_s, trial.position[joint])
-        return np.interp(np.linspace(0, trial.time_s[-1], 200), trial.time_s, q)
-
-    def same(a: Any, b: Any) -> bool:
-        return all(np.std(path(a, j) - path(b, j)) < 0.01 * np.ptp(path(a, j)) for j in rig.joints
-                   if j in a.position and j in b.position)  # fmt: skip
-
-    held = rig.select(True)
-    return bool(held) and all(any(same(v, t) for t in rig.select(False)) for v in held)
 
 
 def _rate(rig: RigModel) -> float:

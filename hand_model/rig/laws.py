@@ -16,6 +16,8 @@ FRICTION = frozenset({"stribeck_friction", "position_dependent_friction"})
 # Variants of friction by load: by what the joint carries where nothing else is said.
 MOTOR, GEAR, TURNING = "motor side", "both sides of the gear", "turning round over a distance"
 LOW, MOTOR_LOW, GEAR_LOW = "low speed", f"{MOTOR}, low speed", f"{GEAR}, low speed"
+# At every speed, and more of it below a Stribeck speed (M5 of the ladder of Duclusaud et al. 2024).
+MORE, MOTOR_MORE, GEAR_MORE = (f"{side}more at low speed" for side in ("", f"{MOTOR}, ", f"{GEAR}, "))
 LINE = "linear_stiffness"  # of a spring where none is declared
 OF_STATE = FRICTION | {"nonlinear_spring", "end_stop_contact", "detent_load", "torque_ripple"}
 
@@ -43,7 +45,7 @@ def law(record: Mapping[str, Any]) -> Law | None:
     if variant == TURNING:
         return _Stop(shape, size[0], by_load=name == "load_dependent_friction")
     if name == "load_dependent_friction":
-        return _by_load(variant, shape, size[0])
+        return _by_load(variant, shape, *size)
     if name == "elastoplastic_hysteresis":
         return None if variant else _Stop(shape, size[0])  # a trial's own level is not known here
     simple: dict[str, Law] = {
@@ -71,12 +73,14 @@ def _of_state(record: Mapping[str, Any]) -> Law:
     return act
 
 
-def _by_load(variant: str, shape: Mapping[str, float], size: float) -> Law:
+def _by_load(variant: str, shape: Mapping[str, float], size: float, slow: float = 0.0) -> Law:
     if variant == "with speed":
         return lambda n: (size * n.velocity * abs(n.load), 0.0)
     side = _SIDES.get(variant, _SIDES[LOW])
     if variant in (LOW, MOTOR_LOW, GEAR_LOW):
-        return lambda n: (0.0, size * side(n) * math.exp(-((n.velocity / shape["stribeck_speed"]) ** 2)))
+        size, slow = 0.0, size
+    if slow:
+        return lambda n: (0.0, side(n) * (size + slow * math.exp(-((n.velocity / shape["stribeck_speed"]) ** 2))))
     return lambda n: (0.0, size * side(n))
 
 
@@ -92,7 +96,7 @@ def _gear(now: Now) -> float:
     return 0.5 * abs(now.drive + now.bias)
 
 
-_SIDES = {LOW: _joint, MOTOR: _motor, MOTOR_LOW: _motor, GEAR: _gear, GEAR_LOW: _gear}
+_SIDES = {LOW: _joint, MORE: _joint, MOTOR: _motor, MOTOR_LOW: _motor, MOTOR_MORE: _motor, GEAR: _gear, GEAR_LOW: _gear, GEAR_MORE: _gear}
 
 
 class _Stop:

@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 
 NOISE_SHARE = 0.03  # acceleration noise allowed, as a share of the acceleration itself
 ORDER = 4
+STEEP = 8  # of states: they lose nothing of the band in which a balance weighs them, and of noise only what lies in their own
 PASSED = 0.45  # of the sampling rate: a filter above lets everything through
 WINDOWS = (5, 7, 11, 15, 21, 29, 41, 57, 81, 113, 159, 225, 317, 447)  # samples
 ROUNDING = 8.2 / 70.0**0.5  # steps: weights of a fourth difference add up to 16; a little for the motion itself
@@ -76,8 +77,8 @@ def _fourth(time_s: Array, values: Array) -> Array:
     return np.sum(weights * np.lib.stride_tricks.sliding_window_view(values, 5), 1)
 
 
-def low_pass(values: Array, rate_hz: float, cutoff_hz: float) -> Array:
-    """Zero-phase Butterworth low-pass (both ways, order 4) along the first axis; no change where the cut-off is too high.
+def low_pass(values: Array, rate_hz: float, cutoff_hz: float, order: int = ORDER) -> Array:
+    """Zero-phase Butterworth low-pass (both ways, together of that order) along the first axis; no change where the cut-off is too high.
 
     Ends are extended by their point reflection and the filter starts settled there: what scipy.signal.filtfilt
     does, without working out the start anew in each of many thousand calls.
@@ -87,7 +88,7 @@ def low_pass(values: Array, rate_hz: float, cutoff_hz: float) -> Array:
     if cutoff_hz >= PASSED * rate_hz or len(values) < 30:
         return values
     pad = min(len(values) - 2, int(3 * rate_hz / cutoff_hz))
-    b, a, settled = _butterworth(cutoff_hz / (0.5 * rate_hz))
+    b, a, settled = _butterworth(cutoff_hz / (0.5 * rate_hz), order)
     out = np.concatenate([2 * values[:1] - values[pad:0:-1], values, 2 * values[-1:] - values[-2 : -pad - 2 : -1]])
     settled = settled.reshape(-1, *[1] * (out.ndim - 1))
     for _ in range(2):
@@ -96,11 +97,11 @@ def low_pass(values: Array, rate_hz: float, cutoff_hz: float) -> Array:
 
 
 @lru_cache(maxsize=256)
-def _butterworth(cutoff: float) -> tuple[Array, Array, Array]:
-    """Numerator and denominator (3,) of the filter and its state on a constant one; cutoff: share of half the sampling rate."""
+def _butterworth(cutoff: float, order: int) -> tuple[Array, Array, Array]:
+    """Numerator and denominator of the filter, one way, and its state on a constant one; cutoff: share of half the sampling rate; order: both ways."""
     from scipy.signal import butter, lfilter_zi
 
-    b, a = butter(ORDER // 2, cutoff)
+    b, a = butter(order // 2, cutoff)
     return b, a, lfilter_zi(b, a)
 
 

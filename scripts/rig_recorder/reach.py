@@ -20,6 +20,7 @@ from .steps import Drive, one_joint
 Array = NDArray[np.float64]
 Log = dict[str, Array]
 WIDE = 3.0  # states are filtered so much wider than the balance
+STATES, WEIGHED = 4, 2  # orders of the filters of states and of the balance: what they let through is part of what is attainable
 SLOW = 0.01  # of the greatest speed: below, friction is not known
 
 
@@ -51,10 +52,11 @@ def balance(folder: Path, answer: Mapping[str, Any], cutoff_hz: float) -> list[f
     return [min((ratios[(e,)] for e in effects), default=1.0), ratios[tuple(effects)]], {e: ratios[(e,)] for e in effects}
 
 
-def _filtered(values: Array, rate: float, cutoff_hz: float) -> Array:
+def _filtered(values: Array, rate: float, cutoff_hz: float, order: int) -> Array:
+    """Values (n, ...) through a filter of that order, run both ways."""
     from scipy.signal import butter, sosfiltfilt
 
-    return values if cutoff_hz >= 0.45 * rate else sosfiltfilt(butter(4, cutoff_hz, fs=rate, output="sos"), values, axis=0)
+    return values if cutoff_hz >= 0.45 * rate else sosfiltfilt(butter(order, cutoff_hz, fs=rate, output="sos"), values, axis=0)
 
 
 def _states(log: Log, answer: Mapping[str, Any], joint: int, cutoff_hz: float) -> dict[str, Any]:
@@ -63,7 +65,7 @@ def _states(log: Log, answer: Mapping[str, Any], joint: int, cutoff_hz: float) -
     grid = np.linspace(0, t[-1], len(t))
     rate = (len(t) - 1) / t[-1]
     names = {"arm": ("shoulder_position", "elbow_position"), "stages": ("output_position",)}.get(answer["machine"], ("position",))
-    q = np.stack([_filtered(np.interp(grid, t, log[n]), rate, WIDE * cutoff_hz) for n in names], 1)
+    q = np.stack([_filtered(np.interp(grid, t, log[n]), rate, WIDE * cutoff_hz, STATES) for n in names], 1)
     v = np.gradient(q, 1 / rate, axis=0)
     effort = next(log[n] for n in (("shoulder_torque", "elbow_torque")[joint], "torque", "force") if n in log)
     if answer["machine"] == "stages":
@@ -134,7 +136,7 @@ def _error(rows: list, machine: str, law: Law, answer: Mapping[str, Any], effect
             moving = np.abs(s["v"][:, s["joint"]]) > SLOW * np.abs(s["v"][:, s["joint"]]).max()
             end = min(int(s["rate"] / s["cutoff"]), len(y) // 20)
             moving[:end] = moving[len(y) - end :] = False
-            parts.append((_filtered(x, s["rate"], s["cutoff"])[moving], _filtered(y, s["rate"], s["cutoff"])[moving], held, x))
+            parts.append((_filtered(x, s["rate"], s["cutoff"], WEIGHED)[moving], _filtered(y, s["rate"], s["cutoff"], WEIGHED)[moving], held, x))
         x, y = (np.concatenate([p[i] for p in parts if not p[2]]) for i in (0, 1))
         size = np.abs(x).max(0) + 1e-300
         theta = np.linalg.lstsq(x / size, y, rcond=1e-9)[0] / size

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...effects import DriveState, catalogue, effect
 from ..balance import Rows
 from ..declared import DeclaredFit
-from ..laws import GEAR, GEAR_LOW, LINE, LOW, MOTOR, MOTOR_LOW, TURNING
+from ..laws import GEAR, GEAR_LOW, GEAR_MORE, LINE, LOW, MORE, MOTOR, MOTOR_LOW, MOTOR_MORE, TURNING
 from ..model import RigModel
 
 Array = NDArray[np.float64]
@@ -162,9 +162,10 @@ def _turning_round(
 
 
 def _knees(rows: list[Rows], count: int = 4) -> tuple[dict[str, float], ...]:
-    """Stribeck speeds between the slow and the fast ones of the recordings."""
-    speeds = np.concatenate([np.abs(r.velocity) for r in rows])
-    return tuple({"stribeck_speed": float(s)} for s in np.geomspace(*np.percentile(speeds[speeds > 0], [10, 90]), count))
+    """Stribeck speeds between the slow and the fast ones of what moves: at rest friction is unknown, and one that acts there alone would be
+    named for what holds the joint while it stands."""
+    speeds = np.concatenate([v[v > r.rest_speed] for r in rows for v in [np.abs(r.velocity)]])
+    return tuple({"stribeck_speed": float(s)} for s in np.geomspace(*np.percentile(speeds, [10, 90]), count))
 
 
 def _by_load(fit: DeclaredFit, joint: str, rows: list[Rows], driven: bool) -> list[Candidate]:
@@ -182,7 +183,12 @@ def _by_load(fit: DeclaredFit, joint: str, rows: list[Rows], driven: bool) -> li
         return Candidate("load_dependent_friction", variant, joint, (("per_load", "1", 0.0, np.inf),), knees,
                          lambda r, s: (r.direction * by[r.trial] * np.exp(-((r.velocity / s["stribeck_speed"]) ** 2)))[:, None])  # fmt: skip
 
-    found = [at_low_speed(LOW, load),
+    def more(variant: str, by: Mapping[str, Array]) -> Candidate:
+        slow = at_low_speed(variant, by)
+        return replace(slow, amplitudes=(*slow.amplitudes, ("per_load_low", "1", 0.0, np.inf)),
+                       columns=lambda r, s: np.column_stack([r.direction * by[r.trial], slow.columns(r, s)]))  # fmt: skip
+
+    found = [at_low_speed(LOW, load), more(MORE, load),
              Candidate("load_dependent_friction", "with speed", joint, (("per_load_speed", "s", 0.0, np.inf),), ({},),
                        lambda r, s: (r.velocity * load[r.trial])[:, None])]  # fmt: skip
     if driven:
@@ -190,7 +196,7 @@ def _by_load(fit: DeclaredFit, joint: str, rows: list[Rows], driven: bool) -> li
         motor = {t: np.abs(e) for t, e in expected.items()}
         gear = {r.trial: 0.5 * np.abs(expected[r.trial] + r.bias(fit.theta)) for r in mine}
         found += [friction(MOTOR, "per_effort", motor), friction(GEAR, "per_load", gear),
-                  at_low_speed(MOTOR_LOW, motor), at_low_speed(GEAR_LOW, gear)]
+                  at_low_speed(MOTOR_LOW, motor), at_low_speed(GEAR_LOW, gear), more(MOTOR_MORE, motor), more(GEAR_MORE, gear)]
     return found
 
 

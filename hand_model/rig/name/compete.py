@@ -7,7 +7,7 @@ trials are never seen.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 LEAST_SHARE = 0.05  # of the held-out residual variance: less is not worth a name
 LOADED = "load_dependent_friction"
 MOST_TERMS, MOST_OF_FEW = 4, 3  # of few recordings what is left after so many goes by many names
-TOGETHER = 3  # rivals for which the shapes of what stands are moved
+TOGETHER = 3  # rivals that meet in their best shapes, beside those of what stands
 
 Settle = Callable[[tuple[Term, ...]], tuple[tuple[Term, ...], Sequence[Candidate]]]
 
@@ -41,12 +41,16 @@ Settle = Callable[[tuple[Term, ...]], tuple[tuple[Term, ...], Sequence[Candidate
 @dataclass(frozen=True)
 class Score:
     """A candidate added to the terms so far. error (B,): squared error of every block when left out [normalised]; parts: its
-    normal equations by block; others: the terms that it is added to, where their shapes have moved for it."""
+    normal equations by block; others: the terms that it is added to, where all shapes have moved for each other (None: not yet)."""
 
     term: Term
     error: Array
     parts: tuple = ()
-    others: tuple[Term, ...] = ()
+    others: tuple[Term, ...] | None = None
+
+    def beside(self, terms: tuple[Term, ...]) -> tuple[Term, ...]:
+        """All terms with it, where it is added to some."""
+        return (*(terms if self.others is None else self.others), self.term)
 
 
 @dataclass(frozen=True)
@@ -74,22 +78,20 @@ def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ..
     while len(terms) < most:
         problem = rescaled(problem, terms)
         parts = normal(problem, terms)
-        none = held_out(problem, terms, parts)
-        taken = {t.candidate.key for t in terms}
-        scores = [score(problem, terms, c, parts) for c in rivals if c.repeats or c.key not in taken]
-        scores = _met(problem, terms, parts, scores, len(begin))
-        stand = scores if left_out_whole(problem) else [s for s in scores if borne_out(problem, (terms, parts), ((*(s.others or terms), s.term), s.parts))]
-        found = judge(none, stand, problem)
+        plain = terms, parts, held_out(problem, terms, parts)
+        scores, found = _round(problem, plain, terms, rivals, len(begin))
+        pair = found is None and bool(scores) and len(terms) == len(begin) and most > len(terms) + 1
+        if pair:  # what one leaves may hide it, as a Stribeck rise hides a tight spot: two at once
+            lead = min(scores, key=lambda s: s.error.sum())
+            found = _round(problem, plain, lead.beside(terms), rivals, len(begin))[1]
         if found is None:
             break
-        # Between the points of a grid a rival may be better than on them: those not told apart meet again at their best.
-        last = [_together(problem, terms, parts, stand[k], len(begin)) for k in dict.fromkeys((found[0], *found[1].close))]
-        won, step = last[0], found[1]
-        if len(last) > 1:
-            again = judge(none, last, problem)
-            won, step = (last[again[0]], again[1]) if again is not None else (won, step)
-        terms, kept = _settled_down(problem, (*(won.others or terms), won.term), len(begin), been)
-        steps = [s for s, stays in zip((*steps, step), kept, strict=True) if stays]
+        every, step = found
+        terms, kept = _settled_down(problem, every, len(begin), been)
+        if pair and not all(kept):  # one of them would have stood alone
+            terms = begin
+            break
+        steps = [replace(step, rivals=(), equals=()), step] if pair else [s for s, stays in zip((*steps, step), kept, strict=True) if stays]
         been.add(_names(terms))
         if settle is not None:
             terms, kept = _resettled(problem, terms, len(begin), been, settle)
@@ -99,18 +101,35 @@ def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ..
     return terms, tuple(steps), tuple(scores)
 
 
+def _round(problem: Problem, plain: tuple[tuple[Term, ...], tuple, Array], terms: tuple[Term, ...], rivals: Sequence[Candidate],
+           first: int) -> tuple[list[Score], tuple[tuple[Term, ...], Step] | None]:  # fmt: skip
+    """Scores of the rivals beside the terms, and all terms with the winner and what the round says, or None where none is better than what stands (plain:
+    its terms, normal equations and errors (B,)). first: from which on shapes of terms move."""
+    parts, taken, none = normal(problem, terms), {t.candidate.key for t in terms}, plain[2]
+    scores = [score(problem, terms, c, parts) for c in rivals if c.repeats or c.key not in taken]
+    scores = _met(problem, terms, parts, scores, first)
+    stand = scores if left_out_whole(problem) else [s for s in scores if borne_out(problem, plain[:2], (s.beside(terms), s.parts))]
+    found = judge(none, stand, problem)
+    if found is None:
+        return scores, None
+    # Between the points of a grid a rival may be better than on them: those not told apart meet again at their best.
+    last = [_together(problem, terms, parts, stand[k], first) for k in dict.fromkeys((found[0], *found[1].close))]
+    again = judge(none, last, problem) if len(last) > 1 else None
+    won, step = (0, found[1]) if again is None else again
+    return scores, (last[won].beside(terms), step)
+
+
 def _met(problem: Problem, terms: tuple[Term, ...], parts: tuple, scores: list[Score], first: int) -> list[Score]:
-    """The scores, those of the rivals that explain most of what they were fitted to with the shapes of the terms moved for them, from `first` on: a
-    shape that has moved to take up what a rival is there for hides it (a Stribeck speed that is too high, drag)."""
-    if not any(moves(t) for t in terms[first:]):
-        return scores
+    """The scores, those of the rivals that explain most of what they were fitted to in their best shapes (a detent between two places of a grid is
+    half of itself) and with the shapes of the terms moved for them, from `first` on: a shape that has moved to take up what a rival is there for
+    hides it (a Stribeck speed that is too high, drag)."""
     best = sorted(scores, key=lambda s: training_error(problem, (*terms, s.term), s.parts))[:TOGETHER]
     return [_together(problem, terms, parts, s, first) if any(s is b for b in best) else s for s in scores]
 
 
 def _together(problem: Problem, terms: tuple[Term, ...], parts: tuple, rival: Score, first: int) -> Score:
     """The rival's score in the best of its forms, with all shapes from `first` on fitted beside each other."""
-    if rival.others:
+    if rival.others is not None:
         return rival
     every = (*terms, refined(problem, terms, rival.term, parts))
     every = refit(problem, every, first) if any(moves(t) for t in terms[first:]) else every
@@ -184,15 +203,22 @@ def score(problem: Problem, terms: Sequence[Term], candidate: Candidate, parts: 
 def judge(none: Array, scores: Sequence[Score], problem: Problem) -> tuple[int, Step] | None:
     """Index of the winner and what the round says, or None where no candidate beats "nothing" (none (B,)) beyond doubt and by
     enough of its error. Of few recordings the splits have said what is no chance."""
-    if not scores:
+    able = [k for k, s in enumerate(scores) if not any(_as_good(r, s) for r in scores)]
+    if not able:
         return None
-    many = left_out_whole(problem)
-    said = weigh(none, np.array([s.error for s in scores]), [_size(s.term) for s in scores], problem.group, by_chance=many, worth=LEAST_SHARE)
+    many, some = left_out_whole(problem), [scores[k] for k in able]
+    said = weigh(none, np.array([s.error for s in some]), [_size(s.term) for s in some], problem.group, by_chance=many, worth=LEAST_SHARE)
     if said is None:
         return None
-    rivals = tuple((scores[i].term.candidate.key, float(said.wins[i])) for i in np.argsort(-said.wins) if said.wins[i] > 0.005)
-    equals = tuple(dict.fromkeys(scores[k].term.candidate.effect for k in said.close))
-    return said.chosen, Step(said.probability, rivals, said.gain, equals, said.close)
+    rivals = tuple((some[i].term.candidate.key, float(said.wins[i])) for i in np.argsort(-said.wins) if said.wins[i] > 0.005)
+    equals = tuple(dict.fromkeys(some[k].term.candidate.effect for k in said.close))
+    return able[said.chosen], Step(said.probability, rivals, said.gain, equals, tuple(able[k] for k in said.close))
+
+
+def _as_good(simple: Score, rich: Score) -> bool:
+    """Whether a form of the same effect with fewer parameters leaves so little more that the rest would be worth no name of its own."""
+    return (simple.term.candidate.effect == rich.term.candidate.effect and _size(simple.term) < _size(rich.term)
+            and (1 - LEAST_SHARE) * simple.error.sum() <= rich.error.sum())  # fmt: skip
 
 
 def _size(term: Term) -> int:
