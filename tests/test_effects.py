@@ -352,3 +352,11 @@ def test_a_drive_warms_in_motion_and_cools_at_every_rest() -> None:
                       np.zeros((len(time_s) - half, 0)), extra={"history": earlier, "moving": moving[half:].astype(float)})
     column = effect("thermal_friction_drift").columns(late, {"form": 1.0, "warm_up_time": warm_s, "cooling_time": cool_s})[:, 0]
     np.testing.assert_allclose(column, want[half:], atol=1e-3)
+
+
+@pytest.mark.parametrize(("trial", "until", "acts"), [(-2.0, 0.95, False), (-1.0, 1.0, False), (-2.0, 0.7, True), (0.0, 1.0, True)])
+def test_what_is_there_all_along_in_every_recording_is_no_obstacle(trial: float, until: float, acts: bool) -> None:
+    s = state()
+    s = replace(s, extra={**s.extra, "session_s": np.full(len(s.time_s), s.elapsed_s[-1])})
+    columns = effect("external_contact").columns(s, {"trial": trial, "form": 0.0, "since": 0.0, "until": until, "begin": float(np.median(s.position))})
+    assert bool(columns.any()) is acts

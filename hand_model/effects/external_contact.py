@@ -10,6 +10,7 @@ import numpy as np
 from .base import Amplitude, Array, DriveState, Effect, Shape, figure, position_range
 
 WHILES = ((0.0, 1.0), (0.2, 1.0), (0.35, 1.0), (0.5, 1.0), (0.65, 1.0), (0.8, 1.0), (0.0, 0.5), (0.2, 0.5), (0.4, 0.7))
+LASTING = 0.85  # share of each recording, or of the session: what is there for longer in all of them is a spring or a stop
 ALL, EACH = -1.0, -2.0  # instead of the number of a trial: the while is one of the whole session; it is the same one of every trial
 MOST_VALIDATION = 4  # validation recordings in which an obstacle can still be told
 
@@ -41,9 +42,9 @@ class ExternalContact(Effect):
                       tuple(low + span * np.linspace(0.1, 0.9, 9))))
 
     def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
-        """Every start of trial, form and place, in some whiles of the trial; what is there all along is no obstacle but a stop."""
+        """Every start of trial, form and place, in some whiles of the trial."""
         return [point for point in super().grid(states)
-                if (point["since"], point["until"]) in WHILES and (point["trial"] >= 0 or (point["since"], point["until"]) != (0.0, 1.0))]
+                if (point["since"], point["until"]) in WHILES and (point["trial"] >= 0 or point["until"] - point["since"] <= LASTING)]
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Stiffness of the contact in that trial, and in each validation recording; never negative."""
@@ -51,11 +52,12 @@ class ExternalContact(Effect):
                 *((f"stiffness_validation_{i}", "effort/position", 0.0, np.inf) for i in range(MOST_VALIDATION)))
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """Depth into the contact in that trial and in each validation recording, (n, 1 + MOST_VALIDATION)."""
+        """Depth into the contact in that trial and in each validation recording, (n, 1 + MOST_VALIDATION); none of what is there in all of
+        them nearly all along."""
         out = np.zeros((len(state.time_s), 1 + MOST_VALIDATION))
         index = state.extra.get("trial_index", np.zeros(len(state.time_s)))[0]
         every, mine = shape["trial"] < 0, index == round(shape["trial"])
-        if not (every or mine or state.validate):
+        if not (every or mine or state.validate) or every and shape["until"] - shape["since"] > LASTING:
             return out
         depth = np.maximum(state.position - shape["begin"], 0.0)
         if shape["form"] > 0.5:
