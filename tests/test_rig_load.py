@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from rig_bench import ARM, HEAD, Motion, recorded
 from hand_model.rig import diagnose_rig, load_rig
 from hand_model.rig.diagnose import trusted_fit
 from hand_model.rig.laws import GEAR, GEAR_LOW, GEAR_MORE, LOW, MORE, MOTOR, MOTOR_LOW, MOTOR_MORE, TURNING, Now, law
-from hand_model.rig.name.candidates import UNDECLARED, Candidate, candidates
+from hand_model.rig.name.candidates import UNDECLARED, Candidate, _knees, candidates
 from hand_model.rig.name.compete import _resettled
 from hand_model.rig.name.problem import Term, pose, rescaled, solution
 from hand_model.rig.name.settled import settled
@@ -180,3 +181,9 @@ def test_no_stribeck_speed_lies_where_the_joint_stands(tmp_path: Path) -> None:
     assert np.mean([np.mean(np.abs(r.velocity) < r.rest_speed) for r in fit.rows]) > 0.5
     speeds = [g["stribeck_speed"] for c in candidates(rig, fit, "hinge") for g in c.grid if "stribeck_speed" in g]
     assert speeds and min(speeds) > max(r.rest_speed for r in fit.rows)
+
+
+@pytest.mark.parametrize("speed", [0.0, 1e-4])
+def test_a_joint_that_is_held_throughout_has_stribeck_speeds_to_try(speed: float) -> None:
+    held = SimpleNamespace(velocity=np.full(50, speed), rest_speed=1e-3)
+    assert all(0 < knee["stribeck_speed"] <= 1e-3 for knee in _knees([held]))

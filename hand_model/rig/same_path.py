@@ -42,7 +42,8 @@ def one_load_each(found: Sequence[Finding]) -> list[Finding]:
 
 
 def _tied(finding: Finding) -> bool:
-    return finding.effect in TIED_TO_POSITION and finding.where["signal"] == "effort"
+    told = all(finding.fit.get(k) is not None for k in ("before", "after", "ci95_reduction"))
+    return told and finding.effect in TIED_TO_POSITION and finding.where["signal"] == "effort"
 
 
 def _together(pieces: Sequence[Finding]) -> Finding:
