@@ -9,6 +9,7 @@ import pytest
 from chain_data import BODY, LABELS, PALM, finger_chain, recording
 
 from hand_model.errors import IdentificationError
+from hand_model.identify import finger
 from hand_model.identify.axis import dominant_axis, gamage_lasenby_axis
 from hand_model.identify.bootstrap import variance_inflation
 from hand_model.identify.centre import project_on_line, sphere_centre
@@ -229,3 +230,20 @@ def test_a_hinge_is_called_a_hinge_and_a_wobble_is_not():
     moved = fitted(replace(data, position_world=pose.to_world(in_palm)))
     assert "no plain hinge" in hinge_note(moved, 0)
     assert block_inflation(moved) > 2
+
+
+@pytest.mark.parametrize(("settles", "slips"), [(True, 1), (False, 0)])
+def test_no_marker_is_split_where_the_chain_settles_neither_with_the_slip_nor_without(monkeypatch, settles: bool, slips: int) -> None:
+    _, data, _ = recording(11)
+    y = data.position_world.copy()
+    y[800:, 4] += np.array([0.0009, -0.0007, 0.0008])
+    fit = replace(fitted(replace(data, position_world=y)), converged=False)
+    calls = []
+
+    def settling(*arguments):
+        calls.append(arguments)
+        return replace(fit_chain(*arguments), converged=settles)
+
+    monkeypatch.setattr(finger, "fit_chain", settling)
+    again, found = finger._fit_with_slips(fit)
+    assert len(found) == slips and (again is fit) is not settles and (settles or len(calls) <= 2)

@@ -141,6 +141,8 @@ def _best_fit(data: ChainData, rest: NDArray[np.int64], palm_shape: Array) -> Ch
 
 
 def _fit_with_slips(fit: ChainFit) -> tuple[ChainFit, tuple[Slip, ...]]:
+    """The fit with every marker that slips in two, and the slips; none is sought where the chain settles neither with it nor without: what
+    moves there moves all the time."""
     slips: list[Slip] = []
     while len(slips) < MOST_SLIPS:
         slip = find_slip(fit)
@@ -149,8 +151,10 @@ def _fit_with_slips(fit: ChainFit) -> tuple[ChainFit, tuple[Slip, ...]]:
         j = max(i for i, label in enumerate(fit.data.labels) if label == slip.label)
         split = split_marker(fit.data, slip)
         marker = np.insert(fit.chain.marker_palm, j + 1, fit.chain.marker_palm[j] + slip.shift_palm, axis=0)
-        fit = fit_chain(split, Chain(marker, fit.chain.axis_palm, fit.chain.centre_palm))
-        fit = _without_loose(fit, (j, j + 1))
+        apart = _without_loose(fit_chain(split, Chain(marker, fit.chain.axis_palm, fit.chain.centre_palm)), (j, j + 1))
+        if not (fit.converged or apart.converged):
+            break
+        fit = apart
         slips.append(slip)
     return fit, tuple(slips)
 
