@@ -11,7 +11,7 @@ from test_diagnose import drive
 
 from hand_model.diagnose.name.balance import Balance
 from hand_model.diagnose.name.shapes import refit
-from hand_model.diagnose.name.term import Term, rubbed
+from hand_model.diagnose.name.term import Term, replaced
 from hand_model.diagnose.prove.improve import as_fitted
 from hand_model.effects import catalogue, effect, outsiders
 from hand_model.hand import Hand
@@ -24,7 +24,7 @@ OF_A_DRIVE = [*catalogue("drive"), *outsiders("drive")]
 def test_what_has_the_direction_of_friction_says_so(candidate) -> None:
     states = tuple(replace(s, extra={**s.extra, "required": s.declared[:, 2], "load": np.ones(len(s.time_s))}) for s in drive(1, trials=2))
     for shape in candidate.grid(states)[:40:8]:
-        as_it_is, turned = (candidate.columns(s, shape) for s in (states[0], rubbed(states[0], (BRISTLES,))))
+        as_it_is, turned = (candidate.columns(s, shape) for s in (states[0], replaced(states[0], (BRISTLES,))))
         assert candidate.rubs or np.array_equal(as_it_is, turned)
 
 

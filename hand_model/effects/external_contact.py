@@ -44,7 +44,7 @@ class ExternalContact(Effect):
     def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
         """Every start of trial, form and place, in some whiles of the trial."""
         return [point for point in super().grid(states)
-                if (point["since"], point["until"]) in WHILES and (point["trial"] >= 0 or point["until"] - point["since"] <= LASTING)]
+                if (point["since"], point["until"]) in WHILES and not _all_along(point)]
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Stiffness of the contact in that trial, and in each validation recording; never negative."""
@@ -57,7 +57,7 @@ class ExternalContact(Effect):
         out = np.zeros((len(state.time_s), 1 + MOST_VALIDATION))
         index = state.extra.get("trial_index", np.zeros(len(state.time_s)))[0]
         every, mine = shape["trial"] < 0, index == round(shape["trial"])
-        if not (every or mine or state.validate) or every and shape["until"] - shape["since"] > LASTING:
+        if not (every or mine or state.validate) or _all_along(shape):
             return out
         depth = np.maximum(state.position - shape["begin"], 0.0)
         if shape["form"] > 0.5:
@@ -87,6 +87,10 @@ class ExternalContact(Effect):
         part = "" if since <= 0 and until >= 100 else f", {since} to {until} % of the way through"
         return (f"in {name}{part}, the finger meets an elastic obstacle at {parameters['begin']:.1f} %: "
                 f"10 % further it takes {figure(10 * parameters['stiffness'])} raw more current")
+
+
+def _all_along(shape: Mapping[str, float]) -> bool:
+    return shape["trial"] < 0 and shape["until"] - shape["since"] > LASTING
 
 
 EFFECT = ExternalContact()

@@ -57,11 +57,11 @@ def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]
 
 def _pulls(station: Station) -> bool:
     """Whether a finger is pulled off its drive by more than a trifle."""
-    if not station.believed:
+    named = next((f for f in station.kept if f.term.effect.name == "spring_decoupling"), None) if station.believed else None
+    if named is None:
         return False
-    named = [station.naming.fit.terms.index(f.term) for f in station.kept if f.term.effect.name == "spring_decoupling"]
-    figures = channel_figures(station.naming.balance.states)
-    return any(magnitude("spring_decoupling", {k: v["value"] for k, v in station.parameters[i].items()}, figures) >= SLIGHT for i in named)
+    values = {k: v["value"] for k, v in station.parameters[station.naming.fit.terms.index(named.term)].items()}
+    return magnitude("spring_decoupling", values, channel_figures(station.naming.balance.states)) >= SLIGHT
 
 
 def _tells(station: Station) -> bool:

@@ -20,7 +20,7 @@ from .least_squares import from_products
 from .memory import Memory
 from .noise import noise
 from .projection import Projection
-from .term import DISCRETE, Term, additive, bending, key_of, keys, rubbed, warped
+from .term import DISCRETE, Term, additive, bending, key_of, keys, replaced, warped
 
 if TYPE_CHECKING:
     from .wander import Wander
@@ -52,7 +52,7 @@ class Fit:
     def added(self, which: int, state: DriveState) -> Array:
         """What the columns of one term add to the effort (n,) along a recording."""
         term = self.terms[which]
-        return term.effect.columns(rubbed(state, self.terms), term.shape) @ np.array(list(self.amplitudes[which].values()))
+        return term.effect.columns(replaced(state, bending(self.terms, term.effect)), term.shape) @ np.array(list(self.amplitudes[which].values()))
 
 
 class Balance:
@@ -169,13 +169,13 @@ class Balance:
         return self._remembered((effect, key_of(shape), keys(bends)), bent)
 
     def _rubbed(self, state: DriveState, bends: tuple[Term, ...]) -> DriveState:
-        """`rubbed`, its columns kept: every candidate beside the same bristles asks."""
-        rubbing = tuple(t for t in bends if not t.effect.warps)
+        """The state with friction turned over by the bristles among `bends`, its columns kept: every candidate beside the same ones asks."""
+        rubbing = tuple(t for t in bends if t.effect.replaces is not None)
         if not rubbing:
             return state
         key = ("rubbed", id(state), keys(rubbing))
         found = self._last.get(key)
-        return replace(state, declared=self._last.put(key, rubbed(state, rubbing).declared) if found is None else found)
+        return replace(state, declared=self._last.put(key, replaced(state, rubbing).declared) if found is None else found)
 
     def _remembered(self, key: Any, value: Callable[[DriveState], Array]) -> Array:
         """What `gather` makes of `value`; while one term's shape is optimised the other terms' columns stay."""
@@ -221,16 +221,11 @@ class Balance:
 
     def design(self, terms: tuple[Term, ...]) -> tuple[Array, Array, Array]:
         """Matrix (n, k + j) of declared and effect columns, lower and upper bounds (k + j,) of their coefficients."""
-        warps = tuple(t for t in terms if t.effect.warps)
+        warps, changing = tuple(t for t in terms if t.effect.warps), tuple(t for t in terms if t.effect.replaces is not None)
 
         def declared(state: DriveState) -> Array:
-            columns = state.declared
-            for term in terms:
-                if term.effect.replaces is not None:
-                    columns = term.effect.declared(replace(state, declared=columns), term.shape)
-            return warped(state, columns, warps)
+            return warped(state, replaced(state, changing).declared, warps)
 
-        changing = tuple(t for t in terms if t.effect.replaces is not None)
         parts = [self._remembered(("declared", keys(changing), keys(warps)), declared)]
         low = [DECLARED_LOW.get(name, -np.inf) for name in self.names]
         high = [np.inf] * len(self.names)

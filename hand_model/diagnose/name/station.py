@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
 from ..findings import UNWRITTEN, Finding, weighed
 from .interval import brought_held_out, held_out, parameter_intervals, sized, undisturbed, variance_ratio
-from .lack_of_fit import LackOfFit
 from .naming import ALPHA, EXPLAINED_LEAST, MOST_TERMS, Named, Naming
 from .selection import EVIDENCE_LEAST, SMALL, name_effects
 
@@ -184,10 +184,6 @@ def _altered(naming: Naming) -> bool:
     return False
 
 
-def _excess(lack: LackOfFit) -> float:
-    return lack.excess
-
-
 def judged(signal: str, finger: str | None, actuator: str | None, joint: str | None, states: tuple[Any, ...], effects: Iterable[Any],
            typical: Mapping[str, float] | None = None) -> Station:
     """The station of the balance of `states`, named among `effects`. Where a name does not stand, or is another's form, the others are
@@ -211,7 +207,7 @@ def judged(signal: str, finger: str | None, actuator: str | None, joint: str | N
         # what the training recordings cannot tell, a pose that one of the others alone has may tell
         lasting = tuple(e for e in every if e.of_the_hand)  # what one recording had explains no other
         learned = name_effects(states, lasting, typical=typical, whole=True)
-        other = Station(signal, finger, actuator, joint, replace(learned, before=max(station.naming.before, learned.before, key=_excess)))
+        other = Station(signal, finger, actuator, joint, replace(learned, before=max(station.naming.before, learned.before, key=attrgetter("excess"))))
         seen = other.naming.after.p >= ALPHA or _altered(station.naming)  # another pose is plain to see, whatever small is left
         station = other if seen and other.believed and other.wander <= max(station.wander, UNREST) else station
     if station.forms:

@@ -63,11 +63,11 @@ def warped(state: DriveState, columns: Array, terms: tuple[Term, ...]) -> Array:
     return columns
 
 
-def rubbed(state: DriveState, terms: tuple[Term, ...]) -> DriveState:
-    """The state with friction's direction as `terms` leave it: steady friction, whatever it depends on, is that of the bristles (Canudas de Wit
-    1995, eq. 3)."""
+def replaced(state: DriveState, terms: tuple[Term, ...]) -> DriveState:
+    """The state with its declared columns as `terms` leave them, and so friction's direction: steady friction, whatever it depends on, is that of
+    the bristles (Canudas de Wit 1995, eq. 3)."""
     for term in terms:
-        if term.effect.replaces == FRICTION:
+        if term.effect.replaces is not None:
             state = replace(state, declared=term.effect.declared(state, term.shape))
     return state
 

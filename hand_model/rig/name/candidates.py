@@ -164,9 +164,9 @@ def _turning_round(
 def _knees(rows: list[Rows], count: int = 4) -> tuple[dict[str, float], ...]:
     """Stribeck speeds between the slow and the fast ones of what moves: at rest friction is unknown, and one that acts there alone would be
     named for what holds the joint while it stands."""
-    speeds = np.concatenate([v[v > r.rest_speed] for r in rows for v in [np.abs(r.velocity)]])
-    if not len(speeds):  # a joint that is held throughout
-        speeds = np.maximum(np.concatenate([np.abs(r.velocity) for r in rows]), 1e-12)
+    speeds = np.concatenate([np.abs(r.velocity) for r in rows])
+    moving = speeds > np.concatenate([np.full(len(r.velocity), r.rest_speed) for r in rows])
+    speeds = speeds[moving] if moving.any() else np.maximum(speeds, 1e-12)  # of a joint that is held throughout all there is
     return tuple({"stribeck_speed": float(s)} for s in np.geomspace(*np.percentile(speeds, [10, 90]), count))
 
 

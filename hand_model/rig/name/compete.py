@@ -105,10 +105,11 @@ def _round(problem: Problem, plain: tuple[tuple[Term, ...], tuple, Array], terms
            first: int) -> tuple[list[Score], tuple[tuple[Term, ...], Step] | None]:  # fmt: skip
     """Scores of the rivals beside the terms, and all terms with the winner and what the round says, or None where none is better than what stands (plain:
     its terms, normal equations and errors (B,)). first: from which on shapes of terms move."""
-    parts, taken, none = normal(problem, terms), {t.candidate.key for t in terms}, plain[2]
+    standing, its_parts, none = plain
+    parts, taken = its_parts if terms is standing else normal(problem, terms), {t.candidate.key for t in terms}
     scores = [score(problem, terms, c, parts) for c in rivals if c.repeats or c.key not in taken]
     scores = _met(problem, terms, parts, scores, first)
-    stand = scores if left_out_whole(problem) else [s for s in scores if borne_out(problem, plain[:2], (s.beside(terms), s.parts))]
+    stand = scores if left_out_whole(problem) else [s for s in scores if borne_out(problem, (standing, its_parts), (s.beside(terms), s.parts))]
     found = judge(none, stand, problem)
     if found is None:
         return scores, None
