@@ -147,5 +147,17 @@ def test_a_lone_drive_is_held_against_a_usual_one() -> None:
     assert len(lateness({"index": late_answers(5, 5, 6)})["index"].drive_s)
 
 
+def test_a_delay_of_a_sample_is_told_by_current_and_motion_together() -> None:
+    """By one channel alone it is not, nor by less than healthy drives differ by."""
+    punctual = late_answers(0, 0, 8)
+
+    def drive_s(current: float, motion: float) -> np.ndarray:
+        return lateness({"index": late_answers(current, motion, 7), "ring": punctual})["index"].drive_s
+
+    assert np.mean(drive_s(1.15, 1.15)) == pytest.approx(1.15 * STEP_S, abs=0.4 * STEP_S)
+    for current, motion in ((1.15, 0), (0, 1.15), (0.4, 0.4)):
+        assert not len(drive_s(current, motion))
+
+
 def test_answers_too_few_say_nothing() -> None:
     assert not lateness({"index": Answers(np.full(4, 0.09), np.full(4, 0.09), STEP_S)})

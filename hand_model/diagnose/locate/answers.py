@@ -16,8 +16,10 @@ from ...effects.base import DriveState, sample_interval
 
 Array = NDArray[np.float64]
 
-LATE = 1.25  # sample intervals, from which an answer is late
-MOSTLY = 0.7  # share of the answers that must be late
+LATE = 1.25  # sample intervals, from which an answer is late that one channel alone shows
+MOSTLY = 0.7  # share of such answers that must be late
+BOTH_LATE = 0.8  # sample intervals, from which a drive is late whose current and motion both are (446 pairs of healthy drives: 0.45 at most)
+CERTAIN = 3.0  # standard errors by which the means of both are late beyond what healthy drives differ by
 UNCLEAR = 0.3  # share of the lateness that the motion has too, from which it is no longer clear what is late
 LEAST_ANSWERS = 5
 UNLIKE = 0.4  # sample intervals by which the answers of healthy drives of one session differ
@@ -66,7 +68,8 @@ def lateness(answers: Mapping[str, Answers]) -> dict[str, Lateness]:
         begins = USUAL_START * x.step_s if alone else min(moved.values(), default=np.nan)
         behind = moved.get(actuator, np.nan) - begins  # nan where too few motions are seen to answer: late is the drive then
         total = float(np.mean(x.current_s)) - usual
-        drive = not behind <= max(x.step_s, 0.5 * total) and np.mean(late) > LATE * x.step_s and np.mean(late > x.step_s) > MOSTLY
+        plain = not behind <= max(x.step_s, 0.5 * total) and np.mean(late) > LATE * x.step_s and np.mean(late > x.step_s) > MOSTLY
+        drive = plain or (not alone and _both_late(x, total, behind))
         channel = max(total - np.nan_to_num(behind, nan=total), 0.0) if drive else total
         # Neither clearly the one nor the other: the motion's own scatter decides between the two.
         torn = total > LATE * x.step_s and UNCLEAR * total < behind < (1 - UNCLEAR) * total
@@ -75,6 +78,20 @@ def lateness(answers: Mapping[str, Answers]) -> dict[str, Lateness]:
         doubt = float(np.hypot(unlike + between, np.std(x.current_s) / np.sqrt(len(x.current_s))))
         out[actuator] = Lateness(late if drive else np.zeros(0), channel, doubt)
     return out
+
+
+def _both_late(x: Answers, current_s: float, motion_s: float) -> bool:
+    """Whether current and motion are late by as much [s] beside another drive, nan where that is not known.
+
+    Each is read to a sample and a motion begins when friction gives way, but not both to the same side: what they share is the delay.
+    """
+    late_s = np.array([current_s, motion_s])
+    if not np.isfinite(late_s).all():
+        return False
+    doubt_s = np.array([np.std(answers_s) / np.sqrt(len(answers_s)) for answers_s in (x.current_s, x.motion_s)])
+    least = float(late_s.min())
+    sure = bool((late_s - CERTAIN * doubt_s > UNLIKE * x.step_s).all())
+    return sure and least > BOTH_LATE * x.step_s and least > 0.5 * float(late_s.max())
 
 
 def _latencies(state: DriveState, channel: Array, early_s: float = 0.0) -> list[float]:
