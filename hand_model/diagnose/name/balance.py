@@ -141,9 +141,8 @@ class Balance:
         """Weighted values (n,) or (n, k) in which the noise is as good as white; as they are without `wander`."""
         return values if self.wander is None else self.wander.whiten(values, weight, self.inflation)
 
-    def products(self, columns: Array, weight: Array) -> Array:
-        """Products (k, k) with each other of columns (n, k), weighted and whitened."""
-        weighted = columns * weight[:, None]
+    def products(self, weighted: Array, weight: Array) -> Array:
+        """Products (k, k) with each other of columns (n, k) that are weighted by `weight`, whitened."""
         out = weighted.T @ weighted
         return out if self.wander is None else out - self.wander.common(weighted, weight, self.inflation)
 
@@ -244,9 +243,17 @@ class Balance:
         clips = [t for t in terms if t.effect.clips]
         prediction = np.zeros(len(self.effort))
         inside = np.ones(len(self.effort), bool)
+        weighted = np.column_stack([matrix, self.effort]) * w[:, None]
+        every = self.products(weighted, w)
+
+        def among(inside: NDArray[np.bool_]) -> Array:
+            if self.wander is not None:
+                return self.products(weighted * inside[:, None], w * inside)
+            outside = weighted[~inside]  # a few
+            return every - outside.T @ outside
+
         for _ in range(4 if clips else 1):
-            v = w * inside
-            products = self.products(np.column_stack([matrix, self.effort]), v)
+            products = every if inside.all() else among(inside)
             coefficients = from_products(products[:-1, :-1], products[:-1, -1], low, high)
             if held:
                 coefficients = self._own_nuisances(matrix, coefficients, w, low)

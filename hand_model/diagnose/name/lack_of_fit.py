@@ -18,13 +18,15 @@ class LackOfFit:
     """p: probability of a residual as structured as this if nothing is missing (Bonferroni over the groupings).
     ratio: variance of cell means over what pure error explains, of the most telling grouping. telling: its name.
     limit: the ratio that pure error stays below with probability 1 - alpha. excess: weighted sum of squares of cell means
-    beyond what pure error explains, of the grouping that holds most: the explainable mismatch."""
+    beyond what pure error explains, of the grouping that holds most: the explainable mismatch. unrest: variance from one stroke
+    to its replicate, over the noise's."""
 
     p: float
     ratio: float
     telling: str
     limit: float
     excess: float = 0.0
+    unrest: float = 0.0
 
 
 def groupings(balance: Balance) -> dict[str, NDArray[np.int64]]:
@@ -73,11 +75,12 @@ def stroke_variance(balance: Balance, z: Array) -> float:
     return max(float(np.mean(squares)), 0.0) if len(squares) >= 8 else 0.0
 
 
-def lack_of_fit(balance: Balance, prediction: Array, parameters: int, alpha: float) -> LackOfFit:
+def lack_of_fit(balance: Balance, prediction: Array, parameters: int, alpha: float, calmest: float = np.inf) -> LackOfFit:
     """Tests of cell means of the residual (steady samples) against how they vary from stroke to stroke, several groupings.
 
     parameters: number of fitted coefficients, taken off the degrees of freedom of the grouping by strokes. alpha:
-    false-alarm probability that `limit` stands for. The null is that of a wild bootstrap with strokes as blocks
+    false-alarm probability that `limit` stands for. calmest: the least unrest known of other models of these recordings, by which the
+    excess is measured: what they explain is no pure error. The null is that of a wild bootstrap with strokes as blocks
     (Liu 1988), in closed form: it holds for noise that is coloured, differs over pose or speed, or comes in bursts.
     """
     from scipy.stats import f
@@ -92,7 +95,8 @@ def lack_of_fit(balance: Balance, prediction: Array, parameters: int, alpha: flo
         keep = count.sum(1) >= 3
         sums, count = sums[keep], count[keep]
         variance = balance.inflation * count.sum(1) + unrest * (count**2).sum(1)
-        excess = max(excess, float(np.sum(sums.sum(1) ** 2 / variance)) - max(len(sums) - parameters, 1))
+        pure = balance.inflation * count.sum(1) + min(unrest, calmest) * (count**2).sum(1)
+        excess = max(excess, float(np.sum(sums.sum(1) ** 2 / pure)) - max(len(sums) - parameters, 1))
         if name == "stroke":
             freedom, many = max(len(sums) - 2, 1), max(count.shape[1] - parameters, 2)
             ratio = float(np.sum(sums.sum(1) ** 2 / variance)) / freedom
@@ -101,7 +105,7 @@ def lack_of_fit(balance: Balance, prediction: Array, parameters: int, alpha: flo
         p = min(float(f.sf(ratio, freedom, many)) * len(cells), 1.0)
         if p < best.p or not best.telling:
             best = LackOfFit(p, ratio, name, float(f.isf(alpha / len(cells), freedom, many)))
-    return replace(best, excess=float(excess))
+    return replace(best, excess=float(excess), unrest=unrest)
 
 
 def _sums(cell: NDArray[np.int64], stroke: NDArray[np.int64], z: Array) -> tuple[Array, Array]:
