@@ -202,6 +202,10 @@ class Effect:
         """Log density of the parameters over that of ordinary ones: negative where machines rarely are like that."""
         return 0.0
 
+    def derived(self, states: tuple[DriveState, ...], parameters: Mapping[str, float]) -> dict[str, float]:
+        """What follows from these parameters and the recorded range, beside them and with an interval of its own; nothing."""
+        return {}
+
     def further(self, states: tuple[DriveState, ...], parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
         """Further parameters (value, unit, ci95) that follow from the fitted ones and the recorded range; none."""
         return {}

@@ -53,19 +53,17 @@ class NonlinearSpring(Effect):
         return {"form": 0.0, **amplitude}
 
     def units(self, shape: Mapping[str, float]) -> Mapping[str, str]:
-        """Of the stiffness beyond a knee."""
-        return {"stiffness_beyond": "effort/position"}
+        """Of the stiffness beyond a knee, and of what it bends the load by."""
+        return {"stiffness_beyond": "effort/position", "bend": "effort"}
 
-    def further(self, states: tuple[DriveState, ...], parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    def derived(self, states: tuple[DriveState, ...], parameters: Mapping[str, float]) -> dict[str, float]:
         """Half of the band about a straight line in which the spring's load stays over the recorded range: what it is bent by."""
-        known = {name: entry["value"] for name, entry in parameters.items()}
         x = np.linspace(*position_range(states), 101)
-        if known["form"] > 0.5:
-            load = known["stiffness_beyond"] * np.maximum(x - known["knee"], 0.0)
+        if parameters["form"] > 0.5:
+            load = parameters["stiffness_beyond"] * np.maximum(x - parameters["knee"], 0.0)
         else:
-            load = known["quadratic_stiffness"] * x**2 + known["cubic_stiffness"] * x**3
-        left = load - np.polyval(np.polyfit(x, load, 1), x)
-        return {"bend": {"value": float(0.5 * np.ptp(left)), "unit": states[0].effort_unit}}
+            load = parameters["quadratic_stiffness"] * x**2 + parameters["cubic_stiffness"] * x**3
+        return {"bend": float(0.5 * np.ptp(load - np.polyval(np.polyfit(x, load, 1), x)))}
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """Where it is stiffer or softer, and by how much."""

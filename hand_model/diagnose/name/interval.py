@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -66,10 +67,9 @@ def _quantile(parts: list[tuple[float, float, float]], at: float) -> float:
 
 
 def _figures(balance: Balance, fit: Fit, which: int) -> tuple[dict[str, float], dict[str, str]]:
-    """Parameters of a term as fitted, and their units."""
+    """Parameters of a term as fitted, with what follows from them, and their units."""
     term = fit.terms[which]
-    values = term.effect.parameters(term.shape, fit.amplitudes[which], fit.declared)
-    return {k: float(v) for k, v in values.items()}, _units(term, balance)
+    return _all(balance, term, term.shape, fit.amplitudes[which], fit.declared), _units(term, balance)
 
 
 def _variances(balance: Balance, fit: Fit, which: int, scale: float) -> dict[str, float]:
@@ -82,7 +82,8 @@ def _variances(balance: Balance, fit: Fit, which: int, scale: float) -> dict[str
         step = 1e-4 * (abs(theta[i]) + 1e-6)
         up, down = theta.copy(), theta.copy()
         up[i], down[i] = theta[i] + step, theta[i] - step
-        above, below = (_all(term, which, build(at)) for at in (up, down))
+        above, below = (_all(balance, term, shape[which], amplitude[which], declared)
+                        for shape, amplitude, declared in (build(up), build(down)))
         columns.append({k: (above[k] - below[k]) / (2 * step) for k in above})
     gradients = {k: np.array([c[k] for c in columns]) for k in columns[0]}
     return {k: max(float(g @ covariance @ g), 0.0) for k, g in gradients.items()}
@@ -131,9 +132,10 @@ def undisturbed(naming: Naming) -> Reading:
     return Reading(calm, calm.fit(), best)
 
 
-def _all(term: Term, which: int, values: Any) -> dict[str, float]:
-    shape, amplitude, declared = values
-    return {k: float(v) for k, v in term.effect.parameters(shape[which], amplitude[which], declared).items()}
+def _all(balance: Balance, term: Term, shape: Mapping[str, float], amplitude: Mapping[str, float],
+         declared: Mapping[str, float]) -> dict[str, float]:
+    values = term.effect.parameters(shape, amplitude, declared)
+    return {k: float(v) for k, v in {**values, **term.effect.derived(balance.states, values)}.items()}
 
 
 def _units(term: Term, balance: Balance) -> dict[str, str]:
