@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from test_diagnose import drive, planted
 
-from hand_model.diagnose.assemble import SIGNALS, _sure
-from hand_model.diagnose.magnitude import LEAST, MOST, PLAIN, channel_figures, magnitude
+from hand_model.diagnose.assemble import SIGNALS
+from hand_model.diagnose.magnitude import LEAST, MOST, PLAIN, channel_figures, magnitude, sure_magnitude
 from hand_model.effects import catalogue
 
 RAW = {"asymmetric_friction": {"half_difference": 4.0}, "detent_load": {"load": 5.0}, "elastoplastic_hysteresis": {"yield_load": 3.0},
@@ -37,10 +37,21 @@ def test_every_effect_of_a_hand_has_a_figure_and_what_has_none_counts_as_plain()
     assert magnitude("detent_load", {"load": np.nan}) == 1.0
 
 
-@pytest.mark.parametrize(("entry", "sure"), [({"value": 3.0}, 3.0), ({"value": -3.0, "ci95": [-4.0, -2.0]}, -2.0), ({"value": 3.0, "ci95": [-1.0, 7.0]}, 0.0),
-                                             ({"value": None, "ci95": None}, None)])
-def test_what_is_sure_of_a_figure_is_the_end_of_its_interval_nearer_to_zero(entry, sure) -> None:
-    assert _sure(entry) == sure
+@pytest.mark.parametrize(("entry", "share"), [({"value": 4.0}, 1.0), ({"value": -4.0, "ci95": [-5.0, -3.0]}, 0.75), ({"value": 4.0, "ci95": [-1.0, 9.0]}, 0.0),
+                                              ({"value": 4.0, "ci95": None}, 1.0), ({"value": 4.0, "ci95": [None, None]}, 1.0)])
+def test_what_is_sure_of_a_magnitude_is_that_of_the_end_of_its_interval(entry, share) -> None:
+    plain = magnitude("detent_load", {"load": 4.0}, channel_figures(drive(0)))
+    assert sure_magnitude("detent_load", {"load": entry}, channel_figures(drive(0))) == pytest.approx(max(share * plain, LEAST))
+
+
+def test_intervals_of_several_figures_take_less_together_than_each_at_its_worst() -> None:
+    """A rise of friction that is higher where it is narrower; a stop that begins later is smaller."""
+    channel = channel_figures(drive(0))
+    rise = {"static_excess": {"value": 4.0, "ci95": [3.0, 5.0]}, "stribeck_speed": {"value": 10.0, "ci95": [6.0, 14.0]}}
+    plain = magnitude("stribeck_friction", {"static_excess": 4.0, "stribeck_speed": 10.0}, channel)
+    assert sure_magnitude("stribeck_friction", rise, channel) == pytest.approx(plain * (1 - np.hypot(0.25, 0.4)))
+    stop = {"from": {"value": 90.0, "unit": "%", "ci95": [88.0, 92.0]}}
+    assert sure_magnitude("distal_stop", stop, channel) == pytest.approx(magnitude("distal_stop", {"from": 92.0}, channel))
 
 
 def test_bristles_count_by_what_they_are_longer_than_any_drive_is_granted() -> None:

@@ -13,7 +13,7 @@ from ..effects.base import sample_interval
 from .findings import Finding, Findings
 from .locate.displacement import NO_HINGE, NOT_RIGID
 from .locate.markers import HINGE, SLIPS
-from .magnitude import SLIGHT, channel_figures, magnitude
+from .magnitude import SLIGHT, channel_figures, magnitude, sure_magnitude
 from .name.distinguishability import protocol_pairs
 from .name.interval import variance_ratio
 from .name.naming import ALPHA, Named
@@ -45,7 +45,7 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
         if stands:
             unexplained += [outsider_of(station, f) for f in station.outsiders]
             for weight, finding in (finding_of(station, *merged) for merged in _merged(station.kept)):
-                if station.naming.before.p >= ALPHA and _magnitude(finding, stations, _value) < MINUTE:
+                if station.naming.before.p >= ALPHA and _magnitude(finding, stations) < MINUTE:
                     rejected.append({"effect": finding.effect, "where": str(station.finger),
                                      "reason": "no test sees it beside the noise, and it is minute for one of its kind"})
                 else:
@@ -59,7 +59,7 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
     unexplained += [unrepeated_of(s) for s in stations if _wanders(s, stations)]
     ranked = _without_tilts(_without_shadows(_one_clock(_of_hinges(ranked, unexplained))))
     # how far a hinge that is none moves is told only beside what another hinge would explain: that it is none is sure all the same
-    sized = [(_magnitude(f, stations, _value if f.effect in HINGE else _sure), weight, f) for weight, f in ranked]
+    sized = [(_magnitude(f, stations, sure=f.effect not in HINGE), weight, f) for weight, f in ranked]
     ranked = sorted(((float((m**3 * weight) ** 0.25), f) for m, weight, f in sized), key=lambda item: -item[0])
     ranked = _heaviest(ranked, _same_place)
     trifles = _trifles(ranked, {id(f): m for m, _, f in sized})
@@ -85,23 +85,13 @@ def _leave_something(station: Station, stations: Sequence[Station]) -> bool:
     return station.signal != "current" and any(s.naming.after.p < ALPHA for s in angles)
 
 
-def _magnitude(finding: Finding, stations: Sequence[Station], read: Callable[[Mapping[str, Any]], float | None]) -> float:
-    """How large a finding is for its kind, measured by the channel in which effects of its kind show. read: figure of a parameter."""
+def _magnitude(finding: Finding, stations: Sequence[Station], sure: bool = False) -> float:
+    """How large a finding is for its kind, measured by the channel in which effects of its kind show; or how large it is for sure."""
     states = next((s.naming.balance.states for s in stations if s.signal == SHOWN_IN.get(finding.effect) and s.finger == finding.where["finger"]), None)
-    values = {name: read(entry) for name, entry in finding.parameters.items()}
-    return magnitude(finding.effect, values, None if states is None else channel_figures(states))
-
-
-def _value(entry: Mapping[str, Any]) -> float | None:
-    return entry["value"]
-
-
-def _sure(entry: Mapping[str, Any]) -> float | None:
-    """The end of its interval nearer to zero."""
-    value, interval = entry["value"], entry.get("ci95")
-    if value is None or interval is None or None in interval:
-        return value
-    return min(interval, key=abs) if interval[0] * interval[1] > 0 else 0.0
+    channel = None if states is None else channel_figures(states)
+    if sure:
+        return sure_magnitude(finding.effect, finding.parameters, channel)
+    return magnitude(finding.effect, {name: entry["value"] for name, entry in finding.parameters.items()}, channel)
 
 
 def _heaviest(found: Sequence[tuple[float, Finding]], key: Callable[[Finding], Any]) -> list[tuple[float, Finding]]:

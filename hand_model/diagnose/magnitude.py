@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -58,6 +59,21 @@ def magnitude(effect: str, parameters: Mapping[str, float], channel: Channel | N
     except KeyError:
         return 1.0
     return float(np.clip(size, LEAST, MOST)) if np.isfinite(size) else 1.0
+
+
+def sure_magnitude(effect: str, figures: Mapping[str, Mapping[str, Any]], channel: Channel | None = None) -> float:
+    """The magnitude less what the 95 % intervals of its figures leave open, as if their errors were independent (square root of the sum of
+    squares). figures: name -> entry with `value` and, where there is one, `ci95`, as a finding's parameters."""
+    values = {name: entry["value"] for name, entry in figures.items()}
+    size, lost = magnitude(effect, values, channel), 0.0
+    for name, entry in figures.items():
+        interval = entry.get("ci95")
+        if entry["value"] is None or interval is None or None in interval:
+            continue
+        ends = [*interval, 0.0] if interval[0] * interval[1] <= 0 else interval
+        least = min(magnitude(effect, {**values, name: end}, channel) for end in ends)
+        lost += max(size - least, 0.0) ** 2
+    return max(size - float(np.sqrt(lost)), LEAST)
 
 
 Rule = Callable[[Mapping[str, float], Channel], float]
