@@ -24,7 +24,6 @@ from .name.candidates import Candidate, candidates
 from .name.compete import LEAST_SHARE, Score, Step, judge, score
 from .name.joint_search import as_term, offsets_first, search_joints
 from .name.problem import Term, held_out, normal, pose, solution
-from .name.settled import settled
 from .noise import effort_noise
 from .proof import Bench
 from .rest_known import known_at_rest
@@ -161,12 +160,11 @@ def _diagnose_balance(rig: RigModel, fit: DeclaredFit, say: Callable[[str], None
     the motion shows says what holds a joint at rest as well, of all that is recorded there."""
     if not fit.rows:
         return [], [], {"metric": None, "before": None, "after": None}, rig.xml, rig.xml
-    search = _searched(rig, fit, say)
-    terms, theta = settled(rig, search.fit, [t for _, t in (*search.offsets, *search.stories)])[:2]
-    if known := known_at_rest(search.fit, terms, theta):
+    told, known = _held_out(rig, _searched(rig, fit, say))
+    if known:
         say(f"{rig.name}: what holds {', '.join(known)} at rest is known: once more with it")
-        search = _searched(rig, fit_declared(rig, _refused(rig, fit), kept=known), say)
-    return _held_out(rig, search)
+        told, _ = _held_out(rig, _searched(rig, fit_declared(rig, _refused(rig, fit), kept=known), say))
+    return told
 
 
 def _refused(rig: RigModel, fit: DeclaredFit) -> set[tuple[str, str]]:
@@ -194,8 +192,8 @@ def _balanced(rig: RigModel, fit: DeclaredFit) -> list[str]:
     return [j for j in rig.joints if any(r.joint == j for r in fit.rows)]
 
 
-def _held_out(rig: RigModel, search: _Search) -> tuple:
-    """What of a search the validation recordings bear out, as `_diagnose_balance` hands it on."""
+def _held_out(rig: RigModel, search: _Search) -> tuple[tuple, tuple[str, ...]]:
+    """What of a search the validation recordings bear out, as `_diagnose_balance` hands it on, and the joints of which it says what holds them at rest."""
     base_fit, fit, bench = search.base, search.fit, Bench(rig, floor=search.floor)
     rejected: list[dict[str, Any]] = [{"effect": key, "reason": NOT_TAKEN} for key in search.left]
     plain = (base_fit, (), solution(pose(base_fit), []))
@@ -209,7 +207,7 @@ def _held_out(rig: RigModel, search: _Search) -> tuple:
             "after": bench.ratio(plain, every), "one_effect": bench.ratio(plain, one),
             "two_effects": bench.ratio(plain, two), "engine": bench.engine,
             "joints": {j: bench.proof(j, plain, every) for j in _balanced(rig, fit)}}  # fmt: skip
-    return shares(found, lack["joints"]), rejected, lack, bench.file(*every), bench.file(*plain)
+    return (shares(found, lack["joints"]), rejected, lack, bench.file(*every), bench.file(*plain)), known_at_rest(*every)
 
 
 def _off_axis(bench: Bench, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple[DeclaredFit, Finding] | None:
