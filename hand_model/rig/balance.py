@@ -143,10 +143,8 @@ def _back_emf(model: Any, name: str) -> float:
     return float(constant**2 / resistance * model.actuator_gear[a, 0] ** 2)
 
 
-def trial_rows(
-    rig: RigModel, trial: RigTrial, columns: tuple[Column, ...], cutoff_hz: float | None = None, trim_s: float | None = None,
-    weights: Mapping[str, Array] | None = None, kept: Collection[str] = (),
-) -> tuple[Rows, ...]:  # fmt: skip
+def trial_rows(rig: RigModel, trial: RigTrial, columns: tuple[Column, ...], cutoff_hz: float | None = None, trim_s: float | None = None,
+               weights: Mapping[str, Array] | None = None, kept: Collection[str] = ()) -> tuple[Rows, ...]:  # fmt: skip
     """The balance of every independent joint whose effort is known (or whose drive is absent or open) in one trial.
     trim_s [s]: what is left out at each of its ends, where the filter knows one side only; by default what the filter reaches; weights: joint ->
     weight of its samples, as another balance of the same trial has them; kept: joints whose rest is kept (`moving_weight`)."""
