@@ -112,3 +112,13 @@ def test_on_one_path_all_loads_tied_to_a_joint_are_one_name() -> None:
     assert one.fit["ci95_reduction"] == pytest.approx([0.3, 1.2]) and len(one.parameters) == 3
     assert merged[1] is found[1] and merged[3] is found[5]
     assert merged[2].members == ("detent_load", "stribeck_friction", "gravity_load")
+
+
+@pytest.mark.parametrize(("left", "count"), [(0.03, 2), (0.3, 3)])
+def test_a_third_effect_takes_more_than_the_forms_of_two_may_be_off_by(monkeypatch: pytest.MonkeyPatch, left: float, count: int) -> None:
+    """A third that takes a fifth of the squared error that two leave is named where they leave 30 % of the error, not where 3 %."""
+    _table_alone(monkeypatch)
+    errors = {(): 1.0, (5.0,): 0.5, (5.0, 5.0): left, (1.0, 2.0, 3.0): 0.9 * left}
+    stories = [(None, term("elbow", name, reach)) for name, reach in (("a", 1.0), ("b", 2.0), ("c", 3.0))]
+    _, kept = standing.proved(Bench(errors, errors), None, stories, [], rejected := [])
+    assert len(kept) == count and [r["reason"] for r in rejected] == [standing.OF_FORM][: 3 - count]

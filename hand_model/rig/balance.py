@@ -6,7 +6,7 @@ Effort, columns and states pass the same filter; samples at rest are left out, s
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from .dynamics import INERTIAL, inertial_columns, inertial_parameters
 from .model import RigModel, RigTrial
 from .overrides import body_names, compile_model
-from .states import PASSED, STEEP, choose_cutoff, differentiate, fill_gaps, low_pass, uniform_time, velocity_noise
+from .rest import moving_weight
+from .states import PASSED, STEEP, choose_cutoff, differentiate, fill_gaps, later, low_pass, uniform_time, velocity_noise
 
 Array = NDArray[np.float64]
 MAX_RATE_HZ = 250.0  # faster recordings are thinned to this: joints move below 50 Hz
@@ -53,7 +54,8 @@ class Rows:
     (n, P), still_columns (n, P): the same without acceleration, carried (P,) bool and load_known (n,): of what the joint carries besides its own drive and friction. Filtered and thinned (m,): effort, columns (m, P), moving (bool): what the fit uses, neither at rest nor at the ends.
     effort: recorded, less what the trial's own bodies add to the declared ones. states: position, velocity, acceleration (n, joints) of the whole rig; direction (n,), directions (n, joints): of
     friction in [-1, 1]: the sign of velocity, linear where it drowns in noise, its mean around each instant (or jumps between two would
-    all be up to half a sample early or late); jacobian: joint -> (n,), what hangs on this joint by couplings, itself included; declared: the columns' names.
+    all be up to half a sample early or late); jacobian: joint -> (n,), what hangs on this joint by couplings, itself included; declared: the columns' names; weight (n,): of every
+    sample before the filter, zero where the joint stands (empty: one).
     """
 
     trial: str
@@ -80,10 +82,15 @@ class Rows:
     jacobian: Mapping[str, Array] = field(default_factory=dict)
     declared: tuple[Column, ...] = ()
     still_columns: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    weight: Array = field(default_factory=lambda: np.zeros(0))
 
-    def filtered(self, values: Array) -> Array:
-        """Full-rate columns (n, ...) through the filter of this balance, thinned to (m, ...)."""
-        return low_pass(values, self.rate_hz, self.cutoff_hz)[:: self.step]
+    def filtered(self, values: Array, delay_s: float = 0.0) -> Array:
+        """Full-rate columns (n, ...), later by a delay, through the weight and filter of this balance, thinned to (m, ...)."""
+        if not len(self.weight):
+            values = low_pass(values, self.rate_hz, self.cutoff_hz)[:: self.step]
+            return later(self.time_s[:: self.step], values, delay_s) if delay_s else values
+        values = later(self.time_s, values, delay_s) if delay_s else values
+        return low_pass(_weighed(values, self.weight), self.rate_hz, self.cutoff_hz)[:: self.step]
 
     def load(self, theta: Array) -> Array:
         """Load (n,) that the joint transmits at declared parameters theta (P,)."""
@@ -136,11 +143,11 @@ def _back_emf(model: Any, name: str) -> float:
     return float(constant**2 / resistance * model.actuator_gear[a, 0] ** 2)
 
 
-def trial_rows(
-    rig: RigModel, trial: RigTrial, columns: tuple[Column, ...], cutoff_hz: float | None = None, trim_s: float | None = None
-) -> tuple[Rows, ...]:
+def trial_rows(rig: RigModel, trial: RigTrial, columns: tuple[Column, ...], cutoff_hz: float | None = None, trim_s: float | None = None,
+               weights: Mapping[str, Array] | None = None, kept: Collection[str] = ()) -> tuple[Rows, ...]:  # fmt: skip
     """The balance of every independent joint whose effort is known (or whose drive is absent or open) in one trial.
-    trim_s [s]: what is left out at each of its ends, where the filter knows one side only; by default what the filter reaches."""
+    trim_s [s]: what is left out at each of its ends, where the filter knows one side only; by default what the filter reaches; weights: joint ->
+    weight of its samples, as another balance of the same trial has them; kept: joints whose rest is kept (`moving_weight`)."""
     missing = [j for j in rig.joints if j not in trial.position]
     if missing:
         return ()
@@ -165,6 +172,8 @@ def trial_rows(
                      for i, j in enumerate(rig.joints)])  # fmt: skip
     sign = np.clip(v / rest, -1.0, 1.0)
     thin = max(1, int(rate / max(12 * cutoff, 24.0)))
+    if weights is None:
+        weights = {j: moving_weight(raw[j], rate, cutoff, wide)[::thin] for j in rig.independent if j not in kept}
     q, v, a, sign = (*(x[::thin] for x in (q, v, a)), _averaged(sign, thin))
     effort = {j: None if e is None else _thinned(e, rate, thin) for j, e in effort.items()}
     grid, channels = grid[::thin], {k: c[::thin] for k, c in channels.items()}
@@ -184,13 +193,20 @@ def trial_rows(
         i = rig.joints.index(joint)
         y = sum((effort[j] - own[:, rig.joints.index(j)]) * w for j, w in jacobian.items())
         x, x_still = (sum(c[:, rig.joints.index(j)] * w[:, None] for j, w in jacobian.items()) for c in (values, still))
+        w = weights.get(joint, np.zeros(0))
+        seen = (settled & (np.abs(v[:, i]) > rest[i]) & (w > 0 if len(w) else True))[::step]
         rows.append(
             Rows(trial.name, joint, trial.validate, grid, q[:, i], v[:, i], a[:, i],
-                 low_pass(y, rate, cutoff)[::step], low_pass(x, rate, cutoff)[::step],
-                 (settled & (np.abs(v[:, i]) > rest[i]))[::step], float(rest[i]), cutoff, rate,
-                 {"effort": y, **channels}, x, external, y - effort[joint], step, (q, v, a), sign[:, i], sign, jacobian, columns, x_still)
+                 low_pass(_weighed(y, w), rate, cutoff)[::step], low_pass(_weighed(x, w), rate, cutoff)[::step],
+                 seen, float(rest[i]), cutoff, rate,
+                 {"effort": y, **channels}, x, external, y - effort[joint], step, (q, v, a), sign[:, i], sign, jacobian, columns, x_still, w)
         )  # fmt: skip
     return tuple(rows)
+
+
+def _weighed(values: Array, weight: Array) -> Array:
+    """Values (n, ...) times a weight (n,) of every sample (empty: one)."""
+    return values * weight.reshape(-1, *[1] * (values.ndim - 1)) if len(weight) else values
 
 
 def _own_bodies(rig: RigModel, trial: RigTrial, model: Any, q: Array, v: Array, a: Array) -> Array:

@@ -22,6 +22,8 @@ NEAR_BEST = 1.1
 ENOUGH_POWER = 1e-4  # share of the effort's power: a hundredth of its amplitude
 CUTOFFS = (2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 35.0, 60.0)
 MOST_NOISE = 0.1  # of the acceleration: a hundredth of its power
+PLACES, SLOW = 8, np.geomspace(0.05, 0.4, 3)  # hats along the range; Stribeck speeds over the greatest
+ALIKE = 1e-9  # of a column's square: columns that are the same but for so much are one
 END_S = 2.0 / CUTOFFS[-1]  # at the very ends any filter fails
 
 
@@ -40,6 +42,7 @@ class DeclaredFit:
     bodies: Array = field(default_factory=lambda: np.zeros((0, 10)))  # declared inertial parameters, in columns' order
     anchored: bool = False  # no effort is recorded anywhere: only ratios show, and the heaviest body's declared weight is the scale
     beside: Mapping[tuple[str, str], Array] = field(default_factory=dict)  # (trial, joint) -> effort (n,) of effects at full rate
+    kept: tuple[str, ...] = ()  # joints whose rest is kept in the balance
 
     def residual(self, row: Rows) -> Array:
         """Effort that the declared model leaves (m,), on the thinned grid."""
@@ -90,35 +93,40 @@ def fit_rows(columns: Sequence[Column], rows: Sequence[Rows], scale: dict[str, f
 
 
 def fit_declared(
-    rig: RigModel, refused: Collection[tuple[str, str]] = (), cutoff_hz: float | None = None, off_axis: bool = False
-) -> DeclaredFit:
+    rig: RigModel, refused: Collection[tuple[str, str]] = (), cutoff_hz: float | None = None, off_axis: bool = False,
+    kept: Collection[str] = (),
+) -> DeclaredFit:  # fmt: skip
     """Fit the declared parameters to the trials that do not validate.
 
-    refused: (trial, joint) whose effort channel cannot be trusted; their balance is not fitted, nor kept. A trial that
+    refused: (trial, joint) whose effort channel cannot be trusted; their balance is not fitted, nor kept; kept: joints whose rest is. A trial that
     disagrees with the others weighs less (its residual rms over the median of all, squared, beyond two).
-    The cut-off is the highest at which the declared model explains nearly the largest share of the effort: below it the
-    motion is lost, above it are noise and flexibility that no rigid model holds.
+    The cut-off is the highest at which the declared model, or it beside any load and friction that are smooth in position and speed, explains
+    nearly the largest share of the effort: below it the motion is lost, above it are noise and flexibility that no rigid model holds.
     """
     columns = declared_columns(rig, off_axis)
     refused = set(refused)
-    cutoff = cutoff_hz or _choose_cutoff(rig, columns, refused)
+    cutoff = cutoff_hz or _choose_cutoff(rig, columns, refused, kept)
     rows = tuple(
-        r for t in rig.trials for r in trial_rows(rig, t, columns, cutoff) if (r.trial, r.joint) not in refused
+        r for t in rig.trials for r in trial_rows(rig, t, columns, cutoff, kept=kept) if (r.trial, r.joint) not in refused
     )
     fit = _robust_fit(columns, rows, cutoff or (rows[0].cutoff_hz if rows else float("nan")))
     model = compile_model(rig)
     names = dict.fromkeys(c.name for c in columns if c.kind == "inertial")
     bodies = [inertial_parameters(model)[model.body(n).id - 1] for n in names]
-    return replace(fit, bodies=np.array(bodies).reshape(-1, 10))
+    return replace(fit, bodies=np.array(bodies).reshape(-1, 10), kept=tuple(kept))
 
 
-def _choose_cutoff(rig: RigModel, columns: tuple[Column, ...], refused: set[tuple[str, str]]) -> float | None:
-    """The highest cut-off at which the share left is within NEAR_BEST of the least, below the first band that adds more to
-    the residual than to the effort: there is nothing of the motion in it; None where none can be tried."""
-    sample, most, shares, last = _sample(rig), 0.0, {}, None
+def _choose_cutoff(rig: RigModel, columns: tuple[Column, ...], refused: set[tuple[str, str]], kept: Collection[str] = ()) -> float | None:
+    """The highest cut-off at which the share left is within NEAR_BEST of the least, below the first band that adds more to the residual than
+    to the effort: there is nothing of the motion in it; None where none can be tried. Shares are asked with all rests, of which a wide band
+    spreads least, and of two models, for what is missing may be seen in wide bands alone, and is no reason against them."""
+    sample, most, last = _sample(rig), 0.0, None
+    shares: dict[float, tuple[float, float]] = {}
     for cutoff in CUTOFFS:
         # The same samples for all: what a low cut-off spoils near the ends counts against it.
-        rows = [r for t in sample for r in trial_rows(rig, t, columns, cutoff, END_S) if (r.trial, r.joint) not in refused]
+        moving = [r for t in sample for r in trial_rows(rig, t, columns, cutoff, END_S, kept=kept) if (r.trial, r.joint) not in refused]
+        stands = any(len(r.weight) for r in moving)
+        rows = [r for t in sample for r in trial_rows(rig, t, columns, cutoff, END_S, kept=rig.joints) if (r.trial, r.joint) not in refused] if stands else moving
         if not rows or cutoff > 0.3 * min(r.rate_hz for r in rows):
             continue
         seen = float(np.mean([r.moving.mean() for r in rows]))
@@ -126,12 +134,12 @@ def _choose_cutoff(rig: RigModel, columns: tuple[Column, ...], refused: set[tupl
         if seen < 0.9 * most or (shares and _drowns(rows)):  # noise hides when the joint moves, or how it accelerates
             break
         fit = _robust_fit(columns, tuple(rows), cutoff)
-        powers = _powers(fit)
+        powers = _powers(_robust_fit(columns, tuple(moving), cutoff) if stands else fit)
         if last is not None and _only_noise(last, powers):
             break
-        shares[cutoff], last = _unexplained(fit), powers
-    least = min(shares.values(), default=1.0)
-    return max((c for c, share in shares.items() if share <= NEAR_BEST * least), default=None)
+        shares[cutoff], last = (_unexplained(fit, False), _unexplained(fit, True)), powers
+    least = np.min([*shares.values(), (1.0, 1.0)], 0)
+    return max((c for c, share in shares.items() if np.any(share <= NEAR_BEST * least)), default=None)
 
 
 def _drowns(rows: Sequence[Rows]) -> bool:
@@ -165,16 +173,31 @@ def _sample(rig: RigModel, most: int = 5) -> list[RigTrial]:
     return list(train[:: max(1, int(np.ceil(len(train) / most)))])
 
 
-def _unexplained(fit: DeclaredFit) -> float:
-    """Share of the training effort left (rms over rms, all trials of a joint pooled), geometric mean over joints."""
+def _unexplained(fit: DeclaredFit, beside: bool) -> float:
+    """Share of the training effort left (rms over rms, all trials of a joint pooled), geometric mean over joints; beside: where any smooth
+    load and friction stand beside the declared columns."""
     shares = []
     for joint in {r.joint for r in fit.rows}:
         rows = [r for r in fit.rows if r.joint == joint and not r.validate and r.moving.any()]
         if rows:
             left = np.concatenate([fit.residual(r)[r.moving] for r in rows])
+            if beside:
+                x = np.concatenate([np.concatenate([r.columns, _smooth(r)], 1)[r.moving] for r in rows])
+                x = x[:, np.any(x != 0, 0)]
+                x = x / np.linalg.norm(x, axis=0)
+                left = left - x @ np.linalg.solve(x.T @ x + ALIKE * np.eye(x.shape[1]), x.T @ left)
             known = np.concatenate([_known(r, fit.columns)[r.moving] for r in rows])
             shares.append(np.log(_rms(left) / (_rms(known) + 1e-300) + 1e-12))
     return float(np.exp(np.mean(shares))) if shares else 1.0
+
+
+def _smooth(row: Rows) -> Array:
+    """Columns (m, k) of any load that is smooth in position, of any friction that is so in position or falls with speed, of drag."""
+    low, size = row.position.min(), float(np.percentile(np.abs(row.velocity), 95)) + 1e-300
+    at = (row.position - low) / (float(np.ptp(row.position)) + 1e-300) * (PLACES - 1)
+    hats, v = np.maximum(1 - np.abs(at[:, None] - np.arange(PLACES)), 0.0), row.velocity / size
+    slow = np.exp(-((v[:, None] / SLOW) ** 2))
+    return row.filtered(np.column_stack([hats, np.column_stack([hats, slow]) * row.direction[:, None], np.abs(v), v * np.abs(v)]))
 
 
 def _rms(values: Array) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ from .name.joint_search import as_term, offsets_first, search_joints
 from .name.problem import Term, held_out, normal, pose, solution
 from .noise import effort_noise
 from .proof import Bench
+from .rest_known import known_at_rest
 from .same_path import one_load_each, repeated_trajectory
 from .standing import FITS, first_of, proved, solved
 from .swing.build import can_swing
@@ -140,44 +141,79 @@ def _channel_finding(issue: ChannelIssue) -> Finding:
 # --- joints by the balance of effort ---------------------------------------------------------------------------------
 
 
+@dataclass(frozen=True)
+class _Search:
+    """What competition found in a balance. base, fit: the declared fit before and after centres of mass are freed (freed: the finding that
+    says so); offsets, stories: rounds and winners, offsets first; left: keys of what was not taken; floor: joint -> noise."""
+
+    base: DeclaredFit
+    fit: DeclaredFit
+    freed: Finding | None
+    offsets: list[tuple[Step, Term]]
+    stories: list[tuple[Step, Term]]
+    left: list[str]
+    floor: Mapping[str, float]
+
+
 def _diagnose_balance(rig: RigModel, fit: DeclaredFit, say: Callable[[str], None]) -> tuple:
-    """Findings, rejections, lack of fit, patched and declared MJCF of a rig whose efforts are recorded."""
-    stories: list[tuple[Step, Term]] = []
-    rejected: list[dict[str, Any]] = []
-    joints = [j for j in rig.joints if any(r.joint == j for r in fit.rows)]
+    """Findings, rejections, lack of fit, patched and declared MJCF of a rig whose efforts are recorded: of its motion alone, or, where what
+    the motion shows says what holds a joint at rest as well, of all that is recorded there."""
     if not fit.rows:
         return [], [], {"metric": None, "before": None, "after": None}, rig.xml, rig.xml
-    floor = effort_noise(rig, fit)
+    told, known = _held_out(rig, _searched(rig, fit, say))
+    if known:
+        say(f"{rig.name}: what holds {', '.join(known)} at rest is known: once more with it")
+        told, _ = _held_out(rig, _searched(rig, fit_declared(rig, _refused(rig, fit), kept=known), say))
+    return told
+
+
+def _refused(rig: RigModel, fit: DeclaredFit) -> set[tuple[str, str]]:
+    """(trial, joint) that have no balance."""
+    return {(t.name, j) for t in rig.trials for j in rig.joints} - {(r.trial, r.joint) for r in fit.rows}
+
+
+def _searched(rig: RigModel, fit: DeclaredFit, say: Callable[[str], None]) -> _Search:
+    """The competition at every joint, on training recordings."""
+    stories: list[tuple[Step, Term]] = []
+    rejected: list[str] = []
+    joints, floor, base = _balanced(rig, fit), effort_noise(rig, fit), fit
     first = offsets_first(rig, fit, joints)  # a sensor's zero is the recording's error: before physics
     offsets = [(w.step, as_term(rig, fit, w)) for w in first.values() if w is not None]
     off_axis = _off_axis(Bench(rig, floor=floor), fit, [t for _, t in offsets])
-    base_fit = fit
-    if off_axis is not None:
-        fit, finding = off_axis
+    fit, finding = (fit, None) if off_axis is None else off_axis
     for joint, (won, left) in zip(joints, search_joints(rig, fit, first), strict=True):
         stories += [(w.step, as_term(rig, fit, w)) for w in won]
-        rejected += [{"effect": key, "reason": NOT_TAKEN} for key in left]
+        rejected += left
         say(f"{rig.name}: {joint}: {', '.join(w.key for w in (first[joint], *won) if w) or 'nothing'}")
-    base, bench = solution(pose(base_fit), []), Bench(rig, floor=floor)
-    plain = (base_fit, (), base)
-    found, kept = proved(bench, base_fit, offsets, [], rejected)
-    if off_axis is not None:
-        found.append(finding)
-    later, kept = proved(bench, fit, stories, kept, rejected)
+    return _Search(base, fit, finding, offsets, stories, rejected, floor)
+
+
+def _balanced(rig: RigModel, fit: DeclaredFit) -> list[str]:
+    return [j for j in rig.joints if any(r.joint == j for r in fit.rows)]
+
+
+def _held_out(rig: RigModel, search: _Search) -> tuple[tuple, tuple[str, ...]]:
+    """What of a search the validation recordings bear out, as `_diagnose_balance` hands it on, and the joints of which it says what holds them at rest."""
+    base_fit, fit, bench = search.base, search.fit, Bench(rig, floor=search.floor)
+    rejected: list[dict[str, Any]] = [{"effect": key, "reason": NOT_TAKEN} for key in search.left]
+    plain = (base_fit, (), solution(pose(base_fit), []))
+    found, kept = proved(bench, base_fit, search.offsets, [], rejected)
+    if search.freed is not None:
+        found.append(search.freed)
+    later, kept = proved(bench, fit, search.stories, kept, rejected)
     found += later
     one, two, every = ((fit, *solved(bench, fit, first_of(fit, kept, k))) for k in (1, 2, len(kept)))
     lack = {"metric": "effort_rmse", "unit": "share of the declared model's", "before": 1.0,
             "after": bench.ratio(plain, every), "one_effect": bench.ratio(plain, one),
             "two_effects": bench.ratio(plain, two), "engine": bench.engine,
-            "joints": {j: bench.proof(j, plain, every) for j in joints}}  # fmt: skip
-    return shares(found, lack["joints"]), rejected, lack, bench.file(*every), bench.file(*plain)
+            "joints": {j: bench.proof(j, plain, every) for j in _balanced(rig, fit)}}  # fmt: skip
+    return (shares(found, lack["joints"]), rejected, lack, bench.file(*every), bench.file(*plain)), known_at_rest(*every)
 
 
 def _off_axis(bench: Bench, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple[DeclaredFit, Finding] | None:
     """Centres of mass off their declared axes: one change to the whole chain, tried before anything at a joint."""
     rig = bench.rig
-    refused = {(t.name, j) for t in rig.trials for j in rig.joints} - {(r.trial, r.joint) for r in fit.rows}
-    freed = fit_declared(rig, refused, fit.cutoff_hz, off_axis=True)
+    freed = fit_declared(rig, _refused(rig, fit), fit.cutoff_hz, off_axis=True, kept=fit.kept)
     if len(freed.columns) == len(fit.columns):
         return None
     freed = replace(freed, scale=fit.scale)

@@ -21,7 +21,6 @@ from .mjcf import read_effects
 from .model import RigModel, RigTrial
 from .name.candidates import TURNS, Candidate, beside, candidates
 from .overrides import compile_model
-from .states import later
 
 Array = NDArray[np.float64]
 
@@ -56,8 +55,8 @@ def effort_residuals(
     if rows is not None and not {c.label for c in columns} <= {c.label for r in rows[:1] for c in r.declared}:
         rows = None  # the file declares more than the balances were made for
     if rows is None:
-        cutoff = next((r["cutoff_hz"] for r in records if "cutoff_hz" in r), None)
-        rows = tuple(r for t in rig.trials for r in trial_rows(rig, t, columns, cutoff))
+        how = next((r for r in records if "cutoff_hz" in r), {})
+        rows = tuple(r for t in rig.trials for r in trial_rows(rig, t, columns, how.get("cutoff_hz"), kept=how.get("rests", ())))
     rows = tuple(r for r in rows if keep is None or (r.trial, r.joint) in keep)
     fit = DeclaredFit(columns, theta, {}, _recolumned(rows, columns), 0.0, {})
     terms = _acting(rig, fit, [r for r in records if "effect" in r])
@@ -67,13 +66,11 @@ def effort_residuals(
     for name, mine in by_trial.items():
         own = joint_efforts(rig, trials[name], mine[0])
         for row in mine:
-            expected = row.filtered(sum(own[:, rig.joints.index(j)] * w for j, w in row.jacobian.items()))
-            for candidate, shape, amplitude in terms:
-                if candidate.joint == row.joint:
-                    expected = expected + row.filtered(candidate.columns(row, shape)) @ amplitude
-            for candidate, shape, _ in terms:
-                if candidate.joint == row.joint and candidate.delays:
-                    expected = later(row.time_s[:: row.step], expected, shape["delay"])
+            full = sum(own[:, rig.joints.index(j)] * w for j, w in row.jacobian.items())
+            here = [t for t in terms if t[0].joint == row.joint]
+            for candidate, shape, amplitude in here:
+                full = full + candidate.columns(row, shape).reshape(len(full), -1) @ amplitude
+            expected = row.filtered(full, sum(shape["delay"] for candidate, shape, _ in here if candidate.delays))
             out.append(EffortResidual(name, row.joint, row.validate, (row.effort - expected)[row.moving], row, expected))
     return tuple(out)
 

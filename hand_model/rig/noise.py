@@ -30,7 +30,8 @@ def effort_noise(rig: RigModel, fit: DeclaredFit) -> dict[str, float]:
     trials = [t for t in rig.trials if any(t.name == name for name, _ in rows)]
     squares: dict[str, list[float]] = {}
     for k, trial in enumerate(trials[:: max(1, int(np.ceil(len(trials) / MOST_TRIALS)))]):
-        for noisy in trial_rows(rig, _noisier(trial, k), fit.columns, fit.cutoff_hz):
+        known = {joint: r.weight for (name, joint), r in rows.items() if name == trial.name}
+        for noisy in trial_rows(rig, _noisier(trial, k), fit.columns, fit.cutoff_hz, weights=known):
             row = rows.get((trial.name, noisy.joint))
             if row is None or len(row.effort) != len(noisy.effort):
                 continue

@@ -46,7 +46,7 @@ class Bench:
         """The rig's MJCF with parameters theta (P + J,) of the declared columns and of the terms."""
         p = len(fit.columns)
         cutoffs = {r.cutoff_hz for r in fit.rows}
-        analysis = [{"cutoff_hz": cutoffs.pop()}] if len(cutoffs) == 1 else []
+        analysis = [{"cutoff_hz": cutoffs.pop(), "rests": list(fit.kept)}] if len(cutoffs) == 1 else []
         records = [*analysis, *body_records(self.rig), *level_records(fit.columns, theta[:p]), *term_records(terms, theta[p:])]
         return write_effects(write_declared(self.rig, fit.columns, theta[:p]), records)
 

@@ -23,6 +23,9 @@ from .words import alternatives, joint_unit, shape_unit, statement
 Array = NDArray[np.float64]
 FITS = 1.6**0.5  # an error within so many noise floors is taken to be noise: a variance 1.6 times as large
 END = 0.99  # of the longest delay that is tried
+# What two effects leave at a joint may be the form of their laws, which no catalogue has to better than 7 % of its amplitude: share of the mismatch.
+FORMED, FORM = 2, 0.07**2
+OF_FORM = "it takes no more than the forms of the effects before it may be off by"
 
 
 def proved(bench: Bench, fit: DeclaredFit, stories: Sequence[tuple[Step, Term]], kept: Sequence[Term],
@@ -37,7 +40,7 @@ def proved(bench: Bench, fit: DeclaredFit, stories: Sequence[tuple[Step, Term]],
         more = _shaped(fit, terms, [*found, term], whole)
         many = solved(bench, fit, more)
         proof = bench.proof(term.candidate.joint, (fit, *few), (fit, *many))
-        reason = _withdrawn(bench, proof, plain, (fit, *few), (fit, *many))
+        reason = _withdrawn(bench, proof, plain, (fit, *few), (fit, *many)) or _of_form(bench, term, found, proof, plain)
         if reason is not None:
             rejected.append({"effect": term.candidate.key, "reason": reason})
             continue
@@ -87,6 +90,16 @@ def _withdrawn(bench: Bench, proof: Mapping[str, Any], plain: tuple, before: tup
     if bench.mujoco and bench.ratio(plain, after) >= bench.ratio(plain, before):
         return "what it takes off at its joint it adds at others"
     return _motion_says(bench, before, after) if bench.mujoco else None
+
+
+def _of_form(bench: Bench, term: Term, found: Sequence[Term], proof: Mapping[str, Any], plain: tuple) -> str | None:
+    """Why an effect may be the form of those found before it at its joint, two or more, or None where it takes more of what the declared
+    model leaves."""
+    joint = term.candidate.joint
+    if sum(t.candidate.joint == joint for t in found) < FORMED:
+        return None
+    whole = bench.proof(joint, plain, plain)["before"]
+    return OF_FORM if proof["before"] ** 2 - proof["after"] ** 2 < FORM * whole**2 else None
 
 
 def _beyond_reach(term: Term) -> bool:

@@ -71,24 +71,26 @@ def left_out_whole(problem: Problem) -> bool:
     return len(set(problem.group.tolist())) >= FEW
 
 
-def term_columns(row: Rows, term: Term) -> Array:
-    """Filtered, thinned columns (m, j) of a term; none of its own joint's rows are anything but zero elsewhere."""
+def term_columns(row: Rows, term: Term, delay_s: float = 0.0) -> Array:
+    """Filtered, thinned columns (m, j) of a term, later by a delay; none of its own joint's rows are anything but zero elsewhere."""
     width = len(term.candidate.amplitudes)
     if row.joint != term.candidate.joint:
         return np.zeros((len(row.effort), width))
-    return row.filtered(term.candidate.columns(row, term.shape)).reshape(len(row.effort), width)
+    return row.filtered(term.candidate.columns(row, term.shape), delay_s).reshape(len(row.effort), width)
 
 
 def design(row: Rows, terms: Sequence[Term]) -> Array:
     """Declared columns and those of the terms (m, P + J), each delayed where a term says so."""
-    return _delayed(row, np.concatenate([row.columns, *(term_columns(row, t) for t in terms)], 1), terms)
+    delay = _delay(row, terms)
+    declared = row.filtered(row.full_columns, delay) if delay and len(row.weight) else row.columns
+    if delay and not len(row.weight):
+        declared = later(row.time_s[:: row.step], declared, delay)
+    return np.concatenate([declared, *(term_columns(row, t, delay) for t in terms)], 1)
 
 
-def _delayed(row: Rows, columns: Array, terms: Sequence[Term]) -> Array:
-    for t in terms:
-        if t.candidate.delays and t.candidate.joint == row.joint:
-            columns = later(row.time_s[:: row.step], columns, t.shape["delay"])
-    return columns
+def _delay(row: Rows, terms: Sequence[Term]) -> float:
+    """How much later [s] the terms make a row's columns."""
+    return sum(t.shape["delay"] for t in terms if t.candidate.delays and t.candidate.joint == row.joint)
 
 
 def limits(problem: Problem, terms: Sequence[Term]) -> tuple[Array, Array, Array, Array]:
@@ -129,7 +131,7 @@ def extended(problem: Problem, terms: Sequence[Term], new: Term, parts: tuple) -
             continue
         scale = problem.fit.scale[row.joint]
         x, y = _moving_design(problem, row, terms), row.effort[row.moving] / scale
-        c = _delayed(row, term_columns(row, new), terms)[row.moving] / scale
+        c = term_columns(row, new, _delay(row, terms))[row.moving] / scale
         for b, s in _pieces(block[row.moving]):
             cross = x[s].T @ c[s]
             g[b, :p, p:] += cross
