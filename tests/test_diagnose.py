@@ -257,6 +257,31 @@ def test_lack_of_fit_sees_what_repeats_from_stroke_to_stroke() -> None:
     assert lack_of_fit(balance, balance.fit().prediction, 5, 0.003).p < 1e-4
 
 
+def test_what_effects_explain_of_strokes_is_no_unrest_of_the_model_without_them() -> None:
+    """A recording of another level makes its strokes differ from their replicates: that is mismatch, not pure error."""
+    from hand_model.diagnose.name.lack_of_fit import lack_of_fit
+
+    states = drive(5, lambda state: np.full(len(state.time_s), 20.0 * state.validate), trials=3)
+    balance = Balance(states, everything=True)
+    shifted = balance.gather(lambda s: np.full(len(s.time_s), 20.0 * s.validate))
+    declared = balance.fit().prediction
+    after = lack_of_fit(balance, declared - 20.0 / 3 + shifted, 6, 0.003)
+    alone, together = lack_of_fit(balance, declared, 5, 0.003), lack_of_fit(balance, declared, 5, 0.003, after.unrest)
+    assert after.unrest < 0.1 * alone.unrest and together.excess > 3 * alone.excess
+    assert (together.p, together.unrest) == (alone.p, alone.unrest)  # what is a false alarm is asked as before
+
+
+def test_what_a_spring_is_bent_by_has_an_interval() -> None:
+    naming = name_effects(drive(6, planted("nonlinear_spring", {"form": 0.0}, [2e-4, 1.5e-5])), catalogue("drive"))
+    which = next(i for i, t in enumerate(naming.fit.terms) if t.effect.name == "nonlinear_spring")
+    bend = parameter_intervals(undisturbed(naming), which)["bend"]
+    x = np.linspace(0, 100, 101)
+    load = 2e-4 * x**2 + 1.5e-5 * x**3
+    truth = 0.5 * float(np.ptp(load - np.polyval(np.polyfit(x, load, 1), x)))
+    low, high = bend["ci95"]
+    assert bend["unit"] == "raw" and low < truth < high and high - low < truth
+
+
 def test_held_out_is_empty_where_validation_took_part() -> None:
     add = planted("detent_load", {"form": 0.0, "centre": 60.0, "width": 6.0}, [-10.0])
     plain = name_effects(drive(3, add), catalogue("drive"))
