@@ -9,11 +9,9 @@ half of both rates (TRC), and made noisy with unsteady stamps and lost rows (Mot
 from __future__ import annotations
 
 import argparse
-import csv
 import json
 import re
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -22,8 +20,9 @@ from scipy.spatial.transform import Rotation
 
 from hand_model import diagnose
 from hand_model.session import read_session
+from hand_model.session.log import read_log
 from hand_model.session.mocap import read_mocap
-from hand_model.twin.files import write_markers
+from hand_model.twin.files import write_log, write_markers
 
 Array = NDArray[np.float64]
 
@@ -49,7 +48,8 @@ def altered(source: Path, target: Path, kind: str, seed: int) -> None:
         write_markers(target / "mocap" / f"{file.stem}{ENDINGS[kind]}", dict(zip(mocap.labels, position.transpose(1, 0, 2), strict=True)),
                       mocap.rate_hz / step, "mm")
     for file in sorted((source / "log").iterdir()):
-        _write_log(file, target / "log" / file.name, LOGS[kind], rng)
+        log = read_log(file)
+        write_log(target / "log" / file.name, _altered_log({"time": log.time_s, **log.columns}, kind, rng))
     text = re.sub(r'(mocap/\w+)\.\w+"', rf'\1{ENDINGS[kind]}"', (source / "session.toml").read_text())
     gravity_world = read_session(source).gravity_world
     if kind == "turned" and gravity_world is not None:
@@ -58,33 +58,16 @@ def altered(source: Path, target: Path, kind: str, seed: int) -> None:
     (target / "session.toml").write_text(text)
 
 
-def _later(time_s: Array, current: Array, rng: np.random.Generator) -> tuple[Array, Array, NDArray[np.int64]]:
-    return time_s - CLOCK_S, current, np.arange(len(time_s))
-
-
-def _halved(time_s: Array, current: Array, rng: np.random.Generator) -> tuple[Array, Array, NDArray[np.int64]]:
-    return time_s, current, np.arange(0, len(time_s), 2)
-
-
-def _noisy(time_s: Array, current: Array, rng: np.random.Generator) -> tuple[Array, Array, NDArray[np.int64]]:
-    kept = np.sort(rng.permutation(len(time_s))[: int(KEPT_ROWS * len(time_s))])
-    read = np.round(current + CURRENT_NOISE_RAW * rng.standard_normal(len(current)))
-    return time_s + STAMP_NOISE_S * rng.standard_normal(len(time_s)), read, kept
-
-
-LOGS = {"turned": _later, "slow": _halved, "noisy": _noisy}
-
-
-def _write_log(source: Path, target: Path, change: Callable[..., tuple[Array, Array, NDArray[np.int64]]], rng: np.random.Generator) -> None:
-    with source.open(newline="") as file:
-        head, *rows = list(csv.reader(file))
-    values = np.array(rows, float)
-    at = {name: head.index(name) for name in ("time", "current")}
-    values[:, at["time"]], values[:, at["current"]], kept = change(values[:, at["time"]], values[:, at["current"]], rng)
-    with target.open("w", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(head)
-        writer.writerows([f"{x:.6f}" if i == at["time"] else f"{x:g}" for i, x in enumerate(row)] for row in values[kept].tolist())
+def _altered_log(columns: dict[str, Array], kind: str, rng: np.random.Generator) -> dict[str, Array]:
+    time_s, count = columns["time"], len(columns["time"])
+    if kind == "turned":
+        return {**columns, "time": time_s - CLOCK_S}
+    if kind == "slow":
+        return {name: values[::2] for name, values in columns.items()}
+    kept = np.sort(rng.permutation(count)[: int(KEPT_ROWS * count)])
+    current = np.round(columns["current"] + CURRENT_NOISE_RAW * rng.standard_normal(count))
+    noisy = {**columns, "current": current, "time": time_s + STAMP_NOISE_S * rng.standard_normal(count)}
+    return {name: values[kept] for name, values in noisy.items()}
 
 
 def main() -> int:

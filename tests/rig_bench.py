@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -26,17 +26,24 @@ Motion = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # time [s], angl
 
 def recorded(folder: Path, arm: str, count: int, torque: Callable[[Motion], np.ndarray], noise: float, last: float = 1.0) -> Path:
     """A session of `count` recordings, those after the fourth held out; torque [N m] of a motion, noise [N m]; last: times as fast the fourth of them."""
-    random, text = np.random.default_rng(4), HEAD
-    (folder / "log").mkdir(parents=True)
-    (folder / "rig.xml").write_text(arm)
+    random, tables = np.random.default_rng(4), []
     t = np.arange(0, 12, 0.004)
     for k in range(count):
         rate, size = 2 * np.pi * random.uniform([0.2, 0.6], [0.45, 1.2]), random.uniform([0.5, 0.15], [0.9, 0.3])
         rate = rate * (last if k == 3 else 1.0)
         phase = np.outer(rate, t) + random.uniform(0, 6, 2)[:, None]
         q, v, a = size @ np.sin(phase), (size * rate) @ np.cos(phase), -(size * rate**2) @ np.sin(phase)
-        table = np.stack([t, np.round(q / 4e-4) * 4e-4, torque((t, q, v, a)) + noise * random.standard_normal(len(t))], 1)
-        np.savetxt(folder / f"log/{k}.csv", table, delimiter=",", header="time,position,torque", comments="", fmt="%.8g")
+        tables.append(np.stack([t, np.round(q / 4e-4) * 4e-4, torque((t, q, v, a)) + noise * random.standard_normal(len(t))], 1))
+    return written(folder, arm, HEAD, "torque", tables)
+
+
+def written(folder: Path, model: str, head: str, effort: str, tables: Sequence[np.ndarray]) -> Path:
+    """A session of recordings (n, 3) of time, position and an effort of that name, those after the fourth held out."""
+    (folder / "log").mkdir(parents=True)
+    (folder / "rig.xml").write_text(model)
+    text = head
+    for k, table in enumerate(tables):
+        np.savetxt(folder / f"log/{k}.csv", table, delimiter=",", header=f"time,position,{effort}", comments="", fmt="%.8g")
         text += f'[[trial]]\nkind = "motion"\nlog = "log/{k}.csv"\n' + ('purpose = "validate"\n' if k > 3 else "")
     (folder / "session.toml").write_text(text)
     return folder

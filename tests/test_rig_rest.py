@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rig_bench import HEAD, written
 
 from hand_model.rig import diagnose_rig
 from hand_model.rig.balance import declared_columns, trial_rows
@@ -22,15 +23,7 @@ SLIDE = """<mujoco><option timestep="0.001" gravity="0 0 -9.81"/>
 <worldbody><body name="carriage"><joint name="slide" type="slide" axis="1 0 0" damping="60" frictionloss="10"/>
 <inertial pos="0 0 0" mass="20" diaginertia="1 1 1"/></body></worldbody><actuator><motor name="motor" joint="slide"/></actuator></mujoco>
 """
-HEAD = """format = "hand-session/1"
-[hand]
-name = "bench"
-[rig]
-model = "rig.xml"
-[signals]
-position = "joint:slide:position"
-force = "actuator:motor:force"
-"""
+SLIDE_HEAD = HEAD.replace("hinge", "slide").replace("torque", "force")
 MASS, DAMPING, COULOMB = 30.0, 90.0, 15.0
 RATE_HZ, STEP_M = 500.0, 1e-5
 
@@ -51,9 +44,7 @@ def strokes(seconds: float, period_s: float, stroke_m: float) -> tuple[np.ndarra
 def session(folder: Path, hold: float, reach_m: float = 0.0) -> Path:
     """Six recordings of a slide, two of them held out, with Coulomb friction, or all of it turning round over a distance; hold [N]: what its
     drive still gives in the direction of the last stroke while it stands and friction is Coulomb's."""
-    random, text = np.random.default_rng(7), HEAD
-    (folder / "log").mkdir(parents=True)
-    (folder / "rig.xml").write_text(SLIDE)
+    random, tables = np.random.default_rng(7), []
     for k in range(6):
         t, q, v, a = strokes(16.0, random.uniform(2.0, 4.0), random.uniform(0.1, 0.3))
         dry = COULOMB * np.sign(v)
@@ -64,11 +55,8 @@ def session(folder: Path, hold: float, reach_m: float = 0.0) -> Path:
             dry = COULOMB * dry
         kept = hold * np.where(q > np.median(q), 1.0, -1.0)
         force = MASS * a + DAMPING * v + np.where((v == 0) & (not reach_m), kept, dry) + 0.05 * random.standard_normal(len(t))
-        np.savetxt(folder / f"log/{k}.csv", np.stack([t, np.round(q / STEP_M) * STEP_M, force], 1), delimiter=",", header="time,position,force",
-                   comments="", fmt="%.8g")  # fmt: skip
-        text += f'[[trial]]\nkind = "motion"\nlog = "log/{k}.csv"\n' + ('purpose = "validate"\n' if k > 3 else "")
-    (folder / "session.toml").write_text(text)
-    return folder
+        tables.append(np.stack([t, np.round(q / STEP_M) * STEP_M, force], 1))
+    return written(folder, SLIDE, SLIDE_HEAD, "force", tables)
 
 
 def test_pauses_are_found_and_neither_slow_motion_nor_a_reversal() -> None:

@@ -17,7 +17,17 @@ from .dynamics import INERTIAL, inertial_columns, inertial_parameters
 from .model import RigModel, RigTrial
 from .overrides import body_names, compile_model
 from .rest import moving_weight
-from .states import PASSED, STEEP, choose_cutoff, differentiate, fill_gaps, later, low_pass, uniform_time, velocity_noise
+from .states import (
+    PASSED,
+    STEEP,
+    choose_cutoff,
+    differentiate,
+    fill_gaps,
+    later,
+    low_pass,
+    uniform_time,
+    velocity_noise,
+)
 
 Array = NDArray[np.float64]
 MAX_RATE_HZ = 250.0  # faster recordings are thinned to this: joints move below 50 Hz
@@ -86,11 +96,10 @@ class Rows:
 
     def filtered(self, values: Array, delay_s: float = 0.0) -> Array:
         """Full-rate columns (n, ...), later by a delay, through the weight and filter of this balance, thinned to (m, ...)."""
-        if not len(self.weight):
-            values = low_pass(values, self.rate_hz, self.cutoff_hz)[:: self.step]
-            return later(self.time_s[:: self.step], values, delay_s) if delay_s else values
-        values = later(self.time_s, values, delay_s) if delay_s else values
-        return low_pass(_weighed(values, self.weight), self.rate_hz, self.cutoff_hz)[:: self.step]
+        stands = len(self.weight) > 0  # at rest all comes later, and the weight stays where it is; else the filter may come first
+        values = later(self.time_s, values, delay_s) if delay_s and stands else values
+        values = low_pass(_weighed(values, self.weight), self.rate_hz, self.cutoff_hz)[:: self.step]
+        return later(self.time_s[:: self.step], values, delay_s) if delay_s and not stands else values
 
     def load(self, theta: Array) -> Array:
         """Load (n,) that the joint transmits at declared parameters theta (P,)."""

@@ -67,10 +67,9 @@ def effort_residuals(
         own = joint_efforts(rig, trials[name], mine[0])
         for row in mine:
             full = sum(own[:, rig.joints.index(j)] * w for j, w in row.jacobian.items())
-            here = [t for t in terms if t[0].joint == row.joint]
-            for candidate, shape, amplitude in here:
-                full = full + candidate.columns(row, shape).reshape(len(full), -1) @ amplitude
-            expected = row.filtered(full, sum(shape["delay"] for candidate, shape, _ in here if candidate.delays))
+            full = full + beside([row], terms).get((name, row.joint), 0.0)
+            delay = sum(shape["delay"] for candidate, shape, _ in terms if candidate.delays and candidate.joint == row.joint)
+            expected = row.filtered(full, delay)
             out.append(EffortResidual(name, row.joint, row.validate, (row.effort - expected)[row.moving], row, expected))
     return tuple(out)
 

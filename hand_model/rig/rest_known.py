@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from .balance import Rows
 from .declared import DeclaredFit
-from .name.candidates import beside
-from .name.problem import Term
+from .name.problem import Term, delay_of
+from .name.settled import at_loads
 from .states import later, low_pass
 
 Array = NDArray[np.float64]
@@ -21,28 +21,25 @@ LEAST_SAMPLES = 20  # of a filtered balance, on both sides
 def known_at_rest(fit: DeclaredFit, terms: Sequence[Term], theta: Array) -> tuple[str, ...]:
     """Joints that stand at times, but where parameters theta (P + J,) of the declared columns and of the terms leave hardly more of the effort
     then than while they move. Dry friction is anything within its bounds there; one that turns round over a distance is known."""
-    known = []
+    known, at = [], at_loads(fit, terms, theta)
     for joint in dict.fromkeys(r.joint for r in fit.rows):
-        sides = [_apart(r, *_left(fit, r, terms, theta)) for r in fit.rows if r.joint == joint and len(r.weight)]
+        sides = [_apart(r, _left(at, r, terms)) for r in at.rows if r.joint == joint and len(r.weight)]
         still, moving = (np.concatenate([s[k] for s in sides]) if sides else np.zeros(0) for k in (0, 1))
         if min(len(still), len(moving)) >= LEAST_SAMPLES and np.mean(still**2) <= MOST**2 * np.mean(moving**2):
             known.append(joint)
     return tuple(known)
 
 
-def _left(fit: DeclaredFit, row: Rows, terms: Sequence[Term], theta: Array) -> tuple[Array, Array]:
-    """What is left of a row's effort (m,), rests as well, and the weight (m,) of these samples."""
-    count = len(fit.columns)
-    ends = np.cumsum([count, *(len(t.candidate.amplitudes) for t in terms)])
-    acting = [(t.candidate, t.shape, theta[a:b]) for t, a, b in zip(terms, ends[:-1], ends[1:], strict=True)]
-    asked = row.full_columns @ theta[:count] + beside([row], acting).get((row.trial, row.joint), 0.0)
-    for t in terms:
-        if t.candidate.delays and t.candidate.joint == row.joint:
-            asked = later(row.time_s, asked, t.shape["delay"])
-    return low_pass(row.extra["effort"] - asked, row.rate_hz, row.cutoff_hz)[:: row.step], row.weight[:: row.step]
+def _left(at: DeclaredFit, row: Rows, terms: Sequence[Term]) -> Array:
+    """What is left of a row's effort (m,), rests as well, by a fit and the terms that it has beside it."""
+    asked = row.full_columns @ at.theta + at.beside.get((row.trial, row.joint), 0.0)
+    delay = delay_of(row, terms)
+    asked = later(row.time_s, asked, delay) if delay else asked
+    return low_pass(row.extra["effort"] - asked, row.rate_hz, row.cutoff_hz)[:: row.step]
 
 
-def _apart(row: Rows, left: Array, weight: Array) -> tuple[Array, Array]:
+def _apart(row: Rows, left: Array) -> tuple[Array, Array]:
     """What is left at rest and in full motion, without the ends of the recording."""
+    weight = row.weight[:: row.step]
     away = np.minimum(row.time_s - row.time_s[0], row.time_s[-1] - row.time_s)[:: row.step] > 1.0 / row.cutoff_hz
     return left[(weight == 0) & away], left[row.moving & (weight == 1) & away]

@@ -84,7 +84,7 @@ def _named(balance: Balance, paired: Callable[[Balance], Pair], effects: tuple[A
             learned = refit(pair.state, pair.state.fit(further.terms))
             fit = balance.fit(learned.terms)
     declared = balance.fit()
-    before, after = _lacks(balance, fit)
+    before, after = _lacks(balance, declared, fit)
     found = _findings(pair, effects, learned)
     kept = {t.effect.name for t in fit.terms}
     rejected = tuple(sorted(((n, e) for n, e in brought.items() if n not in kept), key=lambda item: -item[1]))
@@ -100,10 +100,10 @@ def _remapped(balance: Balance, fit: Fit) -> Balance:
     return other if np.sqrt(np.mean((after - before) ** 2)) > BENT * np.sqrt(np.mean(before**2)) else balance
 
 
-def _lacks(balance: Balance, fit: Fit) -> tuple[LackOfFit, LackOfFit]:
-    """Of the declared model and of `fit`, by one yardstick."""
+def _lacks(balance: Balance, declared: Fit, fit: Fit) -> tuple[LackOfFit, LackOfFit]:
+    """Of the declared model and of another fit, by one yardstick."""
     after = _lack(balance, fit)
-    return _lack(balance, balance.fit(), after.unrest) if fit.terms else after, after
+    return _lack(balance, declared, after.unrest) if fit.terms else after, after
 
 
 def _lack(balance: Balance, fit: Fit, calmest: float = np.inf) -> LackOfFit:
@@ -111,7 +111,7 @@ def _lack(balance: Balance, fit: Fit, calmest: float = np.inf) -> LackOfFit:
 
 
 def _overwhelmed(balance: Balance, fit: Fit) -> bool:
-    return len(fit.terms) >= MOST_TERMS and overwhelmed(len(fit.terms), *_lacks(balance, fit))
+    return len(fit.terms) >= MOST_TERMS and overwhelmed(len(fit.terms), *_lacks(balance, balance.fit(), fit))
 
 
 def _calmed(balance: Balance, fit: Fit, ranked: Iterable[Rival]) -> Rival | None:

@@ -17,7 +17,6 @@ from ..balance import Rows
 from ..consistent import consistent
 from ..declared import DeclaredFit, bounds, prior
 from ..solve import solve_bounded
-from ..states import later
 from .candidates import Candidate
 
 Array = NDArray[np.float64]
@@ -81,14 +80,12 @@ def term_columns(row: Rows, term: Term, delay_s: float = 0.0) -> Array:
 
 def design(row: Rows, terms: Sequence[Term]) -> Array:
     """Declared columns and those of the terms (m, P + J), each delayed where a term says so."""
-    delay = _delay(row, terms)
-    declared = row.filtered(row.full_columns, delay) if delay and len(row.weight) else row.columns
-    if delay and not len(row.weight):
-        declared = later(row.time_s[:: row.step], declared, delay)
+    delay = delay_of(row, terms)
+    declared = row.filtered(row.full_columns, delay) if delay else row.columns
     return np.concatenate([declared, *(term_columns(row, t, delay) for t in terms)], 1)
 
 
-def _delay(row: Rows, terms: Sequence[Term]) -> float:
+def delay_of(row: Rows, terms: Sequence[Term]) -> float:
     """How much later [s] the terms make a row's columns."""
     return sum(t.shape["delay"] for t in terms if t.candidate.delays and t.candidate.joint == row.joint)
 
@@ -131,7 +128,7 @@ def extended(problem: Problem, terms: Sequence[Term], new: Term, parts: tuple) -
             continue
         scale = problem.fit.scale[row.joint]
         x, y = _moving_design(problem, row, terms), row.effort[row.moving] / scale
-        c = term_columns(row, new, _delay(row, terms))[row.moving] / scale
+        c = term_columns(row, new, delay_of(row, terms))[row.moving] / scale
         for b, s in _pieces(block[row.moving]):
             cross = x[s].T @ c[s]
             g[b, :p, p:] += cross
