@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -82,7 +83,7 @@ def test_the_same_bytes_in_another_process(made, residuals, tmp_path):
         "write_report(replay(sys.argv[1], sys.argv[2]), sys.argv[3])"
     )
     argv = [sys.executable, "-c", code, str(root / "compiled"), str(root / "session"), str(tmp_path / "other")]
-    subprocess.run(argv, check=True, env={"PYTHONHASHSEED": "77", "PATH": "/usr/bin", "MPLBACKEND": "pdf"})
+    subprocess.run(argv, check=True, env={**os.environ, "PYTHONHASHSEED": "77", "MPLBACKEND": "pdf"})
     write_report(residuals, tmp_path / "here")
     for name in ("report.html", "figures.json"):
         assert (tmp_path / "here" / name).read_bytes() == (tmp_path / "other" / name).read_bytes()
