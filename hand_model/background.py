@@ -1,5 +1,5 @@
-"""The other cores: for independent calls where the platform can fork, elsewhere these simply run when their results are asked
-for; not for threads within a matrix product."""
+"""The other cores: for independent calls where the platform can fork, elsewhere these simply run when their results are
+asked for; not for threads within a matrix product."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ WORKERS = 2
 
 @contextmanager
 def single_threaded() -> Iterator[None]:
-    """BLAS on one thread, here and in what is forked from here: matrices are small, and threads of two processes on two cores
-    wait for each other. Also a decorator."""
+    """BLAS on one thread, here and in what is forked from here: matrices are small, and threads of two processes on two
+    cores wait for each other. Also a decorator."""
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1, "blas"):
@@ -28,9 +28,13 @@ def single_threaded() -> Iterator[None]:
 
 
 def _forks() -> bool:
-    """Whether a process may be forked here: only while no other thread runs (spawning would import the caller's script again)."""
-    return ("fork" in multiprocessing.get_all_start_methods() and threading.active_count() == 1
-            and not multiprocessing.current_process().daemon)
+    """Whether a process may be forked here: only while no other thread runs (spawning would import the caller's script
+    again)."""
+    return (
+        "fork" in multiprocessing.get_all_start_methods()
+        and threading.active_count() == 1
+        and not multiprocessing.current_process().daemon
+    )
 
 
 class Background:
@@ -55,15 +59,16 @@ class Background:
         try:
             yield from (future.result() for future in self._futures)
         finally:
-            if not all(f.done() for f in self._futures):  # nobody wants what is under way, and its processes would outlive this one
+            # nobody wants what is under way, and its processes would outlive this one
+            if not all(f.done() for f in self._futures):
                 for process in list(self._pool._processes.values()):
                     process.terminate()
             self._pool.shutdown(cancel_futures=True)  # waited for: its thread would keep the next one from forking
 
 
 class Pair:
-    """This process and one forked from it, which hold the same `state` and each keep what they cache: for many short calls. Where nothing
-    can be forked, this process alone. Also a context manager, which ends the other one."""
+    """This process and one forked from it, which hold the same `state` and each keep what they cache: for many short
+    calls. Where nothing can be forked, this process alone. Also a context manager, which ends the other one."""
 
     def __init__(self, state: Any) -> None:
         self.state = state
@@ -88,8 +93,11 @@ class Pair:
             self._process.join()
             self._process = None
 
-    def map(self, function: Callable[..., Any], items: Sequence[Any], *rest: Any, costs: Sequence[float] | None = None) -> list[Any]:
-        """`function(state, item, *rest)` of every item, some by the other process: the same places by the same process each time. costs:
+    def map(
+        self, function: Callable[..., Any], items: Sequence[Any], *rest: Any, costs: Sequence[float] | None = None
+    ) -> list[Any]:
+        """`function(state, item, *rest)` of every item, some by the other process: the same places by the same process
+        each time. costs:
         how long each may take, against each other. Raises what a call raised."""
         items = list(items)
         if self._process is None or len(items) < 2:
@@ -123,7 +131,8 @@ def _shared_out(costs: Sequence[float]) -> tuple[list[int], list[int]]:
 
 
 def _leave_interrupts() -> None:
-    """A terminal sends Ctrl-C to every process in it: the one that was called answers, and ends the others, which end what they began."""
+    """A terminal sends Ctrl-C to every process in it: the one that was called answers, and ends the others, which end
+    what they began."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _end)
 

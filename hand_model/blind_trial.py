@@ -42,12 +42,20 @@ class Trial:
         return "\n".join(lines)
 
 
-def blind_trial(cases: int, seed: int, folder: str | Path | None = None, kinds: Sequence[str] = KIND_SHARE,
-                effects: Sequence[str] | None = None, workers: int = 2, say: Callable[[str], None] = print) -> Trial:
+def blind_trial(
+    cases: int,
+    seed: int,
+    folder: str | Path | None = None,
+    kinds: Sequence[str] = KIND_SHARE,
+    effects: Sequence[str] | None = None,
+    workers: int = 2,
+    say: Callable[[str], None] = print,
+) -> Trial:
     """Record `cases` twin sessions, say the hash of the answers, diagnose them in processes of their own, score.
 
-    cases: number of sessions; seed: of everything. kinds: drawn in turn. effects: main effects drawn in turn for the kinds
-    that take one, instead of at random. folder: where sessions, answers and findings go (a temporary one otherwise).
+    cases: number of sessions; seed: of everything. kinds: drawn in turn. effects: main effects drawn in turn for the
+    kinds that take one, instead of at random. folder: where sessions, answers and findings go (a temporary one
+    otherwise).
     """
     if folder is None:
         with tempfile.TemporaryDirectory() as temporary:
@@ -59,7 +67,8 @@ def blind_trial(cases: int, seed: int, folder: str | Path | None = None, kinds: 
 def judged(root: str | Path, answers: Mapping[str, Any], workers: int = 2, say: Callable[[str], None] = print) -> Trial:
     """Write the answers, say their hash, diagnose the sessions in processes of their own, open the answers and score.
 
-    root: folder with sessions/NAME; answers: NAME -> {"case": kind, "effects": [{"effect", "finger", ...}]}, as a recorder gives them.
+    root: folder with sessions/NAME; answers: NAME -> {"case": kind, "effects": [{"effect", "finger", ...}]}, as a
+    recorder gives them.
     """
     root = Path(root)
     text = json.dumps(answers, indent=1)
@@ -70,29 +79,46 @@ def judged(root: str | Path, answers: Mapping[str, Any], workers: int = 2, say: 
         for done, line in enumerate(pool.map(lambda name: _diagnose(root, name), answers), start=1):
             say(f"{done}/{len(answers)} {line}")
     answers = json.loads((root / "answers.json").read_text())
-    rows = [score_case(name, answer, json.loads((root / "findings" / name / "findings.json").read_text()))
-            for name, answer in answers.items()]
+    rows = [
+        score_case(name, answer, json.loads((root / "findings" / name / "findings.json").read_text()))
+        for name, answer in answers.items()
+    ]
     return _summary(digest, rows)
 
 
-def _record(cases: int, seed: int, root: Path, kinds: Sequence[str], effects: Sequence[str] | None,
-            workers: int) -> dict[str, Any]:
+def _record(
+    cases: int, seed: int, root: Path, kinds: Sequence[str], effects: Sequence[str] | None, workers: int
+) -> dict[str, Any]:
     """Sessions into `root`/sessions, one process per worker; returns their answers by session name."""
     jobs = []
     for i in range(cases):
         kind = kinds[i % len(kinds)]
         takes = kind in ("single", "weak", "pair", "messy")
-        jobs.append((seed * 100000 + i, kind, effects[i % len(effects)] if effects and takes else None, f"case_{i:03d}"))
-    script = ("import sys, json; from hand_model.blind_trial import record_one; "
-              "print(json.dumps(record_one(*json.loads(sys.argv[1]))))")
+        jobs.append(
+            (seed * 100000 + i, kind, effects[i % len(effects)] if effects and takes else None, f"case_{i:03d}")
+        )
+    script = (
+        "import sys, json; from hand_model.blind_trial import record_one; "
+        "print(json.dumps(record_one(*json.loads(sys.argv[1]))))"
+    )
     with ThreadPoolExecutor(workers) as pool:
-        out = pool.map(lambda job: subprocess.run(
-            [sys.executable, "-c", script, json.dumps([*job, str(root)])], check=True, capture_output=True, text=True).stdout, jobs)
+        out = pool.map(
+            lambda job: (
+                subprocess.run(
+                    [sys.executable, "-c", script, json.dumps([*job, str(root)])],
+                    check=True,
+                    capture_output=True,
+                    text=True,
+                ).stdout
+            ),
+            jobs,
+        )
         return {job[3]: json.loads(text) for job, text in zip(jobs, out, strict=True)}
 
 
 def record_one(seed: int, kind: str, effect: str | None, name: str, root: str) -> dict[str, Any]:
-    """Draw and record one case under `root`/sessions/`name`; the answer goes back to the caller, not into the folder."""
+    """Draw and record one case under `root`/sessions/`name`; the answer goes back to the caller, not into the
+    folder."""
     from .twin import draw_case
 
     target = Path(root) / "sessions" / name
@@ -103,8 +129,12 @@ def record_one(seed: int, kind: str, effect: str | None, name: str, root: str) -
 
 
 def _diagnose(root: Path, name: str) -> str:
-    done = subprocess.run([sys.executable, "-m", "hand_model.diagnose", str(root / "sessions" / name), str(root / "findings" / name)],
-                          check=False, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "hand_model.diagnose", str(root / "sessions" / name), str(root / "findings" / name)],
+        check=False,
+        capture_output=True,
+        text=True,
+    )
     if done.returncode:
         (root / "findings" / name).mkdir(parents=True, exist_ok=True)
         (root / "findings" / name / "findings.json").write_text(json.dumps({"verdict": "failed", "findings": []}))
@@ -130,20 +160,34 @@ def score_case(name: str, answer: Mapping[str, Any], findings: Mapping[str, Any]
         right = bool(named) and named[0] == truth[0]
     else:
         right = sorted(named) == sorted(truth) and placed
-    return {"case": name, "kind": kind, "truth": truth, "named": named, "verdict": findings["verdict"], "right": right,
-            "placed": placed, "in_three": bool(truth) and truth[0] in named[:3],
-            "in_class": bool(truth) and any(truth[0] in c for c in classes.values()),
-            "parameter_errors": _parameter_errors(hidden, findings["findings"]),
-            "settings": [e.get("parameters", e.get("settings")) for e in hidden][:2],
-            "parameters": [f["parameters"] for f in findings["findings"]][:2]}
+    return {
+        "case": name,
+        "kind": kind,
+        "truth": truth,
+        "named": named,
+        "verdict": findings["verdict"],
+        "right": right,
+        "placed": placed,
+        "in_three": bool(truth) and truth[0] in named[:3],
+        "in_class": bool(truth) and any(truth[0] in c for c in classes.values()),
+        "parameter_errors": _parameter_errors(hidden, findings["findings"]),
+        "settings": [e.get("parameters", e.get("settings")) for e in hidden][:2],
+        "parameters": [f["parameters"] for f in findings["findings"]][:2],
+    }
 
 
-def _parameter_errors(hidden: Sequence[Mapping[str, Any]], found: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Per parameter of a finding that the answer knows (`textbook.readings`): relative error, and whether the interval (None where none is given)
-    holds the truth. Of effects named at their place and not as one of a class."""
+def _parameter_errors(
+    hidden: Sequence[Mapping[str, Any]], found: Sequence[Mapping[str, Any]]
+) -> dict[str, dict[str, Any]]:
+    """Per parameter of a finding that the answer knows (`textbook.readings`): relative error, and whether the interval
+    (None where none is given) holds the truth. Of effects named at their place and not as one of a class."""
     out: dict[str, dict[str, Any]] = {}
     for finding in found:
-        mine = [e for e in hidden if e["effect"] == finding["effect"] and finding["where"].get("finger") in (e.get("finger"), None)]
+        mine = [
+            e
+            for e in hidden
+            if e["effect"] == finding["effect"] and finding["where"].get("finger") in (e.get("finger"), None)
+        ]
         truth = readings(mine[0]) if mine and "form" in mine[0] else {}
         for name, wanted in truth.items():
             entry = finding["parameters"].get(name, {})
@@ -174,9 +218,13 @@ def _summary(digest: str, rows: Sequence[Mapping[str, Any]]) -> Trial:
     }
     errors = [e for r in rows for e in r["parameter_errors"].values()]
     rates["parameters: within 10 % or interval"] = (
-        sum(e["error"] <= 0.1 or bool(e["covered"]) for e in errors), len(errors))
-    rates["parameters: interval holds truth"] = (sum(bool(e["covered"]) for e in errors),
-                                                 sum(e["covered"] is not None for e in errors))
+        sum(e["error"] <= 0.1 or bool(e["covered"]) for e in errors),
+        len(errors),
+    )
+    rates["parameters: interval holds truth"] = (
+        sum(bool(e["covered"]) for e in errors),
+        sum(e["covered"] is not None for e in errors),
+    )
     confusion: Counter[tuple[str, str]] = Counter()
     for row in rows:
         if row["kind"] in ("single", "weak", "none", "outside"):

@@ -1,7 +1,8 @@
 """What a joint with a course does: its hinge and its extra joints, one after the other, as the angle grows.
 
-A displacement is a motion away from rest in the frame of the segment before the joint (the palm's axes at rest): x -> rotation x +
-translation. Joints are applied as MuJoCo applies those of one body: each is carried by those listed before it.
+A displacement is a motion away from rest in the frame of the segment before the joint (the palm's axes at rest): x ->
+rotation x + translation. Joints are applied as MuJoCo applies those of one body: each is carried by those listed before
+it.
 """
 
 from __future__ import annotations
@@ -20,8 +21,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Motion:
-    """A joint's whole displacement: rotation (n, 3, 3), translation (n, 3) [m]; axis, centre: (n, 3) of its hinge as the extra joints before it
-    carry it; spin (n, 3) [rad/rad] and drift (n, 3) [m/rad]: a point x behind the joint moves by spin x (x - centre) + drift per angle."""
+    """A joint's whole displacement: rotation (n, 3, 3), translation (n, 3) [m]; axis, centre: (n, 3) of its hinge as
+    the extra joints before it carry it; spin (n, 3) [rad/rad] and drift (n, 3) [m/rad]: a point x behind the joint
+    moves by spin x (x - centre) + drift per angle."""
 
     rotation: Array
     translation: Array

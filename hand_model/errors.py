@@ -7,7 +7,8 @@ from collections.abc import Iterable
 
 
 class HandModelError(Exception):
-    """Root of all errors of this package: the input or the request is wrong, and the message says what would be right."""
+    """Root of all errors of this package: the input or the request is wrong, and the message says what would be
+    right."""
 
 
 class SessionError(HandModelError):

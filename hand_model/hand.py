@@ -39,7 +39,8 @@ class Estimate:
 class ExtraJoint:
     """A joint that an angle moves. kind: "hinge" (through the centre) or "slide". axis_palm: (3,) unit, at rest.
 
-    coefficients: (2 to 5,) of its coordinate [rad or m] over powers of that angle [rad]; the first is zero, so that rest stays rest.
+    coefficients: (2 to 5,) of its coordinate [rad or m] over powers of that angle [rad]; the first is zero, so that
+    rest stays rest.
     """
 
     kind: str
@@ -49,7 +50,8 @@ class ExtraJoint:
 
 @dataclass(frozen=True)
 class Course:
-    """What the joint of a segment does beside turning about its hinge: extra joints in step with its angle, slides first.
+    """What the joint of a segment does beside turning about its hinge: extra joints in step with its angle, slides
+    first.
 
     turning: whether their axes turn with the segment that the joint carries (else they stay with the one before it).
     """
@@ -64,7 +66,8 @@ class Joint:
 
     axis_palm: (3,) unit, flexion positive. centre_palm: (3,) [m]. covariance: (6, 6) of (axis [-], centre [m]).
     range_rad: recorded (min, max) [rad]. markers_palm: label -> (3,) [m]. tip_palm: (3,) [m] on the last segment.
-    degenerate: the recorded arc does not determine axis or centre; the covariance says how little. course: where it is no plain hinge.
+    degenerate: the recorded arc does not determine axis or centre; the covariance says how little. course: where it is
+    no plain hinge.
     """
 
     name: str
@@ -80,9 +83,11 @@ class Joint:
 
 @dataclass(frozen=True)
 class EncoderMap:
-    """Encoder counts to joint angle: angle_rad = sum_i coefficients[i] u^i, u = (counts - counts_open) / (counts_close - counts_open).
+    """Encoder counts to joint angle: angle_rad = sum_i coefficients[i] u^i, u = (counts - counts_open) / (counts_close
+    - counts_open).
 
-    rmse_rad: order (as text) -> in-sample RMSE [rad], as the thesis reports it; rmse_held_out_rad: the same on held-out cycles.
+    rmse_rad: order (as text) -> in-sample RMSE [rad], as the thesis reports it; rmse_held_out_rad: the same on held-out
+    cycles.
     """
 
     counts_open: float
@@ -99,7 +104,8 @@ class EncoderMap:
 
 @dataclass(frozen=True)
 class Coupling:
-    """A linkage: follower angle = sum_i coefficients[i] driver^i [rad], monotonic over the driver's range. rmse_rad as in EncoderMap."""
+    """A linkage: follower angle = sum_i coefficients[i] driver^i [rad], monotonic over the driver's range. rmse_rad as
+    in EncoderMap."""
 
     driver: str
     follower: str
@@ -114,7 +120,8 @@ class Coupling:
 
 @dataclass(frozen=True)
 class Finger:
-    """A finger: joints from the palm outwards, one encoder map per joint (none without a log), one coupling per further joint."""
+    """A finger: joints from the palm outwards, one encoder map per joint (none without a log), one coupling per further
+    joint."""
 
     name: str
     actuator: str | None
@@ -173,7 +180,9 @@ class Hand:
         for finger in self.fingers:
             if finger.name == name:
                 return finger
-        raise HandFileError(f'hand "{self.name}" has no finger "{name}"; {did_you_mean(name, [f.name for f in self.fingers])}')
+        raise HandFileError(
+            f'hand "{self.name}" has no finger "{name}"; {did_you_mean(name, [f.name for f in self.fingers])}'
+        )
 
     def save(self, path: str | Path) -> None:
         """Write the hand as JSON with all digits; the same hand gives the same bytes."""
@@ -185,7 +194,9 @@ def load_hand(path: str | Path) -> Hand:
     """Read a `.hand` file; raises HandFileError where it is missing, foreign or incomplete."""
     file = Path(path)
     if not file.is_file():
-        raise HandFileError(f"{file}: no such file; a .hand file, from identify, or a compiled folder with its hand.json is needed")
+        raise HandFileError(
+            f"{file}: no such file; a .hand file, from identify, or a compiled folder with its hand.json is needed"
+        )
     try:
         table = json.loads(file.read_text())
     except (json.JSONDecodeError, UnicodeDecodeError) as error:
@@ -200,7 +211,9 @@ def load_hand(path: str | Path) -> Hand:
 
 def _encode(value: Any) -> Any:
     if dataclasses.is_dataclass(value):
-        known = [f for f in dataclasses.fields(value) if not f.metadata.get("if_known") or getattr(value, f.name) is not None]
+        known = [
+            f for f in dataclasses.fields(value) if not f.metadata.get("if_known") or getattr(value, f.name) is not None
+        ]
         return {f.name: _encode(getattr(value, f.name)) for f in known}
     if isinstance(value, np.ndarray):
         return value.tolist()
@@ -219,7 +232,9 @@ def _decode(kind: Any, value: Any) -> Any:
         return None if value is None else _decode(next(a for a in arguments if a is not type(None)), value)
     if dataclasses.is_dataclass(kind):
         hints = typing.get_type_hints(kind)
-        return kind(**{f.name: _decode(hints[f.name], value[f.name]) for f in dataclasses.fields(kind) if f.name in value})
+        return kind(
+            **{f.name: _decode(hints[f.name], value[f.name]) for f in dataclasses.fields(kind) if f.name in value}
+        )
     if origin is np.ndarray or kind is np.ndarray:
         return np.array(value, float)
     if origin is tuple:

@@ -20,7 +20,8 @@ def refuse_file(folder: str | Path) -> None:
 
 
 def forget(folder: str | Path, names: Collection[str], mark: str) -> None:
-    """Remove the folders of these names that an earlier run wrote into `folder`, which its file `mark` shows; without it nothing."""
+    """Remove the folders of these names that an earlier run wrote into `folder`, which its file `mark` shows; without
+    it nothing."""
     if (Path(folder) / mark).is_file():
         for name in names:
             shutil.rmtree(Path(folder) / name, ignore_errors=True)
@@ -73,7 +74,8 @@ def refuse_folder(file: str | Path) -> None:
 
 @contextmanager
 def new_file(file: str | Path) -> Iterator[Path]:
-    """A file to write, which takes the place of `file` when the block ends well; raises HandModelError as `refuse_folder` does."""
+    """A file to write, which takes the place of `file` when the block ends well; raises HandModelError as
+    `refuse_folder` does."""
     target = Path(file)
     refuse_folder(target)
     target.parent.mkdir(parents=True, exist_ok=True)

@@ -3,8 +3,8 @@
     model = mujoco.MjModel.from_xml_path("bebionic_left/bebionic_left.xml")
     hand_model.effects_on(model, "bebionic_left")
 
-Parameters come from `hand.json` beside the MJCF. Loads of a drive are forces on its motor joint; a follower that departs from
-its map moves the target of its equality. Python is called in every step: some ten microseconds per effect.
+Parameters come from `hand.json` beside the MJCF. Loads of a drive are forces on its motor joint; a follower that
+departs from its map moves the target of its equality. Python is called in every step: some ten microseconds per effect.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ LEAST_GIVE = 0.1  # [%]: the bristle of a motor whose file has plain Coulomb fri
 
 @dataclass(frozen=True)
 class Place:
-    """Where one effect acts in a model. actuator: id of the motor, in the unit [effort per raw]. equality: id of the follower's
-    equality, None for a load on the motor joint. address, dof: of the joint whose state the law reads, the motor's or the follower's
-    driver; scale: its coordinate per unit of the law. body: of the palm. give: bristle length [%]. plane: (2, 3) unit vectors in the
-    palm, along the open finger and where flexion takes it."""
+    """Where one effect acts in a model. actuator: id of the motor, in the unit [effort per raw]. equality: id of the
+    follower's equality, None for a load on the motor joint. address, dof: of the joint whose state the law reads, the
+    motor's or the follower's driver; scale: its coordinate per unit of the law. body: of the palm. give: bristle length
+    [%]. plane: (2, 3) unit vectors in the palm, along the open finger and where flexion takes it."""
 
     effect: Effect
     actuator: int
@@ -76,7 +76,8 @@ class EffectsOn:
         _install()
 
     def apply(self, model: Any, data: Any) -> None:
-        """Add the effects' forces at the state in `data`; called by MuJoCo within mj_step, mj_forward and mj_inverse."""
+        """Add the effects' forces at the state in `data`; called by MuJoCo within mj_step, mj_forward and
+        mj_inverse."""
         memory = self.memories.get(data._address)
         if memory is None or data.time < memory.time_s:  # another simulation, or this one begun again
             memory = self.memories[data._address] = Memory(self.places)
@@ -91,15 +92,20 @@ class EffectsOn:
 
 
 def effects_on(model: Any, folder: str | Path | Hand) -> EffectsOn:
-    """Switch on, for a mujoco.MjModel, the effects of its hand that MJCF cannot hold; every mj_step applies them from here on.
+    """Switch on, for a mujoco.MjModel, the effects of its hand that MJCF cannot hold; every mj_step applies them from
+    here on.
 
-    folder: the compiled folder that the model was loaded from (its `hand.json` is read), a .hand file, or a Hand. Returns an
-    object that switches them off. Raises HandFileError where there is no hand, DescriptionError where the model is not a
-    mujoco.MjModel.
+    folder: the compiled folder that the model was loaded from (its `hand.json` is read), a .hand file, or a Hand.
+    Returns an object that switches them off. Raises HandFileError where there is no hand, DescriptionError where the
+    model is not a mujoco.MjModel.
     """
     if not hasattr(model, "actuator_trnid"):
         raise DescriptionError(f"effects_on needs a mujoco.MjModel, not a {type(model).__name__}")
-    hand = folder if isinstance(folder, Hand) else load_hand(Path(folder) / "hand.json" if Path(folder).is_dir() else folder)
+    hand = (
+        folder
+        if isinstance(folder, Hand)
+        else load_hand(Path(folder) / "hand.json" if Path(folder).is_dir() else folder)
+    )
     places = tuple(p for e in hand.effects if _law(e) is not None for p in [_place(model, hand, e)] if p is not None)
     on = EffectsOn(model, places)
     if places:
@@ -158,12 +164,23 @@ def _place(model: Any, hand: Hand, found: Effect) -> Place | None:
     unit = float(model.numeric_data[model.numeric_adr[number]])
     driver = joint if equality is None else int(model.eq_obj2id[equality])
     scale = math.pi / 180 if station not in ("drive", "encoder") else 1.0  # radians for degrees, or percent
-    return Place(found, actuator, unit, equality, int(model.jnt_qposadr[driver]), int(model.jnt_dofadr[driver]), scale,
-                 int(model.body_parentid[model.jnt_bodyid[joint]]), max(give, LEAST_GIVE), _plane(model, str(name)))
+    return Place(
+        found,
+        actuator,
+        unit,
+        equality,
+        int(model.jnt_qposadr[driver]),
+        int(model.jnt_dofadr[driver]),
+        scale,
+        int(model.body_parentid[model.jnt_bodyid[joint]]),
+        max(give, LEAST_GIVE),
+        _plane(model, str(name)),
+    )
 
 
 def _plane(model: Any, actuator: str) -> Any:
-    """Unit vectors (2, 3) in the palm, in the plane of the finger's first joint; the palm's x and y where the model has a motor alone."""
+    """Unit vectors (2, 3) in the palm, in the plane of the finger's first joint; the palm's x and y where the model has
+    a motor alone."""
     import mujoco
 
     push = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TENDON, f"{actuator}_push")
@@ -172,7 +189,11 @@ def _plane(model: Any, actuator: str) -> Any:
     joint = int(model.wrap_objid[model.tendon_adr[push]])
     body = int(model.jnt_bodyid[joint])
     axis, tips = model.jnt_axis[joint], [model.site_pos[s] for s in range(model.nsite) if model.site_bodyid[s] == body]
-    arms = [model.body_pos[b] for b in range(model.nbody) if model.body_parentid[b] == body] + tips + [model.body_ipos[body]]
+    arms = (
+        [model.body_pos[b] for b in range(model.nbody) if model.body_parentid[b] == body]
+        + tips
+        + [model.body_ipos[body]]
+    )
     along = arms[0] - axis * (axis @ arms[0])
     along = along / max(float(np.linalg.norm(along)), 1e-9)
     return np.stack([along, np.cross(axis, along)])
@@ -181,21 +202,40 @@ def _plane(model: Any, actuator: str) -> Any:
 def _moment(model: Any, data: Any, place: Place, step: float, bristle: Callable[[float], float]) -> Moment:
     position = float(data.qpos[place.address])
     along, across = (place.plane @ (data.xmat[place.body].reshape(3, 3).T @ model.opt.gravity)).tolist()
-    return Moment(data.time, step, position, float(data.qvel[place.dof]), bristle(position), place.give,
-                  float(data.actuator_force[place.actuator]) / place.unit, along, across)
+    return Moment(
+        data.time,
+        step,
+        position,
+        float(data.qvel[place.dof]),
+        bristle(position),
+        place.give,
+        float(data.actuator_force[place.actuator]) / place.unit,
+        along,
+        across,
+    )
 
 
 def _follower(model: Any, data: Any, place: Place, step: float) -> Moment:
     position, scale = float(data.qpos[place.address]), place.scale
     _, c1, c2, c3, c4 = model.eq_data[place.equality, :5].tolist()
     slope = c1 + position * (2 * c2 + position * (3 * c3 + position * 4 * c4))
-    return Moment(data.time, step, position / scale, float(data.qvel[place.dof]) / scale, 0.0, place.give,
-                  float(data.actuator_force[place.actuator]) / place.unit, 0.0, 0.0, slope * scale)
+    return Moment(
+        data.time,
+        step,
+        position / scale,
+        float(data.qvel[place.dof]) / scale,
+        0.0,
+        place.give,
+        float(data.actuator_force[place.actuator]) / place.unit,
+        0.0,
+        0.0,
+        slope * scale,
+    )
 
 
 def _move_target(data: Any, equality: int, shift_rad: float) -> None:
-    """Move the target of a joint equality: its violation counts from there. The reference acceleration is computed after this
-    callback, within the same step."""
+    """Move the target of a joint equality: its violation counts from there. The reference acceleration is computed
+    after this callback, within the same step."""
     equalities = slice(data.ne)  # which come first
     data.efc_pos[equalities] -= shift_rad * (data.efc_id[equalities] == equality)
 

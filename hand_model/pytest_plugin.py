@@ -18,7 +18,9 @@ import pytest
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the two options and the ini line."""
     group = parser.getgroup("hand_model")
-    group.addoption("--hand-conform", nargs=2, metavar=("A", "B"), help="two descriptions (URDF or MJCF) that must agree")
+    group.addoption(
+        "--hand-conform", nargs=2, metavar=("A", "B"), help="two descriptions (URDF or MJCF) that must agree"
+    )
     group.addoption("--hand-conform-pair", metavar="TOML", help="which names of --hand-conform correspond")
     parser.addini("hand_conform", "lines 'A B [pair.toml]': descriptions that must agree", type="linelist", default=[])
 

@@ -1,7 +1,7 @@
 """A Description against a Session: where do the markers go, where did they go.
 
-Three ways to drive the model: with the joint angles that the markers show, with the encoder counts alone, and as a MuJoCo
-simulation in which only the proximal joint is driven and the equalities move the rest.
+Three ways to drive the model: with the joint angles that the markers show, with the encoder counts alone, and as a
+MuJoCo simulation in which only the proximal joint is driven and the equalities move the rest.
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ AGREEMENT_POSES = 500
 class TrialResiduals:
     """One flexion trial replayed.
 
-    labels, segment: (m,) of the finger's markers. time_s: (n,) mocap time. counts: (n,), nan without a log. angle_rad: (n, k)
-    as the markers show it. seen: (n, m) markers that took part. phase: (n,) of PHASES. residual_palm: mode -> (n, m, 3) [m],
-    recorded minus replayed. noise_m: (n, m) what marker noise alone gives in the modes that use the palm markers only, as root
-    mean square of the vector's length. held_out: whether the trial took no part in the fit.
+    labels, segment: (m,) of the finger's markers. time_s: (n,) mocap time. counts: (n,), nan without a log. angle_rad:
+    (n, k) as the markers show it. seen: (n, m) markers that took part. phase: (n,) of PHASES. residual_palm: mode ->
+    (n, m, 3) [m], recorded minus replayed. noise_m: (n, m) what marker noise alone gives in the modes that use the palm
+    markers only, as root mean square of the vector's length. held_out: whether the trial took no part in the fit.
     """
 
     trial: Trial
@@ -61,9 +61,15 @@ class TrialResiduals:
     residual_palm: Mapping[str, Array]
     noise_m: Array
 
-    def distance_m(self, mode: str, segment: str | None = None, label: str | None = None, phase: str | None = None) -> Array:
+    def distance_m(
+        self, mode: str, segment: str | None = None, label: str | None = None, phase: str | None = None
+    ) -> Array:
         """Lengths (q,) [m] of the residual vectors of one mode, optionally of one segment, marker or phase."""
-        columns = [i for i, (s, name) in enumerate(zip(self.segment, self.labels, strict=True)) if segment in (None, s) and label in (None, name)]
+        columns = [
+            i
+            for i, (s, name) in enumerate(zip(self.segment, self.labels, strict=True))
+            if segment in (None, s) and label in (None, name)
+        ]
         mask = self.seen[:, columns] & ((self.phase == phase)[:, None] if phase else True)
         return np.linalg.norm(self.residual_palm[mode][:, columns], axis=-1)[mask]
 
@@ -75,8 +81,9 @@ class TrialResiduals:
 
 @dataclass(frozen=True)
 class Residuals:
-    """A description replayed against a session. agreement_m: engine -> largest distance [m] from this project's own forward
-    kinematics at any marker or tip, over AGREEMENT_POSES poses of every file. notes: what could not be replayed, and why."""
+    """A description replayed against a session. agreement_m: engine -> largest distance [m] from this project's own
+    forward kinematics at any marker or tip, over AGREEMENT_POSES poses of every file. notes: what could not be
+    replayed, and why."""
 
     description: Description
     session: Session
@@ -85,16 +92,20 @@ class Residuals:
     notes: tuple[str, ...]
 
 
-def replay(description: Description | str | Path, session: Session | str | Path, say: Callable[[str], None] = lambda _: None) -> Residuals:
+def replay(
+    description: Description | str | Path, session: Session | str | Path, say: Callable[[str], None] = lambda _: None
+) -> Residuals:
     """Replay the flexion trials of a session that took no part in the fit (all of them, where none was kept back).
 
-    Raises DescriptionError where the description and the session are not of one hand, SessionError and IdentificationError
-    for recordings that cannot be used.
+    Raises DescriptionError where the description and the session are not of one hand, SessionError and
+    IdentificationError for recordings that cannot be used.
     """
     description = description if isinstance(description, Description) else read_description(description)
     session = session if isinstance(session, Session) else read_session(session)
     if session.rig is not None:
-        raise SessionError(f"{session.path}: a rig session brings its own model; a compiled hand cannot be replayed against it")
+        raise SessionError(
+            f"{session.path}: a rig session brings its own model; a compiled hand cannot be replayed against it"
+        )
     agreement = engine_agreement(description)
     say("engines agree within " + ", ".join(f"{name} {value:.1e} m" for name, value in agreement.items()))
     notes: list[str] = []
@@ -102,16 +113,20 @@ def replay(description: Description | str | Path, session: Session | str | Path,
     for finger in description.hand.fingers:
         recorded = next((f for f in session.fingers if f.name == finger.name), None)
         if recorded is None:
-            notes.append(f'{finger.name}: the session does not record this finger')
+            notes.append(f"{finger.name}: the session does not record this finger")
             continue
         held_out = session.select("flexion", finger.name, validate=True)
         chosen = held_out or session.select("flexion", finger.name)
         if not held_out:
-            notes.append(f"{finger.name}: no flexion trial is kept for validation; replayed on those that may have been fitted")
+            notes.append(
+                f"{finger.name}: no flexion trial is kept for validation; replayed on those that may have been fitted"
+            )
         calls += [(description, session, finger, recorded, trial) for trial in chosen]
     if not calls:
         names = ", ".join(f.name for f in session.fingers)
-        raise DescriptionError(f"{description.folder}: none of its fingers is recorded in {session.path} (recorded: {names or 'none'})")
+        raise DescriptionError(
+            f"{description.folder}: none of its fingers is recorded in {session.path} (recorded: {names or 'none'})"
+        )
     trials = []
     for result, remarks in Background(replay_trial, calls).results():
         trials.append(result)
@@ -127,7 +142,8 @@ def summary(trial: TrialResiduals) -> str:
 
 
 def engine_agreement(description: Description, poses: int = AGREEMENT_POSES, seed: int = 0) -> dict[str, float]:
-    """Largest distance [m] of each engine's marker and tip positions from this project's own, over random poses in the limits."""
+    """Largest distance [m] of each engine's marker and tip positions from this project's own, over random poses in the
+    limits."""
     rng = np.random.default_rng(seed)
     worst: dict[str, float] = {}
     for model in description.models:
@@ -141,8 +157,14 @@ def engine_agreement(description: Description, poses: int = AGREEMENT_POSES, see
         }
         exact = own.positions(reference_model, angles)
         hand = reference_model.hand
-        plain = own.positions(own.of_hand(without_courses(hand)), angles) if with_courses(hand) else exact  # a URDF holds no course
-        for engine, file in (("mujoco", model.mjcf), ("mujoco (URDF)", model.urdf), ("pinocchio", model.urdf), ("yourdfpy", model.urdf)):
+        # a URDF holds no course
+        plain = own.positions(own.of_hand(without_courses(hand)), angles) if with_courses(hand) else exact
+        for engine, file in (
+            ("mujoco", model.mjcf),
+            ("mujoco (URDF)", model.urdf),
+            ("pinocchio", model.urdf),
+            ("yourdfpy", model.urdf),
+        ):
             module = importlib.import_module(f"hand_model.engines.{engine.split()[0]}")
             found = module.positions(module.load(file), angles)
             reference = plain if file == model.urdf else exact
@@ -160,14 +182,17 @@ def hand_chain(hand: Hand, finger: Finger, recorded: RecordedFinger, palm_labels
 
 
 def chain_of(hand: Hand, name: str, labels: Sequence[str]) -> Chain:
-    """A finger as a chain with the markers `labels`, those of the palm first; raises DescriptionError where the hand lacks one."""
+    """A finger as a chain with the markers `labels`, those of the palm first; raises DescriptionError where the hand
+    lacks one."""
     finger = hand.finger(name)
     markers = dict(hand.palm_markers_palm)
     for joint in finger.joints:
         markers.update(joint.markers_palm)
     for label in labels:
         if label not in markers:
-            raise DescriptionError(f'finger "{name}": the model has no marker "{label}"; it was identified with other markers')
+            raise DescriptionError(
+                f'finger "{name}": the model has no marker "{label}"; it was identified with other markers'
+            )
     courses = tuple(j.course for j in finger.joints)
     axes, centres = (np.stack([getattr(j, key) for j in finger.joints]) for key in ("axis_palm", "centre_palm"))
     return Chain(np.stack([markers[label] for label in labels]), axes, centres, courses if any(courses) else ())
@@ -194,7 +219,9 @@ def replay_trial(
     data, pose, weight = measure(description.hand, session, recorded, trial)
     sound = sound_frames(data, weight)
     if sound.sum() < 20:
-        raise IdentificationError(f"{trial.name}: {sound.sum()} frames fit this hand; are the markers where they were when it was identified?")
+        raise IdentificationError(
+            f"{trial.name}: {sound.sum()} frames fit this hand; are the markers where they were when it was identified?"
+        )
     time = trial.mocap().time_s
     model = next(m for m in description.models if finger.name in m.fingers)
     counts, clock = _counts(trial, time, np.where(sound, pose.angle_rad[:, 0], np.nan))
@@ -269,7 +296,9 @@ def _points(model: Model, finger: Finger, labels: tuple[str, ...], path_rad: Arr
 
     names = ours.load(model.mjcf).names
     loaded = mujoco.load(model.mjcf)
-    angles = {names.joint[finger.name, joint.name]: np.nan_to_num(path_rad[:, k]) for k, joint in enumerate(finger.joints)}
+    angles = {
+        names.joint[finger.name, joint.name]: np.nan_to_num(path_rad[:, k]) for k, joint in enumerate(finger.joints)
+    }
     found = mujoco.positions(loaded, angles)
     points = np.stack([found[names.marker[finger.name, label]] for label in labels], axis=1)
     return np.where(np.isfinite(path_rad).all(1)[:, None, None], points, np.nan)
@@ -297,7 +326,8 @@ def _palm_from_markers(hand: Hand, session: Session, data: ChainData) -> Pose:
 
 
 def _noise_alone(hand: Hand, session: Session, position_world: Array, palm: Pose) -> Array:
-    """(n, m) root mean square length [m] that marker noise alone gives: the marker's own and the palm pose's at that lever."""
+    """(n, m) root mean square length [m] that marker noise alone gives: the marker's own and the palm pose's at that
+    lever."""
     shape = np.stack([hand.palm_markers_palm[label] for label in session.palm.labels])
     by_pose = np.concatenate([np.broadcast_to(np.eye(3), (len(shape), 3, 3)), -skew(shape)], axis=2).reshape(-1, 6)
     covariance = np.linalg.inv(by_pose.T @ by_pose)
@@ -305,5 +335,3 @@ def _noise_alone(hand: Hand, session: Session, position_world: Array, palm: Pose
     by_marker = np.concatenate([np.broadcast_to(np.eye(3), (*x.shape[:2], 3, 3)), -skew(np.nan_to_num(x))], axis=3)
     lever = np.einsum("nmif,fg,nmig->nm", by_marker, covariance, by_marker)
     return hand.noise_m * np.sqrt(3 + lever)
-
-

@@ -41,7 +41,8 @@ def kabsch(source: ArrayLike, target: ArrayLike, weight: ArrayLike | None = None
     """Rigid registration: R, t minimising sum_j w_j |target_j - R source_j - t|^2 (Kabsch 1976).
 
     source: (m, 3) or (n, m, 3); target: (n, m, 3) or (m, 3); weight: (n, m) or (m,), zero where a point is missing
-    (its coordinates may be nan). Lengths in one unit. Returns rotation (n, 3, 3) or (3, 3) and translation (n, 3) or (3,).
+    (its coordinates may be nan). Lengths in one unit. Returns rotation (n, 3, 3) or (3, 3) and translation (n, 3) or
+    (3,).
     """
     a, b = np.broadcast_arrays(np.asarray(source, float), np.asarray(target, float))
     w = np.ones(a.shape[:-1]) if weight is None else np.broadcast_to(np.asarray(weight, float), a.shape[:-1])

@@ -1,7 +1,8 @@
-"""What a finding's parameters should read, from how the twin's answer says the same: its law, form and units are its own.
+"""What a finding's parameters should read, from how the twin's answer says the same: its law, form and units are its
+own.
 
-Only where the hidden form's law has that parameter: a bell fitted to a trapezoid has a centre, but no height of its own; a compliance is known
-up to the share of friction that sits behind it, which no recording of angles tells.
+Only where the hidden form's law has that parameter: a bell fitted to a trapezoid has a centre, but no height of its
+own; a compliance is known up to the share of friction that sits behind it, which no recording of angles tells.
 """
 
 from __future__ import annotations
@@ -36,13 +37,21 @@ READINGS: Mapping[str, Mapping[str | None, Mapping[str, Read]]] = {
     "coupling_deadband": {"hard": {"until": _same("deadband_rad", math.degrees(1.0))}},
     "current_channel_delay": {"delay": {"delay": _same("delay_s")}, "early": {"delay": _same("delay_s", -1.0)}},
     "current_saturation": {"reading": {"limit": _same("level_raw")}, "drive": {"limit": _same("level_raw")}},
-    "detent_load": {"gaussian": {"load": _signed("height_raw"), "width": _same("width_percent")}, EVERY: {"centre": _same("centre_percent")}},
+    "detent_load": {
+        "gaussian": {"load": _signed("height_raw"), "width": _same("width_percent")},
+        EVERY: {"centre": _same("centre_percent")},
+    },
     "drive_backlash": {EVERY: {"gap": _same("gap_percent")}},
     "drive_sag": {"torque": {"torque_loss": _same("share_per_100_raw")}},
-    "elastoplastic_hysteresis": {"linear": {"yield_load": _same("level_raw")}, "exponential": {"yield_load": _same("level_raw")}},
+    "elastoplastic_hysteresis": {
+        "linear": {"yield_load": _same("level_raw")},
+        "exponential": {"yield_load": _same("level_raw")},
+    },
     "encoder_periodic_error": {EVERY: {"period": _same("period_percent")}},
-    "end_stop_contact": {"linear": {"begin": _same("at_percent"), "stiffness": _same("stiffness_raw")},
-                         "open_side": {"begin": _same("at_percent"), "stiffness": _same("stiffness_raw")}},
+    "end_stop_contact": {
+        "linear": {"begin": _same("at_percent"), "stiffness": _same("stiffness_raw")},
+        "open_side": {"begin": _same("at_percent"), "stiffness": _same("stiffness_raw")},
+    },
     "external_contact": {"stiff": {"begin": _same("at_percent"), "stiffness": _same("stiffness_raw")}},
     "linkage_backlash": {"play": {"gap": _same("gap_rad", math.degrees(1.0))}},
     "load_dependent_friction": {"transmitted": {"load_coefficient": _same("share")}},
@@ -50,21 +59,33 @@ READINGS: Mapping[str, Mapping[str | None, Mapping[str, Read]]] = {
     "moving_centre": {EVERY: {"travel": _same("travel_m")}},
     "nonlinear_spring": {"knee": {"knee": _same("knee_percent")}},
     "palm_marker_slip": {EVERY: {"distance": _same("distance_m")}},
-    "position_dependent_friction": {"gaussian": {"extra_friction": _same("height_raw"), "width": _same("width_percent")},
-                                    EVERY: {"centre": _same("centre_percent")}},
-    "presliding_friction": {EVERY: {"bristle_length": _same("give_percent")}, "lugre": {"bristle_time": _same("bristle_damping_raw")}},
+    "position_dependent_friction": {
+        "gaussian": {"extra_friction": _same("height_raw"), "width": _same("width_percent")},
+        EVERY: {"centre": _same("centre_percent")},
+    },
+    "presliding_friction": {
+        EVERY: {"bristle_length": _same("give_percent")},
+        "lugre": {"bristle_time": _same("bristle_damping_raw")},
+    },
     "quadratic_damping": {"square": {"drag": _same("drag_at_100_raw", 1e-4)}},
-    "stribeck_friction": {f: {"static_excess": _same("static_excess_raw"), "stribeck_speed": _same("stribeck_speed")}
-                          for f in ("exponential", "gaussian")},
+    "stribeck_friction": {
+        f: {"static_excess": _same("static_excess_raw"), "stribeck_speed": _same("stribeck_speed")}
+        for f in ("exponential", "gaussian")
+    },
     "support_slip": {EVERY: {"turn": _same("angle_rad")}},
-    "thermal_friction_drift": {"motion": {"cold_excess": lambda p: -p["change_raw"] * p["sign"], "warm_up_time": _same("warming_s")}},
+    "thermal_friction_drift": {
+        "motion": {"cold_excess": lambda p: -p["change_raw"] * p["sign"], "warm_up_time": _same("warming_s")}
+    },
     "torque_ripple": {"sine": {"amplitude": _same("amplitude_raw")}, EVERY: {"period": _same("period_percent")}},
-    "viscoelastic_spring": {"maxwell": {"stiffness": _same("branch_stiffness"), "relaxation_time": _same("relaxation_s")}},
+    "viscoelastic_spring": {
+        "maxwell": {"stiffness": _same("branch_stiffness"), "relaxation_time": _same("relaxation_s")}
+    },
 }
 
 
 def readings(hidden: Mapping[str, Any]) -> dict[str, float]:
-    """Parameters by the names of a finding, in its units, of one effect of an answer; none where the two laws have none in common."""
+    """Parameters by the names of a finding, in its units, of one effect of an answer; none where the two laws have none
+    in common."""
     forms = READINGS.get(hidden["effect"], {})
     own = {**forms.get(EVERY, {}), **forms.get(hidden.get("form"), {})}
     return {name: float(read(hidden["parameters"])) for name, read in own.items()}

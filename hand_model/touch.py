@@ -1,9 +1,10 @@
 """Touch read from the current: what the free-motion model does not explain, tested sample by sample.
 
-Residual: measured less predicted current of the open-loop simulation, in units of the noise, along the motion. Test: Page's (1954)
-cumulative sum. Its threshold is set for a false-alarm rate on free motion: the largest value of the sum in each free move has an exponential
-tail (Siegmund 1985, ch. 2), whatever the residuals' correlation and model error. A tail known from few moves reaches further than the best
-guess of it: the threshold is that of the predictive distribution, a Pareto one (exponential excesses of unknown mean; Geisser 1993, ch. 2).
+Residual: measured less predicted current of the open-loop simulation, in units of the noise, along the motion. Test:
+Page's (1954) cumulative sum. Its threshold is set for a false-alarm rate on free motion: the largest value of the sum
+in each free move has an exponential tail (Siegmund 1985, ch. 2), whatever the residuals' correlation and model error. A
+tail known from few moves reaches further than the best guess of it: the threshold is that of the predictive
+distribution, a Pareto one (exponential excesses of unknown mean; Geisser 1993, ch. 2).
 """
 
 from __future__ import annotations
@@ -26,14 +27,17 @@ from .session import Log, Session
 Array = NDArray[np.float64]
 
 ALIGN_S = 0.25  # of a move, within which its own unknowns are found; nothing is tested there
-SLACK = 2.0  # of the cumulative sum, in noise deviations: half the rise that is looked for; an object stiffer than the position loop gives that in two samples
+# of the cumulative sum, in noise deviations: half the rise that is looked for; an object stiffer than the position loop
+# gives that in two samples
+SLACK = 2.0
 AFTER_S = 1.2  # of pressing that the stiffness is read from
 
 
 @dataclass(frozen=True)
 class TouchDetector:
-    """Threshold of the cumulative sum [noise deviations]; its false-alarm rate [1/min] on free motion; mean excess of the tail of the
-    moves' maxima, the free moves and the motion [min] that it was calibrated on, and the white-noise threshold below which it is never set."""
+    """Threshold of the cumulative sum [noise deviations]; its false-alarm rate [1/min] on free motion; mean excess of
+    the tail of the moves' maxima, the free moves and the motion [min] that it was calibrated on, and the white-noise
+    threshold below which it is never set."""
 
     threshold: float
     false_alarms_per_minute: float
@@ -45,9 +49,10 @@ class TouchDetector:
 
 @dataclass(frozen=True)
 class Contact:
-    """A touch. detected_s: time of the alarm on the log's clock [s]; onset_s: when the object was met [s]; position [%] there;
-    stiffness [raw/%] with interval; kind: "stiff" (the object gives way less than the drive's own position loop), "compliant",
-    or "undetermined"."""
+    """A touch. detected_s: time of the alarm on the log's clock [s]; onset_s: when the object was met [s]; position [%]
+    there;
+    stiffness [raw/%] with interval; kind: "stiff" (the object gives way less than the drive's own position loop),
+    "compliant", or "undetermined"."""
 
     trial: str
     detected_s: float
@@ -58,10 +63,12 @@ class Contact:
 
 
 def residuals(fit: MotorFit, log: Log, name: str = "log") -> list[tuple[MoveData, Array, Array]]:
-    """Per move into flexion: the move, its sample times on the log's clock (n,) [s], and the residual (n,) [noise deviations].
+    """Per move into flexion: the move, its sample times on the log's clock (n,) [s], and the residual (n,) [noise
+    deviations].
 
-    The residual is zero within ALIGN_S of the command. Where no controller explains the motion, the current is predicted from the
-    recorded motion instead, with friction as in flexion: an object adds to that, whatever the controller does.
+    The residual is zero within ALIGN_S of the command. Where no controller explains the motion, the current is
+    predicted from the recorded motion instead, with friction as in flexion: an object adds to that, whatever the
+    controller does.
     """
     trial = motor_trial(name, log, fit.scale)
     begin = log.time_s[np.isfinite(log.time_s)][0]
@@ -98,11 +105,14 @@ def _from_motion(fit: MotorFit, trial: MotorTrial) -> list[tuple[MoveData, Array
 
 
 def _flexions(trial: MotorTrial) -> list[tuple[int, int]]:
-    """First and last sample of every stretch in which the drive is commanded, or where nothing is logged moves, into flexion."""
+    """First and last sample of every stretch in which the drive is commanded, or where nothing is logged moves, into
+    flexion."""
     if trial.setpoint is not None:
         change = np.flatnonzero(np.diff(trial.setpoint) != 0)
         ends = np.append(change[1:], len(trial.time_s) - 1)
-        return [(int(i), int(j)) for i, j in zip(change, ends, strict=True) if trial.setpoint[i + 1] > trial.setpoint[i]]
+        return [
+            (int(i), int(j)) for i, j in zip(change, ends, strict=True) if trial.setpoint[i + 1] > trial.setpoint[i]
+        ]
     path = friction_state(trial.position, 2.0)  # its sign is the direction of the last 2 % of travel
     flexes = path > 0.5
     starts, ends = np.flatnonzero(np.diff(flexes.astype(int)) == 1), np.flatnonzero(np.diff(flexes.astype(int)) == -1)
@@ -135,11 +145,14 @@ def calibrate(fit: MotorFit, free: Sequence[tuple[str, Log]], false_alarms_per_m
     wanted = false_alarms_per_minute * minutes / len(maxima)  # alarms per move
     threshold, mean_excess = tail_threshold(np.array(maxima), wanted)
     white = np.log(2 * SLACK**2 * samples / minutes / false_alarms_per_minute + 1) / (2 * SLACK) - 1.166
-    return TouchDetector(float(max(threshold, white)), false_alarms_per_minute, mean_excess, len(maxima), minutes, float(white))
+    return TouchDetector(
+        float(max(threshold, white)), false_alarms_per_minute, mean_excess, len(maxima), minutes, float(white)
+    )
 
 
 def tail_threshold(maxima: Array, probability: float) -> tuple[float, float]:
-    """Value that one more of maxima (n,) passes with this probability, by the predictive distribution of an exponential tail; its mean excess."""
+    """Value that one more of maxima (n,) passes with this probability, by the predictive distribution of an exponential
+    tail; its mean excess."""
     middle = float(np.median(maxima))
     excess = maxima[maxima > middle] - middle
     if len(excess) == 0:
@@ -149,7 +162,9 @@ def tail_threshold(maxima: Array, probability: float) -> tuple[float, float]:
     return float(middle + reach), float(excess.mean())
 
 
-def detect(fit: MotorFit, detector: TouchDetector, log: Log, name: str = "log", measure: bool = True) -> tuple[Contact, ...]:
+def detect(
+    fit: MotorFit, detector: TouchDetector, log: Log, name: str = "log", measure: bool = True
+) -> tuple[Contact, ...]:
     """Contacts in one log: at most one per closing move, at the first sample whose sum passes the threshold.
 
     measure: estimate the stiffness and refine the onset too (half a second each).
@@ -163,20 +178,24 @@ def detect(fit: MotorFit, detector: TouchDetector, log: Log, name: str = "log", 
 
 
 def score(fit: MotorFit, log: Log, name: str = "log") -> Array:
-    """Largest value of the cumulative sum in each closing move: the statistic of the receiver operating characteristic."""
+    """Largest value of the cumulative sum in each closing move: the statistic of the receiver operating
+    characteristic."""
     return np.array([cumulative_sum(z).max() for _, _, z in residuals(fit, log, name)])
 
 
 def touch_session(session: Session, actuator: str, false_alarms_per_minute: float = 0.1) -> tuple[Contact, ...]:
     """Contacts in all grasp trials of an actuator, the detector calibrated on its excitation and flexion trials."""
     fit = identify_motor(session, actuator)
-    detector = calibrate(fit, [(t.name, t.log()) for t in actuator_trials(session, actuator, validate=None)], false_alarms_per_minute)
+    detector = calibrate(
+        fit, [(t.name, t.log()) for t in actuator_trials(session, actuator, validate=None)], false_alarms_per_minute
+    )
     grasps = actuator_trials(session, actuator, ("grasp",), validate=None)
     return tuple(c for t in grasps for c in detect(fit, detector, t.log(), t.name))
 
 
 def _contact(fit: MotorFit, m: MoveData, time_s: Array, z: Array, alarm: int, name: str, measure: bool) -> Contact:
-    """Onset and stiffness by output error: the free drive against a one-sided spring, from the move's start to AFTER_S of pressing."""
+    """Onset and stiffness by output error: the free drive against a one-sided spring, from the move's start to AFTER_S
+    of pressing."""
     g = cumulative_sum(z)
     began = alarm
     while began > 0 and g[began - 1] > 0:
@@ -197,7 +216,8 @@ def _contact(fit: MotorFit, m: MoveData, time_s: Array, z: Array, alarm: int, na
             best = one
         if max(best.chi2) < 1.5:
             break
-    # the free-motion parameters are known only so well too; the misfit of a spring that is not quite linear widens the interval
+    # the free-motion parameters are known only so well too; the misfit of a spring that is not quite linear widens the
+    # interval
     value, sd = best.values["contact_stiffness"], float(np.sqrt(best.covariance[0, 0]))
     low, high = max(0.0, value - 1.96 * sd), value + 1.96 * sd
     estimate = Estimate(float(value), (float(low), float(high)), "raw/%", "output error of the drive against an object")
@@ -211,7 +231,8 @@ def _contact(fit: MotorFit, m: MoveData, time_s: Array, z: Array, alarm: int, na
 
 
 def _stiffness(fit: MotorFit, m: MoveData, z: Array, began: int, at: float) -> Estimate | None:
-    """Slope [raw/%] of the unexplained current over the travel since contact, while the drive presses; None where it does not move on."""
+    """Slope [raw/%] of the unexplained current over the travel since contact, while the drive presses; None where it
+    does not move on."""
     k = np.arange(len(z)) >= began
     k &= m.time_s <= m.time_s[began] + AFTER_S
     x, y = m.position[k] - at, z[k] * fit.sigma_current
@@ -219,6 +240,7 @@ def _stiffness(fit: MotorFit, m: MoveData, z: Array, began: int, at: float) -> E
         return None
     a = np.c_[x, np.ones(len(x))]
     beta, inverse = np.linalg.lstsq(a, y, rcond=None)[0], np.linalg.inv(a.T @ a)
-    sd = float(np.sqrt(3 * inverse[0, 0] * np.var(y - a @ beta)))  # the filter leaves about one independent sample in three
+    # the filter leaves about one independent sample in three
+    sd = float(np.sqrt(3 * inverse[0, 0] * np.var(y - a @ beta)))
     value = float(max(beta[0], 0.0))
     return Estimate(value, (max(0.0, value - 1.96 * sd), value + 1.96 * sd), "raw/%", "unexplained current over travel")

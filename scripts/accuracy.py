@@ -2,10 +2,11 @@
 
     python scripts/accuracy.py --seeds 4 --output accuracy.json
 
-Each seed is a whole hand of six fingers, recorded twice: with the laboratory's own noise and with that of the thesis's right
-hand (0.4 mm per marker, ghosts, exchanged labels). "In the landmark frame" is what a user gets: it holds the placement of the
-probe on three landmarks. "Within the palm" takes that out (true and found palm markers are laid on each other), so that it can
-be held against the bound: the root mean square of error over the standard deviation that the information matrix promises.
+Each seed is a whole hand of six fingers, recorded twice: with the laboratory's own noise and with that of the thesis's
+right hand (0.4 mm per marker, ghosts, exchanged labels). "In the landmark frame" is what a user gets: it holds the
+placement of the probe on three landmarks. "Within the palm" takes that out (true and found palm markers are laid on
+each other), so that it can be held against the bound: the root mean square of error over the standard deviation that
+the information matrix promises.
 """
 
 from __future__ import annotations
@@ -51,7 +52,9 @@ def errors(seed: int, noisy: bool, fingers: tuple[str, ...] | None) -> list[dict
                     "axis_within_palm_deg": float(np.rad2deg(angle_between(turn @ joint.axis_palm, axis))),
                     "centre_within_palm_mm": 1e3 * across(turn @ joint.centre_palm + move - centre, axis),
                     "squared_error_over_bound": float(off @ np.linalg.solve(spread, off) / 2),
-                    "published_axis_off_deg": found.hand.extra["published_method"][finger.name][joint.name].get("axis_off_deg", np.nan),
+                    "published_axis_off_deg": found.hand.extra["published_method"][finger.name][joint.name].get(
+                        "axis_off_deg", np.nan
+                    ),
                 }
             )
     return rows
@@ -75,7 +78,7 @@ def across(arm: np.ndarray, axis: np.ndarray) -> float:
 
 def main() -> None:
     """Run and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--seeds", type=int, default=4)
     parser.add_argument("--first", type=int, default=100)
     parser.add_argument("--fingers", nargs="*")

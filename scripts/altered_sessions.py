@@ -2,8 +2,9 @@
 
     python scripts/altered_sessions.py FOLDER --output DIR
 
-FOLDER holds session folders with one answer.json each; DIR must be new. Every session is turned in space with another clock (TSV), recorded at
-half of both rates (TRC), and made noisy with unsteady stamps and lost rows (Motive CSV). What is named and what was hidden is printed.
+FOLDER holds session folders with one answer.json each; DIR must be new. Every session is turned in space with another
+clock (TSV), recorded at half of both rates (TRC), and made noisy with unsteady stamps and lost rows (Motive CSV). What
+is named and what was hidden is printed.
 """
 
 from __future__ import annotations
@@ -45,8 +46,12 @@ def altered(source: Path, target: Path, kind: str, seed: int) -> None:
             position = position @ turn.as_matrix().T + away
         if kind == "noisy":
             position = position + MARKER_NOISE_M * rng.standard_normal(position.shape)
-        write_markers(target / "mocap" / f"{file.stem}{ENDINGS[kind]}", dict(zip(mocap.labels, position.transpose(1, 0, 2), strict=True)),
-                      mocap.rate_hz / step, "mm")
+        write_markers(
+            target / "mocap" / f"{file.stem}{ENDINGS[kind]}",
+            dict(zip(mocap.labels, position.transpose(1, 0, 2), strict=True)),
+            mocap.rate_hz / step,
+            "mm",
+        )
     for file in sorted((source / "log").iterdir()):
         log = read_log(file)
         write_log(target / "log" / file.name, _altered_log({"time": log.time_s, **log.columns}, kind, rng))
@@ -81,10 +86,16 @@ def main() -> int:
         for source in sorted(p.parent for p in arguments.folder.glob("*/answer.json")):
             target = arguments.output / kind / source.name
             altered(source, target / "session", kind, count)
-            hidden = [(e["effect"], e["finger"]) for e in json.loads((source / "answer.json").read_text())["effects"] if e["effect"] != "none"]
+            hidden = [
+                (e["effect"], e["finger"])
+                for e in json.loads((source / "answer.json").read_text())["effects"]
+                if e["effect"] != "none"
+            ]
             findings = diagnose(target / "session", output=target / "findings").findings
             named = [(f.effect, f.where["finger"]) for f in findings]
-            same = len(named) == len(hidden) and all(n == h or (n[0] == h[0] and n[1] is None) for n, h in zip(named, hidden, strict=True))
+            same = len(named) == len(hidden) and all(
+                n == h or (n[0] == h[0] and n[1] is None) for n, h in zip(named, hidden, strict=True)
+            )
             right, count = right + same, count + 1
             print(f"{kind} {source.name}: {named or 'consistent'}, hidden {hidden or 'nothing'}", flush=True)
     print(f"{right} of {count} right")

@@ -2,9 +2,10 @@
 
     OMP_NUM_THREADS=1 python scripts/benchmark.py [RESULT.json]
 
-One finger (40 s at 100 Hz, nine markers, every frame, with covariance) by the chain likelihood, by the published method, and by scipy's
-general least squares with the sparsity of the same problem given to it (few frames: it is slow); ten times the frames; a six-finger hand
-from session to report. Sessions are the twin's, recorded into a temporary folder first.
+One finger (40 s at 100 Hz, nine markers, every frame, with covariance) by the chain likelihood, by the published
+method, and by scipy's general least squares with the sparsity of the same problem given to it (few frames: it is slow);
+ten times the frames; a six-finger hand from session to report. Sessions are the twin's, recorded into a temporary
+folder first.
 """
 
 from __future__ import annotations
@@ -180,6 +181,6 @@ def main(target: str | None = None) -> None:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("target", metavar="RESULT.json", nargs="?", help="where to keep the figures")
     main(parser.parse_args().target)

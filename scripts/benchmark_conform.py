@@ -1,6 +1,6 @@
 """How long a comparison of a 24-joint hand takes, and what a pose costs in a loop over the engines (the baseline).
 
-    python scripts/benchmark_conform.py [--poses 10000]
+python scripts/benchmark_conform.py [--poses 10000]
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from hand_model.conform import conform
 
 
 def baseline(urdf: Path, mjcf: Path, poses: int) -> float:
-    """Seconds for the comparison as one writes it first: both engines, pose by pose, link by link, raw difference only."""
+    """Seconds for the comparison as one writes it first: both engines, pose by pose, link by link, raw difference
+    only."""
     import mujoco
     import numpy as np
     import pinocchio as pin
@@ -50,7 +51,7 @@ def baseline(urdf: Path, mjcf: Path, poses: int) -> float:
 
 def main() -> None:
     """Print the timings."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--poses", type=int, default=10000)
     poses = parser.parse_args().poses
     links = make_hand(0)

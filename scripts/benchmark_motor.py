@@ -1,12 +1,14 @@
-"""A finger's motor by this package and by mujoco.sysid: same parameters, same trials, same run; held-out error of both; writes JSON.
+"""A finger's motor by this package and by mujoco.sysid: same parameters, same trials, same run; held-out error of both;
+writes JSON.
 
     pip install 'mujoco[sysid]'
     python scripts/benchmark_motor.py SESSION ACTUATOR --output benchmark_motor.json
 
-mujoco.sysid is given favours: the reference (controller profile and instants of the commands) that this package identified, and the start that
-this package's own search begins from (its regression). It fits inertia, viscous and Coulomb friction, stiffness, preload, controller gain and
-damping, each in units of its start, so that the unknowns are of one size; wide bounds; residuals in units of their noise. This package fits
-the same seven from the same start (and the profile, presliding and instants besides, which sysid is given).
+mujoco.sysid is given favours: the reference (controller profile and instants of the commands) that this package
+identified, and the start that this package's own search begins from (its regression). It fits inertia, viscous and
+Coulomb friction, stiffness, preload, controller gain and damping, each in units of its start, so that the unknowns are
+of one size; wide bounds; residuals in units of their noise. This package fits the same seven from the same start (and
+the profile, presliding and instants besides, which sysid is given).
 """
 
 from __future__ import annotations
@@ -39,7 +41,9 @@ def load_sysid():
     try:
         from mujoco import sysid
     except ImportError as error:
-        raise MissingDependencyError(f"mujoco.sysid is not here ({error}); install it with: pip install 'mujoco[sysid]'") from None
+        raise MissingDependencyError(
+            f"mujoco.sysid is not here ({error}); install it with: pip install 'mujoco[sysid]'"
+        ) from None
     return sysid
 
 
@@ -47,8 +51,16 @@ def set_parameters(spec, values: dict[str, float]) -> None:
     """Write motor parameters (NAMES -> value) into an MjSpec of MODEL."""
     joint, actuator = spec.joint("motor"), spec.actuator("motor")
     joint.armature, joint.frictionloss = values["inertia"], values["coulomb"]
-    joint.damping = np.array([values["viscous"], *np.atleast_1d(joint.damping)[1:]]) if np.ndim(joint.damping) else values["viscous"]
-    joint.stiffness = np.array([values["stiffness"], *np.atleast_1d(joint.stiffness)[1:]]) if np.ndim(joint.stiffness) else values["stiffness"]
+    joint.damping = (
+        np.array([values["viscous"], *np.atleast_1d(joint.damping)[1:]])
+        if np.ndim(joint.damping)
+        else values["viscous"]
+    )
+    joint.stiffness = (
+        np.array([values["stiffness"], *np.atleast_1d(joint.stiffness)[1:]])
+        if np.ndim(joint.stiffness)
+        else values["stiffness"]
+    )
     joint.springref = -values["preload"] / values["stiffness"]
     gain, bias = np.array(actuator.gainprm), np.array(actuator.biasprm)
     gain[0], bias[1], bias[2] = values["gain"], -values["gain"], -values["damping"]
@@ -72,7 +84,8 @@ def sequences(sysid, spec, fit, trials: list[MotorTrial], lead: float):
 
 
 def begin_values(fit, trials: list[MotorTrial]) -> dict[str, float]:
-    """Where both searches begin: the plant by regression, gain from how far off its setpoint the drive rests, critical damping."""
+    """Where both searches begin: the plant by regression, gain from how far off its setpoint the drive rests, critical
+    damping."""
     plant = dict(zip(NAMES, map(float, fit.regression.values), strict=False))
     m = [x for t in trials for x in moves_from_rest(t, (fit.sigma_position, fit.sigma_current), fit.scale.speed_full)]
     off, hold = np.array([[np.mean(x.target - x.position[-6:]), np.mean(x.current[-6:])] for x in m]).T
@@ -102,12 +115,16 @@ def run_sysid(sysid, fit, trials: list[MotorTrial]) -> tuple[dict[str, float], f
     data = sequences(sysid, spec, fit, trials, lead)
     weights = {"position": 1 / fit.sigma_position, "current": 1 / fit.sigma_current}
     transform = sysid.SignalTransform(normalize=False)
-    residual = sysid.build_residual_fn(models_sequences=[data], modify_residual=transform.apply, sensor_weights=weights, n_threads=1)
+    residual = sysid.build_residual_fn(
+        models_sequences=[data], modify_residual=transform.apply, sensor_weights=weights, n_threads=1
+    )
     begin = time.process_time()
     found, _ = sysid.optimize(parameters, residual, verbose=False, max_iters=30)
     seconds = time.process_time() - begin
     vector = np.ravel(found.as_vector())
-    at_bound = [n for n, x in zip(NAMES, vector, strict=True) if min(abs(x - bounds[n][0]), abs(x - bounds[n][1])) < 1e-3]
+    at_bound = [
+        n for n, x in zip(NAMES, vector, strict=True) if min(abs(x - bounds[n][0]), abs(x - bounds[n][1])) < 1e-3
+    ]
     return {n: start[n] * float(x) for n, x in zip(NAMES, vector, strict=True)}, seconds, at_bound
 
 

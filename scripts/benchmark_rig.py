@@ -1,4 +1,5 @@
-"""The servo pendulum against the published friction ladder of BAM (Duclusaud, Passault, Padois & Ly 2025), and its speed.
+"""The servo pendulum against the published friction ladder of BAM (Duclusaud, Passault, Padois & Ly 2025), and its
+speed.
 
     python scripts/benchmark_rig.py SESSION [--json FILE]
 
@@ -42,14 +43,19 @@ LADDER = {
 
 
 def ladder(session_path: str, starts: int = 4) -> dict[str, dict[str, float]]:
-    """Held-out errors [rad], fitting time [s] and processor time [s] of every rung; the best of several starts by training error."""
+    """Held-out errors [rad], fitting time [s] and processor time [s] of every rung; the best of several starts by
+    training error."""
     session = read_session(session_path)
     rig = load_rig(session)
     declared = fit_declared(rig)
     stages = [build_swing(rig, declared, 4e-3, w) for w in windows_s(rig)]
     base, random, unit = free_declared(stages[0]), np.random.default_rng(0), typical(stages[0])
     out = {}
-    rungs = {f"{n}{words}": (*more, *extra) for words, more in (("", ()), (", offset", OFFSET)) for n, extra in LADDER.items()}
+    rungs = {
+        f"{n}{words}": (*more, *extra)
+        for words, more in (("", ()), (", offset", OFFSET))
+        for n, extra in LADDER.items()
+    }
     for name, extra in rungs.items():
         began, used, tasks = time.perf_counter(), sum(os.times()[:4]), []  # own and children's
         for k in range(starts):
@@ -72,7 +78,8 @@ def ladder(session_path: str, starts: int = 4) -> dict[str, dict[str, float]]:
 
 
 def per_evaluation(session_path: str) -> float:
-    """Milliseconds of processor time that one evaluation of the whole training set takes when a population of 100 is simulated at once."""
+    """Milliseconds of processor time that one evaluation of the whole training set takes when a population of 100 is
+    simulated at once."""
     rig = load_rig(read_session(session_path))
     swing = build_swing(rig, fit_declared(rig), 4e-3)
     train = tuple(int(i) for i in swing.train())
@@ -97,7 +104,9 @@ def main() -> None:
         print(f"{name:32s} rmse {row['rmse_rad']:.4f} mae {row['mae_rad']:.4f} rad, fitted in {row['seconds']:.1f} s, of a "
               f"processor {row['cpu_s']:.1f} s ({row['ms_per_evaluation']:.2f} ms per evaluation)")  # fmt: skip
     smallest = next(iter(rungs.values()))
-    print(f"{'M1 against bam.fit':32s} {BAM_FIT_S / smallest['cpu_s']:.0f} times faster ({BAM_FIT_S:g} s on two cores there)")
+    print(
+        f"{'M1 against bam.fit':32s} {BAM_FIT_S / smallest['cpu_s']:.0f} times faster ({BAM_FIT_S:g} s on two cores there)"
+    )
     print(f"{'diagnosed':32s} rmse {ours['rmse_rad']:.4f} mae {ours['mae_rad']:.4f} rad; declared {ours['declared_rmse_rad']:.4f} "
           f"{ours['declared_mae_rad']:.4f}; {ours['seconds']:.1f} s")  # fmt: skip
     if arguments.json:

@@ -1,10 +1,12 @@
-"""Joints that are no plain hinges, from a twin's session to the compiled file: markers kept out before and after, and the truth.
+"""Joints that are no plain hinges, from a twin's session to the compiled file: markers kept out before and after, and
+the truth.
 
     python scripts/course_accuracy.py [--first-seed 11] [--forms 10]
 
-Every form of `joint_wobble` and `moving_centre`, at full size and at 40 %, in turn at the proximal and at the distal joint. Before, after and
-noise are those of the findings: recordings kept out, in MuJoCo, on the compiled files. "truth": markers of the last segment, over the whole range,
-against the twin's own kinematics (root mean square, palm markers laid on each other).
+Every form of `joint_wobble` and `moving_centre`, at full size and at 40 %, in turn at the proximal and at the distal
+joint. Before, after and noise are those of the findings: recordings kept out, in MuJoCo, on the compiled files.
+"truth": markers of the last segment, over the whole range, against the twin's own kinematics (root mean square, palm
+markers laid on each other).
 """
 
 from __future__ import annotations
@@ -25,7 +27,13 @@ from hand_model.twin.influence import Hidden, activate
 from hand_model.twin.kinematics import segment_markers
 from hand_model.twin.schedule import schedule
 
-FORMS = [("joint_wobble", "wave"), ("joint_wobble", "bow"), ("moving_centre", "rolling"), ("moving_centre", "cam"), ("moving_centre", "ellipse")]
+FORMS = [
+    ("joint_wobble", "wave"),
+    ("joint_wobble", "bow"),
+    ("moving_centre", "rolling"),
+    ("moving_centre", "cam"),
+    ("moving_centre", "ellipse"),
+]
 POSES = 80
 
 
@@ -35,7 +43,9 @@ def off_truth(folder: Path, truth: Any, hidden: Hidden, seed: int) -> float:
     proximal = np.linspace(0, float(finger.proximal_rad.sum()), POSES)
     angle = np.stack([proximal, np.polynomial.polynomial.polyval(proximal, finger.distal_rad)], axis=1)
     trials = schedule(truth, Plan())
-    true = segment_markers(finger, angle, [activate(hidden, truth, trials, seed).influence], trials[-1], np.zeros(POSES))
+    true = segment_markers(
+        finger, angle, [activate(hidden, truth, trials, seed).influence], trials[-1], np.zeros(POSES)
+    )
     description = read_description(folder)
     names = [f"{finger.name}_{joint.name}" for joint in finger.joints]
     found = mujoco.positions(mujoco.load(description.mjcf), dict(zip(names, angle.T, strict=True)))
@@ -52,7 +62,9 @@ def row(effect: str, form: str, joint: int, strength: float, seed: int, root: Pa
     record(truth, root / "session", seed, (hidden,))
     findings = diagnose(root / "session", output=root / "out").findings
     named = ", ".join(f.effect for f in findings) or "nothing"
-    fit = next((f.fit for f in findings if f.effect == effect and f.where["joint"] == ("proximal", "distal")[joint]), None)
+    fit = next(
+        (f.fit for f in findings if f.effect == effect and f.where["joint"] == ("proximal", "distal")[joint]), None
+    )
     told = f"| {effect} | {form} | {('proximal', 'distal')[joint]} | {strength:.0%} | {named} |"
     if fit is None:
         return f"{told} | | | | |"
@@ -64,17 +76,22 @@ def row(effect: str, form: str, joint: int, strength: float, seed: int, root: Pa
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--first-seed", type=int, default=11)
     parser.add_argument("--forms", type=int, default=2 * len(FORMS), help="how many of the ten cases")
     options = parser.parse_args()
-    print("| hidden | form | joint | size | named | before, um | after | noise | after over noise | gone | truth before, mm | after |")
+    print(
+        "| hidden | form | joint | size | named | before, um | after | noise | after over noise | gone | truth before, mm | after |"
+    )
     print("| --- |" + " --- |" * 11)
     for i in range(options.forms):
         effect, form = FORMS[i % len(FORMS)]
         with tempfile.TemporaryDirectory() as scratch:
             strength = 1.0 if i < len(FORMS) else 0.4
-            print(row(effect, form, (i + i // len(FORMS)) % 2, strength, options.first_seed + i, Path(scratch)), flush=True)
+            print(
+                row(effect, form, (i + i // len(FORMS)) % 2, strength, options.first_seed + i, Path(scratch)),
+                flush=True,
+            )
 
 
 if __name__ == "__main__":

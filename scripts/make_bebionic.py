@@ -16,7 +16,7 @@ from hand_model.compile import compile
 
 def main() -> int:
     """Compile both hands and write what the check measured into their READMEs; 1 where an item does not pass."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--assets", type=Path, default=Path(__file__).resolve().parents[1] / "assets")
     assets = parser.parse_args().assets
     folders = {side: compile(published_hand(side), assets / f"bebionic_{side}").folder for side in SIDES}

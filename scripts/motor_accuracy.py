@@ -1,15 +1,18 @@
-"""Accuracy of identified motors on twin drives with known truth: coverage of intervals, held-out replay, time; writes JSON.
+"""Accuracy of identified motors on twin drives with known truth: coverage of intervals, held-out replay, time; writes
+JSON.
 
     python scripts/motor_accuracy.py --seeds 100 --output motor_accuracy.json
     python scripts/motor_accuracy.py --seeds 40 --stribeck --output motor_stribeck.json
     python scripts/motor_accuracy.py --hands 1 --output motor_hands.json
 
-Coverage: share of seeds whose truth lies in the 95 % interval; each seed is another drive, controller, noise and sampling. The regression that
-needs no controller is held against the truth too. Held-out current: over the noise of its sensor, and over what the true drive itself leaves on the
-same samples (the noise as it fell there, rounding, and a load that wanders, which nobody can foresee); the trials above 1.05 are listed with both, and with what
-the true drive leaves over the noise. Time: processor time of a fit, and the same on a core as fast as this one at its best, by a fixed loop timed before and after. --stribeck: friction that rises as speed falls,
-another rise for each seed. --hands N: every finger of left and right hands, both thumb positions, nominal and N seeds,
-replayed in MuJoCo from the setpoints of held-out trials, the motor as the compiler writes it.
+Coverage: share of seeds whose truth lies in the 95 % interval; each seed is another drive, controller, noise and
+sampling. The regression that needs no controller is held against the truth too. Held-out current: over the noise of its
+sensor, and over what the true drive itself leaves on the same samples (the noise as it fell there, rounding, and a load
+that wanders, which nobody can foresee); the trials above 1.05 are listed with both, and with what the true drive leaves
+over the noise. Time: processor time of a fit, and the same on a core as fast as this one at its best, by a fixed loop
+timed before and after. --stribeck: friction that rises as speed falls, another rise for each seed. --hands N: every
+finger of left and right hands, both thumb positions, nominal and N seeds, replayed in MuJoCo from the setpoints of
+held-out trials, the motor as the compiler writes it.
 """
 
 from __future__ import annotations
@@ -45,9 +48,11 @@ FRAME = """<mujoco><compiler angle="radian"/><option timestep="0.001" integrator
 <joint name="f_proximal" type="hinge" axis="0 1 0"/></body></body></worldbody></mujoco>"""
 
 
-def logs(truth, finger: str, seed: int, rise: DriveTerms = PLAIN) -> tuple[list[tuple[str, Log]], list[tuple[str, Log]], list[np.ndarray]]:
-    """Logs of a finger's training and validation trials, as the twin writes them into a session; the current [raw] of the true drive without its
-    unrest at the samples of the latter."""
+def logs(
+    truth, finger: str, seed: int, rise: DriveTerms = PLAIN
+) -> tuple[list[tuple[str, Log]], list[tuple[str, Log]], list[np.ndarray]]:
+    """Logs of a finger's training and validation trials, as the twin writes them into a session; the current [raw] of
+    the true drive without its unrest at the samples of the latter."""
     motor = truth.motors[truth.finger(finger).actuator]
     found: tuple[list, list, list] = ([], [], [])
     for trial in schedule(truth, Plan()):
@@ -56,7 +61,9 @@ def logs(truth, finger: str, seed: int, rise: DriveTerms = PLAIN) -> tuple[list[
         parts = [rise] + ([unrest_terms(motor, trial, seed)] if motor.unrest > 0 else [])
         motion = simulate(motor, trial.program, merge_terms(parts), trial.start_s)
         columns = log_columns(truth, motor, trial, motion, motion.position, motion.current, seed, 1.0)
-        found[trial.validate].append((trial.name, Log(np.round(columns.pop("time"), 5), columns, Path(f"{trial.name}.csv"))))
+        found[trial.validate].append(
+            (trial.name, Log(np.round(columns.pop("time"), 5), columns, Path(f"{trial.name}.csv")))
+        )
         if trial.validate:
             calm = simulate(motor, trial.program, rise, trial.start_s)
             found[2].append(np.interp(sample_times(truth.log, trial, seed), calm.time_s, calm.current))
@@ -64,10 +71,13 @@ def logs(truth, finger: str, seed: int, rise: DriveTerms = PLAIN) -> tuple[list[
 
 
 def stribeck(motor, seed: int) -> tuple[DriveTerms, dict[str, float]]:
-    """Friction that rises as speed falls, drawn from the seed, and its parameters: static over Coulomb friction, speed [%/s], exponent."""
+    """Friction that rises as speed falls, drawn from the seed, and its parameters: static over Coulomb friction, speed
+    [%/s], exponent."""
     rng = np.random.default_rng(seed)
     ratio, speed, exponent = rng.uniform(1.4, 1.9), rng.uniform(10, 30), 1.0 if rng.uniform() < 0.5 else 2.0
-    term = DriveTerms(friction=(lambda now: motor.coulomb * (ratio - 1) * math.exp(-(abs(now.velocity / speed) ** exponent)),))
+    term = DriveTerms(
+        friction=(lambda now: motor.coulomb * (ratio - 1) * math.exp(-(abs(now.velocity / speed) ** exponent)),)
+    )
     return term, {"static_ratio": ratio, "stribeck_speed": speed, "stribeck_exponent": exponent}
 
 
@@ -92,8 +102,11 @@ def yardstick() -> float:
     return time.process_time() - begin
 
 
-def identified(truth, fingers: list[str], seed: int, rise: DriveTerms = PLAIN) -> tuple[MotorFit, tuple[float, float], dict[str, list[tuple]]]:
-    """The motor that drives `fingers`, the processor time [s] of its fit and of the yardstick, and held-out logs by finger: name, log, true current."""
+def identified(
+    truth, fingers: list[str], seed: int, rise: DriveTerms = PLAIN
+) -> tuple[MotorFit, tuple[float, float], dict[str, list[tuple]]]:
+    """The motor that drives `fingers`, the processor time [s] of its fit and of the yardstick, and held-out logs by
+    finger: name, log, true current."""
     recorded = {f: logs(truth, f, seed, rise) for f in fingers}
     training = [x for f in fingers for x in recorded[f][0]]
     scale = trial_scale(training, truth.motors[truth.finger(fingers[0]).actuator].controller.speed_raw_full)
@@ -101,7 +114,11 @@ def identified(truth, fingers: list[str], seed: int, rise: DriveTerms = PLAIN) -
     before, begin = yardstick(), time.process_time()
     fit = fit_motor(trials, scale, truth.finger(fingers[0]).actuator)
     seconds = time.process_time() - begin
-    return fit, (seconds, 0.5 * (before + yardstick())), {f: [(*x, u) for x, u in zip(*recorded[f][1:], strict=True)] for f in fingers}
+    return (
+        fit,
+        (seconds, 0.5 * (before + yardstick())),
+        {f: [(*x, u) for x, u in zip(*recorded[f][1:], strict=True)] for f in fingers},
+    )
 
 
 def one_seed(seed: int, rises: bool) -> dict:
@@ -116,7 +133,9 @@ def one_seed(seed: int, rises: bool) -> dict:
         position, current = predicted.rmse()
         usable = np.isfinite(log.columns["position"]) & np.isfinite(log.columns["current"])
         left = (log.columns["current"] - true_current)[usable][predicted.predicted]
-        result["held_out"].append({"position_rmse": position, "current_rmse": current, "true_drive_rmse": float(np.sqrt(np.mean(left**2)))})
+        result["held_out"].append(
+            {"position_rmse": position, "current_rmse": current, "true_drive_rmse": float(np.sqrt(np.mean(left**2)))}
+        )
     return result
 
 
@@ -130,11 +149,21 @@ def hand_rows(side: str, seed: int | None) -> list[dict]:
         fingers = [f.name for f in truth.fingers if f.actuator == actuator]
         fit, seconds, held = identified(truth, fingers, ("left", "right").index(side) if seed is None else seed)
         for finger in fingers:
-            replayed = [mujoco_rmse(fit, motor_trial(n, log, fit.scale)) for n, log, _ in held[finger]] if fit.simulated else []
+            replayed = (
+                [mujoco_rmse(fit, motor_trial(n, log, fit.scale)) for n, log, _ in held[finger]]
+                if fit.simulated
+                else []
+            )
             rows = [{"position_rmse": p, "current_rmse": c} for p, c in replayed]
-            out.append(row(motor, fit, seconds, truth.log.current_raw, {}) | {"side": side, "seed": seed, "finger": finger, "held_out": rows})
+            out.append(
+                row(motor, fit, seconds, truth.log.current_raw, {})
+                | {"side": side, "seed": seed, "finger": finger, "held_out": rows}
+            )
             for p, c in replayed:
-                print(f"{side:6}{seed!s:6}{finger:9}{motor.controller.kind:9}{fit.method:13}{p:7.3f} %{c / truth.log.current_raw:7.3f} x noise", flush=True)
+                print(
+                    f"{side:6}{seed!s:6}{finger:9}{motor.controller.kind:9}{fit.method:13}{p:7.3f} %{c / truth.log.current_raw:7.3f} x noise",
+                    flush=True,
+                )
     return out
 
 
@@ -146,7 +175,10 @@ def mujoco_rmse(fit: MotorFit, trial: MotorTrial) -> tuple[float, float]:
     joint = Joint("proximal", np.array([0, 1.0, 0]), np.zeros(3), np.zeros((6, 6)), (0.0, 1.35), {})
     encoder = EncoderMap(fit.scale.counts_open, fit.scale.counts_close, np.array([0.0, 1.2]), {}, {})
     root = etree.fromstring(FRAME)
-    write_motors(root, Hand("twin", "left", {}, {}, (Finger("f", fit.motor.actuator, (joint,), (encoder,)),), 1e-4, {}, (fit.motor,)))
+    write_motors(
+        root,
+        Hand("twin", "left", {}, {}, (Finger("f", fit.motor.actuator, (joint,), (encoder,)),), 1e-4, {}, (fit.motor,)),
+    )
     model = mujoco.MjModel.from_xml_string(etree.tostring(root).decode())
     data, q, lead = mujoco.MjData(model), fit.simulated, fit.simulated["damping"] / fit.simulated["gain"]
     name = fit.motor.actuator
@@ -171,17 +203,22 @@ def mujoco_rmse(fit: MotorFit, trial: MotorTrial) -> tuple[float, float]:
         position[i] = motor.qpos[0]
         mujoco.mj_step(model, data)
         current[i] = data.actuator_force[own]
-    k = (trial.time_s > trial.time_s[moves[0].index]) & (trial.time_s < trial.time_s[moves[-1].index] + moves[-1].time_s[-1])
+    k = (trial.time_s > trial.time_s[moves[0].index]) & (
+        trial.time_s < trial.time_s[moves[-1].index] + moves[-1].time_s[-1]
+    )
     error_p = np.interp(trial.time_s, grid, position) - trial.position
     error_u = np.interp(trial.time_s + q["lead"], grid, current) - trial.current
     return float(np.sqrt(np.mean(error_p[k] ** 2))), float(np.sqrt(np.mean(error_u[k] ** 2)))
 
 
 def commands(trial: MotorTrial, moves, starts) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Instants [s], setpoints [%] and speeds [share] of all commands; those that found the drive at rest as they were aligned."""
+    """Instants [s], setpoints [%] and speeds [share] of all commands; those that found the drive at rest as they were
+    aligned."""
     change = np.flatnonzero(np.diff(trial.setpoint) != 0)
     own = {m.index: x for m, x in zip(moves, starts, strict=True)}
-    begins = [trial.time_s[i] + (own[i][0] if i in own else 0.5 * (trial.time_s[i + 1] - trial.time_s[i])) for i in change]
+    begins = [
+        trial.time_s[i] + (own[i][0] if i in own else 0.5 * (trial.time_s[i + 1] - trial.time_s[i])) for i in change
+    ]
     speeds = [own[i][2] if i in own else (1.0 if trial.speed is None else trial.speed[i + 1]) for i in change]
     return np.array(begins), trial.setpoint[change + 1], np.array(speeds)
 
@@ -198,7 +235,9 @@ def summary(rows: list[dict]) -> dict:
         over = np.array([h["current_rmse"] / h["true_drive_rmse"] for h in known])
         floor = np.array([h["true_drive_rmse"] / h["noise"] for h in known])
         full = np.array([r["cpu_s"] * best / r["yard_s"] for r in some])
-        names = sorted({n for r in some for n in r["parameters"]}, key=[*NAMES, *(n for r in some for n in r["parameters"])].index)
+        names = sorted(
+            {n for r in some for n in r["parameters"]}, key=[*NAMES, *(n for r in some for n in r["parameters"])].index
+        )
         given = [r for r in some if r["parameters"]["inertia"][2] is not None]
         told = {n: [x for r in given if (x := r["parameters"].get(n)) and x[2] is not None] for n in names}
         inside = {n: [low <= true <= high for true, _, low, high in x] for n, x in told.items() if x}
@@ -238,12 +277,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--first-seed", type=int, default=1000)
-    parser.add_argument("--stribeck", action="store_true", help="friction that rises as speed falls, planted in every drive")
-    parser.add_argument("--hands", type=int, default=None, help="whole hands in MuJoCo instead: the nominal ones and so many seeds")
+    parser.add_argument(
+        "--stribeck", action="store_true", help="friction that rises as speed falls, planted in every drive"
+    )
+    parser.add_argument(
+        "--hands", type=int, default=None, help="whole hands in MuJoCo instead: the nominal ones and so many seeds"
+    )
     parser.add_argument("--output", default="motor_accuracy.json")
     args = parser.parse_args()
     seeds = range(args.first_seed, args.first_seed + (args.seeds if args.hands is None else args.hands))
-    units = [(one_seed, (s, args.stribeck)) for s in seeds] if args.hands is None else [(hand_rows, (side, s)) for s in (None, *seeds) for side in ("left", "right")]
+    units = (
+        [(one_seed, (s, args.stribeck)) for s in seeds]
+        if args.hands is None
+        else [(hand_rows, (side, s)) for s in (None, *seeds) for side in ("left", "right")]
+    )
     rows: list[dict] = []
     for task, arguments in units:
         found = task(*arguments)

@@ -32,7 +32,10 @@ def run(folder: Path, output: Path, only: list[str]) -> list[dict]:
             continue
         records.append(record(path.name, findings, time.perf_counter() - began, sum(os.times()[:4]) - used))
         write_rig_findings(session, findings, output / path.name)
-        print(f"{path.name}: {findings.verdict}, {records[-1]['seconds']:.0f} s, of a processor {records[-1]['cpu_s']:.0f} s", flush=True)
+        print(
+            f"{path.name}: {findings.verdict}, {records[-1]['seconds']:.0f} s, of a processor {records[-1]['cpu_s']:.0f} s",
+            flush=True,
+        )
     return records
 
 

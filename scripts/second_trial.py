@@ -1,8 +1,11 @@
-"""A blind trial on a second recorder's sessions, which shares no code with the twin nor with the diagnosis (`second_recorder/`).
+"""A blind trial on a second recorder's sessions, which shares no code with the twin nor with the diagnosis
+(`second_recorder/`).
 
-    python scripts/second_trial.py FOLDER [--seed 1] [--single 36] [--none 4] [--pair 10] [--weak 10] [--messy 10] [--outside 10] [--anywhere]
+    python scripts/second_trial.py FOLDER [--seed 1] [--single 36] [--none 4] [--pair 10] [--weak 10] [--messy 10]
+    [--outside 10] [--anywhere]
 
-FOLDER must be new. It gets sessions, answers.json (its SHA-256 is printed before any diagnosis starts), findings; the score is printed.
+FOLDER must be new. It gets sessions, answers.json (its SHA-256 is printed before any diagnosis starts), findings; the
+score is printed.
 """
 
 from __future__ import annotations
@@ -21,7 +24,8 @@ from second_recorder.hand import COUNTS as RANGES
 
 from hand_model.blind_trial import judged
 
-# What a finding should read of the recorder's settings s (all groups together) and of the motor m, where both have the figure.
+# What a finding should read of the recorder's settings s (all groups together) and of the motor m, where both have the
+# figure.
 READINGS: dict[str, Callable[[dict[str, Any], dict[str, float]], dict[str, float]]] = {
     "stribeck_friction": lambda s, m: {"static_ratio": s["Fs_ratio"], "stribeck_speed": s["vs"]},
     "asymmetric_viscous_friction": lambda s, m: {"viscous_flexion": m["b"] * s.get("b_flex_ratio", 1.0), "viscous_extension": m["b"] * s.get("b_ext_ratio", 1.0)},
@@ -55,31 +59,45 @@ COUNTS = {"single": 36, "none": 4, "pair": 10, "weak": 10, "messy": 10, "outside
 
 
 def parameters(folder: Path, made: list[dict[str, Any]]) -> list[tuple[str, float, float, list[float] | None]]:
-    """Effect and name, truth, value and interval of every figure that recorder and finding both have; messy sessions left out."""
+    """Effect and name, truth, value and interval of every figure that recorder and finding both have; messy sessions
+    left out."""
     out = []
     for answer in made:
         if answer["kind"] not in ("single", "weak", "pair"):
             continue
         findings = json.loads((folder / "findings" / answer["case"] / "findings.json").read_text())["findings"]
         for hidden in (e for e in answer["effects"] if e["effect"] in READINGS):
-            settings = {k: v for group in answer["settings_by_finger"][hidden["finger"]].values() for k, v in group.items()}
+            settings = {
+                k: v for group in answer["settings_by_finger"][hidden["finger"]].values() for k, v in group.items()
+            }
             open_counts, full_counts = RANGES[hidden["finger"]]
-            truth = READINGS[hidden["effect"]](settings, {**answer["motor"][hidden["finger"]], "counts": full_counts - open_counts})
-            for found in (f for f in findings if f["effect"] == hidden["effect"] and f["where"]["finger"] in (hidden["finger"], None)):
+            truth = READINGS[hidden["effect"]](
+                settings, {**answer["motor"][hidden["finger"]], "counts": full_counts - open_counts}
+            )
+            for found in (
+                f
+                for f in findings
+                if f["effect"] == hidden["effect"] and f["where"]["finger"] in (hidden["finger"], None)
+            ):
                 read = {name: found["parameters"][name] for name in truth if name in found["parameters"]}
-                out += [(f"{hidden['effect']}.{name}", float(truth[name]), entry["value"], entry.get("ci95")) for name, entry in read.items()]
+                out += [
+                    (f"{hidden['effect']}.{name}", float(truth[name]), entry["value"], entry.get("ci95"))
+                    for name, entry in read.items()
+                ]
     return out
 
 
 def main() -> None:
     """Record, diagnose, score."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2, help="sessions at a time")
     for kind, count in COUNTS.items():
         parser.add_argument(f"--{kind}", type=int, default=count, help=f"number of {kind} sessions")
-    parser.add_argument("--anywhere", action="store_true", help="each session in a laboratory of its own: rates, noise, speeds")
+    parser.add_argument(
+        "--anywhere", action="store_true", help="each session in a laboratory of its own: rates, noise, speeds"
+    )
     options = parser.parse_args()
     if options.folder.exists():
         sys.exit(f"{options.folder} exists; a new folder is needed")
@@ -92,10 +110,15 @@ def main() -> None:
     trial = judged(options.folder, answers, options.workers)
     for row in trial.rows:
         if not row["right"]:
-            print(f"{row['case']} {row['kind']}: {', '.join(row['truth'][:2])} -> {', '.join(row['named'][:4]) or row['verdict']}")
+            print(
+                f"{row['case']} {row['kind']}: {', '.join(row['truth'][:2])} -> {', '.join(row['named'][:4]) or row['verdict']}"
+            )
     print(trial.table())
     figures = parameters(options.folder, made)
-    right = [abs(value - truth) <= 0.1 * abs(truth) or bool(ci and ci[0] <= truth <= ci[1]) for _, truth, value, ci in figures]
+    right = [
+        abs(value - truth) <= 0.1 * abs(truth) or bool(ci and ci[0] <= truth <= ci[1])
+        for _, truth, value, ci in figures
+    ]
     print(f"parameters within 10 % or inside the interval: {sum(right)} of {len(right)}")
     for name, truth, value, ci in (f for f, good in zip(figures, right, strict=True) if not good):
         print(f"  {name}: {value:.4g} {'' if ci is None else [float(f'{c:.4g}') for c in ci]} for {truth:.4g}")

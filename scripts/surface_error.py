@@ -1,10 +1,11 @@
 """Errors of probed surfaces against the probed points and against the twin's true ones, as JSON.
 
-    python scripts/surface_error.py --output surface_error.json [--seeds 0,1,2] [--side left] [--fingers index,ring] [--voxel-mm 5]
-    python scripts/surface_error.py --session SESSION --output surface_error.json          (no truth: probed points only)
+    python scripts/surface_error.py --output surface_error.json [--seeds 0,1,2] [--side left] [--fingers index,ring]
+    [--voxel-mm 5] python scripts/surface_error.py --session SESSION --output surface_error.json          (no truth:
+    probed points only)
 
-true_*: distance [mm] of points spread evenly over the true surface from the mesh; mesh_*: of the mesh's vertices from the true
-surface; both in the recorded palm frame, so that the error of the frame itself is part of them.
+true_*: distance [mm] of points spread evenly over the true surface from the mesh; mesh_*: of the mesh's vertices from
+the true surface; both in the recorded palm frame, so that the error of the frame itself is part of them.
 """
 
 from __future__ import annotations
@@ -48,12 +49,16 @@ def main() -> None:
                 session = read_session(Path(folder) / "session")
                 true = {s.segment: s for s in truth.surfaces}
                 rows += _measured(session, identify(session), options.voxel_mm / 1e3, true, seed)
-    options.output.write_text(json.dumps({"format": "surface-error/1", "voxel_mm": options.voxel_mm, "surfaces": rows}, indent=1) + "\n")
+    options.output.write_text(
+        json.dumps({"format": "surface-error/1", "voxel_mm": options.voxel_mm, "surfaces": rows}, indent=1) + "\n"
+    )
     for row in rows:
         print({key: round(v, 3) if isinstance(v, float) else v for key, v in row.items() if not isinstance(v, dict)})
 
 
-def _measured(session: Session, hand: Hand, voxel_m: float, true: dict[str, SurfaceTruth], seed: int | None) -> list[dict[str, Any]]:
+def _measured(
+    session: Session, hand: Hand, voxel_m: float, true: dict[str, SurfaceTruth], seed: int | None
+) -> list[dict[str, Any]]:
     rows = []
     for pivoting in (True, False) if has_open3d() else (False,):
         for surface in identify_surfaces(session, hand, voxel_m, pivoting):
@@ -78,11 +83,16 @@ def against(surface: Surface, true: SurfaceTruth) -> dict[str, Any]:
     there = summary_mm(distance_to_mesh(points, surface.vertices, surface.faces))
     back = summary_mm(_from_ellipsoid((surface.vertices - true.centre_palm) @ true.axes_palm.T, true.radii_m))
     ratio = volume(surface.vertices, surface.faces) / (4 / 3 * np.pi * true.radii_m.prod())
-    return {f"true_{k}": v for k, v in there.items()} | {f"mesh_{k}": v for k, v in back.items()} | {"volume_ratio": float(ratio)}
+    return (
+        {f"true_{k}": v for k, v in there.items()}
+        | {f"mesh_{k}": v for k, v in back.items()}
+        | {"volume_ratio": float(ratio)}
+    )
 
 
 def _from_ellipsoid(points: np.ndarray, radii: np.ndarray) -> np.ndarray:
-    """Distances (n,) [m] of points (n, 3) [m] from an ellipsoid about the origin, by bisection on the foot's multiplier (Eberly 2013)."""
+    """Distances (n,) [m] of points (n, 3) [m] from an ellipsoid about the origin, by bisection on the foot's multiplier
+    (Eberly 2013)."""
     p = np.abs(points)
     low, high = np.full(len(p), -(radii.min() ** 2) * (1 - 1e-9)), np.linalg.norm(p * radii, axis=1) + 1e-12
     for _ in range(100):

@@ -30,9 +30,15 @@ def recording(seed: int, arcs_deg: tuple[float, float] = (75, 65), noise_m: floa
     phase = np.linspace(0, 2 * np.pi * 5, n)
     drive = (1 - np.cos(phase)) / 2
     drive[:100] = 0
-    angle = np.stack([np.deg2rad(arcs_deg[0]) * drive, np.deg2rad(arcs_deg[1]) * (0.5 * drive + 0.5 * drive**2)], axis=1)
+    angle = np.stack(
+        [np.deg2rad(arcs_deg[0]) * drive, np.deg2rad(arcs_deg[1]) * (0.5 * drive + 0.5 * drive**2)], axis=1
+    )
     x = propagate(chain, BODY, angle)[0]
-    turn = np.stack([0.05 * np.sin(phase / 7), 0.03 * np.cos(phase / 5), 0.04 * np.sin(phase / 11)], axis=1) + [0.3, 0.2, -0.4]
+    turn = np.stack([0.05 * np.sin(phase / 7), 0.03 * np.cos(phase / 5), 0.04 * np.sin(phase / 11)], axis=1) + [
+        0.3,
+        0.2,
+        -0.4,
+    ]
     shift = np.stack([0.004 * np.sin(phase / 9) + 0.4, 0.003 * np.cos(phase / 4) - 0.2, 1 + 0 * phase], axis=1)
     y = np.einsum("nij,nmj->nmi", rotation_from_vector(turn), x) + shift[:, None] + rng.normal(0, noise_m, x.shape)
     return chain, ChainData(y, BODY, LABELS), angle

@@ -9,12 +9,14 @@ from pathlib import Path
 import numpy as np
 from lxml import etree
 
-FINGERS = {"wrist": 2, "index": 4, "middle": 4, "ring": 4, "little": 5, "thumb": 5}  # 24 joints, as the largest hands have
+# 24 joints, as the largest hands have
+FINGERS = {"wrist": 2, "index": 4, "middle": 4, "ring": 4, "little": 5, "thumb": 5}
 
 
 @dataclass
 class Link:
-    """A link with the joint that moves it: pose in the parent's frame at zero, axis in its own frame, all in SI units."""
+    """A link with the joint that moves it: pose in the parent's frame at zero, axis in its own frame, all in SI
+    units."""
 
     name: str
     joint: str
@@ -46,7 +48,8 @@ def transform(vector, position) -> np.ndarray:
 
 
 def make_hand(seed: int = 0, side: str = "right", couplings: bool = True) -> list[Link]:
-    """A five-fingered hand of 24 joints with generic axes; the left one is the mirror image of the right one of the same seed."""
+    """A five-fingered hand of 24 joints with generic axes; the left one is the mirror image of the right one of the
+    same seed."""
     rng = np.random.default_rng(seed)
     links: list[Link] = []
     for n, (finger, count) in enumerate(FINGERS.items()):
@@ -133,7 +136,10 @@ def write_mjcf(
     etree.SubElement(root, "compiler", angle="degree" if degrees else "radian", autolimits="true")
     world = etree.SubElement(root, "worldbody")
     rng = np.random.default_rng(frames)
-    turn = {n: transform(rng.normal(size=3), 0.01 * rng.normal(size=3)) for n in ("palm_base", *(link.name for link in links))}
+    turn = {
+        n: transform(rng.normal(size=3), 0.01 * rng.normal(size=3))
+        for n in ("palm_base", *(link.name for link in links))
+    }
     turn = {n: np.eye(4) if frames is None or n == "palm_base" else t for n, t in turn.items()}
     turn["palm_base"] = np.eye(4) if base is None else base
     bodies = {"palm_base": etree.SubElement(world, "body", name="palm_base", pos="0.1 0.2 0.3", quat="0.8 0.6 0 0")}
@@ -142,7 +148,13 @@ def write_mjcf(
         ref[:3, 3] = link.point - ref[:3, :3] @ link.point
         at_ref = link.origin @ np.linalg.inv(ref)  # at the value `ref` the body stands where it is written
         placed = np.linalg.inv(turn[link.parent]) @ at_ref @ turn[link.name]
-        body = etree.SubElement(bodies[link.parent], "body", name=link.name, pos=text(placed[:3, 3], digits), quat=text(_quat(placed), digits))
+        body = etree.SubElement(
+            bodies[link.parent],
+            "body",
+            name=link.name,
+            pos=text(placed[:3, 3], digits),
+            quat=text(_quat(placed), digits),
+        )
         bodies[link.name] = body
         back = np.linalg.inv(turn[link.name])
         joint = etree.SubElement(body, "joint", name=link.joint, axis=text(back[:3, :3] @ link.axis, digits))
@@ -151,7 +163,9 @@ def write_mjcf(
         if link.ref:
             joint.set("ref", text(link.ref * scale, digits))
         if link.tip is not None and tips:
-            etree.SubElement(body, "site", name=f"{link.name}_tip", pos=text(back[:3, :3] @ link.tip + back[:3, 3], digits))
+            etree.SubElement(
+                body, "site", name=f"{link.name}_tip", pos=text(back[:3, :3] @ link.tip + back[:3, 3], digits)
+            )
     equality = etree.SubElement(root, "equality")
     refs = {link.joint: link.ref for link in links}
     for link in links:

@@ -1,4 +1,5 @@
-"""One thread per numerical library, before any is loaded: the matrices are small, and threads only get in each other's way."""
+"""One thread per numerical library, before any is loaded: the matrices are small, and threads only get in each other's
+way."""
 
 import os
 

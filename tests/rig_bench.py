@@ -24,8 +24,11 @@ torque = "actuator:motor:force"
 Motion = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # time [s], angle [rad], velocity, acceleration
 
 
-def recorded(folder: Path, arm: str, count: int, torque: Callable[[Motion], np.ndarray], noise: float, last: float = 1.0) -> Path:
-    """A session of `count` recordings, those after the fourth held out; torque [N m] of a motion, noise [N m]; last: times as fast the fourth of them."""
+def recorded(
+    folder: Path, arm: str, count: int, torque: Callable[[Motion], np.ndarray], noise: float, last: float = 1.0
+) -> Path:
+    """A session of `count` recordings, those after the fourth held out; torque [N m] of a motion, noise [N m]; last:
+    times as fast the fourth of them."""
     random, tables = np.random.default_rng(4), []
     t = np.arange(0, 12, 0.004)
     for k in range(count):
@@ -33,7 +36,9 @@ def recorded(folder: Path, arm: str, count: int, torque: Callable[[Motion], np.n
         rate = rate * (last if k == 3 else 1.0)
         phase = np.outer(rate, t) + random.uniform(0, 6, 2)[:, None]
         q, v, a = size @ np.sin(phase), (size * rate) @ np.cos(phase), -(size * rate**2) @ np.sin(phase)
-        tables.append(np.stack([t, np.round(q / 4e-4) * 4e-4, torque((t, q, v, a)) + noise * random.standard_normal(len(t))], 1))
+        tables.append(
+            np.stack([t, np.round(q / 4e-4) * 4e-4, torque((t, q, v, a)) + noise * random.standard_normal(len(t))], 1)
+        )
     return written(folder, arm, HEAD, "torque", tables)
 
 
@@ -43,7 +48,9 @@ def written(folder: Path, model: str, head: str, effort: str, tables: Sequence[n
     (folder / "rig.xml").write_text(model)
     text = head
     for k, table in enumerate(tables):
-        np.savetxt(folder / f"log/{k}.csv", table, delimiter=",", header=f"time,position,{effort}", comments="", fmt="%.8g")
+        np.savetxt(
+            folder / f"log/{k}.csv", table, delimiter=",", header=f"time,position,{effort}", comments="", fmt="%.8g"
+        )
         text += f'[[trial]]\nkind = "motion"\nlog = "log/{k}.csv"\n' + ('purpose = "validate"\n' if k > 3 else "")
     (folder / "session.toml").write_text(text)
     return folder

@@ -25,9 +25,13 @@ def periodic(effect: str, actuator: str, period: float) -> tuple[float, Finding]
     return 1.0, Finding(effect, (effect,), 1.0, (), where, "", {"period": {"value": period, "unit": "%"}}, {}, None)
 
 
-@pytest.mark.parametrize(("period", "motor", "stays"), [(10.8, "index", False), (3.62, "index", False), (8.1, "index", True),
-                                                        (3.62, "ring", True), (21.6, "index", True)])
-def test_a_ripple_at_a_harmonic_of_the_same_encoders_error_is_its_shadow(period: float, motor: str, stays: bool) -> None:
+@pytest.mark.parametrize(
+    ("period", "motor", "stays"),
+    [(10.8, "index", False), (3.62, "index", False), (8.1, "index", True), (3.62, "ring", True), (21.6, "index", True)],
+)
+def test_a_ripple_at_a_harmonic_of_the_same_encoders_error_is_its_shadow(
+    period: float, motor: str, stays: bool
+) -> None:
     error, ripple = periodic("encoder_periodic_error", "index", 10.79), periodic("torque_ripple", motor, period)
     assert _without_shadows([error, ripple]) == ([error, ripple] if stays else [error])
 
@@ -58,13 +62,24 @@ def test_a_trifle_in_the_angles_of_a_finger_whose_joint_wobbles_is_no_finding_an
 
 
 def with_share(weight: float, effect: str, finger: str, signal: str, share: float) -> tuple[float, Finding]:
-    where = {"finger": finger, "actuator": finger, "joint": None, "signal": signal, "marker": None, "trials": [], "share_of_mismatch": share}
+    where = {
+        "finger": finger,
+        "actuator": finger,
+        "joint": None,
+        "signal": signal,
+        "marker": None,
+        "trials": [],
+        "share_of_mismatch": share,
+    }
     return weight, Finding(effect, (effect,), 1.0, (), where, "", {}, {}, None)
 
 
 def test_shares_of_the_mismatch_are_ranked_as_the_findings_and_are_those_of_the_whole_session() -> None:
-    ranked = [with_share(1e9, "command_as_measurement", "ring", "current", 1.0), with_share(2.0, "detent_load", "index", "current", 0.7),
-              with_share(1.0, "marker_slip", "index", "markers", 1.0)]
+    ranked = [
+        with_share(1e9, "command_as_measurement", "ring", "current", 1.0),
+        with_share(2.0, "detent_load", "index", "current", 0.7),
+        with_share(1.0, "marker_slip", "index", "markers", 1.0),
+    ]
     shares = [f.where["share_of_mismatch"] for f in _shared(ranked)]
     assert shares == sorted(shares, reverse=True)
     assert shares[0] == shares[1] == pytest.approx(4 * shares[2])
@@ -77,9 +92,19 @@ FIT = {"metric": "current_rmse", "unit": "raw", "before": 2.0, "after": 1.0, "no
 
 
 def finding(effect: str, finger: str, signal: str, **parameters: float) -> Finding:
-    where = {"finger": finger, "joint": None, "actuator": finger, "signal": signal, "marker": None, "trials": [], "region": None,
-             "share_of_mismatch": 1.0}
-    return Finding(effect, (effect,), 1.0, (), where, "", {k: {"value": v, "unit": "1"} for k, v in parameters.items()}, FIT)
+    where = {
+        "finger": finger,
+        "joint": None,
+        "actuator": finger,
+        "signal": signal,
+        "marker": None,
+        "trials": [],
+        "region": None,
+        "share_of_mismatch": 1.0,
+    }
+    return Finding(
+        effect, (effect,), 1.0, (), where, "", {k: {"value": v, "unit": "1"} for k, v in parameters.items()}, FIT
+    )
 
 
 def names(*weighted: tuple[float, Finding]) -> list[str]:
@@ -87,49 +112,88 @@ def names(*weighted: tuple[float, Finding]) -> list[str]:
 
 
 def test_a_slip_of_a_tenth_comes_after_a_plain_friction_however_sharp_the_cameras_are() -> None:
-    slip, drag = finding("marker_slip", "index", "markers", distance=2e-4), finding("load_dependent_friction", "index", "current", load_coefficient=0.4)
+    slip, drag = (
+        finding("marker_slip", "index", "markers", distance=2e-4),
+        finding("load_dependent_friction", "index", "current", load_coefficient=0.4),
+    )
     assert names((0.2, slip), (0.1, drag)) == ["load_dependent_friction", "marker_slip"]
     full = finding("marker_slip", "index", "markers", distance=2e-3)
     assert names((2.0, full), (0.1, drag)) == ["marker_slip", "load_dependent_friction"]
 
 
 def test_one_effect_of_one_drive_is_one_finding() -> None:
-    speed, torque = finding("drive_sag", "index", "command", sag=0.002), finding("drive_sag", "index", "current", torque_loss=0.3)
+    speed, torque = (
+        finding("drive_sag", "index", "command", sag=0.002),
+        finding("drive_sag", "index", "current", torque_loss=0.3),
+    )
     findings = assemble([], [(0.1, speed), (0.3, torque)], []).findings
     assert [f.where["signal"] for f in findings] == ["current"]
-    assert names((0.1, speed), (0.3, finding("drive_sag", "ring", "current", torque_loss=0.3))) == ["drive_sag", "drive_sag"]
+    assert names((0.1, speed), (0.3, finding("drive_sag", "ring", "current", torque_loss=0.3))) == [
+        "drive_sag",
+        "drive_sag",
+    ]
 
 
 def test_a_trifle_beside_a_large_effect_of_the_same_finger_is_no_finding_but_is_said() -> None:
-    main, trifle = finding("clock_drift", "index", "log", rate_minus_one=2e-3), finding("current_channel_delay", "index", "current", delay=0.004)
+    main, trifle = (
+        finding("clock_drift", "index", "log", rate_minus_one=2e-3),
+        finding("current_channel_delay", "index", "current", delay=0.004),
+    )
     found = assemble([], [(1.0, main), (0.01, trifle)], [])
     assert [f.effect for f in found.findings] == ["clock_drift"]
-    assert [r["effect"] for r in found.rejected] == ["current_channel_delay"] and "trifle" in found.rejected[0]["reason"]
+    assert [r["effect"] for r in found.rejected] == ["current_channel_delay"] and "trifle" in found.rejected[0][
+        "reason"
+    ]
     elsewhere = finding("current_channel_delay", "ring", "current", delay=0.004)
     assert names((1.0, main), (0.01, elsewhere)) == ["clock_drift", "current_channel_delay"]
-    assert names((1.0, main), (0.01, finding("current_channel_delay", "index", "current", delay=0.06))) == ["clock_drift", "current_channel_delay"]
+    assert names((1.0, main), (0.01, finding("current_channel_delay", "index", "current", delay=0.06))) == [
+        "clock_drift",
+        "current_channel_delay",
+    ]
 
 
 def test_exchanged_labels_make_no_trifle_of_what_a_current_shows() -> None:
-    main, small = finding("marker_swap", "index", "markers", lasting=4.0), finding("current_channel_delay", "index", "current", delay=0.004)
-    assert {f.effect for f in assemble([], [(1.0, main), (0.01, small)], []).findings} == {"marker_swap", "current_channel_delay"}
-
+    main, small = (
+        finding("marker_swap", "index", "markers", lasting=4.0),
+        finding("current_channel_delay", "index", "current", delay=0.004),
+    )
+    assert {f.effect for f in assemble([], [(1.0, main), (0.01, small)], []).findings} == {
+        "marker_swap",
+        "current_channel_delay",
+    }
 
 
 def test_where_no_finger_is_a_hinge_to_the_cameras_angles_tell_nothing() -> None:
-    bent = [{"where": {"finger": f}, "shape": f"{NO_HINGE}: the markers leave it", "share_of_mismatch": 1.0} for f in ("index", "ring")]
-    ranked = [with_share(1.0, "linkage_backlash", "index", "markers", 1.0), with_share(0.5, "joint_wobble", "ring", "markers", 1.0),
-              with_share(0.5, "stribeck_friction", "index", "current", 1.0), with_share(0.5, "linkage_backlash", "little", "markers", 1.0)]
+    bent = [
+        {"where": {"finger": f}, "shape": f"{NO_HINGE}: the markers leave it", "share_of_mismatch": 1.0}
+        for f in ("index", "ring")
+    ]
+    ranked = [
+        with_share(1.0, "linkage_backlash", "index", "markers", 1.0),
+        with_share(0.5, "joint_wobble", "ring", "markers", 1.0),
+        with_share(0.5, "stribeck_friction", "index", "current", 1.0),
+        with_share(0.5, "linkage_backlash", "little", "markers", 1.0),
+    ]
     assert _of_hinges(ranked, bent) == ranked[2:]
-    assert _of_hinges(ranked, bent[:1]) == ranked  # one finger has none: whether its angles tell anything, what they leave says
+    # one finger has none: whether its angles tell anything, what they leave says
+    assert _of_hinges(ranked, bent[:1]) == ranked
 
 
-@pytest.mark.parametrize(("finger", "signal", "p", "other", "doubtful"), [
-    ("index", "markers", 1e-9, 0.5, True), ("index", "encoder", 1e-9, 0.5, True), ("index", "markers", 0.2, 0.5, False),
-    ("index", "markers", 0.2, 1e-9, True), ("index", "current", 1e-9, 0.5, False), ("ring", "markers", 0.2, 1e-9, False)])
+@pytest.mark.parametrize(
+    ("finger", "signal", "p", "other", "doubtful"),
+    [
+        ("index", "markers", 1e-9, 0.5, True),
+        ("index", "encoder", 1e-9, 0.5, True),
+        ("index", "markers", 0.2, 0.5, False),
+        ("index", "markers", 0.2, 1e-9, True),
+        ("index", "current", 1e-9, 0.5, False),
+        ("ring", "markers", 0.2, 1e-9, False),
+    ],
+)
 def test_angles_of_markers_that_leave_segments_or_hinge_need_names_that_leave_nothing(
         finger: str, signal: str, p: float, other: float, doubtful: bool) -> None:  # fmt: skip
     """At no station of that finger's angles: other is the p of the index's other one."""
+
     def station(finger: str, signal: str, p: float) -> SimpleNamespace:
         return SimpleNamespace(finger=finger, signal=signal, naming=SimpleNamespace(after=SimpleNamespace(p=p)))
 
@@ -138,12 +202,24 @@ def test_angles_of_markers_that_leave_segments_or_hinge_need_names_that_leave_no
     assert _leave_something(asked, every) is doubtful
 
 
-@pytest.mark.parametrize(("named", "believed", "stays"), [("drive_sag", True, False), ("current_saturation", True, False), ("drive_sag", False, True),
-                                                          ("stribeck_friction", True, True)])
-def test_a_loss_of_speed_is_named_once_and_not_where_the_current_is_cut(named: str, believed: bool, stays: bool) -> None:
+@pytest.mark.parametrize(
+    ("named", "believed", "stays"),
+    [
+        ("drive_sag", True, False),
+        ("current_saturation", True, False),
+        ("drive_sag", False, True),
+        ("stribeck_friction", True, True),
+    ],
+)
+def test_a_loss_of_speed_is_named_once_and_not_where_the_current_is_cut(
+    named: str, believed: bool, stays: bool
+) -> None:
     kept = [SimpleNamespace(term=SimpleNamespace(effect=effect(named)))]
     station = SimpleNamespace(actuator="index", believed=believed, kept=kept)
-    mine, other = (1.0, finding("drive_sag", "index", "command", sag=0.1)), (1.0, finding("drive_sag", "ring", "command", sag=0.1))
+    mine, other = (
+        (1.0, finding("drive_sag", "index", "command", sag=0.1)),
+        (1.0, finding("drive_sag", "ring", "command", sag=0.1)),
+    )
     late = (1.0, finding("command_delay", "index", "command", delay=0.05))
     assert _without_settled_sags([mine, other, late], [station]) == ([mine] if stays else []) + [other, late]
 

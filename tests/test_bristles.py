@@ -22,7 +22,10 @@ OF_A_DRIVE = [*catalogue("drive"), *outsiders("drive")]
 
 @pytest.mark.parametrize("candidate", OF_A_DRIVE, ids=[e.name for e in OF_A_DRIVE])
 def test_what_has_the_direction_of_friction_says_so(candidate) -> None:
-    states = tuple(replace(s, extra={**s.extra, "required": s.declared[:, 2], "load": np.ones(len(s.time_s))}) for s in drive(1, trials=2))
+    states = tuple(
+        replace(s, extra={**s.extra, "required": s.declared[:, 2], "load": np.ones(len(s.time_s))})
+        for s in drive(1, trials=2)
+    )
     for shape in candidate.grid(states)[:40:8]:
         as_it_is, turned = (candidate.columns(s, shape) for s in (states[0], replaced(states[0], (BRISTLES,))))
         assert candidate.rubs or np.array_equal(as_it_is, turned)
@@ -47,12 +50,18 @@ def test_columns_of_a_grid_are_those_of_a_fit() -> None:
     for terms in ((), (BRISTLES,), ()):
         terms = tuple(t.coarse for t in terms)
         stacked = balance.grid_columns(grid, weight, terms).matrix
-        wanted = np.concatenate([balance.design((*terms, Term(warm, shape)))[0][:, -1:] for shape in grid.shapes], axis=1) * weight[:, None]
-        np.testing.assert_allclose(np.asarray(stacked if isinstance(stacked, np.ndarray) else stacked.toarray()), wanted, atol=1e-12)
+        wanted = (
+            np.concatenate([balance.design((*terms, Term(warm, shape)))[0][:, -1:] for shape in grid.shapes], axis=1)
+            * weight[:, None]
+        )
+        np.testing.assert_allclose(
+            np.asarray(stacked if isinstance(stacked, np.ndarray) else stacked.toarray()), wanted, atol=1e-12
+        )
 
 
 def test_bristles_and_a_slow_warm_up_are_no_hysteresis() -> None:
-    """A warm-up of many times the session is friction that does not change: it must not stand in for the friction that bristles took over."""
+    """A warm-up of many times the session is friction that does not change: it must not stand in for the friction that
+    bristles took over."""
     hysteresis = Term(effect("elastoplastic_hysteresis"), {"form": 0.0, "reach": 12.0})
     balance = Balance(drive(5, lambda s: hysteresis.effect.columns(s, hysteresis.shape) @ [18.0]))
     warm = Term(effect("thermal_friction_drift"), {"form": 0.0, "warm_up_time": 600.0, "cooling_time": 5.0})
@@ -64,9 +73,16 @@ def test_a_written_motor_has_the_bristles_that_were_named() -> None:
     """Every law of friction in the written model is turned over by them, as it was in the fit."""
     states = tuple(replace(s, extra={**s.extra, "give": np.full(len(s.time_s), 0.7)}) for s in drive(1, trials=2))
     balance = Balance(states)
-    station = SimpleNamespace(signal="current", actuator="index", naming=SimpleNamespace(balance=balance, declared=balance.fit(), fit=balance.fit((BRISTLES,))))
+    station = SimpleNamespace(
+        signal="current",
+        actuator="index",
+        naming=SimpleNamespace(balance=balance, declared=balance.fit(), fit=balance.fit((BRISTLES,))),
+    )
     station.reading = station.naming
     hand = Hand("h", "left", {}, {}, (), 1e-4, {}, (), ())
-    before, after = (as_fitted(hand, [station], {"index": (0.0, 4000.0)}, lambda source, w=which: getattr(source, w)).motors[0] for which in ("declared", "fit"))
+    before, after = (
+        as_fitted(hand, [station], {"index": (0.0, 4000.0)}, lambda source, w=which: getattr(source, w)).motors[0]
+        for which in ("declared", "fit")
+    )
     assert before.parameters["presliding"].value == 0.7
     assert after.parameters["presliding"].value == BRISTLES.shape["bristle_length"]

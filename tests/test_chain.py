@@ -42,7 +42,9 @@ def test_jacobians_are_the_derivatives():
         step = np.zeros((4, 8))
         step[:, i] = 1e-6
         ahead, behind = pose.moved(step), pose.moved(-step)
-        moved = ahead.to_world(propagate(chain, BODY, ahead.angle_rad)[0]) - behind.to_world(propagate(chain, BODY, behind.angle_rad)[0])
+        moved = ahead.to_world(propagate(chain, BODY, ahead.angle_rad)[0]) - behind.to_world(
+            propagate(chain, BODY, behind.angle_rad)[0]
+        )
         np.testing.assert_allclose(by_frame[..., i], moved / 2e-6, atol=1e-8)
     for i in range(chain.size):
         step = np.zeros(chain.size)
@@ -72,7 +74,8 @@ def test_noise_free_recording_is_recovered_exactly():
 
 
 def test_error_keeps_to_the_cramer_rao_bound():
-    """Squared errors over the variances that the information matrix promises: one on average, whatever the direction."""
+    """Squared errors over the variances that the information matrix promises: one on average, whatever the
+    direction."""
     square = []
     for seed in range(16):
         chain, data, _ = recording(seed, n=600)
@@ -208,7 +211,9 @@ def test_sphere_centre_of_a_ball_joint_and_projection():
 def test_cluster_shape_is_robust_and_rigid():
     rng = np.random.default_rng(16)
     shape = rng.normal(0, 0.02, (3, 3))
-    frames = np.einsum("nij,mj->nmi", rotation_from_vector(rng.normal(0, 1, (300, 3))), shape) + rng.normal(0, 1, (300, 1, 3))
+    frames = np.einsum("nij,mj->nmi", rotation_from_vector(rng.normal(0, 1, (300, 3))), shape) + rng.normal(
+        0, 1, (300, 1, 3)
+    )
     frames += rng.normal(0, 1e-4, frames.shape)
     frames[:30, 1] += 0.05
     found = cluster_shape(frames)
@@ -226,14 +231,18 @@ def test_a_hinge_is_called_a_hinge_and_a_wobble_is_not():
     wobble = np.einsum("nij,mj->nmi", rotation_from_vector(0.03 * np.sin(3 * angle[:, :1]) * [1.0, 0, 0]), np.eye(3))
     pose = palm_pose(chain, data)
     in_palm = pose.to_palm(data.position_world)
-    in_palm[:, BODY > 0] = chain.centre_palm[0] + (in_palm[:, BODY > 0] - chain.centre_palm[0]) @ np.swapaxes(wobble, 1, 2).transpose(0, 2, 1)
+    in_palm[:, BODY > 0] = chain.centre_palm[0] + (in_palm[:, BODY > 0] - chain.centre_palm[0]) @ np.swapaxes(
+        wobble, 1, 2
+    ).transpose(0, 2, 1)
     moved = fitted(replace(data, position_world=pose.to_world(in_palm)))
     assert "no plain hinge" in hinge_note(moved, 0)
     assert block_inflation(moved) > 2
 
 
 @pytest.mark.parametrize(("settles", "slips"), [(True, 1), (False, 0)])
-def test_no_marker_is_split_where_the_chain_settles_neither_with_the_slip_nor_without(monkeypatch, settles: bool, slips: int) -> None:
+def test_no_marker_is_split_where_the_chain_settles_neither_with_the_slip_nor_without(
+    monkeypatch, settles: bool, slips: int
+) -> None:
     _, data, _ = recording(11)
     y = data.position_world.copy()
     y[800:, 4] += np.array([0.0009, -0.0007, 0.0008])

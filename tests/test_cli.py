@@ -439,7 +439,9 @@ def test_what_is_not_meant_for_a_rig_or_a_folder_is_refused(rig, loop, tmp_path,
     (tmp_path / "file").write_text("x")
     assert "is a file" in refused(capsys, "diagnose", rig, "--output", tmp_path / "file")
     assert "session itself" in refused(capsys, "diagnose", rig, "--output", rig)
-    assert "brings its own model" in refused(capsys, "diagnose", rig, "--output", tmp_path / "o", "--model", loop / "left.hand")
+    assert "brings its own model" in refused(
+        capsys, "diagnose", rig, "--output", tmp_path / "o", "--model", loop / "left.hand"
+    )
     assert not (tmp_path / "o").exists() and (rig / "pendulum.xml").read_text() == PENDULUM
     assert "--fix" in refused(capsys, "check", loop / "compiled", "--fix", tmp_path / "fixed")
     assert "--json" in refused(capsys, "check", loop / "compiled", "--json")

@@ -33,7 +33,9 @@ def braking(x: float, full: float) -> float:
     return full * min(1.0, 0.2 + (100 - x) / 25)
 
 
-def strokes(profile, seed: int, repeats: int = 4, noise: float = 5.0, viscous: float = VISCOUS) -> tuple[DriveState, np.ndarray]:
+def strokes(
+    profile, seed: int, repeats: int = 4, noise: float = 5.0, viscous: float = VISCOUS
+) -> tuple[DriveState, np.ndarray]:
     """One recording of strokes there and back at every commanded speed, and its current."""
     rng = np.random.default_rng(seed)
     x, v, c, told = [], [], [], []
@@ -49,8 +51,17 @@ def strokes(profile, seed: int, repeats: int = 4, noise: float = 5.0, viscous: f
         x, v, c, told = x + [0.0] * 5, v + [0.0] * 5, c + [0.0] * 5, told + [raw] * 5
     x, v, c = (np.array(k) for k in (x, v, c))
     current = c + rng.normal(0, noise, len(c))
-    state = DriveState("trial", "index", np.arange(len(x)) * STEP_S, x, v + rng.normal(0, 0.5, len(x)), np.zeros(len(x)),
-                       np.where(v == 0, np.nan, current), np.ones((len(x), 1)), extra={"speed": np.array(told)})
+    state = DriveState(
+        "trial",
+        "index",
+        np.arange(len(x)) * STEP_S,
+        x,
+        v + rng.normal(0, 0.5, len(x)),
+        np.zeros(len(x)),
+        np.where(v == 0, np.nan, current),
+        np.ones((len(x), 1)),
+        extra={"speed": np.array(told)},
+    )
     return state, current
 
 
@@ -68,7 +79,7 @@ def test_a_drive_at_its_limit_in_part_of_its_strokes_is_seen(seed: int) -> None:
     state, current = strokes(limited, seed)
     facts = command_facts((state,), (current,))
     assert facts.ceiling == pytest.approx(LIMIT, rel=0.06)
-    (_, finding), = command_findings({"index": facts}, {"index": "index"})
+    ((_, finding),) = command_findings({"index": facts}, {"index": "index"})
     assert finding.parameters["share_cut"]["value"] == facts.share_cut and 0 < facts.share_cut < 0.5
 
 
@@ -89,13 +100,25 @@ def answering(delay_s: float, seed: int) -> tuple[DriveState, np.ndarray]:
     level = np.interp(t, moves, np.tile([0.0, 100.0, 100.0, 0.0], 40))
     current = np.where(np.searchsorted(moves, t) % 2 == 1, np.where(setpoint > 0, 40.0, -40.0), 0.0)
     position = level + rng.normal(0, 0.02, len(t))
-    state = DriveState("trial", "index", t, position, np.gradient(level, t), np.zeros(len(t)), current, np.ones((len(t), 1)),
-                       extra={"setpoint": setpoint})
+    state = DriveState(
+        "trial",
+        "index",
+        t,
+        position,
+        np.gradient(level, t),
+        np.zeros(len(t)),
+        current,
+        np.ones((len(t), 1)),
+        extra={"setpoint": setpoint},
+    )
     return state, current + rng.normal(0, 2, len(t))
 
 
 def test_a_late_drive_is_told_by_how_much_beside_a_prompt_one() -> None:
-    facts = {name: command_facts((s,), (c,)) for name, (s, c) in {"index": answering(0.09, 1), "ring": answering(0.0, 2)}.items()}
+    facts = {
+        name: command_facts((s,), (c,))
+        for name, (s, c) in {"index": answering(0.09, 1), "ring": answering(0.0, 2)}.items()
+    }
     found = command_findings(facts, {"index": "index", "ring": "ring"})
     assert [(f.effect, f.where["finger"]) for _, f in found] == [("command_delay", "index")]
     low, high = found[0][1].parameters["delay"]["ci95"]
@@ -103,13 +126,19 @@ def test_a_late_drive_is_told_by_how_much_beside_a_prompt_one() -> None:
 
 
 def test_two_prompt_drives_have_no_delay() -> None:
-    facts = {name: command_facts((s,), (c,)) for name, (s, c) in {"index": answering(0.0, 3), "ring": answering(0.0, 4)}.items()}
+    facts = {
+        name: command_facts((s,), (c,))
+        for name, (s, c) in {"index": answering(0.0, 3), "ring": answering(0.0, 4)}.items()
+    }
     assert not command_findings(facts, {"index": "index", "ring": "ring"})
 
 
 def test_slow_references_of_all_drives_are_no_delay_of_the_one_that_friction_holds_longer() -> None:
     steps = 3.4 + np.linspace(-0.5, 0.5, 40)
-    alike = {"index": Answers(steps * STEP_S, (steps + 1.5) * STEP_S, STEP_S), "ring": Answers(1.05 * steps * STEP_S, steps * STEP_S, STEP_S)}
+    alike = {
+        "index": Answers(steps * STEP_S, (steps + 1.5) * STEP_S, STEP_S),
+        "ring": Answers(1.05 * steps * STEP_S, steps * STEP_S, STEP_S),
+    }
     assert not any(len(told.drive_s) for told in lateness(alike).values())
 
 
@@ -123,9 +152,12 @@ def test_a_current_ahead_of_its_time_is_early_and_the_prompt_drive_beside_it_is_
 
 
 def late_answers(current: float, motion: float, seed: int) -> Answers:
-    """Answers of a drive whose current and motion follow their commands that many sample intervals late, with scatter."""
+    """Answers of a drive whose current and motion follow their commands that many sample intervals late, with
+    scatter."""
     rng = np.random.default_rng(seed)
-    return Answers(STEP_S * np.round(current + rng.uniform(0, 1, 58)), STEP_S * np.round(motion + rng.uniform(0, 2, 58)), STEP_S)
+    return Answers(
+        STEP_S * np.round(current + rng.uniform(0, 1, 58)), STEP_S * np.round(motion + rng.uniform(0, 2, 58)), STEP_S
+    )
 
 
 def test_a_late_current_beside_a_punctual_motion_is_a_late_channel() -> None:

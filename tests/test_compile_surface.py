@@ -1,4 +1,5 @@
-"""Probed surfaces in a compiled hand: mass properties against closed forms, visuals, and the fallback where a mesh leaks."""
+"""Probed surfaces in a compiled hand: mass properties against closed forms, visuals, and the fallback where a mesh
+leaks."""
 
 import dataclasses
 

@@ -1,4 +1,5 @@
-"""Reading, evaluating and comparing descriptions: against the engines, on published hands, through the command's function."""
+"""Reading, evaluating and comparing descriptions: against the engines, on published hands, through the command's
+function."""
 
 from __future__ import annotations
 
@@ -43,7 +44,8 @@ def files(name: str) -> tuple[Path, Path, Path]:
 
 
 def test_mjcf_is_read_as_mujoco_compiles_it(tmp_path):
-    """Nested frames, classes, several joints in a body, joints in frames, pos, ref, slides, every orientation: 1e-12."""
+    """Nested frames, classes, several joints in a body, joints in frames, pos, ref, slides, every orientation:
+    1e-12."""
     import mujoco
 
     path = tmp_path / "awkward.xml"
@@ -63,7 +65,11 @@ def test_mjcf_is_read_as_mujoco_compiles_it(tmp_path):
             there = data.site(node.name) if node.kind == "site" else data.body(node.name)
             np.testing.assert_allclose(position[0], there.xpos, atol=1e-12)
             np.testing.assert_allclose(rotation[0], there.xmat.reshape(3, 3), atol=1e-12)
-    compiled = mujoco.MjModel.from_xml_string(AWKWARD.replace('zaxis="1 2 3"/>', 'zaxis="1 2 3"/><geom size=".1"/>').replace("</body>", '<geom size=".1"/></body>'))
+    compiled = mujoco.MjModel.from_xml_string(
+        AWKWARD.replace('zaxis="1 2 3"/>', 'zaxis="1 2 3"/><geom size=".1"/>').replace(
+            "</body>", '<geom size=".1"/></body>'
+        )
+    )
     coupling = tree.joint("j0").coupling
     assert coupling.coefficients == pytest.approx(compiled.eq_data[0][:5])
     assert tree.joint("j0").limits == pytest.approx(compiled.joint("j0").range)
@@ -215,7 +221,11 @@ def test_exit_codes_and_output(tmp_path, capsys):
     write_urdf(links, urdf)
     assert main_check(urdf, mjcf, poses=5, json=True) == 1
     table = json.loads(capsys.readouterr().out)
-    assert table["ok"] is False and table["findings"][0]["cause"] == "limits_differ" and table["findings"][0]["cause"] in CAUSES
+    assert (
+        table["ok"] is False
+        and table["findings"][0]["cause"] == "limits_differ"
+        and table["findings"][0]["cause"] in CAUSES
+    )
     assert main_check(urdf, mjcf, poses=5, fix=tmp_path / "fixed") == 1
     assert "The corrected copies agree." in capsys.readouterr().out
     assert main_check(tmp_path / "absent.urdf", mjcf) == 2
@@ -249,7 +259,11 @@ def test_bad_input_is_one_sentence(text, said, tmp_path):
 
 def test_a_pair_file_that_errs(tmp_path):
     links = make_hand(0)
-    urdf, mjcf, pair = write_urdf(links, tmp_path / "a.urdf"), write_mjcf(links, tmp_path / "b.xml"), tmp_path / "pair.toml"
+    urdf, mjcf, pair = (
+        write_urdf(links, tmp_path / "a.urdf"),
+        write_mjcf(links, tmp_path / "b.xml"),
+        tmp_path / "pair.toml",
+    )
     for text, said in (
         ('[joints]\n"index_1" = "index_11"', "did you mean"),
         ("[joints]", "missing or empty"),

@@ -1,4 +1,5 @@
-"""Each cause planted in a correct hand, at every joint, left and right: found, named, located; none on the correct hand."""
+"""Each cause planted in a correct hand, at every joint, left and right: found, named, located; none on the correct
+hand."""
 
 from __future__ import annotations
 
@@ -177,7 +178,8 @@ def test_a_correct_hand_has_no_finding(seed, frames, side, tmp_path):
 
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_ref_dropped_everywhere(side, tmp_path):
-    """The converter that reads body poses and overlooks ref: every joint named, with its angle, and the sign of nothing wrong."""
+    """The converter that reads body poses and overlooks ref: every joint named, with its angle, and the sign of nothing
+    wrong."""
     links = make_hand(3, side)
     urdf = write_urdf(links, tmp_path / "a.urdf")
     turned = deepcopy(links)
@@ -293,17 +295,21 @@ def test_whole_fingers_exchanged(tmp_path):
     assert len(report.findings[0].where) == 8
 
 
-@pytest.mark.parametrize(
-    "mutation", [m for m in MUTATIONS if m not in (limits_degrees,)], ids=lambda m: m.__name__
-)
+@pytest.mark.parametrize("mutation", [m for m in MUTATIONS if m not in (limits_degrees,)], ids=lambda m: m.__name__)
 def test_the_corrected_copy_passes(mutation, tmp_path):
     links = make_hand(2, "left")
     changed = deepcopy(links)
-    at = next(i for i, link in enumerate(links) if link.joint == ("middle_4" if mutation(deepcopy(links), 9) is False else "middle_3"))
+    at = next(
+        i
+        for i, link in enumerate(links)
+        if link.joint == ("middle_4" if mutation(deepcopy(links), 9) is False else "middle_3")
+    )
     if mutation(changed, at) is False:
         at = next(i for i, link in enumerate(links) if link.follows)
         mutation(changed, at)
     urdf, mjcf = write_urdf(changed, tmp_path / "a.urdf"), write_mjcf(links, tmp_path / "b.xml", frames=1)
     for correct in ("a", "b"):
-        fixed = write_fixed(urdf, mjcf, None, tmp_path / correct, correct=correct, poses=POSES, engines=("mujoco", "pinocchio"))
+        fixed = write_fixed(
+            urdf, mjcf, None, tmp_path / correct, correct=correct, poses=POSES, engines=("mujoco", "pinocchio")
+        )
         assert fixed.report.ok, (correct, fixed.text(), fixed.report.text())

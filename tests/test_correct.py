@@ -82,7 +82,9 @@ def test_nothing_is_written_where_nothing_is_to_be_put_right(session: Path, tmp_
     assert not list(tmp_path.iterdir())
 
 
-def test_a_copy_that_cannot_be_written_leaves_the_earlier_one(session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_copy_that_cannot_be_written_leaves_the_earlier_one(
+    session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     read = read_session(session)
     trial = next(t for t in read.trials if t.kind == "flexion")
     drift = finding("clock_drift", [trial.name], rate_minus_one={"value": 0.002, "unit": "1"})
@@ -98,7 +100,9 @@ def test_a_copy_that_cannot_be_written_leaves_the_earlier_one(session: Path, tmp
     assert digests(tmp_path / "corrected") == before
 
 
-def test_the_copy_names_its_files_however_the_manifest_spells_them_and_may_lie_in_the_session(session: Path, tmp_path: Path) -> None:
+def test_the_copy_names_its_files_however_the_manifest_spells_them_and_may_lie_in_the_session(
+    session: Path, tmp_path: Path
+) -> None:
     folder = tmp_path / "it's mine"
     shutil.copytree(session, folder)
     manifest = folder / "session.toml"
@@ -111,7 +115,8 @@ def test_the_copy_names_its_files_however_the_manifest_spells_them_and_may_lie_i
             copy = write_corrected(read, [drift], {}, output)
             again = read_session(copy)
             assert [t.log_path.name for t in again.select("flexion", trial.finger)] == [
-                f"{t.log_path.stem}_corrected.csv" for t in read.select("flexion", trial.finger)]
+                f"{t.log_path.stem}_corrected.csv" for t in read.select("flexion", trial.finger)
+            ]
             assert not list(copy.rglob("corrected"))
         shutil.rmtree(copy)
 
@@ -140,7 +145,9 @@ def test_a_file_of_several_fingers_is_put_right_finger_by_finger(session: Path) 
         np.testing.assert_allclose(both.markers([label]), seen[label] - moved, atol=1e-12)
 
 
-def test_an_output_that_is_a_file_or_holds_somebodys_corrections_is_refused_and_an_earlier_runs_are_forgotten(tmp_path: Path) -> None:
+def test_an_output_that_is_a_file_or_holds_somebodys_corrections_is_refused_and_an_earlier_runs_are_forgotten(
+    tmp_path: Path,
+) -> None:
     (tmp_path / "file").write_text("x")
     for path in (tmp_path / "file", tmp_path / "file" / "deeper"):
         with pytest.raises(HandModelError, match="is a file"):

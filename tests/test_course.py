@@ -1,4 +1,5 @@
-"""Joints that are no plain hinges: their kinematics, their file, their MJCF, and planted ones recovered through the compiled file."""
+"""Joints that are no plain hinges: their kinematics, their file, their MJCF, and planted ones recovered through the
+compiled file."""
 
 from __future__ import annotations
 
@@ -40,6 +41,7 @@ SHAPES = {"hinge": [0.0, 0.02, -0.05, 0.03, 0.01], "slide": [0.0, 5e-4, 1e-3, -2
 
 def crooked(hand: Hand, finger: str, k: int, kinds: tuple[str, ...], turning: bool) -> Hand:
     """The hand with a course of those extra joints at joint k of a finger."""
+
     def bent(joint: Joint) -> Joint:
         across = perpendicular_basis(joint.axis_palm)
         extra = tuple(ExtraJoint(kind, across[i % 2], np.array(SHAPES[kind])) for i, kind in enumerate(kinds))
@@ -58,6 +60,7 @@ def two() -> Hand:
 
 def transform(joint: Joint, angle: float) -> np.ndarray:
     """Displacement (4, 4) of a joint as a product of exponentials (Lynch & Park 2017, eq. 4.14)."""
+
     def exponential(kind: str, axis: np.ndarray, by: float) -> np.ndarray:
         twist = np.zeros((4, 4))
         if kind == "hinge":
@@ -67,7 +70,9 @@ def transform(joint: Joint, angle: float) -> np.ndarray:
         return expm(twist * by)
 
     parts = [exponential("hinge", joint.axis_palm, angle)]
-    extra = [exponential(e.kind, e.axis_palm, float(value(e, angle))) for e in (joint.course.joints if joint.course else ())]
+    extra = [
+        exponential(e.kind, e.axis_palm, float(value(e, angle))) for e in (joint.course.joints if joint.course else ())
+    ]
     parts = [*parts, *extra] if joint.course and joint.course.turning else [*extra, *parts]
     return np.linalg.multi_dot([np.eye(4), *parts])
 
@@ -95,8 +100,12 @@ def test_a_chain_with_courses_moves_as_the_hand_does() -> None:
     for own in (hand.finger("index"), hand.finger("ring")):
         markers = [np.stack(list(j.markers_palm.values())) for j in own.joints]
         body = np.repeat([1, 2], [len(m) for m in markers])
-        chain = Chain(np.concatenate(markers), np.stack([j.axis_palm for j in own.joints]), np.stack([j.centre_palm for j in own.joints]),
-                      tuple(j.course for j in own.joints))
+        chain = Chain(
+            np.concatenate(markers),
+            np.stack([j.axis_palm for j in own.joints]),
+            np.stack([j.centre_palm for j in own.joints]),
+            tuple(j.course for j in own.joints),
+        )
         x, by_frame, _, _ = jacobians(chain, body, angles)
         wanted = np.concatenate([displace(own, angles).points(k, markers[k]) for k in range(2)], axis=1)
         assert np.allclose(x, wanted, atol=1e-14)
@@ -119,8 +128,14 @@ def test_the_file_holds_a_course_and_older_files_have_none(tmp_path) -> None:
     assert all(j.course is None for f in load_hand(tmp_path / "plain.hand").fingers for j in f.joints)
 
 
-@pytest.mark.parametrize(("change", "said"), [({"kind": "screw"}, "screw"), ({"axis_palm": np.ones(3)}, "length one"),
-                                              ({"coefficients": np.array([0.1, 0.2])}, "first zero")])
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"kind": "screw"}, "screw"),
+        ({"axis_palm": np.ones(3)}, "length one"),
+        ({"coefficients": np.array([0.1, 0.2])}, "first zero"),
+    ],
+)
 def test_what_no_file_can_hold_is_refused(tmp_path, change, said: str) -> None:
     hand = two()
     index = hand.finger("index")
@@ -138,9 +153,17 @@ def test_the_compiled_files_are_the_course(tmp_path) -> None:
     assert all(f.passed for f in check(tmp_path / "hand", items=items))
     mj = engine.load(description.mjcf)
     ties = {mj.mj.joint(j).name: (mj.mj.joint(driver).name, c) for j, (driver, c) in mj.courses.items()}
-    assert set(ties) == {"index_s0_travel", "index_s0_travel_2", "index_s0_wobble", "ring_s1_wobble", "ring_s1_wobble_2"}
+    assert set(ties) == {
+        "index_s0_travel",
+        "index_s0_travel_2",
+        "index_s0_wobble",
+        "ring_s1_wobble",
+        "ring_s1_wobble_2",
+    }
     for (name, (driver, polynomial)), extra in zip(
-        sorted(ties.items()), [*hand.finger("index").joints[0].course.joints, *hand.finger("ring").joints[1].course.joints], strict=True
+        sorted(ties.items()),
+        [*hand.finger("index").joints[0].course.joints, *hand.finger("ring").joints[1].course.joints],
+        strict=True,
     ):
         assert driver == name.split("_travel")[0].split("_wobble")[0]
         assert np.array_equal(polynomial[: len(extra.coefficients)], extra.coefficients)
@@ -181,15 +204,22 @@ def test_a_moving_drive_keeps_the_extra_joints_on_their_course(tmp_path) -> None
 
 
 PLANTED = [
-    ("joint_wobble", "wave", 0), ("joint_wobble", "bow", 1), ("moving_centre", "ellipse", 0), ("moving_centre", "cam", 1),
+    ("joint_wobble", "wave", 0),
+    ("joint_wobble", "bow", 1),
+    ("moving_centre", "ellipse", 0),
+    ("moving_centre", "cam", 1),
 ]
 TIP = np.array([0.026, 0.002, 0.003])  # from the last joint's centre
 
 
 @pytest.mark.parametrize(("effect", "form", "joint"), PLANTED)
-def test_a_planted_course_is_recovered_at_the_tip_through_the_compiled_file(tmp_path, effect: str, form: str, joint: int) -> None:
+def test_a_planted_course_is_recovered_at_the_tip_through_the_compiled_file(
+    tmp_path, effect: str, form: str, joint: int
+) -> None:
     truth = bebionic("left", 31, ["index"])
-    plan = Plan(flexion=("full", "slow"), validation=("full", "medium"), excitations=0, joint_sides=("medial",), still_s=0.3)
+    plan = Plan(
+        flexion=("full", "slow"), validation=("full", "medium"), excitations=0, joint_sides=("medial",), still_s=0.3
+    )
     hidden = Hidden(effect, "index", 1.0, form, {"joint": joint})
     record(truth, tmp_path / "session", 31, (hidden,), plan)
     session = read_session(tmp_path / "session")
@@ -197,7 +227,11 @@ def test_a_planted_course_is_recovered_at_the_tip_through_the_compiled_file(tmp_
     naming = name_markers(angles)
     assert {e.effect for e in naming.found} == {effect}
     left = name_markers(corrected_angles(angles, naming))  # what is named is taken out, and hinges are left
-    assert left.excess_before < naming.excess_after + 0.005 * naming.excess_before, (left.excess_before, naming.excess_after, naming.excess_before)
+    assert left.excess_before < naming.excess_after + 0.005 * naming.excess_before, (
+        left.excess_before,
+        naming.excess_after,
+        naming.excess_before,
+    )
     segment = session.fingers[0].segments[joint].name
     courses = finger_courses(angles, naming, {(effect, segment)})
     assert courses.joints == (joint,)
@@ -210,7 +244,9 @@ def test_a_planted_course_is_recovered_at_the_tip_through_the_compiled_file(tmp_
     stated = written_courses(hand, (SimpleNamespace(effect=effect, where={"finger": "index"}),), {"index": courses})
     assert stated
     elsewhere = replace(hand, palm_markers_palm={label: 1.2 * p for label, p in hand.palm_markers_palm.items()})
-    assert not written_courses(elsewhere, (SimpleNamespace(effect=effect, where={"finger": "index"}),), {"index": courses})
+    assert not written_courses(
+        elsewhere, (SimpleNamespace(effect=effect, where={"finger": "index"}),), {"index": courses}
+    )
     driver = np.linspace(0, float(finger.proximal_rad.sum()), 60)
     bent = np.stack([driver, np.polynomial.polynomial.polyval(driver, finger.distal_rad)], axis=1)
     wanted = _true_tip(truth, finger, hidden, plan, bent)
@@ -228,7 +264,9 @@ def _true_hand(truth, finger) -> Hand:
     joints = []
     for k, own in enumerate(finger.joints):
         tip = own.centre_palm + TIP if k == 1 else None
-        joints.append(Joint(own.name, own.axis_palm, own.centre_palm, np.zeros((6, 6)), (0.0, 1.2), own.markers_palm, tip))
+        joints.append(
+            Joint(own.name, own.axis_palm, own.centre_palm, np.zeros((6, 6)), (0.0, 1.2), own.markers_palm, tip)
+        )
     return Hand("twin", truth.side, truth.palm_markers_palm, {}, (Finger("index", None, tuple(joints)),), 1e-4, {})
 
 

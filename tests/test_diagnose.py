@@ -35,9 +35,19 @@ def drive(seed: int, add=None, noise: float = 5.0, colour: float = 0.0, trials: 
         x, v = _path(t, rng.permutation([17.0, 30.0, 55.0, 80.0, 110.0]))
         moving = np.abs(v) > 1
         declared = np.stack([np.zeros_like(v), v, np.sign(v), x, np.ones_like(v)], axis=-1)
-        state = DriveState(f"trial_{k}", "index", t, x, v, np.zeros_like(v), np.zeros_like(v), declared,
-                           extra={"elapsed": t + 40.0 * k, "trial_index": np.full(len(t), float(k))},
-                           declared_names=NAMES, validate=k == trials - 1)
+        state = DriveState(
+            f"trial_{k}",
+            "index",
+            t,
+            x,
+            v,
+            np.zeros_like(v),
+            np.zeros_like(v),
+            declared,
+            extra={"elapsed": t + 40.0 * k, "trial_index": np.full(len(t), float(k))},
+            declared_names=NAMES,
+            validate=k == trials - 1,
+        )
         e = rng.normal(0, noise * np.sqrt(1 - colour**2), len(t))
         for i in range(1, len(e)):
             e[i] += colour * e[i - 1]
@@ -117,7 +127,8 @@ def test_an_interval_is_that_of_the_mixture_of_forms() -> None:
     for at in (0.025, 0.5, 0.975):
         assert abs(_quantile(parts, at) - np.quantile(drawn, at)) < 0.05
     assert abs(_quantile([(1.0, 2.0, 9.0)], 0.975) - (2.0 + 1.96 * 3.0)) < 1e-3
-    assert abs(_quantile([(0.1, 0.418, 0.0), (0.9, 0.408, 1e-30)], 0.975) - 0.418) < 1e-6  # parameters that are as good as exact
+    # parameters that are as good as exact
+    assert abs(_quantile([(0.1, 0.418, 0.0), (0.9, 0.408, 1e-30)], 0.975) - 0.418) < 1e-6
 
 
 def test_a_form_that_does_not_tell_a_parameter_does_not_widen_its_interval_and_a_choice_has_none() -> None:
@@ -132,7 +143,9 @@ def test_a_form_that_does_not_tell_a_parameter_does_not_widen_its_interval_and_a
 def test_readings_cut_at_a_limit_are_named_so_however_many_they_are(share: float) -> None:
     states = drive(3)
     limit = float(np.nanquantile(np.concatenate([np.abs(s.effort) for s in states]), 1 - share))
-    naming = name_effects(tuple(replace(s, effort=np.clip(s.effort, -limit, limit)) for s in states), catalogue("drive"))
+    naming = name_effects(
+        tuple(replace(s, effort=np.clip(s.effort, -limit, limit)) for s in states), catalogue("drive")
+    )
     assert [f.term.effect.name for f in naming.found] == ["current_saturation"]
     assert naming.found[0].term.shape["limit"] == pytest.approx(limit, rel=0.02)
 
@@ -164,8 +177,10 @@ def test_a_faint_effect_needs_the_word_of_untouched_recordings(seed: int) -> Non
 
     faint = half_untouched(drive(seed, planted("load_dependent_friction", {}, [0.014])))
     healthy = half_untouched(drive(seed))
-    borne_out, refuted = (judged("current", "index", "index", None, states, catalogue("drive"))
-                          for states in (faint, (*faint[:2], *healthy[2:])))
+    borne_out, refuted = (
+        judged("current", "index", "index", None, states, catalogue("drive"))
+        for states in (faint, (*faint[:2], *healthy[2:]))
+    )
     assert [f.term.effect.name for f in borne_out.kept] == ["load_dependent_friction"] and borne_out.believed
     assert not refuted.missing
 
@@ -207,8 +222,16 @@ def test_motion_tells_rest_from_motion() -> None:
 
 
 def test_findings_are_json_without_nan(tmp_path: Path) -> None:
-    finding = Finding("stribeck_friction", ("stribeck_friction",), 0.9, (("quadratic_damping", 0.1),), {"finger": "index"},
-                      "text", {"static_ratio": {"value": float("nan"), "unit": "1"}}, {"before": np.float64(2.0)})
+    finding = Finding(
+        "stribeck_friction",
+        ("stribeck_friction",),
+        0.9,
+        (("quadratic_damping", 0.1),),
+        {"finger": "index"},
+        "text",
+        {"static_ratio": {"value": float("nan"), "unit": "1"}},
+        {"before": np.float64(2.0)},
+    )
     path = Findings("mismatch", {"before": 2.0}, {}, (finding,)).save(tmp_path / "new")
     read = json.loads(path.read_text())
     assert read["format"] == "hand-findings/1" and read["findings"][0]["class"] == ["stribeck_friction"]
@@ -230,7 +253,8 @@ def test_shown_sessions(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("burst", [False, True], ids=["coloured", "bursts"])
 def test_lack_of_fit_keeps_its_level_on_dirty_healthy_drives(burst: bool) -> None:
-    """Coloured noise that differs over the range, strokes that do not repeat, bursts of outliers: 24 drives, nominal 5 %."""
+    """Coloured noise that differs over the range, strokes that do not repeat, bursts of outliers: 24 drives, nominal 5
+    %."""
     from hand_model.diagnose.name.lack_of_fit import lack_of_fit
 
     alarms = 0
@@ -285,7 +309,10 @@ def test_what_a_spring_is_bent_by_has_an_interval() -> None:
 def test_held_out_is_empty_where_validation_took_part() -> None:
     add = planted("detent_load", {"form": 0.0, "centre": 60.0, "width": 6.0}, [-10.0])
     plain = name_effects(drive(3, add), catalogue("drive"))
-    assert held_out(undisturbed(plain), 0)["held_out"] == ["trial_3"] and held_out(undisturbed(plain), 0)["ci95_reduction"][0] > 0
+    assert (
+        held_out(undisturbed(plain), 0)["held_out"] == ["trial_3"]
+        and held_out(undisturbed(plain), 0)["ci95_reduction"][0] > 0
+    )
     from dataclasses import replace
 
     everything = replace(plain, balance=Balance(plain.balance.states, everything=True))

@@ -15,8 +15,15 @@ SPEED_LAWS = [effect("stribeck_friction"), effect("quadratic_damping")]
 
 def only(states, low: float, high: float):
     """The states with the effort of other speeds left out."""
-    return tuple(type(s)(**{**vars(s), "effort": np.where((np.abs(s.velocity) >= low) & (np.abs(s.velocity) <= high), s.effort, np.nan)})
-                 for s in states)
+    return tuple(
+        type(s)(
+            **{
+                **vars(s),
+                "effort": np.where((np.abs(s.velocity) >= low) & (np.abs(s.velocity) <= high), s.effort, np.nan),
+            }
+        )
+        for s in states
+    )
 
 
 def test_laws_of_speed_need_many_speeds() -> None:

@@ -26,8 +26,18 @@ def state(n: int = 1200, seed: int = 0) -> DriveState:
     declared = np.stack([a, v, np.sign(v), x, np.ones(n)], axis=-1)
     names = ("inertia", "viscous", "coulomb", "spring", "preload")
     effort = declared @ np.array([0.01, 0.15, 35.0, 0.2, 9.0]) + np.random.default_rng(seed).normal(0, 1, n)
-    return DriveState("trial", "drive", t, x, v, a, effort, declared, declared_names=names,
-                      extra={"load": effort, "trial_index": np.zeros(n)})
+    return DriveState(
+        "trial",
+        "drive",
+        t,
+        x,
+        v,
+        a,
+        effort,
+        declared,
+        declared_names=names,
+        extra={"load": effort, "trial_index": np.zeros(n)},
+    )
 
 
 def test_catalogue_holds_one_effect_per_name_and_station() -> None:
@@ -57,8 +67,17 @@ def test_columns_are_finite_and_as_many_as_amplitudes_at_every_start(candidate) 
         assert all(shape.low - 1e-9 <= start <= shape.high + 1e-9 for start in shape.starts), shape
 
 
-@pytest.mark.parametrize("name", ["stribeck_friction", "load_dependent_friction", "position_dependent_friction",
-                                  "quadratic_damping", "thermal_friction_drift", "elastoplastic_hysteresis"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "stribeck_friction",
+        "load_dependent_friction",
+        "position_dependent_friction",
+        "quadratic_damping",
+        "thermal_friction_drift",
+        "elastoplastic_hysteresis",
+    ],
+)
 def test_friction_opposes_motion(name: str) -> None:
     s, candidate = state(), effect(name)
     for shape in candidate.grid((s,))[:5]:
@@ -71,8 +90,17 @@ def test_friction_opposes_motion(name: str) -> None:
 @pytest.mark.parametrize("name", ["detent_load", "nonlinear_spring", "end_stop_contact", "torque_ripple"])
 def test_loads_depend_on_position_only(name: str) -> None:
     s, candidate = state(), effect(name)
-    reverse = DriveState(s.trial, s.drive, s.time_s, s.position, -s.velocity, s.acceleration, s.effort, -s.declared,
-                         declared_names=s.declared_names)
+    reverse = DriveState(
+        s.trial,
+        s.drive,
+        s.time_s,
+        s.position,
+        -s.velocity,
+        s.acceleration,
+        s.effort,
+        -s.declared,
+        declared_names=s.declared_names,
+    )
     for shape in candidate.grid((s,))[:5]:
         np.testing.assert_allclose(candidate.columns(s, shape), candidate.columns(reverse, shape))
 
@@ -106,7 +134,9 @@ def test_dahl_solves_its_differential_equation() -> None:
 
 def test_damped_bristles_follow_the_state_of_lugre() -> None:
     s, presliding = state(6000), effect("presliding_friction")
-    z, damped = (presliding.declared(s, {"bristle_length": 8.0, "bristle_time": time, "form": 0.0})[:, 2] for time in (0.0, 0.05))
+    z, damped = (
+        presliding.declared(s, {"bristle_length": 8.0, "bristle_time": time, "form": 0.0})[:, 2] for time in (0.0, 0.05)
+    )
     rate = np.gradient(z, s.time_s)
     assert np.corrcoef(damped - z, 0.05 * rate)[0, 1] > 0.99
     assert np.ptp(damped - z) == pytest.approx(np.ptp(0.05 * rate), rel=0.1)
@@ -127,42 +157,93 @@ def test_lowpass_of_a_step_is_exponential() -> None:
 
 def test_an_obstacle_of_a_while_of_the_session_acts_in_every_recording_of_that_while_and_is_told_from_none() -> None:
     contact, one = effect("external_contact"), state()
-    session = tuple(replace(one, extra={"trial_index": np.full(1200, float(i)), "elapsed": one.time_s + 30 * i, "session_s": np.full(1200, 81.6)}) for i in range(3))
+    session = tuple(
+        replace(
+            one,
+            extra={
+                "trial_index": np.full(1200, float(i)),
+                "elapsed": one.time_s + 30 * i,
+                "session_s": np.full(1200, 81.6),
+            },
+        )
+        for i in range(3)
+    )
     shape = next(p for p in contact.grid(session) if p["trial"] == -1.0 and (p["since"], p["until"]) == (0.5, 1.0))
     acting = [np.any(contact.columns(s, shape)[:, 0] > 0) for s in session]
     assert acting == [False, True, True]
     assert not any(p["trial"] == -1.0 and (p["since"], p["until"]) == (0.0, 1.0) for p in contact.grid(session))
 
 
-PLACE = {"finger": "index", "actuator": "index", "joint": "proximal", "signal": "current", "trials": ["first.csv", "second.csv"],
-         "region": {"time": {"first.csv": [[1.0, 2.0], [4.0, 8.0]]}}}
+PLACE = {
+    "finger": "index",
+    "actuator": "index",
+    "joint": "proximal",
+    "signal": "current",
+    "trials": ["first.csv", "second.csv"],
+    "region": {"time": {"first.csv": [[1.0, 2.0], [4.0, 8.0]]}},
+}
 DECLARED = {"viscous": 0.15, "coulomb": 35.0, "spring": 0.22}
-READ_ELSEWHERE = {"asymmetric_friction": {"half_difference": -9.0},
-                  "command_as_measurement": {}, "command_delay": {"delay": 0.06}, "drive_sag": {"sag": 4e-4},
-                  "joint_wobble": {"amplitude": 0.04}, "moving_centre": {"travel": 0.008}}  # no balance has their parameters
+READ_ELSEWHERE = {
+    "asymmetric_friction": {"half_difference": -9.0},
+    "command_as_measurement": {},
+    "command_delay": {"delay": 0.06},
+    "drive_sag": {"sag": 4e-4},
+    # no balance has their parameters
+    "joint_wobble": {"amplitude": 0.04},
+    "moving_centre": {"travel": 0.008},
+}
 
 
-RATIOS = {"rate_minus_one", "side", "trial", "form", "ratio", "static_ratio", "load_coefficient", "since", "until", "passing", "exponent", "lead", "end"}
+RATIOS = {
+    "rate_minus_one",
+    "side",
+    "trial",
+    "form",
+    "ratio",
+    "static_ratio",
+    "load_coefficient",
+    "since",
+    "until",
+    "passing",
+    "exponent",
+    "lead",
+    "end",
+}
 
 
 def posed() -> DriveState:
     s = state()
     extra = {**s.extra, "gravity_along": s.time_s, "moving": np.ones(len(s.time_s))}
-    return DriveState(s.trial, s.drive, s.time_s, s.position, s.velocity, s.acceleration, s.effort, s.declared,
-                      declared_names=s.declared_names, extra=extra)
+    return DriveState(
+        s.trial,
+        s.drive,
+        s.time_s,
+        s.position,
+        s.velocity,
+        s.acceleration,
+        s.effort,
+        s.declared,
+        declared_names=s.declared_names,
+        extra=extra,
+    )
 
 
 @pytest.mark.parametrize("one", [e for e in catalogue() if isinstance(e, Effect)], ids=lambda e: e.name)
 def test_every_parameter_has_its_unit(one) -> None:
     for point in one.grid((posed(),)):
         amplitude = {n: 1e-3 for n, *_ in one.amplitudes()}
-        own = {s.name: s.unit for s in one.shapes((posed(),))} | {n: u for n, u, *_ in one.amplitudes()} | dict(one.units(point))
+        own = (
+            {s.name: s.unit for s in one.shapes((posed(),))}
+            | {n: u for n, u, *_ in one.amplitudes()}
+            | dict(one.units(point))
+        )
         bare = {n for n in one.parameters(point, amplitude, DECLARED) if own.get(n, "1") == "1"}
         assert bare <= RATIOS
 
 
 def named() -> list:
-    """Every effect with parameters for each of its forms and sides, amplitudes of either sign where physics allows it."""
+    """Every effect with parameters for each of its forms and sides, amplitudes of either sign where physics allows
+    it."""
     out = []
     for e in catalogue():
         if e.name in READ_ELSEWHERE:
@@ -197,10 +278,19 @@ def test_statement_never_raises_and_shows_no_figure_that_is_none(candidate, para
             assert candidate.statement(where, partial).endswith(".")
 
 
-@pytest.mark.parametrize("candidate", [e for e in (*catalogue("encoder"), *catalogue("linkage")) if not hasattr(e, "signal")
-                                       and e.name != "spring_decoupling"], ids=lambda e: e.name)
+@pytest.mark.parametrize(
+    "candidate",
+    [
+        e
+        for e in (*catalogue("encoder"), *catalogue("linkage"))
+        if not hasattr(e, "signal") and e.name != "spring_decoupling"
+    ],
+    ids=lambda e: e.name,
+)
 def test_statement_names_the_segment_that_follows(candidate) -> None:
-    parameters = candidate.parameters(candidate.grid((state(),))[0], {n: 0.1 for n, *_ in candidate.amplitudes()}, DECLARED)
+    parameters = candidate.parameters(
+        candidate.grid((state(),))[0], {n: 0.1 for n, *_ in candidate.amplitudes()}, DECLARED
+    )
     assert "the middle segment" in candidate.statement({**PLACE, "joint": "middle"}, parameters)
 
 
@@ -216,7 +306,9 @@ OPPOSITES = [
 ]
 
 
-@pytest.mark.parametrize(("name", "others", "key", "plus", "minus"), OPPOSITES, ids=[f"{o[0]}-{o[3]}" for o in OPPOSITES])
+@pytest.mark.parametrize(
+    ("name", "others", "key", "plus", "minus"), OPPOSITES, ids=[f"{o[0]}-{o[3]}" for o in OPPOSITES]
+)
 def test_statement_tells_the_sign(name, others, key, plus, minus) -> None:
     for value, right, wrong in ((0.01, plus, minus), (-0.01, minus, plus)):
         said = effect(name).statement(PLACE, {**others, key: value})
@@ -225,7 +317,9 @@ def test_statement_tells_the_sign(name, others, key, plus, minus) -> None:
 
 def test_statement_of_a_spring_that_softens_first_gives_the_stiffness_changes_of_its_own_load() -> None:
     quadratic, cubic = -0.02, 2e-4
-    said = effect("nonlinear_spring").statement(PLACE, {"form": 0.0, "quadratic_stiffness": quadratic, "cubic_stiffness": cubic})
+    said = effect("nonlinear_spring").statement(
+        PLACE, {"form": 0.0, "quadratic_stiffness": quadratic, "cubic_stiffness": cubic}
+    )
     slope = np.polyder([cubic, quadratic, 0.0, 0.0])
     turn = np.roots(np.polyder(slope))[0]
     first, second = np.diff(np.polyval(slope, [0.0, turn, 100.0]))
@@ -241,13 +335,30 @@ MOTOR = """<mujoco><compiler angle="radian"/><option gravity="0 0 0"/><worldbody
 NATIVE = [
     ("quadratic_damping", {}, {"drag": 0.002}, [0.002]),
     ("nonlinear_spring", {}, {"quadratic_stiffness": 1e-3, "cubic_stiffness": 3e-5}, [1e-3, 3e-5]),
-    ("end_stop_contact", {"side": 1.0, "inward": 18.0, "end": 100.0}, {"side": 1.0, "begin": 82.0, "stiffness": 1.5}, [1.5]),
-    ("end_stop_contact", {"side": -1.0, "inward": 12.0, "end": 0.0}, {"side": -1.0, "begin": 12.0, "stiffness": 1.5}, [1.5]),
-    ("torque_ripple", {"period": 9.0}, {"amplitude": 5.0, "period": 9.0, "phase": float(np.arctan2(3.0, 4.0))}, [4.0, 3.0]),
+    (
+        "end_stop_contact",
+        {"side": 1.0, "inward": 18.0, "end": 100.0},
+        {"side": 1.0, "begin": 82.0, "stiffness": 1.5},
+        [1.5],
+    ),
+    (
+        "end_stop_contact",
+        {"side": -1.0, "inward": 12.0, "end": 0.0},
+        {"side": -1.0, "begin": 12.0, "stiffness": 1.5},
+        [1.5],
+    ),
+    (
+        "torque_ripple",
+        {"period": 9.0},
+        {"amplitude": 5.0, "period": 9.0, "phase": float(np.arctan2(3.0, 4.0))},
+        [4.0, 3.0],
+    ),
 ]
 
 
-@pytest.mark.parametrize(("name", "shape", "parameters", "amplitude"), NATIVE, ids=[f"{n[0]}_{i}" for i, n in enumerate(NATIVE)])
+@pytest.mark.parametrize(
+    ("name", "shape", "parameters", "amplitude"), NATIVE, ids=[f"{n[0]}_{i}" for i, n in enumerate(NATIVE)]
+)
 def test_native_element_forces_are_the_effects_own(name, shape, parameters, amplitude) -> None:
     """MuJoCo's force at the motor joint changes by minus the effect's load, times the file's effort per raw unit."""
     mujoco = pytest.importorskip("mujoco")
@@ -257,8 +368,18 @@ def test_native_element_forces_are_the_effects_own(name, shape, parameters, ampl
     place = effect(name).write_mjcf(root, {"actuator": "index"}, parameters)
     assert place is not None
     x, v = np.array([0.0, 3.0, 11.0, 50.0, 81.0, 90.0, 99.0]), np.array([0.0, -20.0, 35.0, -80.0, 110.0, 10.0, -5.0])
-    state = DriveState("t", "index", np.arange(7) * 0.02, x, v, 0 * x, 0 * x, np.stack([np.sign(v)], -1),
-                       declared_names=("coulomb",), extra={"bandwidth_s": np.zeros(7)})
+    state = DriveState(
+        "t",
+        "index",
+        np.arange(7) * 0.02,
+        x,
+        v,
+        0 * x,
+        0 * x,
+        np.stack([np.sign(v)], -1),
+        declared_names=("coulomb",),
+        extra={"bandwidth_s": np.zeros(7)},
+    )
     load = effect(name).columns(state, shape) @ np.array(amplitude)
 
     def force(xml: bytes | str) -> np.ndarray:
@@ -283,16 +404,26 @@ def test_native_elements_are_not_written_where_there_is_no_motor() -> None:
         assert etree.tostring(root) == before
 
 
-@pytest.mark.parametrize(("name", "parameters", "lugre"), [
-    ("stribeck_friction", {"static_ratio": 1.8, "stribeck_speed": 18.0, "static_excess": 14.0, "exponent": 2.0}, [350.0, 0.0, 35.0, 63.0, 18.0]),
-    ("presliding_friction", {"bristle_length": 7.0}, [5.0, 0.0, 35.0, 35.0, 20.0]),
-    ("presliding_friction", {"bristle_length": 7.0, "bristle_time": 0.04}, [5.0, 0.2, 35.0, 35.0, 20.0])])
+@pytest.mark.parametrize(
+    ("name", "parameters", "lugre"),
+    [
+        (
+            "stribeck_friction",
+            {"static_ratio": 1.8, "stribeck_speed": 18.0, "static_excess": 14.0, "exponent": 2.0},
+            [350.0, 0.0, 35.0, 63.0, 18.0],
+        ),
+        ("presliding_friction", {"bristle_length": 7.0}, [5.0, 0.0, 35.0, 35.0, 20.0]),
+        ("presliding_friction", {"bristle_length": 7.0, "bristle_time": 0.04}, [5.0, 0.2, 35.0, 35.0, 20.0]),
+    ],
+)
 def test_lugre_replaces_the_joints_friction(name, parameters, lugre) -> None:
     mujoco = pytest.importorskip("mujoco")
     from lxml import etree
 
     root = etree.fromstring(MOTOR)
-    assert effect(name).write_mjcf(root, {"actuator": "index"}, parameters) == "actuator/dcmotor[@name='index_friction']"
+    assert (
+        effect(name).write_mjcf(root, {"actuator": "index"}, parameters) == "actuator/dcmotor[@name='index_friction']"
+    )
     assert mujoco.MjModel.from_xml_string(etree.tostring(root).decode()).dof_frictionloss[0] == 0
     written = [float(x) for x in root.find("actuator/dcmotor").get("lugre").split()]
     np.testing.assert_allclose(written, lugre, rtol=1e-9)
@@ -300,11 +431,16 @@ def test_lugre_replaces_the_joints_friction(name, parameters, lugre) -> None:
 
 @pytest.mark.parametrize(("damping", "nearly"), [(0.0, 0.025), (0.05, 0.02), (0.15, 0.014), (0.5, 0.0125)])
 def test_a_rise_of_exponent_one_is_written_as_near_as_the_joints_damping_allows(damping, nearly) -> None:
-    """Friction and damping of the file against 35 + 28 exp(-v / 18) + damping v (root mean square over the rise, 0.25 to 9 Stribeck speeds)."""
+    """Friction and damping of the file against 35 + 28 exp(-v / 18) + damping v (root mean square over the rise, 0.25
+    to 9 Stribeck speeds)."""
     from lxml import etree
 
     root = etree.fromstring(MOTOR.replace('damping="0.15"', f'damping="{damping}"'))
-    effect("stribeck_friction").write_mjcf(root, {"actuator": "index"}, {"static_ratio": 1.8, "stribeck_speed": 18.0, "static_excess": 14.0, "exponent": 1.0})
+    effect("stribeck_friction").write_mjcf(
+        root,
+        {"actuator": "index"},
+        {"static_ratio": 1.8, "stribeck_speed": 18.0, "static_excess": 14.0, "exponent": 1.0},
+    )
     _, _, sliding, static, speed = (float(x) for x in root.find("actuator/dcmotor").get("lugre").split())
     linear, quadratic = ([float(x) for x in root.find(".//joint").get("damping").split()] + [0.0])[:2]
     v = np.linspace(0.25 * 18, 9 * 18, 300)
@@ -348,15 +484,30 @@ def test_a_drive_warms_in_motion_and_cools_at_every_rest() -> None:
     earlier = np.array(bouts(time_s[:half], moving[:half]))
     assert earlier.sum() == pytest.approx(time_s[half - 1])
     earlier[-1, 1] += 0.02  # until the second half begins
-    late = DriveState("b", "drive", time_s[half:], 0 * time_s[half:], np.ones(len(time_s) - half), 0 * time_s[half:], 0 * time_s[half:],
-                      np.zeros((len(time_s) - half, 0)), extra={"history": earlier, "moving": moving[half:].astype(float)})
-    column = effect("thermal_friction_drift").columns(late, {"form": 1.0, "warm_up_time": warm_s, "cooling_time": cool_s})[:, 0]
+    late = DriveState(
+        "b",
+        "drive",
+        time_s[half:],
+        0 * time_s[half:],
+        np.ones(len(time_s) - half),
+        0 * time_s[half:],
+        0 * time_s[half:],
+        np.zeros((len(time_s) - half, 0)),
+        extra={"history": earlier, "moving": moving[half:].astype(float)},
+    )
+    column = effect("thermal_friction_drift").columns(
+        late, {"form": 1.0, "warm_up_time": warm_s, "cooling_time": cool_s}
+    )[:, 0]
     np.testing.assert_allclose(column, want[half:], atol=1e-3)
 
 
-@pytest.mark.parametrize(("trial", "until", "acts"), [(-2.0, 0.95, False), (-1.0, 1.0, False), (-2.0, 0.7, True), (0.0, 1.0, True)])
+@pytest.mark.parametrize(
+    ("trial", "until", "acts"), [(-2.0, 0.95, False), (-1.0, 1.0, False), (-2.0, 0.7, True), (0.0, 1.0, True)]
+)
 def test_what_is_there_all_along_in_every_recording_is_no_obstacle(trial: float, until: float, acts: bool) -> None:
     s = state()
     s = replace(s, extra={**s.extra, "session_s": np.full(len(s.time_s), s.elapsed_s[-1])})
-    columns = effect("external_contact").columns(s, {"trial": trial, "form": 0.0, "since": 0.0, "until": until, "begin": float(np.median(s.position))})
+    columns = effect("external_contact").columns(
+        s, {"trial": trial, "form": 0.0, "since": 0.0, "until": until, "begin": float(np.median(s.position))}
+    )
     assert bool(columns.any()) is acts

@@ -16,11 +16,14 @@ from hand_model.diagnose.name.wander import Wander
 from hand_model.effects import effect
 
 
-@pytest.mark.parametrize(("name", "shape", "amplitude"), [
-    ("stribeck_friction", {"form": 0.0, "stribeck_speed": 20.0}, [20.0]),
-    ("detent_load", {"form": 0.0, "centre": 50.0, "width": 6.0}, [12.0]),
-    ("nonlinear_spring", {}, [0.004, 0.0]),
-])
+@pytest.mark.parametrize(
+    ("name", "shape", "amplitude"),
+    [
+        ("stribeck_friction", {"form": 0.0, "stribeck_speed": 20.0}, [20.0]),
+        ("detent_load", {"form": 0.0, "centre": 50.0, "width": 6.0}, [12.0]),
+        ("nonlinear_spring", {}, [0.004, 0.0]),
+    ],
+)
 def test_a_scan_finds_the_shape_of_which_a_refit_is_best(name, shape, amplitude) -> None:
     balance = Balance(drive(7, planted(name, shape, amplitude), trials=3))
     kind = effect(name)
@@ -29,8 +32,14 @@ def test_a_scan_finds_the_shape_of_which_a_refit_is_best(name, shape, amplitude)
     assert scan(balance, kind, ()).rss == pytest.approx(best, rel=1e-9)  # from kept columns
 
 
-@pytest.mark.parametrize(("name", "shape"), [("current_channel_delay", {"form": 0.0, "delay": 0.03}), ("current_saturation", {"limit": 50.0}),
-                                             ("stribeck_friction", {"form": 0.0, "stribeck_speed": 20.0})])
+@pytest.mark.parametrize(
+    ("name", "shape"),
+    [
+        ("current_channel_delay", {"form": 0.0, "delay": 0.03}),
+        ("current_saturation", {"limit": 50.0}),
+        ("stribeck_friction", {"form": 0.0, "stribeck_speed": 20.0}),
+    ],
+)
 def test_what_is_learned_is_the_same_without_the_recordings_that_take_no_part(name, shape) -> None:
     states = drive(7, planted("detent_load", {"form": 0.0, "centre": 50.0, "width": 6.0}, [12.0]), trials=4)
     balance = Balance(states)
@@ -39,7 +48,9 @@ def test_what_is_learned_is_the_same_without_the_recordings_that_take_no_part(na
     whole, learned = balance.fit(terms), balance.learning().fit(terms)
     assert len(learned.prediction) == balance.train.sum() < len(whole.prediction)
     np.testing.assert_allclose(whole.prediction[balance.train], learned.prediction, rtol=1e-9)
-    assert learned.rss == pytest.approx(whole.rss, rel=1e-9) and learned.declared == pytest.approx(whole.declared, rel=1e-9)
+    assert learned.rss == pytest.approx(whole.rss, rel=1e-9) and learned.declared == pytest.approx(
+        whole.declared, rel=1e-9
+    )
     assert balance.learning() is balance.learning() and balance.learning().learning() is balance.learning()
     again = pickle.loads(pickle.dumps(balance))
     assert again.fit(terms).rss == whole.rss and len(pickle.dumps(balance)) < 2 * len(pickle.dumps(Balance(states)))
@@ -92,9 +103,20 @@ def resting(delay_s: float, seed: int) -> Balance:
         held = rng.uniform(-30, 30, 40)[(t // 2).astype(int)]
         true = np.where(moving, declared @ np.array([0.0, 0.15, 35.0, 0.22, 9.0]), held)
         shown = np.interp(t - delay_s, t, true) + rng.normal(0, 4, len(t))
-        out.append(type(state)(state.trial, "index", t, x, v, np.zeros_like(v), np.where(moving, shown, np.nan), declared,
-                               extra={**{k: a[:1500] for k, a in state.extra.items()}, "sigma": np.where(moving, 0.0, 35.0)},
-                               declared_names=state.declared_names))
+        out.append(
+            type(state)(
+                state.trial,
+                "index",
+                t,
+                x,
+                v,
+                np.zeros_like(v),
+                np.where(moving, shown, np.nan),
+                declared,
+                extra={**{k: a[:1500] for k, a in state.extra.items()}, "sigma": np.where(moving, 0.0, 35.0)},
+                declared_names=state.declared_names,
+            )
+        )
     return Balance(tuple(out))
 
 
@@ -117,7 +139,9 @@ def test_without_a_delay_weights_stay_and_wider_errors_cost() -> None:
     balance = resting(0.0, 5)
     assert balance.weights(()) is balance.weight
     assert balance.vagueness(balance.weight) == 0.0
-    assert balance.vagueness(0.5 * balance.weight) == pytest.approx(2 * np.log(2) * balance.inflation * balance.train.sum())
+    assert balance.vagueness(0.5 * balance.weight) == pytest.approx(
+        2 * np.log(2) * balance.inflation * balance.train.sum()
+    )
 
 
 def test_a_candidate_that_is_always_dropped_again_ends_the_search(monkeypatch) -> None:

@@ -132,7 +132,9 @@ def test_clean_laboratory_gives_the_hand_back(tmp_path, side):
 
 def test_dirty_laboratory_stays_within_its_own_uncertainty(tmp_path):
     truth = bebionic("left", 4, ["ring", "thumb_0"])
-    truth = replace(truth, mocap=replace(truth.mocap, noise_m=4e-4, ghosts_per_minute=4, ghost_label_share=0.5, swaps_per_minute=2))
+    truth = replace(
+        truth, mocap=replace(truth.mocap, noise_m=4e-4, ghosts_per_minute=4, ghost_label_share=0.5, swaps_per_minute=2)
+    )
     answer = record(truth, tmp_path / "s", 4, plan=SMALL)
     found = identify_all(tmp_path / "s")
     assert found.hand.noise_m == pytest.approx(4e-4, rel=0.03)
@@ -140,7 +142,10 @@ def test_dirty_laboratory_stays_within_its_own_uncertainty(tmp_path):
         table = answer.table["kinematics"][finger.name]
         for joint, a, c in zip(finger.joints, table["axes"], table["centres"], strict=True):
             off = np.concatenate([joint.axis_palm - np.array(a) / np.linalg.norm(a), joint.centre_palm - np.array(c)])
-            sd = np.sqrt(np.linalg.eigvalsh(joint.covariance[:3, :3])[-1]), np.sqrt(np.linalg.eigvalsh(joint.covariance[3:, 3:])[-1])
+            sd = (
+                np.sqrt(np.linalg.eigvalsh(joint.covariance[:3, :3])[-1]),
+                np.sqrt(np.linalg.eigvalsh(joint.covariance[3:, 3:])[-1]),
+            )
             assert np.linalg.norm(off[:3]) < 4 * sd[0] and np.linalg.norm(off[3:]) < 4 * sd[1]
 
 

@@ -32,7 +32,8 @@ def strokes(speeds: tuple[float, ...], rest_s: float = 0.5, rate_hz: float = 100
 
 
 def joint(seed: int, move=None, add=None, noise: float = 0.6, drift: float = 0.0) -> tuple[DriveState, ...]:
-    """Two recordings of an angle behind a map, the second for validation. move(x): what drives the map; add(t, x): on the angle."""
+    """Two recordings of an angle behind a map, the second for validation. move(x): what drives the map; add(t, x): on
+    the angle."""
     rng = np.random.default_rng(seed)
     out = []
     for k, speeds in enumerate([(100.0, 45.0, 27.0, 70.0, 15.0), (45.0, 27.0, 70.0)]):
@@ -46,9 +47,29 @@ def joint(seed: int, move=None, add=None, noise: float = 0.6, drift: float = 0.0
         offset = np.zeros((len(x), 2))
         offset[:, k] = slope * v
         declared = np.concatenate([np.stack([(x / 100) ** i for i in range(4)], axis=-1), offset], axis=1)
-        extra = {"trial_index": np.full(len(x), float(k)), "scale": np.full(len(x), 100.0), "slope": slope, "load": load}
-        out.append(DriveState(f"log/{k}.csv", "index", t, x, v, 0 * v, angle + rng.normal(0, noise, len(x)), declared, "%", "deg", extra,
-                              ("power_0", "power_1", "power_2", "power_3", "offset_0", "offset_1"), validate=k == 1))
+        extra = {
+            "trial_index": np.full(len(x), float(k)),
+            "scale": np.full(len(x), 100.0),
+            "slope": slope,
+            "load": load,
+        }
+        out.append(
+            DriveState(
+                f"log/{k}.csv",
+                "index",
+                t,
+                x,
+                v,
+                0 * v,
+                angle + rng.normal(0, noise, len(x)),
+                declared,
+                "%",
+                "deg",
+                extra,
+                ("power_0", "power_1", "power_2", "power_3", "offset_0", "offset_1"),
+                validate=k == 1,
+            )
+        )
     return with_excursions(out)
 
 
@@ -112,7 +133,12 @@ def test_give_that_grows_with_load_is_no_lost_motion(station: str, name: str) ->
 
 
 def test_a_play_and_as_much_give_are_both_named_and_little_give_is_the_plays_form() -> None:
-    states = joint(1, move=lambda x: play(x, 2.5), add=lambda t, x, v: -0.03 * (15.0 + 0.2 * x + 35.0 * np.tanh(v) + 0.15 * v), noise=0.2)
+    states = joint(
+        1,
+        move=lambda x: play(x, 2.5),
+        add=lambda t, x, v: -0.03 * (15.0 + 0.2 * x + 35.0 * np.tanh(v) + 0.15 * v),
+        noise=0.2,
+    )
     station = judged("encoder", "index", "index", "proximal", states, catalogue("encoder"))
     assert {f.term.effect.name for f in station.kept} == {"drive_backlash", "series_elasticity"}
 
@@ -174,7 +200,11 @@ def test_clock_drift_is_named_with_its_rate() -> None:
 def test_exchanged_labels_of_a_symmetrical_cluster_are_put_right() -> None:
     t = np.linspace(0, 10, 1000)
     base = np.array([[0, 0, 0], [60, 0, 0], [0, 40, 0], [80, 0, 20], [95, 7.5, 20], [95, -7.5, 20]]) * 1e-3
-    truth = base + 0.02 * np.stack([np.sin(t), np.cos(t), 0 * t], axis=-1)[:, None] + np.random.default_rng(0).normal(0, 1e-4, (1000, 6, 3))
+    truth = (
+        base
+        + 0.02 * np.stack([np.sin(t), np.cos(t), 0 * t], axis=-1)[:, None]
+        + np.random.default_rng(0).normal(0, 1e-4, (1000, 6, 3))
+    )
     wrong = truth.copy()
     wrong[300:700, [4, 5]] = truth[300:700, [5, 4]]
     fixed, swaps = repair_labels(ChainData(wrong, np.array([0, 0, 0, 1, 1, 1]), tuple("abcdef")))
@@ -190,7 +220,12 @@ def exchanging(*swaps_of_recordings: tuple[Swap, ...]) -> SimpleNamespace:
 
     def record(number: int, swaps: tuple[Swap, ...]) -> SimpleNamespace:
         data = SimpleNamespace(labels=("a", "b", "c"), position_world=np.zeros((500, 3, 3)))
-        return SimpleNamespace(mocap=SimpleNamespace(time_s=np.arange(500) / 100), swaps=swaps, trial=SimpleNamespace(name=f"t{number}"), data=data)
+        return SimpleNamespace(
+            mocap=SimpleNamespace(time_s=np.arange(500) / 100),
+            swaps=swaps,
+            trial=SimpleNamespace(name=f"t{number}"),
+            data=data,
+        )
 
     segment = SimpleNamespace(name="distal", markers=("a", "b", "c"))
     records = tuple(record(i, swaps) for i, swaps in enumerate(swaps_of_recordings))
@@ -206,12 +241,14 @@ def test_labels_that_flicker_are_no_exchange() -> None:
 
 def test_an_exchange_is_told_by_its_own_recording_and_while() -> None:
     angles = exchanging((Swap(("a", "b"), 40, 60),), (Swap(("a", "b"), 300, 420), Swap(("a", "b"), 460, 480)))
-    (_, finding), = _swaps(angles)
+    ((_, finding),) = _swaps(angles)
     read = {name: entry["value"] for name, entry in finding.parameters.items()}
     assert read == pytest.approx({"begin": 3.0, "end": 4.2, "lasting": 0.2 + 1.2 + 0.2})
-    assert finding.where["trials"] == ["t0", "t1"] and all(text in finding.statement for text in ("0.4 to 0.6 s of t0", "3.0 to 4.2 s of t1", "4.6 to 4.8 s of t1"))
+    assert finding.where["trials"] == ["t0", "t1"] and all(
+        text in finding.statement for text in ("0.4 to 0.6 s of t0", "3.0 to 4.2 s of t1", "4.6 to 4.8 s of t1")
+    )
     angles.records[1].data.position_world[421:460, 0] = np.nan  # between the two a marker is lost: one while
-    (_, finding), = _swaps(angles)
+    ((_, finding),) = _swaps(angles)
     assert finding.parameters["end"]["value"] == pytest.approx(4.8)
 
 
@@ -226,13 +263,21 @@ def test_the_current_of_whiles_in_which_the_finger_has_left_its_drive_is_not_jud
 
     def state(time_s: np.ndarray, **extra) -> DriveState:
         one = np.ones((len(time_s), 1))
-        return DriveState("trial", "index", time_s, np.interp(time_s, t, x), one[:, 0], one[:, 0], one[:, 0], one, extra=extra)
+        return DriveState(
+            "trial", "index", time_s, np.interp(time_s, t, x), one[:, 0], one[:, 0], one[:, 0], one, extra=extra
+        )
 
     late_s, lifted = 3.0, (t > 20.0) & (t < 20.5)
     angle = np.deg2rad(0.8 * x)[:, None]
-    angles = SimpleNamespace(records=[SimpleNamespace(trial=SimpleNamespace(name="trial"), mocap=SimpleNamespace(time_s=t + late_s), angle_rad=angle)])
+    angles = SimpleNamespace(
+        records=[
+            SimpleNamespace(
+                trial=SimpleNamespace(name="trial"), mocap=SimpleNamespace(time_s=t + late_s), angle_rad=angle
+            )
+        ]
+    )
     ahead = DriveState(**{**vars(state(t)), "time_s": t + late_s, "extra": {"ahead": lifted.astype(float)}})
-    judged, = without_excursions((state(t),), (ahead,), angles)
+    (judged,) = without_excursions((state(t),), (ahead,), angles)
     free = np.isnan(judged.effort)
     assert free[lifted].all() and not free[(t < 19.5) | (t > 21.0)].any()
     assert np.isfinite(without_excursions((state(t),), (state(t),), angles)[0].effort).all()
@@ -246,7 +291,9 @@ def test_a_drifting_clock_lifts_no_finger() -> None:
 
 def held(begin_s: float, end_s: float, lift_deg: float):
     """A finger held ahead of its drive for a while, as if somebody pushed: it can only be ahead."""
-    return lambda t, x, v: np.maximum(lift_deg * np.clip(np.minimum(t - begin_s, end_s - t) / 0.4, 0, 1) - np.polynomial.Polynomial(MAP)(x / 100), 0.0)
+    return lambda t, x, v: np.maximum(
+        lift_deg * np.clip(np.minimum(t - begin_s, end_s - t) / 0.4, 0, 1) - np.polynomial.Polynomial(MAP)(x / 100), 0.0
+    )
 
 
 @pytest.mark.parametrize("lasting_s", [2.0, 7.0])
@@ -280,4 +327,7 @@ def test_what_follows_a_lifted_joint_is_not_judged_while_it_is_lifted() -> None:
     state, other = beside_excursions(joint(4), ahead)
     during = ahead[0].extra["ahead"] > 0
     assert during.any() and np.isnan(state.effort[during]).all()
-    assert np.isfinite(state.effort[(state.time_s < 7.0) | (state.time_s > 12.0)]).all() and np.isfinite(other.effort).all()
+    assert (
+        np.isfinite(state.effort[(state.time_s < 7.0) | (state.time_s > 12.0)]).all()
+        and np.isfinite(other.effort).all()
+    )

@@ -1,4 +1,5 @@
-"""Logs as laboratories hand them over, before a diagnosis: commands that are lost or not the motion's own, dead channels, wrong units."""
+"""Logs as laboratories hand them over, before a diagnosis: commands that are lost or not the motion's own, dead
+channels, wrong units."""
 
 from __future__ import annotations
 
@@ -50,8 +51,10 @@ def test_a_recording_too_short_for_a_motion_is_told() -> None:
     lost = MOTION.copy()
     lost[40:] = np.nan
     logs = {"a.csv": log(MOTION), "b.csv": log(MOTION[:30]), "c.csv": log(lost)}
-    trials = [SimpleNamespace(kind="excitation", log_path=Path(name), finger="index", name=name, log=lambda one=one: one)
-              for name, one in logs.items()]
+    trials = [
+        SimpleNamespace(kind="excitation", log_path=Path(name), finger="index", name=name, log=lambda one=one: one)
+        for name, one in logs.items()
+    ]
     session = SimpleNamespace(trials=trials, finger=lambda name: SimpleNamespace(actuator=name))
     said = too_short(session)
     assert [line.split(" rows")[0] for line in said] == ["b.csv: 30", "c.csv: 40"]
@@ -83,7 +86,9 @@ def test_a_session_that_breaks_its_format_is_refused_before_anything_is_computed
 
 def test_counts_that_fall_with_flexion_are_refused() -> None:
     at = np.arange(0, 30, 0.01)
-    angle = np.interp(at, [0, 1, 4, 5, 7, 9, 9.5, 14, 16, 17, 19, 23, 24, 30], [0, 0, 1.2, 1.2, 0, 0, 0.6, 0.6, 0, 0, 1.2, 1.2, 0, 0])
+    angle = np.interp(
+        at, [0, 1, 4, 5, 7, 9, 9.5, 14, 16, 17, 19, 23, 24, 30], [0, 0, 1.2, 1.2, 0, 0, 0.6, 0.6, 0, 0, 1.2, 1.2, 0, 0]
+    )
     with pytest.raises(SessionError, match="must increase with flexion"):
         align(at, angle, at + 100, 9000 - 3000 * angle, "log/index.csv")
     assert align(at, angle, at + 100, 9000 + 3000 * angle, "log/index.csv").offset_s == pytest.approx(100, abs=1e-3)

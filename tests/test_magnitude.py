@@ -12,10 +12,18 @@ from hand_model.diagnose.assemble import SIGNALS
 from hand_model.diagnose.magnitude import LEAST, MOST, PLAIN, channel_figures, magnitude, sure_magnitude
 from hand_model.effects import catalogue
 
-RAW = {"asymmetric_friction": {"half_difference": 4.0}, "detent_load": {"load": 5.0}, "elastoplastic_hysteresis": {"yield_load": 3.0},
-       "quadratic_damping": {"drag": 3e-4}, "position_dependent_friction": {"extra_friction": 4.0}, "torque_ripple": {"amplitude": 2.0},
-       "viscoelastic_spring": {"stiffness": 0.1}, "gravity_load": {"along": 3.0, "across": -2.0}, "thermal_friction_drift": {"cold_excess": -2.0},
-       "nonlinear_spring": {"bend": 4.0}}
+RAW = {
+    "asymmetric_friction": {"half_difference": 4.0},
+    "detent_load": {"load": 5.0},
+    "elastoplastic_hysteresis": {"yield_load": 3.0},
+    "quadratic_damping": {"drag": 3e-4},
+    "position_dependent_friction": {"extra_friction": 4.0},
+    "torque_ripple": {"amplitude": 2.0},
+    "viscoelastic_spring": {"stiffness": 0.1},
+    "gravity_load": {"along": 3.0, "across": -2.0},
+    "thermal_friction_drift": {"cold_excess": -2.0},
+    "nonlinear_spring": {"bend": 4.0},
+}
 
 
 @pytest.mark.parametrize("effect", RAW)
@@ -26,22 +34,35 @@ def test_a_tenth_is_a_tenth_and_the_unit_of_the_current_does_not_matter(effect: 
     assert LEAST < plain < MOST
     thousand = {k: 1e3 * v for k, v in RAW[effect].items()}
     assert magnitude(effect, thousand, channel_figures(milliampere)) == pytest.approx(plain)
-    assert magnitude(effect, {k: 0.1 * v for k, v in RAW[effect].items()}, channel_figures(states)) == pytest.approx(0.1 * plain)
+    assert magnitude(effect, {k: 0.1 * v for k, v in RAW[effect].items()}, channel_figures(states)) == pytest.approx(
+        0.1 * plain
+    )
 
 
 def test_every_effect_of_a_hand_has_a_figure_and_what_has_none_counts_as_plain() -> None:
     named = {e.name for e in catalogue()} - {"command_as_measurement"}  # a refusal
-    assert {e.station for e in catalogue()} - {"markers"} == set(SIGNALS)  # and its figure refers to the channel in which it shows
+    # and its figure refers to the channel in which it shows
+    assert {e.station for e in catalogue()} - {"markers"} == set(SIGNALS)
     assert named - set(PLAIN) == set()
     assert magnitude("something_new", {"size": 7.0}) == 1.0
     assert magnitude("detent_load", {"load": np.nan}) == 1.0
 
 
-@pytest.mark.parametrize(("entry", "share"), [({"value": 4.0}, 1.0), ({"value": -4.0, "ci95": [-5.0, -3.0]}, 0.75), ({"value": 4.0, "ci95": [-1.0, 9.0]}, 0.0),
-                                              ({"value": 4.0, "ci95": None}, 1.0), ({"value": 4.0, "ci95": [None, None]}, 1.0)])
+@pytest.mark.parametrize(
+    ("entry", "share"),
+    [
+        ({"value": 4.0}, 1.0),
+        ({"value": -4.0, "ci95": [-5.0, -3.0]}, 0.75),
+        ({"value": 4.0, "ci95": [-1.0, 9.0]}, 0.0),
+        ({"value": 4.0, "ci95": None}, 1.0),
+        ({"value": 4.0, "ci95": [None, None]}, 1.0),
+    ],
+)
 def test_what_is_sure_of_a_magnitude_is_that_of_the_end_of_its_interval(entry, share) -> None:
     plain = magnitude("detent_load", {"load": 4.0}, channel_figures(drive(0)))
-    assert sure_magnitude("detent_load", {"load": entry}, channel_figures(drive(0))) == pytest.approx(max(share * plain, LEAST))
+    assert sure_magnitude("detent_load", {"load": entry}, channel_figures(drive(0))) == pytest.approx(
+        max(share * plain, LEAST)
+    )
 
 
 def test_intervals_of_several_figures_take_less_together_than_each_at_its_worst() -> None:
@@ -51,10 +72,15 @@ def test_intervals_of_several_figures_take_less_together_than_each_at_its_worst(
     plain = magnitude("stribeck_friction", {"static_excess": 4.0, "stribeck_speed": 10.0}, channel)
     assert sure_magnitude("stribeck_friction", rise, channel) == pytest.approx(plain * (1 - np.hypot(0.25, 0.4)))
     stop = {"from": {"value": 90.0, "unit": "%", "ci95": [88.0, 92.0]}}
-    assert sure_magnitude("distal_stop", stop, channel) == pytest.approx(magnitude("distal_stop", {"from": 92.0}, channel))
+    assert sure_magnitude("distal_stop", stop, channel) == pytest.approx(
+        magnitude("distal_stop", {"from": 92.0}, channel)
+    )
 
 
 def test_bristles_count_by_what_they_are_longer_than_any_drive_is_granted() -> None:
     states = tuple(replace(s, extra={**s.extra, "granted": np.full(len(s.time_s), 0.9)}) for s in drive(0))
-    sizes = [magnitude("presliding_friction", {"bristle_length": length}, channel_figures(states)) for length in (0.9, 1.9, 2.9)]
+    sizes = [
+        magnitude("presliding_friction", {"bristle_length": length}, channel_figures(states))
+        for length in (0.9, 1.9, 2.9)
+    ]
     assert sizes[0] == LEAST and sizes[2] == pytest.approx(2 * sizes[1])

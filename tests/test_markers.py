@@ -20,8 +20,9 @@ COUNT, RECORDS = 240, 2
 
 
 def seen(shift, seed: int = 0) -> MarkerNaming:
-    """The naming of two recordings of a finger of two joints whose markers are displaced by shift(share, turn, arm): (b, 4, 3) [m] of the first
-    segment's markers. share: (b,) of the recording. turn: (b, 3, 3) of that segment. arm: (4, 3) [m] from the support's middle, at rest."""
+    """The naming of two recordings of a finger of two joints whose markers are displaced by shift(share, turn, arm):
+    (b, 4, 3) [m] of the first segment's markers. share: (b,) of the recording. turn: (b, 3, 3) of that segment. arm:
+    (4, 3) [m] from the support's middle, at rest."""
     rng = np.random.default_rng(seed)
     rest = np.concatenate([rng.normal(0, 0.012, (4, 3)) + [0.03 * k + 0.01, 0, 0.01] for k in range(3)])
     chain = Chain(rest, np.array([[0, 1, 0], [0, 1, 0]], float), np.array([[0.03, 0, 0], [0.06, 0, 0]]))
@@ -31,15 +32,19 @@ def seen(shift, seed: int = 0) -> MarkerNaming:
     turn = Rotation.from_rotvec(angle[:, :1] * chain.axis_palm[0]).as_matrix()
     residual[:, BODY == 1] += shift(share, turn, rest[BODY == 1] - rest[BODY == 1].mean(0))
     record = np.repeat(np.arange(RECORDS), COUNT)
-    return named_in(_assembled(chain, BODY, LABELS, residual, np.full((len(share), 12), 8.0), angle, record, 30 * share))
+    return named_in(
+        _assembled(chain, BODY, LABELS, residual, np.full((len(share), 12), 8.0), angle, record, 30 * share)
+    )
 
 
 def slipping(at: float):
     """The first marker slips by 1.5 mm at that share of each recording."""
+
     def shift(share, turn, arm):
         out = np.zeros((len(share), 4, 3))
         out[:, 0] = (share >= at)[:, None] * (turn @ np.array([1e-3, -1e-3, 0.5e-3]))
         return out
+
     return shift
 
 
@@ -77,13 +82,22 @@ def test_slips_close_to_each_other_are_told_apart_whatever_was_found_first() -> 
     naming = seen(slipping_together)
     assert places(naming) == {("support_slip", None), ("marker_slip", "M5"), ("marker_slip", "M7")}
     assert naming.p_after > 0.003
-    assert {(e.effect, e.begin // COUNT, round(e.begin % COUNT / COUNT, 2)) for e in naming.found if e.begin is not None} == {
-        (effect, record, at) for record in range(RECORDS) for effect, at in (("support_slip", 0.26), ("marker_slip", 0.32), ("marker_slip", 0.28))}
+    assert {
+        (e.effect, e.begin // COUNT, round(e.begin % COUNT / COUNT, 2)) for e in naming.found if e.begin is not None
+    } == {
+        (effect, record, at)
+        for record in range(RECORDS)
+        for effect, at in (("support_slip", 0.26), ("marker_slip", 0.32), ("marker_slip", 0.28))
+    }
 
 
 def test_a_support_that_turns_all_the_time_does_not_slip() -> None:
     naming = seen(creeping)
     assert naming.believed and places(naming) == {(CREEP, None)}
     finger = SimpleNamespace(name="index", segments=(SimpleNamespace(name="proximal"), SimpleNamespace(name="distal")))
-    told, = unexplained(SimpleNamespace(finger=finger), naming)
-    assert told["where"]["joint"] == "proximal" and told["shape"] == "a support moves all the time" and NO_HINGE not in told["shape"]
+    (told,) = unexplained(SimpleNamespace(finger=finger), naming)
+    assert (
+        told["where"]["joint"] == "proximal"
+        and told["shape"] == "a support moves all the time"
+        and NO_HINGE not in told["shape"]
+    )

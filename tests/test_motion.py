@@ -10,7 +10,9 @@ from hand_model.diagnose.locate.motion import estimate_motion, position_at, sure
 def strokes(time_s: np.ndarray, acceleration: float = 900.0, speed: float = 110.0) -> np.ndarray:
     """Position [%] that goes there and back in trapezoids of velocity, a rest before and after each."""
     fine = np.arange(0.0, time_s[-1] + 1e-3, 1e-3)
-    wanted = speed * (((fine % 4.0) > 1.0) & ((fine % 4.0) < 1.8)) - speed * (((fine % 4.0) > 2.8) & ((fine % 4.0) < 3.6))
+    wanted = speed * (((fine % 4.0) > 1.0) & ((fine % 4.0) < 1.8)) - speed * (
+        ((fine % 4.0) > 2.8) & ((fine % 4.0) < 3.6)
+    )
     velocity = np.zeros_like(fine)
     for i in range(1, len(fine)):
         velocity[i] = velocity[i - 1] + np.clip(wanted[i] - velocity[i - 1], -acceleration * 1e-3, acceleration * 1e-3)

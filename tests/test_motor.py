@@ -65,7 +65,8 @@ def test_a_current_logged_late_is_told_to_a_fraction_of_a_sample(trials, fit, de
 
 
 def test_regression_without_controller(trials) -> None:
-    """A regression that knows nothing of setpoints agrees within its own interval, and the inertia is told to a quarter."""
+    """A regression that knows nothing of setpoints agrees within its own interval, and the inertia is told to a
+    quarter."""
     blind = [dataclasses.replace(t, setpoint=None, speed=None, limit=None) for t in trials]
     plain, curved = fit_regressions(blind, 3.5 / 58, 5.0)
     sd = np.sqrt(np.diag(plain.covariance))
@@ -82,7 +83,15 @@ def test_regression_is_exact_without_noise() -> None:
         far = 40.0 + 6 * (i // 2)
         there, back, friction = (0.0, far, -0.5) if i % 2 == 0 else (far, 0.0, 0.5)
         held = TRUTH["stiffness"] * there + TRUTH["preload"] + friction * TRUTH["coulomb"]
-        moves = _moves(origin=there + held / 22.0, target=back, position=there, hold=held, speed=0.3 + 0.07 * i, duration_s=4.0, start_s=0.5)
+        moves = _moves(
+            origin=there + held / 22.0,
+            target=back,
+            position=there,
+            hold=held,
+            speed=0.3 + 0.07 * i,
+            duration_s=4.0,
+            start_s=0.5,
+        )
         t, p, u = (x[:8000:4] for x in simulate(moves, q, 5e-4))
         trials.append(MotorTrial(f"move {i}", t, p[:, 0], u[:, 0], None, None, None))
     found, _ = fit_regressions(trials, 0.02, 0.5)
@@ -96,7 +105,8 @@ def test_prediction_of_held_out_trials(session, fit) -> None:
 
 
 def test_reciprocal_term_is_smear(trials) -> None:
-    """On a drive without Stribeck friction the reciprocal term still lowers the published error, and both sides alike undo that."""
+    """On a drive without Stribeck friction the reciprocal term still lowers the published error, and both sides alike
+    undo that."""
     fits = fit_published(trials)
     published = {f.model: f.rmse_raw for f in fits}
     assert [published[m] for m in MODELS] == sorted(published.values(), reverse=True)
@@ -106,7 +116,16 @@ def test_reciprocal_term_is_smear(trials) -> None:
 
 def _moves(**more: float) -> Moves:
     one = np.ones(1)
-    values = {"start_s": 0.05, "origin": 0.0, "target": 80.0, "speed": 1.0, "limit": 255.0, "position": 0.0, "hold": 0.0, "duration_s": 1.5}
+    values = {
+        "start_s": 0.05,
+        "origin": 0.0,
+        "target": 80.0,
+        "speed": 1.0,
+        "limit": 255.0,
+        "position": 0.0,
+        "hold": 0.0,
+        "duration_s": 1.5,
+    }
     return Moves(**{k: v * one for k, v in {**values, **more}.items()})
 
 
@@ -114,7 +133,15 @@ PARAMETERS = {
     **TRUTH, "presliding": 0.5, "bristle": 0.0, "speed_full": 115.0, "rise": 0.1, "fall": 0.1, "gain": 22.0, "damping": 3.0, "delay": 0.0, "lag": 0.0, "edge": 0.1,
     "static_ratio": 1.0, "stribeck_speed": 20.0, "stribeck_exponent": 1.0,
 }  # fmt: skip
-CASCADE = {"presliding": 0.0, "gain": 12.0, "damping": 2.0, "position_gain": 14.0, "deadband": 1.0, "rise": 0.07, "edge": 0.02}
+CASCADE = {
+    "presliding": 0.0,
+    "gain": 12.0,
+    "damping": 2.0,
+    "position_gain": 14.0,
+    "deadband": 1.0,
+    "rise": 0.07,
+    "edge": 0.02,
+}
 
 
 def test_profile_is_its_velocitys_integral() -> None:
@@ -137,7 +164,9 @@ def test_simulation_obeys_the_plant() -> None:
     z0 = (u[0] - TRUTH["preload"]) / TRUTH["coulomb"]
     z = friction_state(np.r_[p], 0.5)
     sliding = (p > 8) & (p < 70)
-    balance = TRUTH["inertia"] * a + TRUTH["viscous"] * v + TRUTH["coulomb"] * z + TRUTH["stiffness"] * p + TRUTH["preload"]
+    balance = (
+        TRUTH["inertia"] * a + TRUTH["viscous"] * v + TRUTH["coulomb"] * z + TRUTH["stiffness"] * p + TRUTH["preload"]
+    )
     assert abs(z0) <= 1
     assert np.max(np.abs((balance - u)[sliding])) < 0.2
 
@@ -148,7 +177,9 @@ def test_friction_that_sticks_is_the_limit_of_stiff_bristles(speed: float) -> No
     q = {k: np.array([v]) for k, v in {**PARAMETERS, "rise": 1e-4, "fall": 1e-4, "damping": 0.6}.items()}
     moves = _moves(speed=speed, duration_s=1.2)
     hard = simulate(moves, q | {"presliding": np.zeros(1)}, 2e-4)[1][:6000, 0]
-    off = [np.abs(simulate(moves, q | {"presliding": np.full(1, d)}, 2e-4)[1][:6000, 0] - hard).max() for d in (0.04, 0.01)]
+    off = [
+        np.abs(simulate(moves, q | {"presliding": np.full(1, d)}, 2e-4)[1][:6000, 0] - hard).max() for d in (0.04, 0.01)
+    ]
     assert off[1] < 0.75 * off[0] and off[1] < 0.1
     assert np.ptp(hard[:240]) == 0.0
 
@@ -157,14 +188,20 @@ def test_a_velocity_that_lags_passes_for_less_inertia_while_speed_rises() -> Non
     """During the rise a reference velocity `lag` behind acts as damping lag less of accelerating current."""
     q = {k: np.array([v]) for k, v in PARAMETERS.items()}
     current = [simulate(_moves(), q | {"lag": np.full(1, lag)}, 5e-4) for lag in (0.0, 1e-3)]
-    late, heavy = current[1], simulate(_moves(), q | {"inertia": q["inertia"] + q["damping"] * 1e-3, "lag": np.zeros(1)}, 5e-4)
+    late, heavy = (
+        current[1],
+        simulate(_moves(), q | {"inertia": q["inertia"] + q["damping"] * 1e-3, "lag": np.zeros(1)}, 5e-4),
+    )
     rising = slice(180, 280)
     assert np.allclose((late[1] - current[0][1])[rising], (heavy[1] - current[0][1])[rising], atol=0.02)
 
 
 def test_jump_within_a_step_counts() -> None:
     """The command's instant shifts the motion by itself, however coarse the step."""
-    q = {k: np.array([v]) for k, v in {**PARAMETERS, "presliding": 0.0, "rise": 1e-4, "fall": 1e-4, "damping": 0.6}.items()}
+    q = {
+        k: np.array([v])
+        for k, v in {**PARAMETERS, "presliding": 0.0, "rise": 1e-4, "fall": 1e-4, "damping": 0.6}.items()
+    }
     t, early, _ = simulate(_moves(start_s=0.0500), q, 2e-3)
     _, later, _ = simulate(_moves(start_s=0.0507), q, 2e-3)
     k = (t > 0.3) & (t < 0.6)
@@ -172,7 +209,8 @@ def test_jump_within_a_step_counts() -> None:
 
 
 def test_jump_of_the_current_is_where_the_reference_jumps() -> None:
-    """Between two steps, however coarse: just before the command the current is what held the drive, a tick later it has jumped, half of it between."""
+    """Between two steps, however coarse: just before the command the current is what held the drive, a tick later it
+    has jumped, half of it between."""
     jump = {"presliding": 0.0, "rise": 1e-4, "fall": 1e-4, "damping": 0.6, "lead": 0.0}
     q = {k: np.array([v]) for k, v in {**PARAMETERS, **jump}.items()}
     _, u = run(_moves(start_s=0.0513), q, 5e-3).sample([np.array([0.0507, 0.0513, 0.0519])])
@@ -189,7 +227,8 @@ def test_cascade_does_not_depend_on_the_step() -> None:
 
 
 def test_a_logged_speed_stands_for_one_speed(trials) -> None:
-    """Moves of one logged speed tell it together: each one's own scatter averages out, a move that is alone keeps what the log says of it."""
+    """Moves of one logged speed tell it together: each one's own scatter averages out, a move that is alone keeps what
+    the log says of it."""
     moves = [m for t in trials for m in moves_from_rest(t, (0.06, 5.0), 255.0)]
     rng, alone = np.random.default_rng(0), min(range(len(moves)), key=lambda i: moves[i].logged)
     moves[alone] = dataclasses.replace(moves[alone], logged=-1.0)
@@ -263,10 +302,14 @@ def test_good_log_passes() -> None:
         ({"current": np.clip(60 * np.sin(np.arange(600) * 0.018), -40, 40)}, "saturated"),
         ({"current": _clipped(0.4)}, "saturated near"),
         ({"current": 20 + 29 * (1 - np.cos(np.arange(600) * 0.018))}, "command"),
-        ({"current": 20 + 29 * (1 - np.cos(np.arange(600) * 0.018 + 0.05))}, "command"),  # a reference that the position follows
+        # a reference that the position follows
+        ({"current": 20 + 29 * (1 - np.cos(np.arange(600) * 0.018 + 0.05))}, "command"),
         ({"current": np.random.default_rng(2).normal(0, 5, 600)}, "no higher in flexion"),
         ({"current": 80 * np.sign(np.sin(np.arange(600) * 0.018))}, "holds its value"),
-        ({"setpoint": np.repeat([12000.0, 18000.0, 12000.0], 200), "current": np.repeat([5.0, 80.0, 5.0], 200)}, "command"),
+        (
+            {"setpoint": np.repeat([12000.0, 18000.0, 12000.0], 200), "current": np.repeat([5.0, 80.0, 5.0], 200)},
+            "command",
+        ),
     ],
 )
 def test_bad_current_or_motion(columns: dict[str, np.ndarray], words: str) -> None:

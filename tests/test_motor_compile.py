@@ -13,7 +13,15 @@ from hand_model.hand import EncoderMap, Estimate, Finger, Hand, Joint, Motor
 mujoco = pytest.importorskip("mujoco")
 etree = pytest.importorskip("lxml.etree")
 
-VALUES = {"inertia": 0.0125, "viscous": 0.15, "coulomb": 34.0, "stiffness": 0.23, "preload": 9.0, "gain": 22.0, "damping": 3.0}
+VALUES = {
+    "inertia": 0.0125,
+    "viscous": 0.15,
+    "coulomb": 34.0,
+    "stiffness": 0.23,
+    "preload": 9.0,
+    "gain": 22.0,
+    "damping": 3.0,
+}
 XML = """<mujoco><compiler angle="radian"/><option timestep="0.001" integrator="implicitfast" gravity="0 0 0"/>
 <worldbody><body name="palm"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
 <body name="index_proximal_link"><inertial pos="0.02 0 0" mass="0.01" diaginertia="1e-6 1e-6 1e-6"/>
@@ -58,7 +66,11 @@ def test_motor_accelerates_as_identified(scale: float | None) -> None:
     encoder = np.polynomial.Polynomial([0.0, 1.2, 0.25, -0.1])
     u = (12100 + 58 * percent - 12000) / 6000
     slope = encoder.deriv()(u) * 58 / 6000
-    for name, value, rate in (("index_motor", percent, speed), ("index_drive", encoder(u), slope * speed), ("index_proximal", encoder(u), slope * speed)):
+    for name, value, rate in (
+        ("index_motor", percent, speed),
+        ("index_drive", encoder(u), slope * speed),
+        ("index_proximal", encoder(u), slope * speed),
+    ):
         data.joint(name).qpos[0], data.joint(name).qvel[0] = value, rate
     data.joint("index_distal").qpos[0], data.joint("index_distal").qvel[0] = 0.9 * encoder(u), 0.9 * slope * speed
     data.ctrl[model.actuator("index").id] = percent + (current + 3.0 * speed) / 22.0
@@ -76,7 +88,9 @@ def test_finger_follows_the_encoder_map_and_holds() -> None:
     percent = _q(model, data, "index_motor")
     assert 55 < percent < 60  # friction and spring hold it short of the setpoint
     u = (12100 + 58 * percent - 12000) / 6000
-    assert _q(model, data, "index_proximal") == pytest.approx(np.polynomial.polynomial.polyval(u, [0.0, 1.2, 0.25, -0.1]), abs=2e-3)
+    assert _q(model, data, "index_proximal") == pytest.approx(
+        np.polynomial.polynomial.polyval(u, [0.0, 1.2, 0.25, -0.1]), abs=2e-3
+    )
     still = percent
     for _ in range(1000):
         mujoco.mj_step(model, data)
@@ -126,8 +140,9 @@ def test_keyframe_puts_motor_where_the_finger_is(more: dict[str, float]) -> None
 
 
 def test_pinocchio_is_given_what_it_leaves_out() -> None:
-    """Pinocchio's dynamics know no damping, friction, spring, actuator or equality: supplied from the file's numbers (and the
-    equality's and push's forces from MuJoCo), both agree to 1e-8 of the largest acceleration; without them they do not."""
+    """Pinocchio's dynamics know no damping, friction, spring, actuator or equality: supplied from the file's numbers
+    (and the equality's and push's forces from MuJoCo), both agree to 1e-8 of the largest acceleration; without them
+    they do not."""
     pin = pytest.importorskip("pinocchio")
     model, data = _model(_hand())
     body = pin.Model()
@@ -139,7 +154,9 @@ def test_pinocchio_is_given_what_it_leaves_out() -> None:
         axis = pin.JointModelRY() if name in inertias else pin.JointModelRZ()
         parent = body.addJoint(parent if name == "index_distal" else 0, axis, shift, name)
         mass, centre, inertia = inertias.get(name, (1e-9, [0, 0, 0], 1e-9))
-        body.appendBodyToJoint(parent, pin.Inertia(mass, np.array(centre, float), inertia * np.eye(3)), pin.SE3.Identity())
+        body.appendBodyToJoint(
+            parent, pin.Inertia(mass, np.array(centre, float), inertia * np.eye(3)), pin.SE3.Identity()
+        )
     body.gravity.setZero()
     address = np.array([model.joint(n).dofadr[0] for n in order])
     body.armature = model.dof_armature[address].copy()
@@ -177,7 +194,9 @@ def test_names_are_shared_by_no_two_things() -> None:
     root = etree.fromstring(XML)
     etree.SubElement(root.find("worldbody/body"), "site", name="index_map")
     write_motors(root, _hand(presliding=0.6))
-    names = [e.get("name") for e in root.iter() if isinstance(e.tag, str) and e.getparent() is not None and e.get("name")]
+    names = [
+        e.get("name") for e in root.iter() if isinstance(e.tag, str) and e.getparent() is not None and e.get("name")
+    ]
     assert len(names) == len(set(names)) and "index_map_2" in names
 
 

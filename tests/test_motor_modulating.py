@@ -1,4 +1,5 @@
-"""Modulating functions: orthonormal once whitened, and their derivatives stand for those of what they are multiplied with."""
+"""Modulating functions: orthonormal once whitened, and their derivatives stand for those of what they are multiplied
+with."""
 
 from __future__ import annotations
 
@@ -20,12 +21,21 @@ def test_whitened_splines_are_orthonormal() -> None:
 
 
 def test_derivatives_by_parts() -> None:
-    """The splines vanish at both ends: their derivatives times y are they times the derivatives of y, but for the sign."""
-    y, first, second = np.exp(T) * np.sin(4 * T), np.exp(T) * (np.sin(4 * T) + 4 * np.cos(4 * T)), np.exp(T) * (8 * np.cos(4 * T) - 15 * np.sin(4 * T))
+    """The splines vanish at both ends: their derivatives times y are they times the derivatives of y, but for the
+    sign."""
+    y, first, second = (
+        np.exp(T) * np.sin(4 * T),
+        np.exp(T) * (np.sin(4 * T) + 4 * np.cos(4 * T)),
+        np.exp(T) * (8 * np.cos(4 * T) - 15 * np.sin(4 * T)),
+    )
     scale = np.abs(SPLINES.products(first)).max()
-    assert np.abs(SPLINES.products(y, 1) + SPLINES.products(first)).max() < 1e-2 * scale  # the trapezoidal rule over kinks
+    # the trapezoidal rule over kinks
+    assert np.abs(SPLINES.products(y, 1) + SPLINES.products(first)).max() < 1e-2 * scale
     bent = y - y[0] - (y[-1] - y[0]) * (T - T[0]) / (T[-1] - T[0])
-    assert np.abs(SPLINES.products(bent, 2) - SPLINES.products(second)).max() < 2e-2 * np.abs(SPLINES.products(second)).max()
+    assert (
+        np.abs(SPLINES.products(bent, 2) - SPLINES.products(second)).max()
+        < 2e-2 * np.abs(SPLINES.products(second)).max()
+    )
 
 
 def test_slope_of_a_combination() -> None:

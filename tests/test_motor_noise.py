@@ -18,9 +18,12 @@ def _wander(rng: np.random.Generator, n: int, keep: float) -> np.ndarray:
 
 
 def test_noise_is_freed_of_its_memory() -> None:
-    """A load that wanders under white noise: what is left is white and as large as before; the channel without memory stays as it is."""
+    """A load that wanders under white noise: what is left is white and as large as before; the channel without memory
+    stays as it is."""
     rng = np.random.default_rng(1)
-    moves = [np.c_[(_wander(rng, 300, 0.9) + rng.normal(size=300)) / np.sqrt(2), rng.normal(size=300)] for _ in range(40)]
+    moves = [
+        np.c_[(_wander(rng, 300, 0.9) + rng.normal(size=300)) / np.sqrt(2), rng.normal(size=300)] for _ in range(40)
+    ]
     correlation = autocorrelation(moves)
     assert correlation[0, 1] == pytest.approx(0.45, abs=0.05) and abs(correlation[1, 1]) < 0.03
     known = tuple(predictors(c) for c in correlation)
@@ -43,7 +46,8 @@ def test_freeing_is_linear_and_leaves_the_first_sample() -> None:
 
 @pytest.mark.parametrize("between", [0.0, 1.0])
 def test_intervals_hold_the_truth_with_moves_that_differ(between: float) -> None:
-    """A line fitted to moves, each with a slope of its own: nine in ten intervals at least, and without such moves not much more than promised."""
+    """A line fitted to moves, each with a slope of its own: nine in ten intervals at least, and without such moves not
+    much more than promised."""
     rng = np.random.default_rng(3)
     inside = []
     for _ in range(300):

@@ -1,4 +1,5 @@
-"""Outsiders: what no table of effects holds competes, is told as unexplained and never named; what is known comes first."""
+"""Outsiders: what no table of effects holds competes, is told as unexplained and never named; what is known comes
+first."""
 
 from __future__ import annotations
 
@@ -61,13 +62,17 @@ def test_no_outsider_is_a_row_of_the_table() -> None:
     assert not any(e.listed for e in BY_NAME.values()) and all(e.listed for e in catalogue())
 
 
-def weighed(states: tuple[DriveState, ...], poses: list[tuple[float, float] | None], load_raw: float = 20.0) -> tuple[DriveState, ...]:
+def weighed(
+    states: tuple[DriveState, ...], poses: list[tuple[float, float] | None], load_raw: float = 20.0
+) -> tuple[DriveState, ...]:
     """The states with a weight of `load_raw` whose poses (along, across) are recorded, or not."""
     out = []
     for state, pose in zip(states, poses, strict=True):
         along, across = pose or (9.0, -3.0)
         n = np.ones(len(state.time_s))
-        seen = replace(state, extra={**state.extra, "gravity_along": along * n, "gravity_across": across * n, "pose_seen": n})
+        seen = replace(
+            state, extra={**state.extra, "gravity_along": along * n, "gravity_across": across * n, "pose_seen": n}
+        )
         load = effect("gravity_load").columns(seen, {"sweep": 1.4}) @ np.array([load_raw, 0.0, 0.0, 0.0])
         bare = {**state.extra, "pose_unseen": n}
         out.append(replace(seen if pose else replace(state, extra=bare), effort=state.effort + load))
@@ -75,7 +80,9 @@ def weighed(states: tuple[DriveState, ...], poses: list[tuple[float, float] | No
 
 
 @pytest.mark.parametrize(("load_raw", "noise", "within"), [(20.0, 5.0, 0.15), (1.5, 8.0, 0.9)])
-def test_a_weight_is_named_where_only_the_recording_kept_out_shows_another_pose(load_raw: float, noise: float, within: float) -> None:
+def test_a_weight_is_named_where_only_the_recording_kept_out_shows_another_pose(
+    load_raw: float, noise: float, within: float
+) -> None:
     states = drive(8, noise=noise, trials=5)
     poses = [(9.81, 0.0), None, None, (-8.0, 5.0), None]
     station = heard(weighed(tuple(replace(s, validate=k > 2) for k, s in enumerate(states)), poses, load_raw))
@@ -109,7 +116,9 @@ def test_a_rhythm_in_time_is_no_ripple(hz: float) -> None:
 
 
 def indexed(states: tuple[DriveState, ...]) -> tuple[DriveState, ...]:
-    return tuple(replace(s, extra={**s.extra, "trial_index": np.full(len(s.time_s), float(k))}) for k, s in enumerate(states))
+    return tuple(
+        replace(s, extra={**s.extra, "trial_index": np.full(len(s.time_s), float(k))}) for k, s in enumerate(states)
+    )
 
 
 def test_frames_that_were_lost_are_no_drift_of_a_clock() -> None:
@@ -117,7 +126,9 @@ def test_frames_that_were_lost_are_no_drift_of_a_clock() -> None:
         late = 0.12 * (t > 0.2 * t[-1]) - 0.09 * (t > 0.55 * t[-1]) + 0.1 * (t > 0.8 * t[-1])
         return np.polynomial.Polynomial(MAP)(np.interp(t + late, t, x) / 100) - np.polynomial.Polynomial(MAP)(x / 100)
 
-    station = judged("encoder", "index", "index", "proximal", joint(3, add=lost), [*catalogue("encoder"), *outsiders("encoder")])
+    station = judged(
+        "encoder", "index", "index", "proximal", joint(3, add=lost), [*catalogue("encoder"), *outsiders("encoder")]
+    )
     assert "clock_wander" in {f.term.effect.name for f in station.outsiders}
     assert "clock_drift" not in {f.term.effect.name for f in station.kept}
 
@@ -126,9 +137,13 @@ def test_frames_that_were_lost_are_no_drift_of_a_clock() -> None:
 def test_an_encoder_whose_scale_changes_lifts_no_finger(since_s: float) -> None:
     def further(t, x, v):
         later = (t >= since_s) if t[-1] > 25 else np.ones(len(t), bool)  # the second recording comes after it
-        return np.polynomial.Polynomial(MAP)(1.025 * x / 100 * later + x / 100 * ~later) - np.polynomial.Polynomial(MAP)(x / 100)
+        return np.polynomial.Polynomial(MAP)(1.025 * x / 100 * later + x / 100 * ~later) - np.polynomial.Polynomial(
+            MAP
+        )(x / 100)
 
-    station = judged("encoder", "index", "index", "proximal", joint(3, add=further), [*catalogue("encoder"), *outsiders("encoder")])
+    station = judged(
+        "encoder", "index", "index", "proximal", joint(3, add=further), [*catalogue("encoder"), *outsiders("encoder")]
+    )
     assert not station.kept and [f.term.effect.name for f in station.outsiders] == ["scale_change"]
     assert station.outsiders[0].amplitudes["change"] == pytest.approx(0.025, abs=0.005)
 
@@ -142,17 +157,26 @@ def test_names_that_leave_what_recordings_kept_out_show_are_not_believed(seed: i
 
 
 @pytest.mark.parametrize(("cold", "believed"), [(40.0, True), (6.0, False)])
-def test_names_that_leave_nothing_of_what_recordings_kept_out_showed_plainly_are_believed(cold: float, believed: bool) -> None:
+def test_names_that_leave_nothing_of_what_recordings_kept_out_showed_plainly_are_believed(
+    cold: float, believed: bool
+) -> None:
     """Whatever repeats beside them: the test hardly sees what changes over a recording."""
     warm = planted("thermal_friction_drift", {"form": 0.0, "warm_up_time": 50.0, "cooling_time": 50.0}, [cold])
     naming = judged("current", "index", "index", None, drive(2, warm), catalogue("drive")).naming
     assert [f.term.effect.name for f in naming.found] == ["thermal_friction_drift"]
     some = replace(naming.after, p=1e-6, excess=0.5 * naming.before.excess)
-    assert Station("current", "index", "index", None, replace(naming, before=replace(naming.before, p=1e-9), after=some)).believed is believed
+    assert (
+        Station(
+            "current", "index", "index", None, replace(naming, before=replace(naming.before, p=1e-9), after=some)
+        ).believed
+        is believed
+    )
 
 
 def test_a_drifting_clock_is_named_beside_outsiders() -> None:
-    station = judged("encoder", "index", "index", "proximal", joint(5, drift=2e-3), [*catalogue("encoder"), *outsiders("encoder")])
+    station = judged(
+        "encoder", "index", "index", "proximal", joint(5, drift=2e-3), [*catalogue("encoder"), *outsiders("encoder")]
+    )
     assert [f.term.effect.name for f in station.kept] == ["clock_drift"] and not station.outsiders
 
 
@@ -166,8 +190,11 @@ def test_a_level_that_wanders_names_no_obstacle() -> None:
     assert not heard(indexed(drive(6, walk))).kept
 
 
-def test_the_only_effect_needs_no_steady_motion_where_it_is_plain_and_a_faint_one_does(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("hand_model.diagnose.name.station.sized", lambda *_: False)  # all of it happens at starts and stops
+def test_the_only_effect_needs_no_steady_motion_where_it_is_plain_and_a_faint_one_does(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # all of it happens at starts and stops
+    monkeypatch.setattr("hand_model.diagnose.name.station.sized", lambda *_: False)
     plain = heard(drive(3, planted(*PLANTED[0])))
     assert [f.term.effect.name for f in plain.kept] == [PLANTED[0][0]]
     faint = replace(plain.naming, found=(plain.naming.found[0],) * 2)
@@ -177,8 +204,13 @@ def test_the_only_effect_needs_no_steady_motion_where_it_is_plain_and_a_faint_on
     assert channel_of(plain)["effects"] == [PLANTED[0][0]]
 
 
-@pytest.mark.parametrize(("count", "p", "left", "overwhelmed"), [(5, 1e-9, 0.5, True), (4, 1e-9, 0.5, False), (5, 0.2, 0.5, False), (5, 1e-9, 0.1, False)])
-def test_five_effects_that_leave_most_of_a_plain_mismatch_are_enough(count: int, p: float, left: float, overwhelmed: bool) -> None:
+@pytest.mark.parametrize(
+    ("count", "p", "left", "overwhelmed"),
+    [(5, 1e-9, 0.5, True), (4, 1e-9, 0.5, False), (5, 0.2, 0.5, False), (5, 1e-9, 0.1, False)],
+)
+def test_five_effects_that_leave_most_of_a_plain_mismatch_are_enough(
+    count: int, p: float, left: float, overwhelmed: bool
+) -> None:
     naming = heard(drive(3, planted(*PLANTED[0]))).naming
     before, after = replace(naming.before, p=1e-30, excess=100.0), replace(naming.after, p=p, excess=100.0 * left)
     assert replace(naming, before=before, after=after, found=naming.found[:1] * count).overwhelmed is overwhelmed

@@ -49,11 +49,18 @@ DRIVE = [
     ("torque_ripple", {"period": 9.0}, {"sine": 4.0, "cosine": 3.0}, 0.01),
     ("viscoelastic_spring", {"relaxation_time": 1.2}, {"stiffness": 0.3}, 0.01),
 ]
-# Nothing of them is a force of the drive: an obstacle of one recording, a controller's speed, what is read of a command.
+# Nothing of them is a force of the drive: an obstacle of one recording, a controller's speed, what is read of a
+# command.
 NOT_OF_THE_DRIVE = {"external_contact"}
 # An encoder's own error and a clock are no motion of the finger; one that runs ahead is pushed by something else.
 NOT_OF_A_MAP = {"encoder_periodic_error", "clock_drift", "spring_decoupling"}
-MOTOR_NAMES = {"inertia": "inertia", "viscous": "viscous", "coulomb": "coulomb", "spring": "stiffness", "preload": "preload"}
+MOTOR_NAMES = {
+    "inertia": "inertia",
+    "viscous": "viscous",
+    "coulomb": "coulomb",
+    "spring": "stiffness",
+    "preload": "preload",
+}
 
 
 def state(until_s: float = 24.0, elapsed_s: float = 5.0) -> DriveState:
@@ -64,12 +71,22 @@ def state(until_s: float = 24.0, elapsed_s: float = 5.0) -> DriveState:
     fine = np.arange(-1.0, 25.0, 0.001)
     kernel = np.exp(-0.5 * (np.arange(-400, 401) / 120) ** 2)
     smooth = np.convolve(np.pad(np.interp(fine, knots, level), 400, mode="edge"), kernel / kernel.sum(), mode="valid")
-    x, v, a = (np.interp(t, fine, y) for y in (smooth, np.gradient(smooth, fine), np.gradient(np.gradient(smooth, fine), fine)))
+    x, v, a = (
+        np.interp(t, fine, y) for y in (smooth, np.gradient(smooth, fine), np.gradient(np.gradient(smooth, fine), fine))
+    )
     declared = np.stack([a, v, dahl(x, GIVE), x, np.ones_like(x)], axis=-1)
-    extra = {"bandwidth_s": 0 * t, "give": 0 * t + GIVE, "elapsed": t + elapsed_s, "gravity_along": 0 * t + 3.0,
-             "gravity_across": 0 * t - 9.0, "gravity_x": 0 * t + 3.0, "gravity_z": 0 * t - 9.0}
+    extra = {
+        "bandwidth_s": 0 * t,
+        "give": 0 * t + GIVE,
+        "elapsed": t + elapsed_s,
+        "gravity_along": 0 * t + 3.0,
+        "gravity_across": 0 * t - 9.0,
+        "gravity_x": 0 * t + 3.0,
+        "gravity_z": 0 * t - 9.0,
+    }
     needed = declared @ np.array(list(DECLARED.values()))
-    extra["required"] = np.sign(needed) * (1 - np.sqrt(1 - 4 * SAG / 100 * np.abs(needed))) / (2 * SAG / 100)  # u (1 - SAG |u| / 100) = needed
+    # u (1 - SAG |u| / 100) = needed
+    extra["required"] = np.sign(needed) * (1 - np.sqrt(1 - 4 * SAG / 100 * np.abs(needed))) / (2 * SAG / 100)
     return DriveState("log/a.csv", "index", t, x, v, a, 0 * x, declared, declared_names=tuple(DECLARED), extra=extra)
 
 
@@ -96,11 +113,23 @@ def motor_with(name: str, shape: dict[str, float], amplitude: dict[str, float]):
     assert (place is None) != (effect(name).law(values) is None)  # either the file holds it or the callback applies it
     estimates = {k: Estimate(v, None, "", "") for k, v in values.items()}
     motor = Motor("index", 0.0, 100.0, {"presliding": Estimate(GIVE, None, "%", "")}, 1.0, ())
-    hand = Hand("h", "left", {}, {}, (), 1e-4, {}, (motor,), (Effect(name, {"actuator": "index", "finger": "index"}, estimates),))
+    hand = Hand(
+        "h",
+        "left",
+        {},
+        {},
+        (),
+        1e-4,
+        {},
+        (motor,),
+        (Effect(name, {"actuator": "index", "finger": "index"}, estimates),),
+    )
     return CompiledMotor(etree.fromstring(etree.tostring(root)), "index", "index_motor", UNIT, hand)
 
 
-@pytest.mark.parametrize(("name", "shape", "amplitude", "tolerance"), DRIVE, ids=[f"{d[0]}_{i}" for i, d in enumerate(DRIVE)])
+@pytest.mark.parametrize(
+    ("name", "shape", "amplitude", "tolerance"), DRIVE, ids=[f"{d[0]}_{i}" for i, d in enumerate(DRIVE)]
+)
 def test_written_and_replayed_effect_is_the_effects_own_column(name, shape, amplitude, tolerance) -> None:
     from hand_model.diagnose.prove.inverse import current_along
 
@@ -112,7 +141,9 @@ def test_written_and_replayed_effect_is_the_effects_own_column(name, shape, ampl
     assert size > 3
     error = np.abs(replayed - wanted)
     if name == "stribeck_friction":  # MuJoCo's rise has another form: nearest where it slides, and late to turn over
-        assert np.sqrt(np.mean(error[(np.abs(now.velocity) > 4) & (travelled(now.position) > 4)] ** 2)) < tolerance * size
+        assert (
+            np.sqrt(np.mean(error[(np.abs(now.velocity) > 4) & (travelled(now.position) > 4)] ** 2)) < tolerance * size
+        )
     else:
         assert np.quantile(error, 0.99) < tolerance * size + 0.3  # friction turns over within steps of 2 ms
 
@@ -124,7 +155,8 @@ FINGER = """<mujoco><compiler angle="radian"/><option timestep="0.001" integrato
 <joint name="index_distal" type="hinge" axis="0 1 0"/></body></body></body></worldbody>
 <equality><joint name="index_linkage" joint1="index_distal" joint2="index_proximal" polycoef="0.02 0.7 0.15 0 0" solref="0.002 1"
  solimp="0.9999 0.9999 0.001 0.5 2"/></equality></mujoco>"""
-ENCODER, LINKAGE = np.array([0.02, 1.1, 0.25, -0.1]), np.array([0.02, 0.7, 0.15, 0.0, 0.0])  # rad over the share of the range; over rad
+# rad over the share of the range; over rad
+ENCODER, LINKAGE = np.array([0.02, 1.1, 0.25, -0.1]), np.array([0.02, 0.7, 0.15, 0.0, 0.0])
 KINEMATIC = [
     ("drive_backlash", {"gap": 2.5, "form": 0.0}, {}),
     ("series_elasticity", {"form": 0.0}, {"compliance": 0.02}),
@@ -146,19 +178,42 @@ def kinematic_state(station: str) -> DriveState:
     declared = np.stack([(x / scale) ** k for k in range(4 if station == "encoder" else 5)], axis=-1)
     polynomial = np.polynomial.Polynomial(ENCODER if station == "encoder" else LINKAGE)
     u, per = (x / 100, 0.01) if station == "encoder" else (np.deg2rad(x), np.deg2rad(1.0))
-    extra = {"scale": 0 * x + scale, "load": now.declared @ np.array(list(DECLARED.values())),
-             "slope": np.rad2deg(polynomial.deriv()(u)) * per}
-    return DriveState("log/a.csv", "index", now.time_s, x, now.velocity, now.acceleration, np.rad2deg(polynomial(u)), declared,
-                      "%" if station == "encoder" else "deg", "deg", extra, tuple(f"power_{k}" for k in range(declared.shape[1])))
+    extra = {
+        "scale": 0 * x + scale,
+        "load": now.declared @ np.array(list(DECLARED.values())),
+        "slope": np.rad2deg(polynomial.deriv()(u)) * per,
+    }
+    return DriveState(
+        "log/a.csv",
+        "index",
+        now.time_s,
+        x,
+        now.velocity,
+        now.acceleration,
+        np.rad2deg(polynomial(u)),
+        declared,
+        "%" if station == "encoder" else "deg",
+        "deg",
+        extra,
+        tuple(f"power_{k}" for k in range(declared.shape[1])),
+    )
 
 
 def _add_passive_motor(root) -> None:
-    """Another finger's friction, a motor without control, ahead of all others: controls and actuators are numbered apart."""
+    """Another finger's friction, a motor without control, ahead of all others: controls and actuators are numbered
+    apart."""
     other = etree.SubElement(root.find("worldbody"), "body", name="other")
     etree.SubElement(other, "inertial", pos="0 0 0", mass="0.01", diaginertia="1e-6 1e-6 1e-6")
     etree.SubElement(other, "joint", name="other", type="hinge", axis="0 1 0", armature="1e-3")
-    friction = etree.Element("dcmotor", name="other_friction", joint="other", input="none", motorconst="0 0", resistance="1",
-                             lugre="1 0.1 0.01 0.01 20")
+    friction = etree.Element(
+        "dcmotor",
+        name="other_friction",
+        joint="other",
+        input="none",
+        motorconst="0 0",
+        resistance="1",
+        lugre="1 0.1 0.01 0.01 20",
+    )
     root.find("actuator").insert(0, friction)
 
 
@@ -167,12 +222,22 @@ def replayed(folder, now: DriveState, station: str, *written: tuple[str, dict, d
     from hand_model.compile.motor import write_motors
     from hand_model.diagnose.prove.forward import follower_along
 
-    motor = Motor("index", 0.0, 100.0, {MOTOR_NAMES[k]: Estimate(v, None, "", "") for k, v in DECLARED.items()}, 1.0, ())
+    motor = Motor(
+        "index", 0.0, 100.0, {MOTOR_NAMES[k]: Estimate(v, None, "", "") for k, v in DECLARED.items()}, 1.0, ()
+    )
     hinge = Joint("proximal", np.array([0, 1.0, 0]), np.zeros(3), np.zeros((6, 6)), (0.0, 1.4), {})
-    finger = Finger("index", "index", (hinge, replace(hinge, name="distal")), (EncoderMap(0.0, 100.0, ENCODER, {}, {}),))
-    at = {s: {"finger": "index", "joint": "proximal" if s == "encoder" else "distal", "actuator": "index"} for s in ("encoder", "linkage")}
+    finger = Finger(
+        "index", "index", (hinge, replace(hinge, name="distal")), (EncoderMap(0.0, 100.0, ENCODER, {}, {}),)
+    )
+    at = {
+        s: {"finger": "index", "joint": "proximal" if s == "encoder" else "distal", "actuator": "index"}
+        for s in ("encoder", "linkage")
+    }
     values = {name: effect(name).parameters(shape, amplitude, {}) for name, shape, amplitude in written}
-    found = tuple(Effect(name, at[effect(name).station], {k: Estimate(v, None, "", "") for k, v in value.items()}) for name, value in values.items())
+    found = tuple(
+        Effect(name, at[effect(name).station], {k: Estimate(v, None, "", "") for k, v in value.items()})
+        for name, value in values.items()
+    )
     hand = Hand("h", "left", {}, {}, (finger,), 1e-4, {}, (motor,), found)
     root = etree.fromstring(FINGER)
     write_motors(root, hand)
@@ -192,33 +257,48 @@ def powers(now: DriveState, station: str) -> np.ndarray:
     return np.rad2deg(ENCODER if station == "encoder" else LINKAGE) * per * unit ** np.arange(len(per))
 
 
-@pytest.mark.parametrize(("name", "shape", "amplitude"), KINEMATIC, ids=[f"{d[0]}_{i}" for i, d in enumerate(KINEMATIC)])
+@pytest.mark.parametrize(
+    ("name", "shape", "amplitude"), KINEMATIC, ids=[f"{d[0]}_{i}" for i, d in enumerate(KINEMATIC)]
+)
 def test_written_finger_moves_as_the_effect_predicts(name, shape, amplitude, tmp_path) -> None:
     station = effect(name).station
     now = kinematic_state(station)
     moved = replayed(tmp_path, now, station, (name, shape, amplitude))
     columns = effect(name).columns(now, shape)
-    wanted = effect(name).declared(now, shape) @ powers(now, station) + columns @ np.array(list(amplitude.values()) if columns.shape[1] else [])
+    wanted = effect(name).declared(now, shape) @ powers(now, station) + columns @ np.array(
+        list(amplitude.values()) if columns.shape[1] else []
+    )
     size = np.abs(wanted - now.effort).max()
     assert size > 0.5
     assert np.quantile(np.abs(moved - wanted), 0.98) < 0.05 * size + 0.03
 
 
-@pytest.mark.parametrize("bound", [("coupling_deadband", {"until": 15.0, "corner": 0.1}, {}), ("distal_stop", {"from": 50.0, "passing": 0.0}, {})])
+@pytest.mark.parametrize(
+    "bound",
+    [("coupling_deadband", {"until": 15.0, "corner": 0.1}, {}), ("distal_stop", {"from": 50.0, "passing": 0.0}, {})],
+)
 def test_a_distal_segment_held_back_does_not_lift_the_finger_off_its_lever(bound, tmp_path) -> None:
     now = kinematic_state("encoder")
-    held, free = (replayed(folder, now, "encoder", *written) for folder, written in ((tmp_path, (bound,)), (tmp_path, ())))
+    held, free = (
+        replayed(folder, now, "encoder", *written) for folder, written in ((tmp_path, (bound,)), (tmp_path, ()))
+    )
     assert np.abs(held - free).max() < 0.5  # of a segment held back by 15 to 20 deg
 
 
 def test_a_play_before_a_stop_is_replayed_as_both_predict(tmp_path) -> None:
-    play, stop = ("linkage_backlash", {"gap": 2.0, "form": 0.0}, {}), ("distal_stop", {"from": 50.0, "passing": 0.0}, {})
+    play, stop = (
+        ("linkage_backlash", {"gap": 2.0, "form": 0.0}, {}),
+        ("distal_stop", {"from": 50.0, "passing": 0.0}, {}),
+    )
     now = kinematic_state("linkage")
     moved = replayed(tmp_path, now, "linkage", play, stop)
     by_play = effect(play[0]).declared(now, play[1])[:, 1] * now.extra["scale"][0]
     x = np.minimum(by_play, 50.0)
-    wanted = np.stack([(x / now.extra["scale"][0]) ** k for k in range(now.declared.shape[1])], axis=-1) @ powers(now, "linkage")
-    begun = np.maximum.accumulate(np.abs(now.position - now.position[0]) > 4.0)  # on which side it lay before is not asked
+    wanted = np.stack([(x / now.extra["scale"][0]) ** k for k in range(now.declared.shape[1])], axis=-1) @ powers(
+        now, "linkage"
+    )
+    # on which side it lay before is not asked
+    begun = np.maximum.accumulate(np.abs(now.position - now.position[0]) > 4.0)
     assert np.quantile(np.abs(moved - wanted)[begun], 0.98) < 0.1
 
 
@@ -267,11 +347,18 @@ def test_compliance_moves_the_target_within_the_step() -> None:
     from hand_model.passive import effects_on
 
     root = etree.fromstring(FINGER)
-    motor = Motor("index", 0.0, 100.0, {MOTOR_NAMES[k]: Estimate(v, None, "", "") for k, v in DECLARED.items()}, 1.0, ())
+    motor = Motor(
+        "index", 0.0, 100.0, {MOTOR_NAMES[k]: Estimate(v, None, "", "") for k, v in DECLARED.items()}, 1.0, ()
+    )
     hinge = Joint("proximal", np.array([0, 1.0, 0]), np.zeros(3), np.zeros((6, 6)), (0.0, 1.4), {})
-    finger = Finger("index", "index", (hinge, replace(hinge, name="distal")), (EncoderMap(0.0, 100.0, ENCODER, {}, {}),))
-    give = Effect("series_elasticity", {"finger": "index", "joint": "proximal", "actuator": "index"},
-                  {"compliance": Estimate(0.05, None, "deg/raw", ""), "form": Estimate(1.0, None, "1", "")})
+    finger = Finger(
+        "index", "index", (hinge, replace(hinge, name="distal")), (EncoderMap(0.0, 100.0, ENCODER, {}, {}),)
+    )
+    give = Effect(
+        "series_elasticity",
+        {"finger": "index", "joint": "proximal", "actuator": "index"},
+        {"compliance": Estimate(0.05, None, "deg/raw", ""), "form": Estimate(1.0, None, "1", "")},
+    )
     hand = Hand("h", "left", {}, {}, (finger,), 1e-4, {}, (motor,), (give,))
     write_motors(root, hand)
     model = mujoco.MjModel.from_xml_string(etree.tostring(root).decode())
@@ -290,6 +377,7 @@ def test_compliance_moves_the_target_within_the_step() -> None:
 
 def test_delays_and_clipping_are_what_mujoco_does() -> None:
     """A command delay holds the drive's force back; the sensor of the current is late, or clips."""
+
     def run(name: str, values: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
         root = etree.fromstring(MOTOR.replace('gainprm="0"', f'gainprm="{UNIT}"'))
         assert effect(name).write_mjcf(root, {"actuator": "index"}, values) is not None
@@ -312,11 +400,20 @@ def test_delays_and_clipping_are_what_mujoco_does() -> None:
     assert seen.max() == pytest.approx(20)
 
 
-@pytest.mark.parametrize(("name", "said"), [("command_delay", "| yes | not needed |"), ("detent_load", "| no | yes |"), 
-                                            ("joint_wobble", "| no: over which course"), ("quadratic_damping", "| yes | not needed |")])
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("command_delay", "| yes | not needed |"),
+        ("detent_load", "| no | yes |"),
+        ("joint_wobble", "| no: over which course"),
+        ("quadratic_damping", "| yes | not needed |"),
+    ],
+)
 def test_the_readme_says_where_an_effect_is(name, said) -> None:
     from hand_model.compile.readme import _effects
 
     values = {"detent_load": {"centre": 40.0, "width": 5.0, "load": 20.0, "form": 0.0}}.get(name, {})
-    found = Effect(name, {"finger": "index", "actuator": "index"}, {k: Estimate(v, None, "1", "test") for k, v in values.items()})
+    found = Effect(
+        name, {"finger": "index", "actuator": "index"}, {k: Estimate(v, None, "1", "test") for k, v in values.items()}
+    )
     assert f"| {name} | index {said}" in _effects(SimpleNamespace(effects=(found,), fingers=()))

@@ -17,8 +17,17 @@ from hand_model.effects import effect
 
 def hand(*half_difference: float):
     """Stations of as many motors as given, each with that much more current flexing than extending [raw]."""
-    return [judged("current", f"finger_{i}", f"motor_{i}", None, drive(11 + i, lambda s, half=half: np.full(len(s.time_s), half)), [effect("torque_ripple")])
-            for i, half in enumerate(half_difference)]
+    return [
+        judged(
+            "current",
+            f"finger_{i}",
+            f"motor_{i}",
+            None,
+            drive(11 + i, lambda s, half=half: np.full(len(s.time_s), half)),
+            [effect("torque_ripple")],
+        )
+        for i, half in enumerate(half_difference)
+    ]
 
 
 def test_motors_alike_are_not_accused() -> None:
@@ -44,12 +53,21 @@ def test_of_two_that_differ_the_heavier_is_odd_unless_one_has_lost_its_preload()
 
 def test_drives_alike_in_everything_else_are_held_to_be_alike_in_their_preload_and_others_are_not() -> None:
     assert [f.where["finger"] for _, f in preload_findings(hand(8.0, 0.0))] == ["finger_0"]
-    other = judged("current", "ring", "ring", None, drive(12, lambda s: 14.0 * s.direction + 0.07 * s.velocity), [effect("torque_ripple")])
+    other = judged(
+        "current",
+        "ring",
+        "ring",
+        None,
+        drive(12, lambda s: 14.0 * s.direction + 0.07 * s.velocity),
+        [effect("torque_ripple")],
+    )
     assert not preload_findings([*hand(8.0), other])
 
 
 def test_of_two_either_may_be_the_odd_one_and_the_probability_says_so() -> None:
-    two, three = (next(f for _, f in preload_findings(hand(*halves))).probability for halves in ((25.0, 0.0), (25.0, 0.0, 0.5)))
+    two, three = (
+        next(f for _, f in preload_findings(hand(*halves))).probability for halves in ((25.0, 0.0), (25.0, 0.0, 0.5))
+    )
     assert 0.5 < two < three
     assert three > 0.95
 
@@ -65,16 +83,31 @@ def test_a_motor_that_does_not_repeat_itself_is_not_compared() -> None:
 
 def test_a_motor_of_which_something_is_missing_accuses_no_other() -> None:
     spot = effect("position_dependent_friction")
-    one = judged("current", "ring", "ring", None, drive(9, lambda s: 25.0 * spot.columns(s, {"centre": 50.0, "width": 6.0})[:, 0]), [spot])
+    one = judged(
+        "current",
+        "ring",
+        "ring",
+        None,
+        drive(9, lambda s: 25.0 * spot.columns(s, {"centre": 50.0, "width": 6.0})[:, 0]),
+        [spot],
+    )
     assert one.missing and one.believed
     assert preload_findings(hand(25.0, 0.0)) and not preload_findings([*hand(25.0), one])
 
 
 @pytest.mark.parametrize(("below", "accused"), [(4.0, ["finger_0"]), (40.0, [])])
-def test_only_a_finger_that_is_plainly_pulled_off_its_drive_keeps_its_drive_from_being_compared(below: float, accused: list[str]) -> None:
+def test_only_a_finger_that_is_plainly_pulled_off_its_drive_keeps_its_drive_from_being_compared(
+    below: float, accused: list[str]
+) -> None:
     states = tuple(replace(s, effort=80.0 * s.position / 100, effort_unit="deg") for s in drive(11))
     term = Term(effect("spring_decoupling"), {"form": 1.0, "below": below})
     naming = SimpleNamespace(balance=SimpleNamespace(states=states), fit=SimpleNamespace(terms=(term,)))
-    named = SimpleNamespace(believed=True, signal="encoder", actuator="motor_0", naming=naming, kept=[SimpleNamespace(term=term)],
-                            parameters={0: {"form": {"value": 1.0}, "below": {"value": below}, "lead": {"value": 0.3}}})
+    named = SimpleNamespace(
+        believed=True,
+        signal="encoder",
+        actuator="motor_0",
+        naming=naming,
+        kept=[SimpleNamespace(term=term)],
+        parameters={0: {"form": {"value": 1.0}, "below": {"value": below}, "lead": {"value": 0.3}}},
+    )
     assert [f.where["finger"] for _, f in preload_findings([*hand(-12.0, 0.0), named])] == accused

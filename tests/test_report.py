@@ -213,7 +213,12 @@ def test_the_published_motor_models_stand_beside_the_published_figures(tmp_path)
             errors = [float(r[column]) for r in mine]
             assert errors == sorted(errors, reverse=True)
         assert f"({actuator})" in section.conclusion
-    assert published_motors_section(Hand("h", session.side, {}, {}, (), 1e-4, {}, (Motor("absent", 0.0, 1.0, {}, 1.0, ()),)), session) is None
+    assert (
+        published_motors_section(
+            Hand("h", session.side, {}, {}, (), 1e-4, {}, (Motor("absent", 0.0, 1.0, {}, 1.0, ()),)), session
+        )
+        is None
+    )
 
 
 def test_engines_that_disagree_are_said_to(residuals):

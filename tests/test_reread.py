@@ -1,4 +1,5 @@
-"""Findings among themselves: sizes without what is no finding, maps beside lost motion, what belongs to the recording."""
+"""Findings among themselves: sizes without what is no finding, maps beside lost motion, what belongs to the
+recording."""
 
 from __future__ import annotations
 
@@ -21,7 +22,8 @@ COMPLIANCE = 0.04  # % per raw
 
 
 def yielding(states):
-    """The same recordings behind a give at the driver's end, whose slope was read from angles that hold the give already."""
+    """The same recordings behind a give at the driver's end, whose slope was read from angles that hold the give
+    already."""
     out = []
     for state in states:
         polynomial = np.polynomial.Polynomial(MAP)
@@ -52,7 +54,8 @@ def test_a_balance_without_a_map_is_as_it_was() -> None:
 def test_what_is_no_finding_is_not_in_the_sizes_of_the_others() -> None:
     def add(state):
         return planted("stribeck_friction", {"form": 0.0, "stribeck_speed": 20.0}, [18.0])(state) + planted(
-            "detent_load", {"form": 0.0, "centre": 60.0, "width": 6.0}, [-10.0])(state)
+            "detent_load", {"form": 0.0, "centre": 60.0, "width": 6.0}, [-10.0]
+        )(state)
 
     station = judged("current", "index", "index", None, drive(3, add), catalogue("drive"))
     assert {f.term.effect.name for f in station.kept} == {"stribeck_friction", "detent_load"}
@@ -66,7 +69,8 @@ def test_what_is_no_finding_is_not_in_the_sizes_of_the_others() -> None:
     (found,), (written,) = reread(alone, [station])
     assert [t.effect.name for t in written.reading.fit.terms] == ["stribeck_friction"]
     figures = written.reading.fit.terms[0].effect.parameters(
-        written.reading.fit.terms[0].shape, written.reading.fit.amplitudes[0], written.reading.fit.declared)
+        written.reading.fit.terms[0].shape, written.reading.fit.amplitudes[0], written.reading.fit.declared
+    )
     assert found.parameters["stribeck_speed"]["value"] == pytest.approx(figures["stribeck_speed"])
     assert found.parameters != alone[0].parameters
     assert found.where["share_of_mismatch"] == alone[0].where["share_of_mismatch"]
@@ -82,12 +86,17 @@ def test_what_belongs_to_the_recording_stays_with_it() -> None:
         np.testing.assert_allclose(own, 1.2 * np.sin(2 * np.pi * state.position / 12.0), atol=0.15)
 
 
-@pytest.mark.parametrize(("name", "shape", "start"), [("detent_load", {"form": 0.0, "width": 6.0}, {"centre": 55.0}),
-                                                      ("torque_ripple", {}, {"period": 9.02})])
+@pytest.mark.parametrize(
+    ("name", "shape", "start"),
+    [("detent_load", {"form": 0.0, "width": 6.0}, {"centre": 55.0}), ("torque_ripple", {}, {"period": 9.02})],
+)
 def test_a_shape_polished_beside_a_projection_is_that_of_full_fits(name, shape, start) -> None:
     amplitude = [12.0] if name == "detent_load" else [4.0, 3.0]
     balance = Balance(drive(7, planted(name, {**shape, "centre": 57.0, "period": 9.0}, amplitude), trials=3))
-    others = (Term(effect("stribeck_friction"), {"form": 0.0, "stribeck_speed": 20.0}), Term(effect("nonlinear_spring"), {"form": 0.0}))
+    others = (
+        Term(effect("stribeck_friction"), {"form": 0.0, "stribeck_speed": 20.0}),
+        Term(effect("nonlinear_spring"), {"form": 0.0}),
+    )
     error = balance.error_beside(others, effect(name), balance.fit(others))
     for step in (0.0, 0.3, 0.7):
         moved = {**shape, **{k: v + step for k, v in start.items()}}
@@ -98,20 +107,29 @@ def test_a_shape_polished_beside_a_projection_is_that_of_full_fits(name, shape, 
 def test_where_lost_motion_lay_before_the_first_motion_is_not_asked() -> None:
     from hand_model.diagnose.locate.angles import _begun
 
-    driver = np.r_[np.full(100, 3.0), np.linspace(3.0, 80.0, 200), np.linspace(80.0, 2.0, 200)] + np.random.default_rng(0).normal(0, 0.1, 500)
+    driver = np.r_[np.full(100, 3.0), np.linspace(3.0, 80.0, 200), np.linspace(80.0, 2.0, 200)] + np.random.default_rng(
+        0
+    ).normal(0, 0.1, 500)
     begun = _begun(driver)
     first = int(np.argmax(begun))
     assert 105 <= first <= 115 and not begun[:first].any() and begun[first:].all()
 
 
 def test_a_sag_is_read_from_what_is_asked_beside_it() -> None:
-    """The first estimate of what is asked is the declared model's, which bends less than a drive that sags by a third."""
+    """The first estimate of what is asked is the declared model's, which bends less than a drive that sags by a
+    third."""
     from hand_model.diagnose.locate.drive import with_required
 
     def sagging(state):
         truth = state.declared @ np.array([0.012, 0.1, 38.0, 0.2, 9.0])
-        asked = (1 - np.sqrt(1 - 4 * 0.3 / 100 * np.abs(truth))) / (2 * 0.3 / 100) * np.sign(truth)  # u (1 - 0.3 |u| / 100) = truth
-        return replace(state, effort=np.where(np.isfinite(state.effort), asked + np.random.default_rng(9).normal(0, 4, len(asked)), np.nan))
+        # u (1 - 0.3 |u| / 100) = truth
+        asked = (1 - np.sqrt(1 - 4 * 0.3 / 100 * np.abs(truth))) / (2 * 0.3 / 100) * np.sign(truth)
+        return replace(
+            state,
+            effort=np.where(
+                np.isfinite(state.effort), asked + np.random.default_rng(9).normal(0, 4, len(asked)), np.nan
+            ),
+        )
 
     states = with_required(tuple(sagging(s) for s in drive(6)))
     station = judged("current", "index", "index", None, states, catalogue("drive"))

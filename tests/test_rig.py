@@ -43,7 +43,8 @@ MASS, LEVER, INERTIA = 0.6, 0.2, 0.6 * 0.04 + 0.002
 
 
 def planted(folder: Path, effect: str = "none", trials: int = 4, seconds: float = 12.0) -> Path:
-    """A pendulum moved along sums of sinusoids; its torque by the true balance (mass 0.6, not 0.5), with an effect or none."""
+    """A pendulum moved along sums of sinusoids; its torque by the true balance (mass 0.6, not 0.5), with an effect or
+    none."""
     (folder / "log").mkdir(parents=True)
     (folder / "rig.xml").write_text(PENDULUM)
     text, random = HEAD, np.random.default_rng(3)
@@ -114,7 +115,8 @@ def test_bounded_solution_meets_the_optimality_conditions() -> None:
 
 
 def test_physical_keeps_what_is_physical_and_mends_what_is_not() -> None:
-    """A true body comes back as it is; an impossible inertia becomes one with positive, triangular principal moments."""
+    """A true body comes back as it is; an impossible inertia becomes one with positive, triangular principal
+    moments."""
     mass, centre, inertia = 2.0, np.array([0.1, -0.2, 0.3]), np.diag([0.3, 0.4, 0.5])
     about = inertia + mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
     p = np.array([mass, *(mass * centre), about[0, 0], about[1, 1], about[2, 2], about[0, 1], about[0, 2], about[1, 2]])
@@ -157,7 +159,9 @@ def test_load_dependent_friction_is_named_and_measured(planted_load: Path, tmp_p
     assert kept[0] == "load_dependent_friction"
     for key, name in (("before", "rig_declared.xml"), ("after", "rig.xml")):  # the files alone reproduce the figures
         replayed = replay_rig(read_session(planted_load), (tmp_path / "out" / name).read_bytes(), simulate=False)
-        assert replayed.figure("effort_rmse", True) == pytest.approx(findings.lack_of_fit["joints"]["hinge"][key], rel=1e-9)
+        assert replayed.figure("effort_rmse", True) == pytest.approx(
+            findings.lack_of_fit["joints"]["hinge"][key], rel=1e-9
+        )
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["findings.json", "rig.xml", "rig_declared.xml"]
 
 
@@ -184,7 +188,8 @@ def test_unsigned_torque_is_refused(tmp_path: Path) -> None:
 
 
 def test_simulation_agrees_with_mujoco(tmp_path: Path) -> None:
-    """A free pendulum with friction: the batch simulator and MuJoCo's replay of the written file are the same motion."""
+    """A free pendulum with friction: the batch simulator and MuJoCo's replay of the written file are the same
+    motion."""
     text = (PENDULUM.replace('<actuator><motor name="motor" joint="hinge"/></actuator>', "")
             .replace('frictionloss="0.05"', 'frictionloss="0.02"'))  # fmt: skip
     (tmp_path / "log").mkdir()
@@ -272,8 +277,8 @@ def test_screw_drive_differs_by_direction() -> None:
 
 @pytest.mark.parametrize("zero", [0.0, 0.006])
 def test_a_passive_session_without_validation_is_diagnosed(tmp_path: Path, zero: float) -> None:
-    """Air drag of a free swing is named from encoder alone; two recordings, none held out. So it is with an encoder whose zero is off,
-    and that is named besides."""
+    """Air drag of a free swing is named from encoder alone; two recordings, none held out. So it is with an encoder
+    whose zero is off, and that is named besides."""
     text = PENDULUM.replace('<actuator><motor name="motor" joint="hinge"/></actuator>', "").replace(
         'damping="0.02"', 'damping="0.004"'
     )
@@ -293,12 +298,14 @@ def test_a_passive_session_without_validation_is_diagnosed(tmp_path: Path, zero:
     findings = diagnose_rig(read_session(tmp_path))
     assert "quadratic_damping" in findings.findings[0].members
     assert findings.lack_of_fit["after"] < (0.5 if not zero else 0.2) * findings.lack_of_fit["before"]
-    assert {f.effect for f in findings.findings} == ({"quadratic_damping", "gravity_load"} if zero else {"quadratic_damping"})
+    assert {f.effect for f in findings.findings} == (
+        {"quadratic_damping", "gravity_load"} if zero else {"quadratic_damping"}
+    )
 
 
 def test_bodies_of_a_solution_can_exist() -> None:
-    """Where least squares asks for a negative moment of inertia, the constrained solution has none, and fits no worse than
-    any physical body drawn at random; a solution that is physical already comes back untouched."""
+    """Where least squares asks for a negative moment of inertia, the constrained solution has none, and fits no worse
+    than any physical body drawn at random; a solution that is physical already comes back untouched."""
     declared = np.array([1.0, 0, 0, -0.3, 0.15, 0.15, 0.02, 0, 0, 0])
     free = [i for i, v in enumerate(declared) if v]
     columns = tuple(Column("inertial", "arm", INERTIAL[i], declared[i]) for i in free)
@@ -334,7 +341,9 @@ def mirrored(table: np.ndarray) -> np.ndarray:
     return table * [1, -1, -1]
 
 
-@pytest.mark.parametrize("change", [lambda x: x[::2], mirrored, lambda x: x[: len(x) // 2]], ids=["rate", "mirror", "half"])
+@pytest.mark.parametrize(
+    "change", [lambda x: x[::2], mirrored, lambda x: x[: len(x) // 2]], ids=["rate", "mirror", "half"]
+)
 def test_first_effect_stays_when_the_recording_changes(planted_load: Path, tmp_path: Path, change: Any) -> None:
     """Half the rate, mirrored signs, half the time: the same effect leads, with a coefficient near the planted one."""
     folder = tmp_path / "s"
@@ -353,12 +362,23 @@ def test_a_rigs_findings_say_names_and_units_as_the_format_has_them() -> None:
     assert joint_unit("rad/effort^2", "rad", "N m") == "rad/(N m)^2"
     assert joint_unit("effort", "m", "N") == "N"
     assert [shape_unit(n, "m") for n in ("reach", "stribeck_speed", "delay", "form")] == ["m", "m/s", "s", "1"]
-    rivals = [("detent_load/a@hinge", 0.3), ("detent_load@hinge", 0.5), ("torque_ripple@hinge", 0.1), ("stribeck_friction/b@hinge", 0.1)]
+    rivals = [
+        ("detent_load/a@hinge", 0.3),
+        ("detent_load@hinge", 0.5),
+        ("torque_ripple@hinge", 0.1),
+        ("stribeck_friction/b@hinge", 0.1),
+    ]
     assert alternatives(rivals, "stribeck_friction") == (("detent_load", 0.5), ("torque_ripple", 0.1))
     assert rejection("load_dependent_friction/low speed@hinge", NOT_TAKEN) == {
         "effect": "load_dependent_friction", "variant": "low speed", "where": "hinge", "reason": NOT_TAKEN}  # fmt: skip
-    values = {"drag": {"value": 0.5, "unit": "N s^2/m^2"}, "form": {"value": 0.0, "unit": "1"}, "ratio": {"value": 2.0, "unit": "1"}}
-    said = statement("quadratic_damping", "", "slide", values, {"metric": "effort_rmse", "before": 2.0, "after": 1.0, "unit": "N"})
+    values = {
+        "drag": {"value": 0.5, "unit": "N s^2/m^2"},
+        "form": {"value": 0.0, "unit": "1"},
+        "ratio": {"value": 2.0, "unit": "1"},
+    }
+    said = statement(
+        "quadratic_damping", "", "slide", values, {"metric": "effort_rmse", "before": 2.0, "after": 1.0, "unit": "N"}
+    )
     assert said == "slide: quadratic damping: drag 0.5 N s^2/m^2, ratio 2; held-out effort rmse falls from 2 to 1 N."
 
 
@@ -369,7 +389,9 @@ def test_a_late_drive_has_a_positive_delay(effect: str, told: float) -> None:
     candidate = Candidate(effect, "", "hinge", (), ({"delay": -0.02},), lambda r, s: np.zeros((0, 0)), True)
     proof = {"metric": "effort_rmse", "unit": "N m", "before": 2.0, "after": 1.0, "held_out": ["log/b.csv"]}
     step = SimpleNamespace(rivals=(), equals=(), probability=0.9)
-    found = _joint_finding(rig, None, step, SimpleNamespace(candidate=candidate, shape={"delay": -0.02}), np.zeros(0), proof, None)
+    found = _joint_finding(
+        rig, None, step, SimpleNamespace(candidate=candidate, shape={"delay": -0.02}), np.zeros(0), proof, None
+    )
     assert found.parameters["delay"] == {"value": told, "unit": "s", "ci95": None}
     assert f"delay {told} s" in found.statement
     assert found.where["region"] is None and found.where["finger"] is None
@@ -378,10 +400,17 @@ def test_a_late_drive_has_a_positive_delay(effect: str, told: float) -> None:
 def test_report_of_a_rig_shows_what_was_found(planted_load: Path, tmp_path: Path) -> None:
     """One page with the map, the effect through the data, before and after; without outside resources."""
     session = read_session(planted_load)
-    rejected = (rejection("stribeck_friction@hinge", NOT_BORNE_OUT), rejection("detent_load/of a kind@hinge", NOT_TAKEN))
+    rejected = (
+        rejection("stribeck_friction@hinge", NOT_BORNE_OUT),
+        rejection("detent_load/of a kind@hinge", NOT_TAKEN),
+    )
     findings = replace(diagnose_rig(session), rejected=rejected)
     page = write_rig_findings(session, findings, tmp_path / "out").read_text()
-    assert "then withdrawn" in page and f"stribeck friction at hinge: {NOT_BORNE_OUT}" in page and "not taken: detent load (of a kind)." in page
+    assert (
+        "then withdrawn" in page
+        and f"stribeck friction at hinge: {NOT_BORNE_OUT}" in page
+        and "not taken: detent load (of a kind)." in page
+    )
     for anchor in ('id="findings"', 'id="map"', 'id="effects"', 'id="validation"', "load dependent friction"):
         assert anchor in page
     assert "http://" not in page.replace("http://www.w3.org", "")
@@ -398,7 +427,8 @@ def test_the_start_of_a_recording_is_read_without_bias() -> None:
 
 
 def test_noise_floor_of_a_balance_is_that_of_its_sensors(tmp_path: Path) -> None:
-    """Where nothing is missing, what is left is noise: the floor says so within a third, and the verdict is "consistent"."""
+    """Where nothing is missing, what is left is noise: the floor says so within a third, and the verdict is
+    "consistent"."""
     findings = diagnose_rig(read_session(planted(tmp_path / "s")))
     left = findings.lack_of_fit["joints"]["hinge"]
     assert findings.verdict == "consistent"

@@ -1,4 +1,5 @@
-"""Friction by load at a hinge: which side of the gear it goes by, and how large; springs and offsets beside what is declared."""
+"""Friction by load at a hinge: which side of the gear it goes by, and how large; springs and offsets beside what is
+declared."""
 
 from __future__ import annotations
 
@@ -23,9 +24,11 @@ LAWS = {MOTOR: lambda drive, load, bias: np.abs(drive), GEAR: lambda drive, load
         "": lambda drive, load, bias: np.abs(load)}  # fmt: skip
 
 
-def bench(folder: Path, side: str | None = None, offset: float = 0.0, stiffness: float = 0.0, weight: float = 9.81) -> Path:
-    """Five recordings of two sines each, the last held out: friction in proportion to one side of the gear (None: constant),
-    an offset [N m] and a spring [N m/rad] that nobody declared; weight [m/s2]: of the arm."""
+def bench(
+    folder: Path, side: str | None = None, offset: float = 0.0, stiffness: float = 0.0, weight: float = 9.81
+) -> Path:
+    """Five recordings of two sines each, the last held out: friction in proportion to one side of the gear (None:
+    constant), an offset [N m] and a spring [N m/rad] that nobody declared; weight [m/s2]: of the arm."""
 
     def torque(motion: Motion) -> np.ndarray:
         _, q, v, a = motion
@@ -65,7 +68,11 @@ def test_every_friction_by_load_is_in_open_loop_what_it_is_in_the_balance(tmp_pa
     fit = trusted_fit(rig)[0]
     row, variants = fit.rows[0], set()
     sides = [row.position, row.velocity, row.load(fit.theta), fit.expected(row), row.bias(fit.theta)]
-    for candidate in (c for c in candidates(rig, fit, "hinge") if c.effect == "load_dependent_friction" and c.variant not in ("", TURNING)):
+    for candidate in (
+        c
+        for c in candidates(rig, fit, "hinge")
+        if c.effect == "load_dependent_friction" and c.variant not in ("", TURNING)
+    ):
         shape, sizes = candidate.grid[-1], dict(zip((a[0] for a in candidate.amplitudes), (0.2, 0.3), strict=False))
         act = law({"effect": candidate.effect, "variant": candidate.variant, "shape": shape, "amplitude": sizes})
         assert act is not None
@@ -78,11 +85,13 @@ def test_every_friction_by_load_is_in_open_loop_what_it_is_in_the_balance(tmp_pa
 
 
 def test_a_spring_that_nobody_declared(tmp_path: Path) -> None:
-    """Where nothing declared pulls the joint back a spring is seen by its line, and the law in open loop has it too; beside a
-    weight it is not looked for."""
+    """Where nothing declared pulls the joint back a spring is seen by its line, and the law in open loop has it too;
+    beside a weight it is not looked for."""
     rigs = [load_rig(read_session(bench(tmp_path / f"{w}", stiffness=0.5, weight=w))) for w in (9.81, 0.0)]
     fits = [trusted_fit(rig)[0] for rig in rigs]
-    none, spring = ([c for c in candidates(*x, "hinge") if c.variant == UNDECLARED] for x in zip(rigs, fits, strict=True))
+    none, spring = (
+        [c for c in candidates(*x, "hinge") if c.variant == UNDECLARED] for x in zip(rigs, fits, strict=True)
+    )
     assert not none
     fit, spring = fits[1], spring[0]
     theta = solution(pose(fit), [Term(spring, {})])
@@ -94,7 +103,8 @@ def test_a_spring_that_nobody_declared(tmp_path: Path) -> None:
 
 
 def test_a_large_effect_does_not_hold_the_declared_parameters_back(tmp_path: Path) -> None:
-    """Beside an offset of many times the rest, once it is there, the weight is as the recordings say, not as declared."""
+    """Beside an offset of many times the rest, once it is there, the weight is as the recordings say, not as
+    declared."""
     rig = load_rig(read_session(bench(tmp_path / "s", offset=8.0)))
     fit = trusted_fit(rig)[0]
     offset = Term(next(c for c in candidates(rig, fit, "hinge") if c.effect == "asymmetric_friction"), {})
@@ -108,9 +118,13 @@ def test_bristles_that_slacken_with_speed_are_in_open_loop_what_they_are_in_the_
     rig = load_rig(read_session(bench(tmp_path / "s")))
     fit = trusted_fit(rig)[0]
     row = fit.rows[0]
-    candidate = next(c for c in candidates(rig, fit, "hinge") if (c.effect, c.variant) == ("stribeck_friction", TURNING))
+    candidate = next(
+        c for c in candidates(rig, fit, "hinge") if (c.effect, c.variant) == ("stribeck_friction", TURNING)
+    )
     shape = candidate.grid[5]
-    act = law({"effect": candidate.effect, "variant": candidate.variant, "shape": shape, "amplitude": {"static_excess": 0.2}})
+    act = law(
+        {"effect": candidate.effect, "variant": candidate.variant, "shape": shape, "amplitude": {"static_excess": 0.2}}
+    )
     assert act is not None
     column = 0.2 * candidate.columns(row, shape)[:, 0]
     stepped = np.array([np.sum(act(Now(q, v, 0.0, 0.0))) for q, v in zip(row.position, row.velocity, strict=True)])
@@ -133,7 +147,8 @@ def test_a_stribeck_rise_beside_friction_by_load_is_read_at_its_size(tmp_path: P
 
 
 def test_friction_by_load_that_is_larger_at_low_speed_is_one_effect(tmp_path: Path) -> None:
-    """A part of the load at every speed and a larger one below a Stribeck speed: one name, all three figures within 10 %."""
+    """A part of the load at every speed and a larger one below a Stribeck speed: one name, all three figures within 10
+    %."""
 
     def torque(motion: Motion) -> np.ndarray:
         _, q, v, a = motion
@@ -147,7 +162,8 @@ def test_friction_by_load_that_is_larger_at_low_speed_is_one_effect(tmp_path: Pa
 
 
 def test_what_stood_in_for_a_later_friction_by_load_goes(tmp_path: Path) -> None:
-    """Each at the loads of what remains; not where the rest stood before, or two sets would follow each other for ever."""
+    """Each at the loads of what remains; not where the rest stood before, or two sets would follow each other for
+    ever."""
     rig = load_rig(read_session(bench(tmp_path / "s", MOTOR)))
     fit = trusted_fit(rig)[0]
 
@@ -163,7 +179,8 @@ def test_what_stood_in_for_a_later_friction_by_load_goes(tmp_path: Path) -> None
 
 
 def test_no_stribeck_speed_lies_where_the_joint_stands(tmp_path: Path) -> None:
-    """A joint that stands most of the time, its encoder noisy: what is tried acts on what moves, for friction at rest is unknown."""
+    """A joint that stands most of the time, its encoder noisy: what is tried acts on what moves, for friction at rest
+    is unknown."""
     folder, t = tmp_path / "s", np.arange(0, 12, 0.004)
     (folder / "log").mkdir(parents=True)
     (folder / "rig.xml").write_text(ARM)
@@ -173,7 +190,9 @@ def test_no_stribeck_speed_lies_where_the_joint_stands(tmp_path: Path) -> None:
         v = np.gradient(q, t)
         torque = 0.6 * 0.2 * 9.81 * np.sin(q) + 0.026 * np.gradient(v, t) + 0.03 * v + 0.1 * np.sign(v)
         table = np.stack([t, q + 1e-4 * np.random.default_rng(k).standard_normal(len(t)), torque], 1)
-        np.savetxt(folder / f"log/{k}.csv", table, delimiter=",", header="time,position,torque", comments="", fmt="%.8g")
+        np.savetxt(
+            folder / f"log/{k}.csv", table, delimiter=",", header="time,position,torque", comments="", fmt="%.8g"
+        )
         text += f'[[trial]]\nkind = "motion"\nlog = "log/{k}.csv"\n'
     (folder / "session.toml").write_text(text)
     rig = load_rig(read_session(folder))

@@ -18,7 +18,10 @@ from hand_model.rig.name.candidates import candidates
 from hand_model.rig.states import low_pass, noise_std
 from hand_model.session import read_session
 
-VOLTAGE = ARM.replace('<motor name="motor" joint="hinge"/>', '<dcmotor name="motor" joint="hinge" motorconst="0.35 0.35" resistance="3.4"/>')
+VOLTAGE = ARM.replace(
+    '<motor name="motor" joint="hinge"/>',
+    '<dcmotor name="motor" joint="hinge" motorconst="0.35 0.35" resistance="3.4"/>',
+)
 OPEN = 'set = { "actuator:motor:gear" = [0, 0, 0, 0, 0, 0] }\n'
 
 
@@ -54,8 +57,8 @@ def test_a_voltage_without_sign_is_refused(tmp_path: Path, size: bool) -> None:
 
 @pytest.mark.parametrize("size", [True, False])
 def test_a_friction_without_sign_is_refused(tmp_path: Path, size: bool) -> None:
-    """Friction that outweighs all else and turns round over a distance: its size touches zero at every reversal and is refused; beside
-    an offset that keeps it on one side it has its sign."""
+    """Friction that outweighs all else and turns round over a distance: its size touches zero at every reversal and is
+    refused; beside an offset that keeps it on one side it has its sign."""
     heavy = ARM.replace('frictionloss="0.05"', 'frictionloss="4"')
 
     def told(motion: Motion) -> np.ndarray:
@@ -70,7 +73,8 @@ def test_a_friction_without_sign_is_refused(tmp_path: Path, size: bool) -> None:
 
 
 def test_a_drive_that_is_unplugged_has_no_effects(tmp_path: Path) -> None:
-    """Nothing of the drive (a delay, friction by its effort) is a candidate where its leads are open in every recording."""
+    """Nothing of the drive (a delay, friction by its effort) is a candidate where its leads are open in every
+    recording."""
     recorded(tmp_path / "s", ARM, 2, balance, 0.0)
     rig = load_rig(read_session(tmp_path / "s"))
     names = {c.key for c in candidates(rig, fit_declared(rig), "hinge")}
@@ -84,23 +88,34 @@ def test_a_drive_that_is_unplugged_has_no_effects(tmp_path: Path) -> None:
 
 
 def test_inertia_is_fitted_where_nothing_is_driven(tmp_path: Path) -> None:
-    """A free swing: the weight is the scale and stays as declared; its period tells the inertia, a fifth more than declared."""
+    """A free swing: the weight is the scale and stays as declared; its period tells the inertia, a fifth more than
+    declared."""
     folder, inertia = tmp_path / "s", 1.2 * (0.002 + 0.5 * 0.2**2)
     (folder / "log").mkdir(parents=True)
     (folder / "rig.xml").write_text(ARM.replace('<motor name="motor" joint="hinge"/>', "").replace("0.05", "1e-5"))
     t = np.arange(0, 12, 0.004)
     q = 0.02 * np.exp(-0.1 * t) * np.cos(np.sqrt(0.5 * 0.2 * 9.81 / inertia) * t)
-    np.savetxt(folder / "log/0.csv", np.stack([t, q], 1), delimiter=",", header="time,position", comments="", fmt="%.10g")
-    (folder / "session.toml").write_text(HEAD.replace('torque = "actuator:motor:force"\n', "") + '[[trial]]\nkind = "motion"\nlog = "log/0.csv"\n')
+    np.savetxt(
+        folder / "log/0.csv", np.stack([t, q], 1), delimiter=",", header="time,position", comments="", fmt="%.10g"
+    )
+    (folder / "session.toml").write_text(
+        HEAD.replace('torque = "actuator:motor:force"\n', "") + '[[trial]]\nkind = "motion"\nlog = "log/0.csv"\n'
+    )
     fit = fit_declared(load_rig(read_session(folder)))
     found = {c.label: v for c, v in zip(fit.columns, fit.theta, strict=True)}
     assert found["inertial:arm:hz"] == pytest.approx(-0.1, rel=1e-4)
     assert found["inertial:arm:Iyy"] == pytest.approx(inertia, rel=0.01)
 
 
-def test_a_file_that_diverges_is_said_to_and_leaves_nothing_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_diverges_is_said_to_and_leaves_nothing_behind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Beyond what a simulation can step there is no position error, and MuJoCo writes no log into the user's folder."""
-    stiff = ARM.replace('damping="0.02"', 'damping="0.02" stiffness="1e9"').replace('timestep="0.001"', 'timestep="0.01"').replace("implicitfast", "Euler")
+    stiff = (
+        ARM.replace('damping="0.02"', 'damping="0.02" stiffness="1e9"')
+        .replace('timestep="0.001"', 'timestep="0.01"')
+        .replace("implicitfast", "Euler")
+    )
     session = read_session(recorded(tmp_path / "s", stiff, 1, balance, 0.0))
     (tmp_path / "empty").mkdir()
     monkeypatch.chdir(tmp_path / "empty")
@@ -109,8 +124,8 @@ def test_a_file_that_diverges_is_said_to_and_leaves_nothing_behind(tmp_path: Pat
 
 
 def test_a_ramp_is_no_sinusoid_and_an_unplugged_drive_no_command(tmp_path: Path) -> None:
-    """A slow lift's torque is a piece of many a sinusoid, and a torque of zero beside open leads is true: neither is refused. A
-    sinusoid that comes several times is one."""
+    """A slow lift's torque is a piece of many a sinusoid, and a torque of zero beside open leads is true: neither is
+    refused. A sinusoid that comes several times is one."""
     t = np.arange(0, 2, 0.005)
     assert sinusoids_left(t, np.sin(0.5 * np.pi * t / 2 - 0.1)) == 1.0
     assert sinusoids_left(t, np.sin(2 * np.pi * 2.3 * t)) < 1e-3
@@ -138,7 +153,8 @@ def test_one_sinusoid_among_other_torques_is_no_command(tmp_path: Path) -> None:
 
 
 def test_uneven_stamps_are_no_noise() -> None:
-    """What moves smoothly has none, however its samples lie; what noise there is comes out, and with even stamps as without any."""
+    """What moves smoothly has none, however its samples lie; what noise there is comes out, and with even stamps as
+    without any."""
     random = np.random.default_rng(0)
     even = np.arange(4000) * 1e-3
     t = even + 0.4e-3 * random.uniform(-1, 1, len(even))
@@ -157,12 +173,15 @@ def test_the_low_pass_is_that_of_scipy(shape: tuple[int, ...]) -> None:
 
 
 def test_a_joint_that_no_training_recording_moves_is_left_alone(tmp_path: Path) -> None:
-    """What stands in all recordings but the one that is held out has nothing fitted to it, and a session that holds out all says so."""
+    """What stands in all recordings but the one that is held out has nothing fitted to it, and a session that holds out
+    all says so."""
     folder = recorded(tmp_path / "s", ARM, 3, balance, 0.0)
     text = (folder / "session.toml").read_text()
     table = np.loadtxt(folder / "log/0.csv", delimiter=",", skiprows=1)
     for k in (0, 1):
-        np.savetxt(folder / f"log/{k}.csv", table * [1, 0, 1], delimiter=",", header="time,position,torque", comments="")
+        np.savetxt(
+            folder / f"log/{k}.csv", table * [1, 0, 1], delimiter=",", header="time,position,torque", comments=""
+        )
     (folder / "session.toml").write_text(text + 'purpose = "validate"\n')
     assert diagnose_rig(read_session(folder)).verdict in ("consistent", "unexplained")
     (folder / "session.toml").write_text(text.replace('kind = "motion"', 'kind = "motion"\npurpose = "validate"'))

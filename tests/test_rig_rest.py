@@ -29,7 +29,8 @@ RATE_HZ, STEP_M = 500.0, 1e-5
 
 
 def strokes(seconds: float, period_s: float, stroke_m: float) -> tuple[np.ndarray, ...]:
-    """Time, position, velocity and acceleration of strokes there and back with a pause of a fifth of the period after each."""
+    """Time, position, velocity and acceleration of strokes there and back with a pause of a fifth of the period after
+    each."""
     t = np.arange(0, seconds, 1 / RATE_HZ)
     phase = (t / period_s) % 1.0
     moves = 0.3 * period_s
@@ -42,8 +43,9 @@ def strokes(seconds: float, period_s: float, stroke_m: float) -> tuple[np.ndarra
 
 
 def session(folder: Path, hold: float, reach_m: float = 0.0) -> Path:
-    """Six recordings of a slide, two of them held out, with Coulomb friction, or all of it turning round over a distance; hold [N]: what its
-    drive still gives in the direction of the last stroke while it stands and friction is Coulomb's."""
+    """Six recordings of a slide, two of them held out, with Coulomb friction, or all of it turning round over a
+    distance; hold [N]: what its drive still gives in the direction of the last stroke while it stands and friction is
+    Coulomb's."""
     random, tables = np.random.default_rng(7), []
     for k in range(6):
         t, q, v, a = strokes(16.0, random.uniform(2.0, 4.0), random.uniform(0.1, 0.3))
@@ -54,13 +56,19 @@ def session(folder: Path, hold: float, reach_m: float = 0.0) -> Path:
                 state = dry[n] = np.clip(state + step / reach_m, -1, 1)
             dry = COULOMB * dry
         kept = hold * np.where(q > np.median(q), 1.0, -1.0)
-        force = MASS * a + DAMPING * v + np.where((v == 0) & (not reach_m), kept, dry) + 0.05 * random.standard_normal(len(t))
+        force = (
+            MASS * a
+            + DAMPING * v
+            + np.where((v == 0) & (not reach_m), kept, dry)
+            + 0.05 * random.standard_normal(len(t))
+        )
         tables.append(np.stack([t, np.round(q / STEP_M) * STEP_M, force], 1))
     return written(folder, SLIDE, SLIDE_HEAD, "force", tables)
 
 
 def test_pauses_are_found_and_neither_slow_motion_nor_a_reversal() -> None:
-    """Strokes with pauses of 0.6 s: these and nothing else; a sine has none, nor has a creep of 5 mm/s; noise changes nothing."""
+    """Strokes with pauses of 0.6 s: these and nothing else; a sine has none, nor has a creep of 5 mm/s; noise changes
+    nothing."""
     t, q, v, _ = strokes(12.0, 3.0, 0.2)
     random = np.random.default_rng(0)
     for seen in (np.round(q / STEP_M) * STEP_M, q + 3e-6 * random.standard_normal(len(q))):
@@ -75,7 +83,8 @@ def test_pauses_are_found_and_neither_slow_motion_nor_a_reversal() -> None:
 
 
 def test_what_holds_a_joint_changes_nothing_of_its_balance(tmp_path: Path) -> None:
-    """The same strokes held by 3 N and by 12 N: the same parameters, the true ones; with rests kept they move with the hold."""
+    """The same strokes held by 3 N and by 12 N: the same parameters, the true ones; with rests kept they move with the
+    hold."""
     fits = {}
     for hold in (3.0, 12.0):
         rig = load_rig(read_session(session(tmp_path / str(hold), hold)))
@@ -96,7 +105,9 @@ def test_delayed_columns_pass_the_same_weight(tmp_path: Path) -> None:
     early = row.filtered(row.full_columns, 0.01)
     again = replace(row, weight=np.roll(row.weight, -round(0.01 * row.rate_hz))).filtered(row.full_columns)
     shift = 0.01 * row.rate_hz / row.step
-    apart = np.abs(early - np.stack([np.interp(np.arange(len(c)) - shift, np.arange(len(c)), c) for c in again.T], 1))[50:-50]
+    apart = np.abs(early - np.stack([np.interp(np.arange(len(c)) - shift, np.arange(len(c)), c) for c in again.T], 1))[
+        50:-50
+    ]
     assert np.all(apart.max(0) <= 0.05 * np.abs(early).max(0))
 
 

@@ -1,4 +1,5 @@
-"""What a rig's search may rest on: noise that is no mismatch, friction that turns round over a distance, long recordings."""
+"""What a rig's search may rest on: noise that is no mismatch, friction that turns round over a distance, long
+recordings."""
 
 from __future__ import annotations
 
@@ -30,7 +31,8 @@ from hand_model.session import read_session
 
 
 def bench(folder: Path, by_load: float, noise: float, late: float = 0.0, last: float = 1.0) -> Path:
-    """Six recordings of two sines each, the last two held out; by_load: friction per load, which turns round over 0.1 rad;
+    """Six recordings of two sines each, the last two held out; by_load: friction per load, which turns round over 0.1
+    rad;
     noise [N m] of the torque, which acts late [s] after it is recorded; last: times as fast the fourth of them."""
 
     def torque(motion: Motion) -> np.ndarray:
@@ -42,7 +44,8 @@ def bench(folder: Path, by_load: float, noise: float, late: float = 0.0, last: f
 
 
 def test_friction_by_load_that_turns_round_over_a_distance(tmp_path: Path) -> None:
-    """Load-dependent friction is named first, with its size and the distance within 10 %, and leaves little of the mismatch."""
+    """Load-dependent friction is named first, with its size and the distance within 10 %, and leaves little of the
+    mismatch."""
     found = diagnose_rig(read_session(bench(tmp_path / "s", 0.3, 0.01)))
     first = found.findings[0]
     assert first.effect == "load_dependent_friction"
@@ -51,7 +54,8 @@ def test_friction_by_load_that_turns_round_over_a_distance(tmp_path: Path) -> No
 
 
 def test_a_noisy_torque_is_no_mismatch(tmp_path: Path) -> None:
-    """Ten percent of noise on a torque that the declared model explains: consistent, and the friction is the planted one."""
+    """Ten percent of noise on a torque that the declared model explains: consistent, and the friction is the planted
+    one."""
     session = read_session(bench(tmp_path / "s", 0.0, 0.08))
     assert diagnose_rig(session).verdict == "consistent"
     fit = trusted_fit(load_rig(session))[0]
@@ -70,11 +74,15 @@ def test_a_torque_that_acts_a_fraction_of_a_sample_late_is_a_delay_and_no_spring
 
 
 def test_terms_are_fitted_beside_each_other_and_leave_where_they_do_not_pay(tmp_path: Path) -> None:
-    """A shape that is off finds its place beside another term; what takes nothing away goes, unless that was tried before."""
+    """A shape that is off finds its place beside another term; what takes nothing away goes, unless that was tried
+    before."""
     rig = load_rig(read_session(bench(tmp_path / "s", 0.3, 0.01)))
     fit = trusted_fit(rig)[0]
     problem, known = pose(fit, "hinge"), {c.key: c for c in candidates(rig, fit, "hinge")}
-    turning, drag = (next(c for k, c in known.items() if k.startswith(name)) for name in (f"load_dependent_friction/{TURNING}", "quadratic_damping"))
+    turning, drag = (
+        next(c for k, c in known.items() if k.startswith(name))
+        for name in (f"load_dependent_friction/{TURNING}", "quadratic_damping")
+    )
     terms = Term(turning, {"form": 1.0, "reach": 0.3}), Term(drag, {})
     kept, stays = _settled_down(problem, terms, 0, set())
     assert [t.candidate.key for t in kept] == [turning.key] and stays == [True, False]
@@ -89,7 +97,9 @@ def test_a_column_beside_a_delay_is_late_as_all_others_are(tmp_path: Path) -> No
     known = {c.effect: c for c in candidates(rig, fit, "hinge")}
     late, drag = Term(known["current_channel_delay"], {"delay": 0.02}), Term(known["quadratic_damping"], {})
     problem = pose(fit, "hinge")
-    for one, other in zip(extended(problem, [late], drag, normal(problem, [late])), normal(problem, [late, drag]), strict=True):
+    for one, other in zip(
+        extended(problem, [late], drag, normal(problem, [late])), normal(problem, [late, drag]), strict=True
+    ):
         np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9 * np.abs(other).max())
 
 
@@ -158,11 +168,14 @@ def test_an_effect_whose_size_cannot_be_told_leaves_its_place_to_the_next() -> N
 
 
 def test_what_stood_before_a_later_round_comes_back_where_that_holds_no_better() -> None:
-    """A variant that suits the first effect alone, another that the last round exchanged it for: what all predict decides which stands, and
-    the figure with one effect is that of the one that suits it alone."""
+    """A variant that suits the first effect alone, another that the last round exchanged it for: what all predict
+    decides which stands, and the figure with one effect is that of the one that suits it alone."""
     alone, beside, other = (SimpleNamespace(key=k, effect=k[0], start={k: 0.0}) for k in ("a1", "a2", "b"))
     found = [(beside, SimpleNamespace(taken=(alone,))), (other, SimpleNamespace(taken=(beside, other)))]
-    for error, stands in (({"": 1.0, "a1": 0.4, "a2": 0.9, "a2b": 0.5}, ["a1"]), ({"": 1.0, "a1": 0.4, "a2": 0.9, "a2b": 0.2}, ["a2", "b"])):
+    for error, stands in (
+        ({"": 1.0, "a1": 0.4, "a2": 0.9, "a2b": 0.5}, ["a1"]),
+        ({"": 1.0, "a1": 0.4, "a2": 0.9, "a2b": 0.2}, ["a2", "b"]),
+    ):
 
         def links(sets: list, table: dict = error) -> list[SimpleNamespace]:
             return [SimpleNamespace(error=table["".join(v.key for v, _ in some)]) for some in sets]
@@ -177,20 +190,27 @@ def test_what_stood_before_a_later_round_comes_back_where_that_holds_no_better()
 
 
 def test_a_fit_with_a_variant_that_was_exchanged_starts_from_both_sides() -> None:
-    """Its round knows nothing of it: from what the last round says, and from where it begins beside the declared model."""
+    """Its round knows nothing of it: from what the last round says, and from where it begins beside the declared
+    model."""
     variant = Variant("load_dependent_friction", "external", {"load_external": 0.0})
-    own, last, declared = (vector({"inertia": i, **more}) for i, more in ((1.0, {"load_gear": 0.3}), (2.0, {"load_external": 0.2}), (3.0, {})))
+    own, last, declared = (
+        vector({"inertia": i, **more})
+        for i, more in ((1.0, {"load_gear": 0.3}), (2.0, {"load_external": 0.2}), (3.0, {}))
+    )
     free = ("inertia", "load_external")
     starts = _starts(free, [(variant, SimpleNamespace(fit=SimpleNamespace(theta=own)))], declared, last)
-    assert [[s[INDEX[n]] for n in ("inertia", "load_external", "load_gear")] for s in starts] == [[1.0, 0.2, 0.0], [3.0, 0.0, 0.0]]
+    assert [[s[INDEX[n]] for n in ("inertia", "load_external", "load_gear")] for s in starts] == [
+        [1.0, 0.2, 0.0],
+        [3.0, 0.0, 0.0],
+    ]
     known = [(variant, SimpleNamespace(fit=SimpleNamespace(theta=last)))]
     assert len(_starts(free, known, declared, last)) == 1 and _starts(free, [], declared, last)[0] is declared
 
 
 @pytest.mark.parametrize(("cost", "named"), [(0.5, True), (0.99, False)])
 def test_only_what_explains_its_own_recordings_may_explain_others(cost: float, named: bool) -> None:
-    """A rival that predicts what is left out of a dying swing, and one that does so without lowering the error that it was fitted to; and
-    the large first turns do not speak for all."""
+    """A rival that predicts what is left out of a dying swing, and one that does so without lowering the error that it
+    was fitted to; and the large first turns do not speak for all."""
     blocks, folds = 8 * PARTS, [(tuple(i for i in range(8) if i != k), (k,)) for k in range(8)]
     test = SimpleNamespace(lanes=[SimpleNamespace(trial=f"run_{k}") for k in range(8)], driven=False)
     none = np.where(np.arange(blocks) < PARTS, 100.0, 1.0)
@@ -216,24 +236,34 @@ def test_a_long_swing_is_searched_on_some_of_its_stretches() -> None:
 
 
 def test_a_recording_with_a_level_of_its_own_is_not_left_out_whole(tmp_path: Path) -> None:
-    """Two recordings: each is left out alone where they share all parameters, in halves and thirds where each sets its own friction."""
+    """Two recordings: each is left out alone where they share all parameters, in halves and thirds where each sets its
+    own friction."""
     folder = bench(tmp_path / "s", 0.3, 0.01)
     head, *trials = (path := folder / "session.toml").read_text().split("[[trial]]")
-    for levels, count in ((("", ""), 2), (('set = { "joint:hinge:frictionloss" = 0.05 }\n', 'set = { "joint:hinge:frictionloss" = 0.1 }\n'), 5)):
+    for levels, count in (
+        (("", ""), 2),
+        (('set = { "joint:hinge:frictionloss" = 0.05 }\n', 'set = { "joint:hinge:frictionloss" = 0.1 }\n'), 5),
+    ):
         path.write_text("[[trial]]".join([head, *(t + level for t, level in zip(trials[:2], levels, strict=True))]))
         parts = splits(pose(trusted_fit(load_rig(read_session(folder)))[0]))
         assert len(parts) == count and np.all(np.sum(parts, 0) == (1 if count == 2 else 2))
 
 
 def test_a_free_swing_starts_where_its_first_period_says() -> None:
-    """Starts that are wrong by half a degree and 0.1 rad/s come back to what the recording was made with, at a friction that is wrong
-    by a tenth; those of a driven joint stay."""
+    """Starts that are wrong by half a degree and 0.1 rad/s come back to what the recording was made with, at a friction
+    that is wrong by a tenth; those of a driven joint stay."""
     theta = vector({"inertia": 0.02, "damping": 4e-4, "coulomb": 1e-3})
     starts, steps = ((1.2, 0.5), (0.3, -1.5), (-0.6, 2.0)), 1500
-    blank = [Lane(n, False, np.zeros(steps), 1.0, np.zeros(steps), s, np.zeros(steps), np.ones(steps)) for n, s in zip("abc", starts, strict=True)]
+    blank = [
+        Lane(n, False, np.zeros(steps), 1.0, np.zeros(steps), s, np.zeros(steps), np.ones(steps))
+        for n, s in zip("abc", starts, strict=True)
+    ]
     swing = Swing(tuple(blank), 0.8, 0.0, {"inertia": 0.02}, False, 4e-3, 1.0)
     q = simulate(swing, np.repeat(theta[None], 3, 0), np.arange(3))
-    lanes = tuple(replace(lane, position=q[:, k], start=(lane.start[0] + 0.009, lane.start[1] - 0.1)) for k, lane in enumerate(swing.lanes))
+    lanes = tuple(
+        replace(lane, position=q[:, k], start=(lane.start[0] + 0.009, lane.start[1] - 0.1))
+        for k, lane in enumerate(swing.lanes)
+    )
     wrong = theta * np.where(np.isin(PARAMETERS, ("damping", "coulomb")), 1.1, 1.0)
     found = started(replace(swing, lanes=lanes), wrong)
     assert np.abs([np.subtract(lane.start, s) for lane, s in zip(found.lanes, starts, strict=True)]).max() < 0.005
@@ -242,7 +272,8 @@ def test_a_free_swing_starts_where_its_first_period_says() -> None:
 
 
 def test_a_free_start_takes_no_part_in_what_a_law_is_held_to() -> None:
-    """Under the true law nothing is left, whatever the start was taken for; of a wrong law it leaves what no start explains."""
+    """Under the true law nothing is left, whatever the start was taken for; of a wrong law it leaves what no start
+    explains."""
     theta, steps = vector({"inertia": 0.02, "damping": 4e-4, "coulomb": 1e-3, "lateral": 4e-3}), 1500
     blank = Lane("a", False, np.zeros(steps), 1.0, np.zeros(steps), (0.5, -1.5), np.zeros(steps), np.ones(steps))
     swing = Swing((blank,), 0.8, 0.0, {"inertia": 0.02}, False, 4e-3, 1.0)
@@ -285,7 +316,8 @@ def test_recordings_are_left_out_one_by_one_while_they_are_few() -> None:
 
 
 def test_a_term_of_one_recording_is_borne_out_in_every_part_of_it(tmp_path: Path) -> None:
-    """Friction by load that is there all the time is; a load tied to a place that the first half alone was drawn to is not."""
+    """Friction by load that is there all the time is; a load tied to a place that the first half alone was drawn to is
+    not."""
     folder = bench(tmp_path / "s", 0.3, 0.01)
     text = (folder / "session.toml").read_text().split("[[trial]]")
     (folder / "session.toml").write_text("[[trial]]".join([text[0], text[1], text[-1]]))
@@ -306,52 +338,84 @@ def test_a_term_of_one_recording_is_borne_out_in_every_part_of_it(tmp_path: Path
 
 
 @pytest.mark.parametrize(("helps", "names"), [(True, ["stribeck_friction", "command_delay"]), (False, [])])
-def test_what_one_effect_hides_is_sought_beside_another(monkeypatch: pytest.MonkeyPatch, helps: bool, names: list[str]) -> None:
-    """Friction that gains in two recordings and costs in the others, as long as a late drive is not known: both or none."""
+def test_what_one_effect_hides_is_sought_beside_another(
+    monkeypatch: pytest.MonkeyPatch, helps: bool, names: list[str]
+) -> None:
+    """Friction that gains in two recordings and costs in the others, as long as a late drive is not known: both or
+    none."""
     count, blocks = 8, 8 * PARTS
-    stage = SimpleNamespace(lanes=[SimpleNamespace(trial=f"run_{k}") for k in range(count)], driven=True, train=lambda: np.arange(count))
+    stage = SimpleNamespace(
+        lanes=[SimpleNamespace(trial=f"run_{k}") for k in range(count)], driven=True, train=lambda: np.arange(count)
+    )
     fitted = Fitted(np.zeros(len(PARAMETERS)), 1.0, 1, 3)
     better = replace(fitted, cost=0.5)
     alone = np.where(np.arange(blocks) < 2 * PARTS, 0.1, 1.05)
 
     def two_rounds(stages, taken, current, test, folds, without):
-        rival = swing_compete._Rival(Variant("command_delay" if taken else "stribeck_friction", "", {}), better, np.full(blocks, 0.2) if taken and helps else alone)
+        rival = swing_compete._Rival(
+            Variant("command_delay" if taken else "stribeck_friction", "", {}),
+            better,
+            np.full(blocks, 0.2) if taken and helps else alone,
+        )
         return fitted, np.ones(blocks), [rival] if len(taken) < 2 else []
 
     monkeypatch.setattr(swing_compete, "_round", two_rounds)
     monkeypatch.setattr(swing_compete, "freed", lambda swing, theta: swing)
     monkeypatch.setattr(swing_compete, "_exchanged", lambda stages, taken, fit: (taken, fit))
-    monkeypatch.setattr(swing_compete, "_folds", lambda swing, train, whole: (swing, [(tuple(i for i in range(count) if i != k), (k,)) for k in range(count)]))
+    monkeypatch.setattr(
+        swing_compete,
+        "_folds",
+        lambda swing, train, whole: (swing, [(tuple(i for i in range(count) if i != k), (k,)) for k in range(count)]),
+    )
     taken = swing_compete.compete_swing([stage], fitted)
     assert [v.effect for v, _ in taken] == names and [r.variant.effect for _, r in taken] == names
 
 
 @pytest.mark.parametrize(("error", "names"), [(3.0, ["stribeck_friction"]), (1.0, [])])
-def test_a_fit_within_the_noise_is_held_to_what_it_predicts(monkeypatch: pytest.MonkeyPatch, error: float, names: list[str]) -> None:
-    """A law that is wrong fits short stretches to within the noise of 2; only what it predicts to within it, too, is left at that."""
+def test_a_fit_within_the_noise_is_held_to_what_it_predicts(
+    monkeypatch: pytest.MonkeyPatch, error: float, names: list[str]
+) -> None:
+    """A law that is wrong fits short stretches to within the noise of 2; only what it predicts to within it, too, is
+    left at that."""
     count = 8
-    stage = SimpleNamespace(lanes=[SimpleNamespace(trial=f"run_{k}") for k in range(count)], driven=True, train=lambda: np.arange(count))
+    stage = SimpleNamespace(
+        lanes=[SimpleNamespace(trial=f"run_{k}") for k in range(count)], driven=True, train=lambda: np.arange(count)
+    )
     fitted = Fitted(np.zeros(len(PARAMETERS)), 1.0, 1, 3)
 
     def one_round(stages, taken, current, test, folds, without):
-        rival = swing_compete._Rival(Variant("stribeck_friction", "", {}), replace(fitted, cost=0.5), np.full(count * PARTS, 0.2 * error))
+        rival = swing_compete._Rival(
+            Variant("stribeck_friction", "", {}), replace(fitted, cost=0.5), np.full(count * PARTS, 0.2 * error)
+        )
         return fitted, np.full(count * PARTS, error), [] if taken else [rival]
 
     monkeypatch.setattr(swing_compete, "_round", one_round)
     monkeypatch.setattr(swing_compete, "freed", lambda swing, theta: swing)
     monkeypatch.setattr(swing_compete, "_exchanged", lambda stages, taken, fit: (taken, fit))
-    monkeypatch.setattr(swing_compete, "_folds", lambda swing, train, whole: (swing, [(tuple(i for i in range(count) if i != k), (k,)) for k in range(count)]))
+    monkeypatch.setattr(
+        swing_compete,
+        "_folds",
+        lambda swing, train, whole: (swing, [(tuple(i for i in range(count) if i != k), (k,)) for k in range(count)]),
+    )
     assert [v.effect for v, _ in swing_compete.compete_swing([stage], fitted, floor=2.0)] == names
 
 
 @pytest.mark.parametrize(("cost", "name"), [(1.001, "lateral"), (1.5, "both")])
-def test_what_made_up_for_a_later_effect_leaves_the_variant(monkeypatch: pytest.MonkeyPatch, cost: float, name: str) -> None:
-    """A variant with a parameter less takes the place of one that fits hardly better beside the later effect, not of one that fits better."""
-    both, lateral = Variant("gravity_load", "both", {"lateral": 0.0, "offset": 0.0}), Variant("gravity_load", "lateral", {"lateral": 0.0})
+def test_what_made_up_for_a_later_effect_leaves_the_variant(
+    monkeypatch: pytest.MonkeyPatch, cost: float, name: str
+) -> None:
+    """A variant with a parameter less takes the place of one that fits hardly better beside the later effect, not of
+    one that fits better."""
+    both, lateral = (
+        Variant("gravity_load", "both", {"lateral": 0.0, "offset": 0.0}),
+        Variant("gravity_load", "lateral", {"lateral": 0.0}),
+    )
     taken = both, Variant("stribeck_friction", "", {"static_excess": 0.0})
     theta = np.zeros(len(PARAMETERS))
     monkeypatch.setattr(swing_compete, "variants", lambda swing: (both, lateral))
     monkeypatch.setattr(swing_compete, "free_declared", lambda swing: ("inertia",))
-    monkeypatch.setattr(swing_compete, "fit_stages", lambda stages, tasks, most: [Fitted(t.start, cost, 1, len(t.free)) for t in tasks])
+    monkeypatch.setattr(
+        swing_compete, "fit_stages", lambda stages, tasks, most: [Fitted(t.start, cost, 1, len(t.free)) for t in tasks]
+    )
     kept, _ = swing_compete._exchanged([SimpleNamespace(train=lambda: np.arange(16))], taken, Fitted(theta, 1.0, 1, 4))
     assert [v.name for v in kept] == [name, ""]

@@ -1,4 +1,5 @@
-"""Effects with shapes beside each other: what stands must not keep out what it has made up for; what is largest comes first."""
+"""Effects with shapes beside each other: what stands must not keep out what it has made up for; what is largest comes
+first."""
 
 from __future__ import annotations
 
@@ -31,7 +32,13 @@ def rig_fit(tmp_path_factory: pytest.TempPathFactory) -> Any:
     def torque(motion: Motion) -> np.ndarray:
         _, q, v, a = motion
         dry = 0.065 + 0.056 * np.exp(-((v / SPEED) ** 2))
-        return (0.6 * 0.04 + 0.002) * a + 0.6 * 0.2 * 9.81 * np.sin(q) + 0.02 * v + 0.0142 * v * np.abs(v) + np.sign(v) * dry
+        return (
+            (0.6 * 0.04 + 0.002) * a
+            + 0.6 * 0.2 * 9.81 * np.sin(q)
+            + 0.02 * v
+            + 0.0142 * v * np.abs(v)
+            + np.sign(v) * dry
+        )
 
     path: Path = tmp_path_factory.mktemp("bench") / "s"
     rig = load_rig(read_session(recorded(path, ARM, 5, torque, 0.01)))
@@ -39,10 +46,14 @@ def rig_fit(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 
 def test_a_rival_is_held_to_what_stands_with_its_shapes_moved_for_it(rig_fit: Any) -> None:
-    """Alone a Stribeck rise takes a speed that makes up for the drag: beside that the drag is not worth a name, beside the right one it is."""
+    """Alone a Stribeck rise takes a speed that makes up for the drag: beside that the drag is not worth a name, beside
+    the right one it is."""
     rig, fit = rig_fit
     problem, known = pose(fit, "hinge"), {c.key: c for c in candidates(rig, fit, "hinge")}
-    rise = replace(known["stribeck_friction@hinge"], grid=tuple(g for g in known["stribeck_friction@hinge"].grid if g["form"] == 1.0))
+    rise = replace(
+        known["stribeck_friction@hinge"],
+        grid=tuple(g for g in known["stribeck_friction@hinge"].grid if g["form"] == 1.0),
+    )
     terms = refit(problem, (Term(rise, dict(rise.grid[0])),))
     parts = normal(problem, terms)
     none = held_out(problem, terms, parts).sum()
@@ -56,7 +67,11 @@ def test_a_rival_is_held_to_what_stands_with_its_shapes_moved_for_it(rig_fit: An
 def test_a_form_that_was_chosen_without_a_later_effect_is_chosen_again_beside_it(rig_fit: Any) -> None:
     """Without the drag the exponential rise explains more than the Gaussian one, which was planted."""
     rig, fit = rig_fit
-    some = [c for c in candidates(rig, fit, "hinge") if c.effect in ("stribeck_friction", "quadratic_damping") and not c.variant]
+    some = [
+        c
+        for c in candidates(rig, fit, "hinge")
+        if c.effect in ("stribeck_friction", "quadratic_damping") and not c.variant
+    ]
     first = compete(pose(fit), some, most=1)[0][0]
     both = {t.candidate.effect: t.shape for t in compete(pose(fit), some)[0]}
     assert first.shape["form"] == 0.0 and both["stribeck_friction"]["form"] == 1.0
@@ -75,7 +90,8 @@ def with_load(folder: Path, load: Callable[[np.ndarray], np.ndarray]) -> Any:
 
 
 def test_a_rival_is_held_to_the_others_at_its_best_place_not_at_that_of_a_grid(tmp_path: Path) -> None:
-    """A detent between two places of its grid: there it leaves most of itself, and another effect would take its name."""
+    """A detent between two places of its grid: there it leaves most of itself, and another effect would take its
+    name."""
     rig, fit = with_load(tmp_path / "s", lambda q: 0.3 * np.exp(-0.5 * ((q - 0.13) / 0.09) ** 2))
     detent = next(c for c in candidates(rig, fit, "hinge") if c.effect == "detent_load")
     places = np.unique([g["centre"] for g in detent.grid])
@@ -90,7 +106,8 @@ def test_a_rival_is_held_to_the_others_at_its_best_place_not_at_that_of_a_grid(t
 
 
 def test_two_effects_of_which_neither_alone_is_worth_a_name(tmp_path: Path) -> None:
-    """What is left is the difference of two columns that are nearly one: both are found, in whichever order; one of them alone is not."""
+    """What is left is the difference of two columns that are nearly one: both are found, in whichever order; one of
+    them alone is not."""
     columns = {"detent_load": lambda q: np.sin(7 * q), "torque_ripple": lambda q: np.sin(7 * q) + 0.1 * np.cos(19 * q)}
     _, fit = with_load(tmp_path / "s", lambda q: columns["torque_ripple"](q) - columns["detent_load"](q))
     rivals = [Candidate(name, "", "hinge", (("size", "effort", -np.inf, np.inf),), ({},), lambda r, s, c=column: c(r.position)[:, None])
@@ -102,12 +119,27 @@ def test_two_effects_of_which_neither_alone_is_worth_a_name(tmp_path: Path) -> N
 
 def found(joint: str, before: float, after: float) -> Finding:
     """A finding at a joint that takes the error from before to after."""
-    return Finding("torque_ripple", ("torque_ripple",), 1.0, (), {"joint": joint, "share_of_mismatch": before**2 - after**2}, "", {}, {}, {})
+    return Finding(
+        "torque_ripple",
+        ("torque_ripple",),
+        1.0,
+        (),
+        {"joint": joint, "share_of_mismatch": before**2 - after**2},
+        "",
+        {},
+        {},
+        {},
+    )
 
 
 def test_a_faint_effect_alone_at_a_joint_is_a_small_share() -> None:
-    """Of what the declared model leaves beyond the noise, at each joint; where noise is all there is, of what is explained."""
-    declared = {"shoulder": {"before": 5.0, "noise_floor": 3.0}, "elbow": {"before": 5.0, "noise_floor": 3.0}, "wrist": {"before": 2.0, "noise_floor": 2.0}}
+    """Of what the declared model leaves beyond the noise, at each joint; where noise is all there is, of what is
+    explained."""
+    declared = {
+        "shoulder": {"before": 5.0, "noise_floor": 3.0},
+        "elbow": {"before": 5.0, "noise_floor": 3.0},
+        "wrist": {"before": 2.0, "noise_floor": 2.0},
+    }
     told = shares([found("shoulder", 5.0, 4.9), found("elbow", 5.0, 3.5), found("wrist", 2.0, 1.0)], declared)
     assert [f.where["share_of_mismatch"] for f in told] == pytest.approx([0.99 / 16, 12.75 / 16, 1.0])
 

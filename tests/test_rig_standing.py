@@ -1,4 +1,5 @@
-"""What an effect is held to on validation recordings: what stands in its best shapes without it, all joints, the motion."""
+"""What an effect is held to on validation recordings: what stands in its best shapes without it, all joints, the
+motion."""
 
 from __future__ import annotations
 
@@ -41,10 +42,14 @@ class Bench:
 def _table_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing is fitted: without another the best shape is 5; a finding is its effect and reach."""
     monkeypatch.setattr(standing, "pose", lambda fit, joint=None: None)
-    monkeypatch.setattr(standing, "refit", lambda problem, terms: tuple(Term(t.candidate, {"reach": 5.0}) for t in terms))
+    monkeypatch.setattr(
+        standing, "refit", lambda problem, terms: tuple(Term(t.candidate, {"reach": 5.0}) for t in terms)
+    )
     monkeypatch.setattr(standing, "solved", lambda bench, fit, terms: (list(terms), np.zeros(0)))
     monkeypatch.setattr(standing, "_motion_says", lambda bench, before, after: None)
-    monkeypatch.setattr(standing, "_joint_finding", lambda rig, fit, step, term, *more: (term.candidate.effect, term.shape["reach"]))
+    monkeypatch.setattr(
+        standing, "_joint_finding", lambda rig, fit, step, term, *more: (term.candidate.effect, term.shape["reach"])
+    )
 
 
 def _reaches(side: tuple) -> tuple[float, ...]:
@@ -56,7 +61,9 @@ def _reaches(side: tuple) -> tuple[float, ...]:
     ({(): 1.0, (5.0,): 0.3, (1.0, 2.0): 0.32, (1.0,): 0.9}, {(): 1.0, (5.0,): 0.3}, [5.0]),
     ({(): 1.0, (5.0,): 0.5, (1.0, 2.0): 0.3}, {(): 1.0, (5.0,): 0.5, (1.0, 2.0): 0.6}, [5.0]),
 ], ids=["both help", "the first does as well in a shape of its own", "others pay for it"])  # fmt: skip
-def test_an_effect_is_held_to_what_stands_at_its_best_without_it(monkeypatch: pytest.MonkeyPatch, errors: dict, whole: dict, holds: list) -> None:
+def test_an_effect_is_held_to_what_stands_at_its_best_without_it(
+    monkeypatch: pytest.MonkeyPatch, errors: dict, whole: dict, holds: list
+) -> None:
     """Two effects of one joint, found with shapes 1 and 2 beside each other; the first alone has shape 5."""
     _table_alone(monkeypatch)
     stories = [(None, term("elbow", "a", 1.0)), (None, term("elbow", "b", 2.0))]
@@ -66,7 +73,8 @@ def test_an_effect_is_held_to_what_stands_at_its_best_without_it(monkeypatch: py
 
 
 def test_what_stands_at_a_joint_keeps_its_shape_when_another_joint_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The elbow's first effect, found with shape 1 beside one that is withdrawn, stands with its own, 5: in the file and as it is told."""
+    """The elbow's first effect, found with shape 1 beside one that is withdrawn, stands with its own, 5: in the file
+    and as it is told."""
     _table_alone(monkeypatch)
     errors = {(): 1.0, (5.0,): 0.5, (5.0, 3.0): 0.4, (1.0, 2.0): 0.6}
     stories = [(None, term(*t)) for t in (("elbow", "a", 1.0), ("elbow", "b", 2.0), ("wrist", "c", 3.0))]
@@ -77,10 +85,14 @@ def test_what_stands_at_a_joint_keeps_its_shape_when_another_joint_is_asked(monk
 
 @pytest.mark.parametrize(("told", "against"), [({"ratio": 0.9}, False), ({"ratio": 1.001}, False), ({"ratio": 1.2}, True), ({"not_run": "no law in open loop for x"}, True),
                                               ({"not_run": "a simulation leaves the recordings"}, False)])  # fmt: skip
-def test_a_motion_that_hardly_depends_on_an_effect_says_nothing_against_it(monkeypatch: pytest.MonkeyPatch, told: dict, against: bool) -> None:
+def test_a_motion_that_hardly_depends_on_an_effect_says_nothing_against_it(
+    monkeypatch: pytest.MonkeyPatch, told: dict, against: bool
+) -> None:
     """Only one that gets worse by as much as would be worth a name does, and an effect that has no motion."""
     monkeypatch.setattr(standing, "open_loop", lambda *args, **more: told)
-    bench = SimpleNamespace(rig=SimpleNamespace(trials=[SimpleNamespace(effort={})], drives=(1,)), file=lambda *side: b"", moved={})
+    bench = SimpleNamespace(
+        rig=SimpleNamespace(trials=[SimpleNamespace(effort={})], drives=(1,)), file=lambda *side: b"", moved={}
+    )
     assert (standing._motion_says(bench, (), ()) is not None) is against
 
 
@@ -89,7 +101,9 @@ def test_a_delay_at_the_end_of_those_tried_is_none(delay: float, beyond: bool) -
     """What is best there may lie beyond it."""
     grid = tuple({"delay": s * d} for d in (0.01, 0.04) for s in (-1.0, 1.0))
     late = Candidate("current_channel_delay", "", "j1", (), grid, lambda r, s: np.zeros((0, 0)), True)
-    assert standing._beyond_reach(Term(late, {"delay": delay})) is beyond and not standing._beyond_reach(term("j1", "a", 1.0))
+    assert standing._beyond_reach(Term(late, {"delay": delay})) is beyond and not standing._beyond_reach(
+        term("j1", "a", 1.0)
+    )
 
 
 def _load(effect: str, joint: str, before: float, after: float, share: float, signal: str = "effort") -> Finding:
@@ -100,11 +114,17 @@ def _load(effect: str, joint: str, before: float, after: float, share: float, si
 
 
 def test_on_one_path_all_loads_tied_to_a_joint_are_one_name() -> None:
-    """A spring, a detent and a ripple at one joint bend one curve; other joints, other effects and angles of couplings stay as they are."""
+    """A spring, a detent and a ripple at one joint bend one curve; other joints, other effects and angles of couplings
+    stay as they are."""
     found = [_load("nonlinear_spring", "a", 5.0, 4.0, 0.5), _load("asymmetric_friction", "a", 4.0, 3.5, 0.2), _load("detent_load", "b", 1.0, 0.5, 0.9),
              _load("detent_load", "a", 3.5, 2.5, 0.2), _load("torque_ripple", "a", 2.5, 2.0, 0.1), _load("torque_ripple", "a", 2.0, 1.0, 0.1, "position")]  # fmt: skip
     merged = one_load_each(found)
-    assert [(f.effect, f.where["joint"]) for f in merged] == [("nonlinear_spring", "a"), ("asymmetric_friction", "a"), ("detent_load", "b"), ("torque_ripple", "a")]
+    assert [(f.effect, f.where["joint"]) for f in merged] == [
+        ("nonlinear_spring", "a"),
+        ("asymmetric_friction", "a"),
+        ("detent_load", "b"),
+        ("torque_ripple", "a"),
+    ]
     one = merged[0]
     assert one.members == ("nonlinear_spring", "stribeck_friction", "detent_load", "torque_ripple", "gravity_load")
     assert one.where["share_of_mismatch"] == pytest.approx(0.8)
@@ -115,8 +135,11 @@ def test_on_one_path_all_loads_tied_to_a_joint_are_one_name() -> None:
 
 
 @pytest.mark.parametrize(("left", "count"), [(0.03, 2), (0.3, 3)])
-def test_a_third_effect_takes_more_than_the_forms_of_two_may_be_off_by(monkeypatch: pytest.MonkeyPatch, left: float, count: int) -> None:
-    """A third that takes a fifth of the squared error that two leave is named where they leave 30 % of the error, not where 3 %."""
+def test_a_third_effect_takes_more_than_the_forms_of_two_may_be_off_by(
+    monkeypatch: pytest.MonkeyPatch, left: float, count: int
+) -> None:
+    """A third that takes a fifth of the squared error that two leave is named where they leave 30 % of the error, not
+    where 3 %."""
     _table_alone(monkeypatch)
     errors = {(): 1.0, (5.0,): 0.5, (5.0, 5.0): left, (1.0, 2.0, 3.0): 0.9 * left}
     stories = [(None, term("elbow", name, reach)) for name, reach in (("a", 1.0), ("b", 2.0), ("c", 3.0))]

@@ -1,4 +1,5 @@
-"""What a rig makes of rounded, thinned and passive recordings: the noise of coarse encoders, slopes, weights as the scale."""
+"""What a rig makes of rounded, thinned and passive recordings: the noise of coarse encoders, slopes, weights as the
+scale."""
 
 from __future__ import annotations
 
@@ -22,8 +23,8 @@ SIGNALS = 'one = "joint:one:position"\ntwo = "joint:two:position"\n'
 
 
 def swings(folder: Path, drag: float, step: float, upper: float = 0.094, lower: float = 0.138) -> Path:
-    """Four swings of a passive double pendulum (the last held out) with drag [N m s^2/rad^2] at both joints, as an encoder of
-    that step [rad] reads them at 1 kHz; upper, lower: masses [kg] that are declared."""
+    """Four swings of a passive double pendulum (the last held out) with drag [N m s^2/rad^2] at both joints, as an
+    encoder of that step [rad] reads them at 1 kHz; upper, lower: masses [kg] that are declared."""
     (folder / "log").mkdir(parents=True)
     (folder / "rig.xml").write_text(LINKS.format(upper=upper, lower=lower))
     text = f'format = "hand-session/1"\n[hand]\nname = "swings"\n[rig]\nmodel = "rig.xml"\n[signals]\n{SIGNALS}'
@@ -46,7 +47,8 @@ def swings(folder: Path, drag: float, step: float, upper: float = 0.094, lower: 
 @pytest.mark.parametrize("step", [1e-4, 1.57e-4, 1e-3, 6e-3])
 @pytest.mark.parametrize("size", [0.05, 0.3, 1.5])
 def test_the_noise_of_an_encoder_is_that_of_its_rounding(step: float, size: float) -> None:
-    """Within 3 % of step / sqrt(12), fast or slow; with white noise as large as a step beside it, of both together within 10 %."""
+    """Within 3 % of step / sqrt(12), fast or slow; with white noise as large as a step beside it, of both together
+    within 10 %."""
     t = np.arange(0, 20, 1e-3)
     q = size * np.sin(2 * np.pi * 0.8 * t) * np.exp(-t / 20)
     rounded = np.round(q / step) * step
@@ -57,8 +59,8 @@ def test_the_noise_of_an_encoder_is_that_of_its_rounding(step: float, size: floa
 
 
 def test_slopes_of_what_is_resolved_lose_nothing() -> None:
-    """A sine at a tenth of the sampling rate: slope and acceleration within 0.1 % away from the ends; a jump that no filter has
-    seen does not ring."""
+    """A sine at a tenth of the sampling rate: slope and acceleration within 0.1 % away from the ends; a jump that no
+    filter has seen does not ring."""
     t = np.arange(0, 2, 0.01)
     turn = 2 * np.pi * 10
     v = differentiate(np.sin(turn * t), 100.0)
@@ -68,8 +70,8 @@ def test_slopes_of_what_is_resolved_lose_nothing() -> None:
 
 
 def test_drag_of_a_passive_double_pendulum(tmp_path: Path) -> None:
-    """Behind coarse encoders drag is named at the lower joint and nothing else anywhere; where there is none, nothing is, and the
-    model leaves what the encoders' noise is."""
+    """Behind coarse encoders drag is named at the lower joint and nothing else anywhere; where there is none, nothing
+    is, and the model leaves what the encoders' noise is."""
     found = diagnose_rig(read_session(swings(tmp_path / "drag", 5e-5, 1.5e-3)))
     assert {f.effect for f in found.findings} == {"quadratic_damping"}
     assert "two" in {f.where["joint"] for f in found.findings}
@@ -80,7 +82,8 @@ def test_drag_of_a_passive_double_pendulum(tmp_path: Path) -> None:
 
 
 def test_one_weight_is_the_scale_of_what_nothing_drives(tmp_path: Path) -> None:
-    """Masses that are declared wrong by a tenth each, in opposite ways: their ratio is found, the heavier one's weight is kept."""
+    """Masses that are declared wrong by a tenth each, in opposite ways: their ratio is found, the heavier one's weight
+    is kept."""
     fit = trusted_fit(load_rig(read_session(swings(tmp_path / "s", 0.0, 1e-4, 0.094 * 1.1, 0.138 / 1.1))))[0]
     theta = {c.label: t for c, t in zip(fit.columns, fit.theta, strict=True)}
     assert theta["inertial:lower:hz"] == pytest.approx(-0.138 / 1.1 * 0.12, rel=1e-3)

@@ -15,8 +15,8 @@ from hand_model.session import read_session
 
 
 def test_a_log_that_is_thinned_keeps_where_friction_turns(tmp_path: Path) -> None:
-    """Coulomb friction under a slow sine, logged at 500 Hz and weighed up to 2 Hz: a jump read half a thinned sample early or late left
-    5 % of it unexplained (there is no noise, and no spring or weight to mistake it for)."""
+    """Coulomb friction under a slow sine, logged at 500 Hz and weighed up to 2 Hz: a jump read half a thinned sample
+    early or late left 5 % of it unexplained (there is no noise, and no spring or weight to mistake it for)."""
     t = np.arange(0, 12, 0.002)
     folder = tmp_path / "s"
     (folder / "log").mkdir(parents=True)
@@ -26,7 +26,9 @@ def test_a_log_that_is_thinned_keeps_where_friction_turns(tmp_path: Path) -> Non
         q, v = 0.5 * np.sin(2 * np.pi * hz * t), np.pi * hz * np.cos(2 * np.pi * hz * t)
         load = -(0.6 * 0.04 + 0.002) * (2 * np.pi * hz) ** 2 * q + 0.6 * 0.2 * 9.81 * np.sin(q)
         table = np.stack([t, q, load + 0.03 * v + 2.0 * np.sign(v)], 1)
-        np.savetxt(folder / f"log/{k}.csv", table, delimiter=",", header="time,position,torque", comments="", fmt="%.10g")
+        np.savetxt(
+            folder / f"log/{k}.csv", table, delimiter=",", header="time,position,torque", comments="", fmt="%.10g"
+        )
         text += f'[[trial]]\nkind = "motion"\nlog = "log/{k}.csv"\n'
     (folder / "session.toml").write_text(text)
     fit = fit_declared(load_rig(read_session(folder)), cutoff_hz=2.0)
@@ -35,7 +37,8 @@ def test_a_log_that_is_thinned_keeps_where_friction_turns(tmp_path: Path) -> Non
 
 
 def test_states_lose_nothing_of_the_band_that_is_weighed(tmp_path: Path) -> None:
-    """A sine as fast as the band goes: its acceleration within 0.2 %, where a gentle filter as wide lost 1.2 %, all of it a wrong inertia."""
+    """A sine as fast as the band goes: its acceleration within 0.2 %, where a gentle filter as wide lost 1.2 %, all of
+    it a wrong inertia."""
     t, turn = np.arange(0, 8, 0.004), 2 * np.pi * 8.0
     folder = tmp_path / "s"
     (folder / "log").mkdir(parents=True)

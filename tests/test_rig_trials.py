@@ -1,4 +1,5 @@
-"""Rigs whose trials differ: own weights and lengths, supplies; what resampled recordings say; intervals of simulated fits."""
+"""Rigs whose trials differ: own weights and lengths, supplies; what resampled recordings say; intervals of simulated
+fits."""
 
 from __future__ import annotations
 
@@ -77,7 +78,8 @@ def test_own_weights_of_trials_are_known_and_the_rest_is_fitted(torque_bench: Pa
 
 
 def test_a_fitted_file_keeps_the_trials_own_weights(torque_bench: Path) -> None:
-    """The written file replays trials of both weights as well as the fit does: what was fitted is added to what is set."""
+    """The written file replays trials of both weights as well as the fit does: what was fitted is added to what is
+    set."""
     rig = load_rig(read_session(torque_bench))
     fit = fit_declared(rig)
     xml = Bench(rig).file(fit, (), solution(pose(fit), ()))
@@ -91,7 +93,9 @@ def test_a_fitted_file_keeps_the_trials_own_weights(torque_bench: Path) -> None:
 def test_simulated_fit_uses_each_trials_weight_and_covers_the_truth(tmp_path: Path) -> None:
     """Voltage-driven, two weights: inertia, gain and friction return, the truth lies within their intervals, and MuJoCo
     on the written file moves as recorded."""
-    truth = vector({"inertia": 0.0085, "gain": 0.13, "back_emf": 0.05, "damping": 0.012, "coulomb": 0.03, "load_gear": 0.1})
+    truth = vector(
+        {"inertia": 0.0085, "gain": 0.13, "back_emf": 0.05, "damping": 0.012, "coulomb": 0.03, "load_gear": 0.1}
+    )
     t, random = np.arange(0, 5, 0.002), np.random.default_rng(0)
     volts = [2.5 * np.sin(2.2 * t + k) + 1.5 * np.sin(5.1 * t + 2 * k) for k in range(4)]
     table = [np.stack([t, 0 * t, u], 1) for u in volts]
@@ -119,7 +123,10 @@ def test_overrides_reach_what_mjcf_names() -> None:
 
     servo = BENCH.format(drive='<position name="motor" joint="hinge" kp="10"/>')
     model = mujoco.MjModel.from_xml_string(servo)
-    apply_overrides(model, {"option:timestep": 0.002, "actuator:motor:kp": 7.0, "joint:hinge:damping": 0.5, "option:gravity": [0, 0, 0]})
+    apply_overrides(
+        model,
+        {"option:timestep": 0.002, "actuator:motor:kp": 7.0, "joint:hinge:damping": 0.5, "option:gravity": [0, 0, 0]},
+    )
     assert model.opt.timestep == 0.002 and model.actuator_gainprm[0, 0] == 7.0 and model.actuator_biasprm[0, 1] == -7.0
     assert model.dof_damping[0] == 0.5 and not model.opt.gravity.any()
     for key, value in (("body:leg:mass", 1.0), ("joint:hinge:mass", 1.0), ("option:gravity", [0, 0])):
@@ -131,7 +138,10 @@ def test_supply_is_relative_to_the_session(torque_bench: Path) -> None:
     """Two recordings at 7 V and 8 V deviate to either side of their mean; a session without a supply has none."""
     rig = load_rig(read_session(torque_bench))
     assert supply_channel(rig) is None and not supply_deviation(rig, rig.trials[0]).any()
-    own = [replace(t, extra={"input_volts": np.full(len(t.time_s), v)}) for t, v in zip(rig.trials[:2], (7.0, 8.0), strict=True)]
+    own = [
+        replace(t, extra={"input_volts": np.full(len(t.time_s), v)})
+        for t, v in zip(rig.trials[:2], (7.0, 8.0), strict=True)
+    ]
     rig = replace(rig, trials=tuple(own))
     assert [supply_deviation(rig, t)[0] for t in rig.trials] == pytest.approx([-1 / 15, 1 / 15])
 
@@ -160,7 +170,8 @@ SIZE = {"asymmetric_friction": 0.3, "asymmetric_viscous_friction": -0.2, "quadra
 
 @pytest.mark.parametrize("name", SIZE)
 def test_law_in_open_loop_is_the_column_along_the_path(name: str) -> None:
-    """Step by step along a recorded path, an effect's effort (friction by the motion's direction) is that of its columns."""
+    """Step by step along a recorded path, an effect's effort (friction by the motion's direction) is that of its
+    columns."""
     t = np.arange(0, 6, 0.002)
     q, v = np.sin(1.7 * t) + 0.4 * np.sin(4.1 * t), 1.7 * np.cos(1.7 * t) + 1.64 * np.cos(4.1 * t)
     state = DriveState("", "", t, q, v, 0 * t, 0 * t, np.sign(v)[:, None], "rad", "N m", {}, ("coulomb",))
@@ -169,7 +180,14 @@ def test_law_in_open_loop_is_the_column_along_the_path(name: str) -> None:
     else:
         shape = effect(name).grid((state,))[-1]
         columns, names = effect(name).columns(state, shape), [a[0] for a in effect(name).amplitudes()]
-    act = law({"effect": name, "variant": "", "shape": shape, "amplitude": {n: SIZE[name] * (k + 1) for k, n in enumerate(names)}})
+    act = law(
+        {
+            "effect": name,
+            "variant": "",
+            "shape": shape,
+            "amplitude": {n: SIZE[name] * (k + 1) for k, n in enumerate(names)},
+        }
+    )
     done = [act(Now(a, b, 0.0, 0.0)) for a, b in zip(q, v, strict=True)]
     effort = np.array([e + f * np.sign(b) for (e, f), b in zip(done, v, strict=True)])
     wanted = columns @ (SIZE[name] * (1 + np.arange(len(names))))
@@ -177,7 +195,8 @@ def test_law_in_open_loop_is_the_column_along_the_path(name: str) -> None:
 
 
 def test_law_by_load_and_what_has_none() -> None:
-    """Friction by load is a bound that never turns over; an effect that needs its past in another form is not simulated."""
+    """Friction by load is a bound that never turns over; an effect that needs its past in another form is not
+    simulated."""
     now = Now(0.1, -2.0, -3.0, 4.0)
     record = {"effect": "load_dependent_friction", "amplitude": {"per": 0.5}, "shape": {"stribeck_speed": 2.0}}
     known = {"": (0.0, 1.5), "motor side": (0.0, 2.0), "low speed": (0.0, 1.5 / np.e), "with speed": (-3.0, 0.0)}
@@ -187,8 +206,8 @@ def test_law_by_load_and_what_has_none() -> None:
 
 
 def test_motion_in_open_loop_falls_with_what_was_found(torque_bench: Path) -> None:
-    """The same recordings with an offset of the drive: the file that has it predicts whole trials, the declared one worse; a
-    trial whose torque is refused takes no part."""
+    """The same recordings with an offset of the drive: the file that has it predicts whole trials, the declared one
+    worse; a trial whose torque is refused takes no part."""
     rig = load_rig(read_session(torque_bench))
     rig = replace(rig, trials=tuple(replace(t, effort={"hinge": t.effort["hinge"] + 0.05}) for t in rig.trials))
     fit = fit_declared(rig)
@@ -202,8 +221,8 @@ def test_motion_in_open_loop_falls_with_what_was_found(torque_bench: Path) -> No
 
 
 def test_effort_recorded_of_a_voltage_drive_is_the_effort(tmp_path: Path, torque_bench: Path) -> None:
-    """A current, scaled to torque, beside a motor that the file drives by voltage: balance and replay use it as it is, and
-    no back-EMF is fitted; a trial without any drive channel is not simulated."""
+    """A current, scaled to torque, beside a motor that the file drives by voltage: balance and replay use it as it is,
+    and no back-EMF is fitted; a trial without any drive channel is not simulated."""
     folder = tmp_path / "s"
     shutil.copytree(torque_bench, folder)
     (folder / "rig.xml").write_text(BENCH.format(drive=VOLTAGE))
@@ -213,25 +232,38 @@ def test_effort_recorded_of_a_voltage_drive_is_the_effort(tmp_path: Path, torque
     fit, plain = fit_declared(rig), fit_declared(load_rig(read_session(torque_bench)))
     assert not can_swing(rig) and "back_emf:motor" not in [c.label for c in fit.columns]
     assert [can_simulate(rig, t) for t in rig.trials] == [False, True, True, True]
-    xml = [Bench(load_rig(read_session(f))).file(x, (), solution(pose(x), ())) for f, x in ((folder, fit), (torque_bench, plain))]
-    told = [replay_rig(read_session(f), x, validate=True).joints[0] for f, x in zip((folder, torque_bench), xml, strict=True)]
+    xml = [
+        Bench(load_rig(read_session(f))).file(x, (), solution(pose(x), ()))
+        for f, x in ((folder, fit), (torque_bench, plain))
+    ]
+    told = [
+        replay_rig(read_session(f), x, validate=True).joints[0]
+        for f, x in zip((folder, torque_bench), xml, strict=True)
+    ]
     assert told[0].effort_rmse == pytest.approx(told[1].effort_rmse, rel=0.5) and told[0].position_rmse < 0.1
     assert np.isnan(replay_rig(read_session(folder), efforts=False, validate=False).joints[0].position_rmse)
 
 
 def test_the_form_of_a_friction_by_load_is_the_one_that_was_planted(tmp_path: Path) -> None:
-    """Friction by the gear's load, or by the square of the load that the motor drives at low speed: the first effect is it, in
-    that form, and explains the recordings down to their noise."""
+    """Friction by the gear's load, or by the square of the load that the motor drives at low speed: the first effect is
+    it, in that form, and explains the recordings down to their noise."""
     t = np.arange(0, 5, 0.002)
     volts = [2.5 * np.sin(2.2 * t + k) + 1.5 * np.sin(5.1 * t + 2 * k) for k in range(4)]
-    folder = session(tmp_path / "s", VOLTAGE, "voltage", [np.stack([t, 0 * t, u], 1) for u in volts], "time,position,voltage")
+    folder = session(
+        tmp_path / "s", VOLTAGE, "voltage", [np.stack([t, 0 * t, u], 1) for u in volts], "time,position,voltage"
+    )
     blank = build_swing(rig := load_rig(read_session(folder)), fit_declared(rig), 4e-3, 1.0)
     line = {"inertia": 0.0085, "gain": 0.13, "back_emf": 0.05, "damping": 0.012, "coulomb": 0.02}
     noise = 1e-3 * np.random.default_rng(0).standard_normal((2, len(blank.lanes), len(t)))
     squared = {"external_squared": 0.6, "stribeck_speed": 1.5}
     for planted, form, e in zip(({"load_gear": 0.1}, squared), ("gear", "squared"), noise, strict=True):
-        q = simulate(blank, np.repeat(vector({**line, **planted})[None], len(blank.lanes), 0), np.arange(len(blank.lanes)))
-        lanes = tuple(replace(lane, position=q[: len(lane.position), k] + e[k, : len(lane.position)]) for k, lane in enumerate(blank.lanes))
+        q = simulate(
+            blank, np.repeat(vector({**line, **planted})[None], len(blank.lanes), 0), np.arange(len(blank.lanes))
+        )
+        lanes = tuple(
+            replace(lane, position=q[: len(lane.position), k] + e[k, : len(lane.position)])
+            for k, lane in enumerate(blank.lanes)
+        )
         swing = replace(blank, lanes=lanes)
         declared = fit_stages([swing], [Task(all_free(swing, []), vector(line), ())], 12)[0]
         first, round_ = compete_swing([swing], declared, 2e-3)[0]
@@ -260,14 +292,18 @@ load = "actuator:l:force"
 
 
 def test_lost_motion_between_encoders_makes_no_load(tmp_path: Path) -> None:
-    """Play of 0.03 rad between two encoders is found with its size, and nothing is named of the efforts, which are healthy: the
-    polynomial that projects them has not bent to the play."""
+    """Play of 0.03 rad between two encoders is found with its size, and nothing is named of the efforts, which are
+    healthy: the polynomial that projects them has not bent to the play."""
     (tmp_path / "log").mkdir()
     (tmp_path / "rig.xml").write_text(COUPLED)
     text, random = BOTH_ENDS, np.random.default_rng(1)
     for k in range(5):
         t = np.arange(0, 15, 0.005)
-        w, size, phase = 2 * np.pi * random.uniform([0.15, 0.4], [0.35, 0.9]), random.uniform([0.4, 0.1], [0.7, 0.2]), random.uniform(0, 6, 2)
+        w, size, phase = (
+            2 * np.pi * random.uniform([0.15, 0.4], [0.35, 0.9]),
+            random.uniform([0.4, 0.1], [0.7, 0.2]),
+            random.uniform(0, 6, 2),
+        )
         near, speed, acceleration = (sum(s * w_**d * np.sin(w_ * t + p + d * np.pi / 2) for s, w_, p in zip(size, w, phase, strict=True))
                                      for d in range(3))  # fmt: skip
         far, slack = np.empty(len(t)), near[0]
@@ -278,7 +314,9 @@ def test_lost_motion_between_encoders_makes_no_load(tmp_path: Path) -> None:
         drive = 1e-3 * acceleration + 0.015 * speed + 0.04 * np.sign(speed) - 0.9 * load
         noise = 2e-3 * random.standard_normal((2, len(t)))
         table = np.stack([t, *(np.round(x / 2e-4) * 2e-4 for x in (near, far)), drive + noise[0], load + noise[1]], 1)
-        np.savetxt(tmp_path / f"log/{k}.csv", table, delimiter=",", header="time,near,far,drive,load", comments="", fmt="%.8g")
+        np.savetxt(
+            tmp_path / f"log/{k}.csv", table, delimiter=",", header="time,near,far,drive,load", comments="", fmt="%.8g"
+        )
         text += f'[[trial]]\nkind = "motion"\nlog = "log/{k}.csv"\n' + ('purpose = "validate"\n' if k == 4 else "")
     (tmp_path / "session.toml").write_text(text)
     found = diagnose_rig(read_session(tmp_path)).findings

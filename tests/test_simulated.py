@@ -1,4 +1,5 @@
-"""The state of a drive that its commands explain: simulated, with what is slow beside it, and none of the encoder's noise."""
+"""The state of a drive that its commands explain: simulated, with what is slow beside it, and none of the encoder's
+noise."""
 
 from __future__ import annotations
 
@@ -37,13 +38,17 @@ def drive(session: Session) -> SimulatedDrive:
     return simulated_drive(session, "index")
 
 
-def test_the_simulated_state_carries_little_noise_and_is_where_the_drive_was(session: Session, drive: SimulatedDrive) -> None:
+def test_the_simulated_state_carries_little_noise_and_is_where_the_drive_was(
+    session: Session, drive: SimulatedDrive
+) -> None:
     assert drive.motions and abs(drive.delay_s) < 3 * drive.doubt_s
     smooth, simulated = (drive_states(session, simulated=s)["index"] for s in ({}, {"index": drive}))
     for plain, state in zip(smooth, simulated, strict=True):
         cruise = (np.abs(state.velocity) > 20) & (plain.extra["steady"] > 0)
         cruise[1:] &= cruise[:-1]
-        assert np.sqrt(np.mean((state.position - plain.position)[cruise] ** 2)) < 2 * float(plain.extra["position_noise"][0])
+        assert np.sqrt(np.mean((state.position - plain.position)[cruise] ** 2)) < 2 * float(
+            plain.extra["position_noise"][0]
+        )
         jitter = [np.std(np.diff(s.velocity)[cruise[1:]]) for s in (plain, state)]
         assert jitter[1] < 0.3 * jitter[0]
         assert np.sum(state.extra["steady"]) > np.sum(plain.extra["steady"])  # starts and stops are not smeared
@@ -53,7 +58,12 @@ def test_what_the_simulation_lacks_is_not_smoothed_away(session: Session) -> Non
     fit, log = identify_motor(session, "index"), session.select("flexion")[0].log()
     position = log.column("position")
     swing = 0.003 * np.ptp(position)
-    slow, fast = (dataclasses.replace(log, columns={**log.columns, "position": position + swing * np.sin(2 * np.pi * hz * log.time_s)}) for hz in (0.15, 6.0))
+    slow, fast = (
+        dataclasses.replace(
+            log, columns={**log.columns, "position": position + swing * np.sin(2 * np.pi * hz * log.time_s)}
+        )
+        for hz in (0.15, 6.0)
+    )
     assert _motion(fit, "flexion", slow) is not None
     assert _motion(fit, "flexion", fast) is None
 

@@ -1,4 +1,5 @@
-"""Probed surfaces: known shapes swept with noise come back, defects are repaired, what is open or too little is said."""
+"""Probed surfaces: known shapes swept with noise come back, defects are repaired, what is open or too little is
+said."""
 
 import dataclasses
 
@@ -28,7 +29,8 @@ METHODS = [False, pytest.param(True, marks=pytest.mark.skipif(not has_open3d(), 
 
 
 def _swept_ellipsoid(low, high, noise_m=4e-4, seed=3, n=3500, turns=20):
-    """Zig-zag of a probe over an ellipsoid, from one angle about its long axis to another; its shaft stands off the surface."""
+    """Zig-zag of a probe over an ellipsoid, from one angle about its long axis to another; its shaft stands off the
+    surface."""
     random, t = np.random.default_rng(seed), np.linspace(0, 1, n)
     along = 0.97 * (2 * t - 1)
     ring, angle = np.sqrt(1 - along**2), low + (high - low) * (0.5 - 0.5 * np.cos(2 * np.pi * turns * t))
@@ -256,7 +258,9 @@ def test_surfaces_arrive_in_the_compiled_hand(recorded, tmp_path):
     true = next(s for s in truth.surfaces if s.segment == "palm")
     assert model.body("palm").mass[0] == pytest.approx(1100 * 4 / 3 * np.pi * true.radii_m.prod(), rel=0.05)
     assert np.allclose(model.body("palm").ipos, true.centre_palm, atol=1e-3)
-    of_palm = [i for i in range(model.ngeom) if model.geom_bodyid[i] == model.body("palm").id and model.geom_group[i] == 3]
+    of_palm = [
+        i for i in range(model.ngeom) if model.geom_bodyid[i] == model.body("palm").id and model.geom_group[i] == 3
+    ]
     assert {int(model.geom_type[i]) for i in of_palm} == {int(mujoco.mjtGeom.mjGEOM_MESH)}
 
 
@@ -265,7 +269,8 @@ def test_parts_that_would_touch_give_way_to_capsules_with_a_note(recorded, tmp_p
     hand = with_surfaces(_known(truth), identify_surfaces(session, _known(truth), pivoting=False))
     surfaces = {name: dict(table) for name, table in hand.extra["surfaces"].items()}
     probed = np.array(surfaces["index/proximal"]["vertices"])
-    corners, faces = hull(np.concatenate([probed + [0, 0.03, 0], probed - [0, 0.03, 0]]))  # as wide as all fingers together
+    # as wide as all fingers together
+    corners, faces = hull(np.concatenate([probed + [0, 0.03, 0], probed - [0, 0.03, 0]]))
     surfaces["index/proximal"]["parts"] = [{"vertices": corners.tolist(), "faces": faces.tolist()}]
     description = compile(dataclasses.replace(hand, extra={"surfaces": surfaces}), tmp_path / "out")
     assert [f.sentence for f in check(description.folder, items=("contact", "geoms")) if not f.passed] == []

@@ -19,7 +19,12 @@ def grasps(tmp_path_factory: pytest.TempPathFactory):
     from hand_model.twin import Plan, bebionic, record
 
     folder = tmp_path_factory.mktemp("touch") / "session"
-    answer = record(bebionic("left", None, ["index"]), folder, 3, plan=Plan(grasps=(("block", 40.0), ("foam", 2.0)), grasp_repeats=1))
+    answer = record(
+        bebionic("left", None, ["index"]),
+        folder,
+        3,
+        plan=Plan(grasps=(("block", 40.0), ("foam", 2.0)), grasp_repeats=1),
+    )
     session = read_session(folder)
     fit = identify_motor(session, "index")
     detector = touch.calibrate(fit, [(t.name, t.log()) for t in actuator_trials(session, "index")])
@@ -32,7 +37,10 @@ def test_contacts_are_found_in_time(grasps) -> None:
         log, stem = trial.log(), Path(trial.name).stem
         found = touch.detect(fit, detector, log, trial.name)
         assert len(found) == 2  # it closes twice
-        delay = np.interp(found[0].detected_s, log.time_s, answer.trials[stem].log_time_s) - answer.table["grasps"][stem]["contact_s"]
+        delay = (
+            np.interp(found[0].detected_s, log.time_s, answer.trials[stem].log_time_s)
+            - answer.table["grasps"][stem]["contact_s"]
+        )
         assert -0.02 < delay < (0.06 if trial.object == "block" else 0.4)
         assert found[0].kind == ("stiff" if trial.object == "block" else "compliant")
         for contact in found:
@@ -76,5 +84,8 @@ def test_contact_is_found_without_a_controller(grasps) -> None:
             log, stem = trial.log(), Path(trial.name).stem
             found = touch.detect(blind, detector, log, trial.name)
             assert len(found) == 2
-            delay = np.interp(found[0].detected_s, log.time_s, answer.trials[stem].log_time_s) - answer.table["grasps"][stem]["contact_s"]
+            delay = (
+                np.interp(found[0].detected_s, log.time_s, answer.trials[stem].log_time_s)
+                - answer.table["grasps"][stem]["contact_s"]
+            )
             assert -0.1 < delay < 0.15

@@ -119,7 +119,12 @@ def test_an_effect_changes_its_own_files_only(name, plain, tmp_path):
     if declared.station in ("transmission", "kinematics", "recording") and name != "spring_decoupling":
         assert not any(file.startswith("log") for file in files), "the drive does not know of it"
     before, after = columns(plain.path, "flexion_index"), columns(answer.path, "flexion_index")
-    if name in ("current_channel_delay", "rhythmic_disturbance") and told["form"] in ("delay", "lag", "early", "pickup"):
+    if name in ("current_channel_delay", "rhythmic_disturbance") and told["form"] in (
+        "delay",
+        "lag",
+        "early",
+        "pickup",
+    ):
         assert files == LOGS and np.array_equal(before["position"], after["position"])
     if name in ("clock_drift", "buffered_log"):
         assert all(file.startswith("log") for file in files)

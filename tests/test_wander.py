@@ -1,4 +1,5 @@
-"""What does not repeat: random levels are told from noise and from physics; time stamps and echoes from measurements."""
+"""What does not repeat: random levels are told from noise and from physics; time stamps and echoes from
+measurements."""
 
 from __future__ import annotations
 
@@ -81,7 +82,8 @@ def test_physics_is_found_through_a_wandering_zero():
 
 @pytest.mark.parametrize(("seed", "before", "share"), [(1, 12, 0.5), (2, 8, 0.5), (2, 8, 0.7)])
 def test_a_jump_of_friction_is_found_between_the_moments_that_are_tried(seed, before, share):
-    """Beside levels per stroke only the stroke in which it happens tells the moment, and every start may be in another one."""
+    """Beside levels per stroke only the stroke in which it happens tells the moment, and every start may be in another
+    one."""
     jump = next(e for e in outsiders("drive") if e.name == "friction_jump")
     starts = jump.shapes(drive(seed))[0].starts
     moment = (1 - share) * starts[before] + share * starts[before + 1]
@@ -124,7 +126,8 @@ def test_a_position_that_rests_on_every_setpoint_to_the_count_is_no_measurement(
     states = drive(12)
     move = np.arange(len(states[0].time_s)) // 100
     setpoint = 12000.0 + 3000.0 * (move % 3) + 37.0 * move
-    reference = np.convolve(np.r_[np.full(30, setpoint[0]), setpoint], np.ones(31) / 31, mode="valid").round()  # starts at once, ends there
+    # starts at once, ends there
+    reference = np.convolve(np.r_[np.full(30, setpoint[0]), setpoint], np.ones(31) / 31, mode="valid").round()
     ended = np.random.default_rng(1).normal(0, 5.0, len(setpoint)).round()
     log = log_of(states[0], states[0].time_s, reference)
     log = replace(log, columns={**log.columns, "setpoint": setpoint})

@@ -62,8 +62,11 @@ def direction(description: Description, model: Model) -> Finding:
 
 def _loose(ours: Any) -> set[str]:
     """Followers that a named effect takes off their polynomial: lost motion, give, a stop, a dead band."""
-    return {ours.names.joint[str(e.where.get("finger")), str(e.where.get("joint"))] for e in ours.hand.effects
-            if effect(e.effect).station == "linkage" and (e.where.get("finger"), e.where.get("joint")) in ours.names.joint}
+    return {
+        ours.names.joint[str(e.where.get("finger")), str(e.where.get("joint"))]
+        for e in ours.hand.effects
+        if effect(e.effect).station == "linkage" and (e.where.get("finger"), e.where.get("joint")) in ours.names.joint
+    }
 
 
 def _roles(ours: Any, root: Any) -> list[str]:
@@ -140,10 +143,14 @@ def _pushed(mj: Any, tip: str, joints: list[str], held: bool, sign: float) -> Ar
             push *= sign * FORCE / max(float(np.linalg.norm(push)), 1e-9)
             data.qfrc_applied[:] = 0
             mujoco.mj_comPos(mj, data)
-            mujoco.mj_applyFT(mj, data, push, np.zeros(3), data.site_xpos[site], mj.site_bodyid[site], data.qfrc_applied)
+            mujoco.mj_applyFT(
+                mj, data, push, np.zeros(3), data.site_xpos[site], mj.site_bodyid[site], data.qfrc_applied
+            )
             mujoco.mj_step(mj, data)
             wanted = engine.on_linkages(mj, data.qpos)
-            gaps.append(max(abs(wanted[mj.jnt_qposadr[j]] - data.qpos[mj.jnt_qposadr[j]]) for j in coupled if j in mine))
+            gaps.append(
+                max(abs(wanted[mj.jnt_qposadr[j]] - data.qpos[mj.jnt_qposadr[j]]) for j in coupled if j in mine)
+            )
     return np.nan_to_num(np.array(gaps), nan=np.inf)
 
 

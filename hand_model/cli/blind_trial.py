@@ -26,7 +26,8 @@ def run(options: Namespace, say: Callable[[str], None]) -> int:
 
     if options.cases < 1:
         raise HandModelError(f"--cases {options.cases}: one or more are needed")
-    trial = blind_trial(options.cases, options.seed, options.output,
-                        say=lambda line: print(line, file=sys.stderr, flush=True))
+    trial = blind_trial(
+        options.cases, options.seed, options.output, say=lambda line: print(line, file=sys.stderr, flush=True)
+    )
     print(f"answers.json SHA-256 {trial.sha256}\n\n{trial.table()}")
     return 0

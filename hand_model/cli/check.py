@@ -38,7 +38,9 @@ def run(options: Namespace, say: Callable[[str], None]) -> int:
         if given:
             from ..errors import HandModelError
 
-            raise HandModelError(f"{given[0]} is for two descriptions, and {options.first} is a folder; name A.urdf B.xml")
+            raise HandModelError(
+                f"{given[0]} is for two descriptions, and {options.first} is a folder; name A.urdf B.xml"
+            )
         return _folder(options.first, options.second)
     if options.second is None:
         from ..errors import DescriptionError

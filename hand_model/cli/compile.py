@@ -15,7 +15,10 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--output", required=True, metavar="DIR", help="the folder to write; an earlier compiled hand is replaced"
     )
     parser.add_argument(
-        "--newton-metre-per-unit", type=float, metavar="X", help="torque at the proximal joint per raw unit of current (default: efforts stay raw)"
+        "--newton-metre-per-unit",
+        type=float,
+        metavar="X",
+        help="torque at the proximal joint per raw unit of current (default: efforts stay raw)",
     )
 
 

@@ -18,10 +18,16 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("session", metavar="SESSION", help="folder with a session.toml, of a hand or a rig")
     which = parser.add_mutually_exclusive_group()
-    which.add_argument("--model", metavar="DIR", help="a compiled hand or a .hand file into which the effects are written (default: identified here); "
-                                                      "a rig brings its own")
+    which.add_argument(
+        "--model",
+        metavar="DIR",
+        help="a compiled hand or a .hand file into which the effects are written (default: identified here); "
+        "a rig brings its own",
+    )
     which.add_argument("--no-model", action="store_true", help="write no model: findings and report only")
-    parser.add_argument("--output", required=True, metavar="DIR", help="folder for findings.json, report.html and the improved model")
+    parser.add_argument(
+        "--output", required=True, metavar="DIR", help="folder for findings.json, report.html and the improved model"
+    )
 
 
 def run(options: Namespace, say: Progress) -> int:
@@ -57,5 +63,7 @@ def _proof(finding: Finding) -> str:
         words.append(f"not told here from {', '.join(others)}")
     if fit.get("before") is not None and fit.get("after") is not None:
         where = "of recordings kept out" if fit["held_out"] else "of the same recordings"
-        words.append(f"error {where} {scale * fit['before']:.3g} -> {scale * fit['after']:.3g} {unit} (noise {scale * fit['noise_floor']:.3g})")
+        words.append(
+            f"error {where} {scale * fit['before']:.3g} -> {scale * fit['after']:.3g} {unit} (noise {scale * fit['noise_floor']:.3g})"
+        )
     return "; ".join(words)

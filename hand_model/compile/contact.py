@@ -12,8 +12,8 @@ from .xml import document
 
 
 def settled(plan: Plan) -> Plan:
-    """The plan with capsules for contact, in place of convex parts, on those links whose parts would touch another link at
-    rest or at a keyframe; `contact_notes` says which."""
+    """The plan with capsules for contact, in place of convex parts, on those links whose parts would touch another link
+    at rest or at a keyframe; `contact_notes` says which."""
     notes = []
     while any(link.parts for link in plan.links):
         touching = _touching(plan)
@@ -24,7 +24,9 @@ def settled(plan: Plan) -> Plan:
         worst = min(blamed, key=lambda name: (-blamed[name], name))
         one, other, where = next(t for t in sorted(touching) if worst in t[:2])
         with_ = other if worst == one else one
-        notes.append(f"`{plan.stem}`: contact of `{worst}` stays with capsules, its probed parts would touch `{with_}` at {where}.")
+        notes.append(
+            f"`{plan.stem}`: contact of `{worst}` stays with capsules, its probed parts would touch `{with_}` at {where}."
+        )
         plan = replace(plan, links=tuple(replace(k, parts=()) if k.name == worst else k for k in plan.links))
     return replace(plan, contact_notes=tuple(notes))
 

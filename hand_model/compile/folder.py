@@ -130,7 +130,11 @@ def _table(hand: Hand, plans: tuple[Plan, ...]) -> Mapping[str, Any]:
             for plan in plans
         ],
         "guessed_tips": {f: how for plan in plans for f, how in plan.guessed_tips.items()},
-        "inertia": {"origin": "fallback: capsules of uniform density, nothing measured", "density_kg_m3": DENSITY, **_probed(plans)},
+        "inertia": {
+            "origin": "fallback: capsules of uniform density, nothing measured",
+            "density_kg_m3": DENSITY,
+            **_probed(plans),
+        },
     }
 
 

@@ -21,7 +21,8 @@ SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 
 
 def mjcf(plan: Plan, newton_metre_per_unit: float | None = None) -> Any:
-    """The MJCF tree (lxml element) of one plan; newton_metre_per_unit: torque per raw unit of current [N m], where it is known."""
+    """The MJCF tree (lxml element) of one plan; newton_metre_per_unit: torque per raw unit of current [N m], where it
+    is known."""
     from lxml import etree
 
     root = etree.Element("mujoco", model=plan.stem)

@@ -1,11 +1,16 @@
-"""Identified motors in an MJCF: a motor joint in percent of range, its friction and spring, and a drive that only pushes.
+"""Identified motors in an MJCF: a motor joint in percent of range, its friction and spring, and a drive that only
+pushes.
 
 Per actuator, natively:
-    joint `<actuator>_motor`, coordinate [%] of the encoder range: armature, damping, frictionloss (or a LuGre element where the
+    joint `<actuator>_motor`, coordinate [%] of the encoder range: armature, damping, frictionloss (or a LuGre element
+    where the
         recordings show presliding or a Stribeck rise), stiffness, springref;
-    joint `<actuator>_drive`, tied to it by the encoder map (equality `<actuator>_map`): where the actuator's lever stands [rad];
-    tendon `<actuator>_push`: the proximal joint is never behind the lever (one-sided range) and a spring holds it there;
-    actuator `<actuator>`: force = current. Its ctrl is r + (damping / gain) r', with r the reference of `identify.motor.reference`.
+    joint `<actuator>_drive`, tied to it by the encoder map (equality `<actuator>_map`): where the actuator's lever
+    stands [rad];
+    tendon `<actuator>_push`: the proximal joint is never behind the lever (one-sided range) and a spring holds it
+    there;
+    actuator `<actuator>`: force = current. Its ctrl is r + (damping / gain) r', with r the reference of
+    `identify.motor.reference`.
 Efforts are raw units of current, or newton metres at the proximal joint where `newton_metre_per_unit` is given.
 """
 
@@ -22,7 +27,8 @@ from .xml import child, comment, number, vector
 YIELD_RATE = 150.0  # rad/s: natural frequency of the finger on its return spring; not identified, and said so
 PRESLIDING_LEAST = 0.1  # [%]: presliding below it is Coulomb friction to any encoder here
 SOLREF_FRICTION, SOLIMP_FRICTION = (0.004, 1.0), (0.9999, 0.9999, 0.001, 0.5, 2.0)  # hold without creep
-TRAVEL = (-2.0, 102.0)  # [%]: the encoder map holds over the recorded range; a little more, as noise and overshoot go beyond it
+# [%]: the encoder map holds over the recorded range; a little more, as noise and overshoot go beyond it
+TRAVEL = (-2.0, 102.0)
 SOLREF, SOLIMP = (0.002, 1.0), (0.9999, 0.9999, 0.001, 0.5, 2.0)
 DUMMY = {"pos": (0, 0, 0), "mass": 1e-9, "diaginertia": (1e-9, 1e-9, 1e-9)}
 
@@ -39,7 +45,8 @@ def write_motors(root: Any, hand: Hand, newton_metre_per_unit: float | None = No
 
 
 def complete_keyframes(root: Any, hand: Hand) -> None:
-    """Put every motor and lever of the keyframes where their proximal joint stands, and the controls of the motors with them."""
+    """Put every motor and lever of the keyframes where their proximal joint stands, and the controls of the motors with
+    them."""
     joints = [j.get("name") for j in root.find("worldbody").iter("joint")]
     every = [a for a in root.iterfind("actuator/*") if isinstance(a.tag, str)]
     actuators = [a.get("name") for a in every if a.get("input") != "none"]  # an actuator without input has no control
@@ -79,7 +86,9 @@ def _joint(root: Any, finger: Finger) -> Any:
 
 def _own_joints(root: Any, actuator: str) -> tuple[str, str]:
     """Names of the motor joint and of the lever of a written actuator."""
-    rotor = next(a for a in root.iterfind("actuator/*") if isinstance(a.tag, str) and a.get("name") == actuator).get("joint")
+    rotor = next(a for a in root.iterfind("actuator/*") if isinstance(a.tag, str) and a.get("name") == actuator).get(
+        "joint"
+    )
     return rotor, map_of(root, {"actuator": actuator}, "encoder").get("joint1")
 
 
@@ -90,10 +99,13 @@ def _free(root: Any, name: str) -> str:
 
 
 def _map(finger: Finger, motor: Motor) -> np.ndarray:
-    """Coefficients (<= 5,) of the proximal angle [rad] over the motor's percent, from the encoder map over its own range."""
+    """Coefficients (<= 5,) of the proximal angle [rad] over the motor's percent, from the encoder map over its own
+    range."""
     encoder = finger.encoder_maps[0]
     span = encoder.counts_close - encoder.counts_open
-    inner = np.polynomial.Polynomial([(motor.counts_open - encoder.counts_open) / span, (motor.counts_close - motor.counts_open) / span / 100])
+    inner = np.polynomial.Polynomial(
+        [(motor.counts_open - encoder.counts_open) / span, (motor.counts_close - motor.counts_open) / span / 100]
+    )
     angle = np.polynomial.Polynomial(encoder.coefficients)(inner)
     return np.asarray(angle.coef, float)
 
@@ -108,7 +120,11 @@ def _write_motor(root: Any, finger: Finger, motor: Motor, scale: float | None) -
     unit = 1.0 if scale is None else scale * full / 100
     palm = root.find("worldbody").find("body")
     label = "raw units of current" if scale is None else f"N m at {proximal.get('name')} times {full / 100!r} rad/%"
-    link = _child_body(palm, _free(root, f"{name}_motor_link"), f"motor of {name}: coordinate in percent of the encoder range, effort in {label}")
+    link = _child_body(
+        palm,
+        _free(root, f"{name}_motor_link"),
+        f"motor of {name}: coordinate in percent of the encoder range, effort in {label}",
+    )
     rotor = _free(root, f"{name}_motor")
     joint = child(
         link, "joint", name=rotor, type="hinge", pos=(0, 0, 0), axis=(0, 0, 1), ref="0", limited=True, range=TRAVEL,
@@ -116,7 +132,11 @@ def _write_motor(root: Any, finger: Finger, motor: Motor, scale: float | None) -
         armature=unit * value["inertia"], damping=unit * max(value["viscous"], 0.0), stiffness=unit * max(value["stiffness"], 0.0),
         springref=-value["preload"] / value["stiffness"] if value["stiffness"] > 0 else 0.0,
     )  # fmt: skip
-    arm = _child_body(palm, _free(root, f"{name}_drive_link"), f"lever of {name}: where the actuator pushes the proximal segment to [rad]")
+    arm = _child_body(
+        palm,
+        _free(root, f"{name}_drive_link"),
+        f"lever of {name}: where the actuator pushes the proximal segment to [rad]",
+    )
     lever = _free(root, f"{name}_drive")
     child(arm, "joint", name=lever, type="hinge", pos=(0, 0, 0), axis=(0, 0, 1), ref="0", limited=False, armature=1e-7)
     coefficients = np.zeros(5)
@@ -134,7 +154,9 @@ def _write_motor(root: Any, finger: Finger, motor: Motor, scale: float | None) -
         f'motor "{name}": the return spring that holds the finger on its actuator is nominal, not measured',
     ]
     if lugre:
-        notes.append(f'motor "{name}": friction is the LuGre element {name}_friction (presliding or Stribeck), not frictionloss')
+        notes.append(
+            f'motor "{name}": friction is the LuGre element {name}_friction (presliding or Stribeck), not frictionloss'
+        )
     return notes
 
 
@@ -196,7 +218,9 @@ def _write_actuator(root: Any, name: str, proximal: str, motor: Motor, unit: flo
     gain = value.get("gain", 20.0)
     damping = value.get("damping", 2 * float(np.sqrt(gain * max(value["inertia"], 1e-6))))
     limit = max(255.0, 4 * value["coulomb"])
-    comment(section, f"{name}: force is the current; ctrl is the reference [%] plus {damping / gain!r} s times its velocity")
+    comment(
+        section, f"{name}: force is the current; ctrl is the reference [%] plus {damping / gain!r} s times its velocity"
+    )
     child(
         section, "general", name=name, joint=rotor, gaintype="fixed", gainprm=(unit * gain,), biastype="affine",
         biasprm=(0.0, -unit * gain, -unit * damping), ctrlrange=(-50.0, 150.0), forcerange=(-unit * limit, unit * limit),

@@ -30,8 +30,10 @@ class Link:
     name: body. finger, segment: where it comes from ("" and "palm" for the palm). parent: body, None for the palm.
     position_parent, axis: (3,) [m], [-]. range_rad: (low, high). solid: nominal shape, which the
     inertia and the visual mesh (file stem `mesh`) come from; shapes: what collides. sites: name -> (3,) [m].
-    surface: the probed surface that takes the nominal shape's place as visual, and as origin of the inertia if watertight.
-    parts: its convex parts, which collide in place of `shapes`. extras: joints beside its hinge, turning with it or standing before it.
+    surface: the probed surface that takes the nominal shape's place as visual, and as origin of the inertia if
+    watertight.
+    parts: its convex parts, which collide in place of `shapes`. extras: joints beside its hinge, turning with it or
+    standing before it.
     """
 
     name: str
@@ -59,8 +61,8 @@ class Plan:
 
     stem: file name without ending; suffix: what tells it from the plain variant. linkages: equality name -> (finger,
     Linkage). keyframes: name -> {joint: angle [rad]}.
-    reached: keyframe -> {finger: fraction closed}. excludes: (body, body, reason). guessed_tips: finger -> how. contact_notes: where probed
-    parts could not serve for contact.
+    reached: keyframe -> {finger: fraction closed}. excludes: (body, body, reason). guessed_tips: finger -> how.
+    contact_notes: where probed parts could not serve for contact.
     """
 
     stem: str
@@ -238,6 +240,8 @@ def _finger_links(
         position, axis, link = centre - origin, np.asarray(joint.axis_palm, float), names.link[key]
         where = (link, name, joint.name, parent, names.joint[key], position, axis, bounds[joint.name])
         turning = joint.course is not None and joint.course.turning
-        links.append(Link(*where, full, local, inertia, sites, link, extras=tied(finger, joint, names), turning=turning))
+        links.append(
+            Link(*where, full, local, inertia, sites, link, extras=tied(finger, joint, names), turning=turning)
+        )
         parent, origin = link, centre
     return links

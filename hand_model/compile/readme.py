@@ -142,7 +142,9 @@ def _courses(hand: Hand) -> str:
     if not crooked:
         return ""
     rows = ["## Joints that are no plain hinges\n"]
-    rows.append("In the MJCF their segments have extra joints, tied to the hinge's angle by equalities (`polycoef`). The URDF has the")
+    rows.append(
+        "In the MJCF their segments have extra joints, tied to the hinge's angle by equalities (`polycoef`). The URDF has the"
+    )
     rows.append("hinge alone; what that loses, at worst over the range:\n")
     rows += ["| finger | joint | extra joints | tilt, deg | tip, mm |", "| --- | --- | --- | --- | --- |"]
     for finger, joint in crooked:
@@ -150,8 +152,10 @@ def _courses(hand: Hand) -> str:
         kinds = ", ".join(e.kind for e in joint.course.joints)
         rows.append(f"| {finger.name} | {joint.name} | {kinds} | {np.degrees(tilt):.2f} | {tip * 1e3:.2f} |")
     if any(e.kind == "slide" for _, joint in crooked for e in joint.course.joints):
-        rows.append("\nThe ties of slides have an absolute stiffness (`solref` below zero), right for this file's inertias: whoever makes their")
-        rows.append("finger much heavier gives them MuJoCo's own (`solref=\"0.002 1\"`).")
+        rows.append(
+            "\nThe ties of slides have an absolute stiffness (`solref` below zero), right for this file's inertias: whoever makes their"
+        )
+        rows.append('finger much heavier gives them MuJoCo\'s own (`solref="0.002 1"`).')
     return "\n".join(rows) + "\n"
 
 
@@ -182,14 +186,24 @@ def _effects(hand: Hand) -> str:
         kind = effect(found.effect)
         law = kind.law({name: e.value for name, e in found.parameters.items()}) is not None
         place = " ".join(str(found.where[k]) for k in ("finger", "joint") if found.where.get(k))
-        native = not law and type(kind).write_mjcf is not Effect.write_mjcf and (
-            kind.station != "markers" or (found.where.get("finger"), found.where.get("joint")) in crooked)
+        native = (
+            not law
+            and type(kind).write_mjcf is not Effect.write_mjcf
+            and (kind.station != "markers" or (found.where.get("finger"), found.where.get("joint")) in crooked)
+        )
         held = "yes" if native else f"no: {kind.unwritten}" if kind.unwritten and not law else "no"
-        rows.append(f"| {found.effect} | {place} | {held} | {'yes' if law else 'not needed' if native else 'no'} | no: hand.json |")
+        rows.append(
+            f"| {found.effect} | {place} | {held} | {'yes' if law else 'not needed' if native else 'no'} | no: hand.json |"
+        )
         called |= law
     if called:
-        rows += ["\nEffects of the callback act once it is switched on, in every `mj_step` from then on:\n", "```python",
-                 "model = mujoco.MjModel.from_xml_path(mjcf)", "hand_model.effects_on(model, folder)  # this folder", "```"]
+        rows += [
+            "\nEffects of the callback act once it is switched on, in every `mj_step` from then on:\n",
+            "```python",
+            "model = mujoco.MjModel.from_xml_path(mjcf)",
+            "hand_model.effects_on(model, folder)  # this folder",
+            "```",
+        ]
     return "\n".join(rows) + "\n"
 
 

@@ -1,9 +1,9 @@
-"""Probed surfaces that a hand carries: visual meshes, convex parts for contact and, where watertight, mass properties in
-place of the fallback.
+"""Probed surfaces that a hand carries: visual meshes, convex parts for contact and, where watertight, mass properties
+in place of the fallback.
 
-`hand.extra["surfaces"]` maps "palm" or "<finger>/<joint>" to {"vertices": (v, 3) [m] in the palm frame at rest, "faces": (f, 3)
-counter-clockwise from outside, "parts": convex meshes of the same form, optional, "how", "error": optional, see
-identify.surface}.
+`hand.extra["surfaces"]` maps "palm" or "<finger>/<joint>" to {"vertices": (v, 3) [m] in the palm frame at rest,
+"faces": (f, 3) counter-clockwise from outside, "parts": convex meshes of the same form, optional, "how", "error":
+optional, see identify.surface}.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Surface:
-    """A triangle mesh: vertices (v, 3) [m], faces (f, 3). parts: convex meshes for contact. how: where it comes from."""
+    """A triangle mesh: vertices (v, 3) [m], faces (f, 3). parts: convex meshes for contact. how: where it comes
+    from."""
 
     vertices: Array
     faces: NDArray[np.int64]
@@ -34,7 +35,8 @@ class Surface:
 
     @property
     def watertight(self) -> bool:
-        """Whether every edge is shared by two faces that run along it in opposite directions, and the inside has volume."""
+        """Whether every edge is shared by two faces that run along it in opposite directions, and the inside has
+        volume."""
         edges = np.concatenate([self.faces[:, [0, 1]], self.faces[:, [1, 2]], self.faces[:, [2, 0]]])
         there = {(int(a), int(b)) for a, b in edges}
         return len(there) == len(edges) and all((b, a) in there for a, b in there) and mesh_inertia(self).mass > 0
@@ -45,7 +47,8 @@ class Surface:
 
 
 def surfaces(hand: Hand) -> Mapping[Key, Surface]:
-    """Surfaces of the hand's segments, {(finger, joint): Surface}, the palm under ("", "palm"); those of absent fingers are left out.
+    """Surfaces of the hand's segments, {(finger, joint): Surface}, the palm under ("", "palm"); those of absent fingers
+    are left out.
 
     Raises HandFileError for a segment that no such hand has the form of, or a mesh that is none.
     """
@@ -79,7 +82,9 @@ def _how(table: Mapping[str, Any]) -> str:
     error = table.get("error", {})
     names = (("median_mm", "median"), ("p95_mm", "95 %"), ("max_mm", "largest"))
     said = ", ".join(f"{text} {error[key]:.2f} mm" for key, text in names if key in error)
-    return "; ".join(part for part in (str(table.get("how", "")), said and f"probed points off the mesh: {said}") if part)
+    return "; ".join(
+        part for part in (str(table.get("how", "")), said and f"probed points off the mesh: {said}") if part
+    )
 
 
 def mesh_inertia(surface: Surface, density: float = DENSITY) -> Inertia:

@@ -1,8 +1,10 @@
-"""Lay one description's axes over the other's, joint by joint from the base outwards, so that each difference stays local.
+"""Lay one description's axes over the other's, joint by joint from the base outwards, so that each difference stays
+local.
 
-At zero every joint is a line in the base frame (product of exponentials, Brockett 1984): two descriptions move alike exactly
-when these lines coincide up to one transform of the base. Comparing them directly would smear a difference at the knuckle
-over the whole finger, so each link keeps its own transform from b to a, passed on to its children, and a joint may change it:
+At zero every joint is a line in the base frame (product of exponentials, Brockett 1984): two descriptions move alike
+exactly when these lines coincide up to one transform of the base. Comparing them directly would smear a difference at
+the knuckle over the whole finger, so each link keeps its own transform from b to a, passed on to its children, and a
+joint may change it:
 by a turn about its own axis (another zero), or because the links beyond follow its displaced axis.
 """
 
@@ -30,9 +32,11 @@ SLIGHT_RAD, SLIGHT_M = 0.2, 0.01
 class Features:
     """What is compared, at zero, in each file's own base frame.
 
-    axes_*, points_* (k, 3): the paired joints' lines. parent (k,): index of the nearest paired joint towards the base, or -1.
+    axes_*, points_* (k, 3): the paired joints' lines. parent (k,): index of the nearest paired joint towards the base,
+    or -1.
     frames: joint index (-1: base) -> list of (pose in a, pose in b, name in a, name in b, is the joint's own link);
-    coms: joint index -> (point in a, point in b). slide (k,): prismatic. slack_*: (k, 2) half units [m, rad] from the parent on.
+    coms: joint index -> (point in a, point in b). slide (k,): prismatic. slack_*: (k, 2) half units [m, rad] from the
+    parent on.
     """
 
     names: tuple[tuple[str, str], ...]
@@ -60,9 +64,11 @@ class Fit:
     """How one joint of b lies against its partner in a, seen from the link before it.
 
     angle_rad: between the two lines (0 to pi/2). gap: (3,) [m] from b's line to a's at a's joint, in a's base frame.
-    sign: -1 where b turns the other way. offset: a's coordinate is sign * b's - offset [rad or m]. advance: [m] that the links
-    beyond sit further along the axis in a. follows: the links beyond keep their place relative to the displaced axis.
-    carry: (4, 4) from b's base frame to a's for the link that the joint moves. reach: [m] to the farthest thing it carries.
+    sign: -1 where b turns the other way. offset: a's coordinate is sign * b's - offset [rad or m]. advance: [m] that
+    the links beyond sit further along the axis in a. follows: the links beyond keep their place relative to the
+    displaced axis.
+    carry: (4, 4) from b's base frame to a's for the link that the joint moves. reach: [m] to the farthest thing it
+    carries.
     seen: offset and advance show in axes or points farther out, not only in how the link's own frame lies.
     """
 
@@ -115,17 +121,43 @@ def features(a: Tree, b: Tree, pairing: Pairing) -> Features:
         com_a, com_b = a.nodes[i].com, b.nodes[j].com
         if k >= 0 and own and com_a is not None and com_b is not None:
             coms[k] = (_apply(poses_a[i], com_a), _apply(poses_b[j], com_b))
-    slack_a = np.array([_slack(a, x, base_a if parents[k] < 0 else a.joint_node[order[parents[k]][0]]) for k, (x, _) in enumerate(order)])
-    slack_b = np.array([_slack(b, y, base_b if parents[k] < 0 else b.joint_node[order[parents[k]][1]]) for k, (_, y) in enumerate(order)])
+    slack_a = np.array(
+        [
+            _slack(a, x, base_a if parents[k] < 0 else a.joint_node[order[parents[k]][0]])
+            for k, (x, _) in enumerate(order)
+        ]
+    )
+    slack_b = np.array(
+        [
+            _slack(b, y, base_b if parents[k] < 0 else b.joint_node[order[parents[k]][1]])
+            for k, (_, y) in enumerate(order)
+        ]
+    )
     slide = tuple(a.joint(x).kind == "slide" for x, _ in order)
     parents_b = tuple(_paired_ancestor(b, y, index_b) for _, y in order)
     return Features(
-        tuple(order), axes_a, points_a, axes_b, points_b, parents, parents_b, slide, frames, coms, slack_a, slack_b, children
+        tuple(order),
+        axes_a,
+        points_a,
+        axes_b,
+        points_b,
+        parents,
+        parents_b,
+        slide,
+        frames,
+        coms,
+        slack_a,
+        slack_b,
+        children,
     )
 
 
 def _nearest(tree: Tree, node: int, index: dict[str, int]) -> int:
-    found = (index[tree.nodes[i].joint.name] for i in tree.ancestors(node) if tree.nodes[i].joint and tree.nodes[i].joint.name in index)
+    found = (
+        index[tree.nodes[i].joint.name]
+        for i in tree.ancestors(node)
+        if tree.nodes[i].joint and tree.nodes[i].joint.name in index
+    )
     return next(found, -1)
 
 
@@ -147,7 +179,8 @@ def _apply(transform: Array, points: Array) -> Array:
 
 
 def line_distance(axis_a: Array, point_a: Array, axis_b: Array, point_b: Array) -> tuple[Array, Array]:
-    """Angle [rad] (0 to pi/2) between lines (..., 3), and the vector (..., 3) [m] from line b to point_a, across line b."""
+    """Angle [rad] (0 to pi/2) between lines (..., 3), and the vector (..., 3) [m] from line b to point_a, across line
+    b."""
     next_, last = [1, 2, 0], [2, 0, 1]  # np.cross spends most of its time on checks
     cross = axis_a[..., next_] * axis_b[..., last] - axis_a[..., last] * axis_b[..., next_]
     angle = np.arctan2(np.sqrt((cross * cross).sum(-1)), np.abs((axis_a * axis_b).sum(-1)))
@@ -155,7 +188,9 @@ def line_distance(axis_a: Array, point_a: Array, axis_b: Array, point_b: Array) 
     return angle, gap - (gap * axis_b).sum(-1, keepdims=True) * axis_b
 
 
-def line_cost(f: Features, carry: Array, wanted: list[int], other: list[int] | None = None, scale: float = SCALE) -> Array:
+def line_cost(
+    f: Features, carry: Array, wanted: list[int], other: list[int] | None = None, scale: float = SCALE
+) -> Array:
     """Robust cost (k,) of b's lines `other`, carried over, against a's lines `wanted`."""
     other = wanted if other is None else other
     axes, points = f.axes_b[other] @ carry[:3, :3].T, _apply(carry, f.points_b[other])
@@ -167,7 +202,8 @@ def line_cost(f: Features, carry: Array, wanted: list[int], other: list[int] | N
 
 
 def _robust(distance: Array, scale: float = SCALE) -> Array:
-    """Nearly flat beyond the scale [m] (Geman & McClure 1985), so that features count by whether they coincide; a faint slope remains."""
+    """Nearly flat beyond the scale [m] (Geman & McClure 1985), so that features count by whether they coincide; a faint
+    slope remains."""
     squared = (np.asarray(distance) / scale) ** 2
     return 10 * squared / (1 + squared) + 0.3 * np.log1p(squared)
 
@@ -176,7 +212,9 @@ def _turn(frame: Array) -> float:
     return float(np.arctan2(np.linalg.norm(frame - frame.T) / np.sqrt(8), (np.trace(frame) - 1) / 2))
 
 
-def _frame_cost(conventions: Iterable[Array], frame_a: Array, frame_b: Array, carry: Array, scale: float = SCALE) -> float:
+def _frame_cost(
+    conventions: Iterable[Array], frame_a: Array, frame_b: Array, carry: Array, scale: float = SCALE
+) -> float:
     """Cost of the link frame's constant transform being none of the conventions that this hand has used so far."""
     actual = inverse(frame_a) @ carry @ frame_b
     best = np.inf
@@ -202,12 +240,16 @@ def align(f: Features, base: Array | None = None) -> Alignment:
         before = f.parent[k]
         up, held = carries[before], conventions[before]
         # A link frame is evidence only where this hand's frames follow a rule: none is turned, or all alike.
-        rule = any(_differs(held, other) < 1e-4 for other in (np.eye(4), conventions[f.parent[before] if before >= 0 else -1]))
+        rule = any(
+            _differs(held, other) < 1e-4 for other in (np.eye(4), conventions[f.parent[before] if before >= 0 else -1])
+        )
         fit = _fit(f, k, up, [np.eye(4), held], 0.5 if rule else 0.1)
         fits.append(fit)
         carries[k], conventions[k] = fit.carry, _convention(f, k, fit.carry)
         total += float(line_cost(f, up, [k])[0]) + 2.0 * (abs(fit.offset) > 1e-9) + (fit.sign < 0)
-        total += 0.3 * sum(_frame_cost([np.eye(4), conventions[f.parent[k]]], *frame[:2], fit.carry) for frame in f.frames.get(k, []))
+        total += 0.3 * sum(
+            _frame_cost([np.eye(4), conventions[f.parent[k]]], *frame[:2], fit.carry) for frame in f.frames.get(k, [])
+        )
     return Alignment(base, tuple(fits), total)
 
 
@@ -299,8 +341,14 @@ def _offsets(f: Features, axis, point, carry, direct, points, frames) -> list[fl
             found.append(_turn_between(axis, _foot(q - point, v), _foot(p - point, u)))
     found += [_turn_between(axis, _apply(carry, q) - point, p - point) for p, q, _ in points]
     for x, y in frames:
-        difference = (x[:3, :3] @ (carry @ y)[:3, :3].T)
-        skew = np.array([difference[2, 1] - difference[1, 2], difference[0, 2] - difference[2, 0], difference[1, 0] - difference[0, 1]])
+        difference = x[:3, :3] @ (carry @ y)[:3, :3].T
+        skew = np.array(
+            [
+                difference[2, 1] - difference[1, 2],
+                difference[0, 2] - difference[2, 0],
+                difference[1, 0] - difference[0, 1],
+            ]
+        )
         found.append(float(np.arctan2(skew @ axis / 2, (np.trace(difference) - axis @ difference @ axis) / 2)))
     return [o for o in _distinct(found) if abs(o) > 1e-9]
 
@@ -339,9 +387,11 @@ def _advances(f: Features, axis, carry, direct, points, frames) -> list[float]:
 
 
 def base_transform(f: Features) -> Array:
-    """The one transform (4, 4) from b's base frame to a's: none, if the first joints agree under it; else the best supported.
+    """The one transform (4, 4) from b's base frame to a's: none, if the first joints agree under it; else the best
+    supported.
 
-    Hypotheses come from pairs of lines (RANSAC, Fischler & Bolles 1981, here exhaustive); lines at the base count first.
+    Hypotheses come from pairs of lines (RANSAC, Fischler & Bolles 1981, here exhaustive); lines at the base count
+    first.
     """
     roots = f.children.get(-1, [])
     fixed = f.frames.get(-1, [])[1:]
@@ -368,8 +418,13 @@ def base_transform(f: Features) -> Array:
 
 
 def _unless_slight(f: Features, carry: Array) -> Array:
-    """With one joint at the base nothing tells its change from a base frame's; a slight one is a change, not a convention."""
-    slight = len(f.children.get(-1, [])) == 1 and _turn(carry[:3, :3]) < SLIGHT_RAD and np.linalg.norm(carry[:3, 3]) < SLIGHT_M
+    """With one joint at the base nothing tells its change from a base frame's; a slight one is a change, not a
+    convention."""
+    slight = (
+        len(f.children.get(-1, [])) == 1
+        and _turn(carry[:3, :3]) < SLIGHT_RAD
+        and np.linalg.norm(carry[:3, 3]) < SLIGHT_M
+    )
     return np.eye(4) if slight else carry
 
 
@@ -392,7 +447,9 @@ def _from_two_lines(f: Features, i: int, j: int) -> list[Array]:
             rotation, _ = kabsch(b, a)
             across = [np.eye(3) - np.outer(w, w) for w in (u, v)]
             matrix = np.concatenate(across)
-            right = np.concatenate([c @ (g - rotation @ h) for c, g, h in zip(across, (p, q), f.points_b[[i, j]], strict=True)])
+            right = np.concatenate(
+                [c @ (g - rotation @ h) for c, g, h in zip(across, (p, q), f.points_b[[i, j]], strict=True)]
+            )
             out.append(pose(rotation, np.linalg.lstsq(matrix, right, rcond=1e-9)[0]))
     return out
 

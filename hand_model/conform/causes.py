@@ -29,7 +29,12 @@ def geometry_findings(
     for k in wrong:
         out += _joint_findings(a, b, f, k, at.fits[k], tolerance_m)
     for k, fit in enumerate(at.fits):
-        if k not in wrong and (rounded is None or k not in rounded[1]) and not fit.seen and abs(fit.advance) > tolerance_m:
+        if (
+            k not in wrong
+            and (rounded is None or k not in rounded[1])
+            and not fit.seen
+            and abs(fit.advance) > tolerance_m
+        ):
             name = f.names[k][0]
             text = f'the frame of the link beyond "{name}" sits {fit.advance * 1e3:.4g} mm along the axis: a convention or a displaced link, nothing farther out tells'
             out.append(Finding("link_displaced", 2, (name,), text, {"along_mm": fit.advance * 1e3}, False))
@@ -83,7 +88,9 @@ def _bound(slack: np.ndarray, f: Features, k: int, reach: float) -> float:
 def _passes(f: Features, k: int, fit: Fit, tolerance_m: float) -> bool:
     if fit.sign < 0:
         return False
-    room = max(tolerance_m, min(ROUNDING_CAP, 2 * max(_bound(f.slack_a, f, k, fit.reach), _bound(f.slack_b, f, k, fit.reach))))
+    room = max(
+        tolerance_m, min(ROUNDING_CAP, 2 * max(_bound(f.slack_a, f, k, fit.reach), _bound(f.slack_b, f, k, fit.reach)))
+    )
     return max(_parts(f, k, fit).values()) <= room
 
 
@@ -106,7 +113,9 @@ def _rounding(a: Tree, b: Tree, f: Features, at: Alignment, wrong: Sequence[int]
         f"{tree.path.name} writes the numbers of {other.path.name} with fewer digits (to about {place:.2g} mm) at {len(names)} "
         f"joint(s), {', '.join(names)}: up to {moved:.3g} mm and {turned:.3g} deg"
     )
-    return Finding("numbers_rounded", 3, names, text, {"shift_mm": moved, "turn_deg": turned, "written_to_mm": place}), inside
+    return Finding(
+        "numbers_rounded", 3, names, text, {"shift_mm": moved, "turn_deg": turned, "written_to_mm": place}
+    ), inside
 
 
 def _within(f: Features, k: int, fit: Fit, slack: np.ndarray) -> bool:
@@ -115,7 +124,12 @@ def _within(f: Features, k: int, fit: Fit, slack: np.ndarray) -> bool:
     arm = float(np.linalg.norm(f.points_a[k] - (f.points_a[parent] if parent >= 0 else 0.0)))
     length = 1.05 * (slack[k, 0] + before[0] * (parent >= 0) + (slack[k, 1] + before[1]) * arm)
     turn = 1.05 * (slack[k, 1] + before[1])
-    return fit.shift <= length and fit.angle_rad <= turn and abs(fit.offset) <= 2 * turn + length / LEVER and abs(fit.advance) <= 2 * length
+    return (
+        fit.shift <= length
+        and fit.angle_rad <= turn
+        and abs(fit.offset) <= 2 * turn + length / LEVER
+        and abs(fit.advance) <= 2 * length
+    )
 
 
 def _components(f: Features, k: int, fit: Fit) -> int:
@@ -139,7 +153,9 @@ def _joint_findings(a: Tree, b: Tree, f: Features, k: int, fit: Fit, tolerance_m
         out.append(_shifted(a, b, f, k, fit, label))
     if parts["tilt"] > tolerance_m and LEVER * fit.angle_rad > 0.2 * parts["shift"]:
         angle = float(np.degrees(fit.angle_rad))
-        text = f"the axis of {label} is tilted by {angle:.4g} deg" + (f" ({fit.angle_rad * fit.reach * 1e3:.3g} mm at its far end)")
+        text = f"the axis of {label} is tilted by {angle:.4g} deg" + (
+            f" ({fit.angle_rad * fit.reach * 1e3:.3g} mm at its far end)"
+        )
         out.append(Finding("axis_tilted", 3, (name,), text, {"angle_deg": angle, "shift_mm": fit.shift * 1e3}))
     small = 0.05 * (fit.angle_rad + fit.shift / LEVER)
     if parts["offset"] > tolerance_m and abs(fit.offset) > small:
@@ -182,7 +198,13 @@ def _opposite(a: Tree, b: Tree, f: Features, k: int) -> str:
 def _offset(a: Tree, b: Tree, f: Features, k: int, fit: Fit, label: str) -> Finding:
     name, partner = f.names[k]
     if f.slide[k]:
-        return Finding("offset_dropped", 3, (name,), f"the zero of {label} differs by {fit.offset * 1e3:.4g} mm", {"offset_mm": fit.offset * 1e3})
+        return Finding(
+            "offset_dropped",
+            3,
+            (name,),
+            f"the zero of {label} differs by {fit.offset * 1e3:.4g} mm",
+            {"offset_mm": fit.offset * 1e3},
+        )
     degrees = float(np.degrees(fit.offset))
     refs = a.joint(name).ref, b.joint(partner).ref
     text = f"the zeros of {label} differ by {degrees:+.4f} deg"

@@ -50,9 +50,11 @@ def conform(
     """Compare two descriptions of one hand, in three layers: relations, frames, axes and points.
 
     a, b: paths of a URDF or MJCF each. pair: a pair.toml (see `read_pair`); without it names are paired automatically.
-    poses: random poses within the limits that both share, seeded. tolerance_mm: [mm] on axes, and on the far ends of what they
-    carry. accept: causes that are reported without deciding the verdict, such as "linear_mimic" where a URDF cannot do better.
-    engines: "mujoco" and "pinocchio" evaluate the poses as well and must agree with this package's own kinematics to 1e-9 m.
+    poses: random poses within the limits that both share, seeded. tolerance_mm: [mm] on axes, and on the far ends of
+    what they carry. accept: causes that are reported without deciding the verdict, such as "linear_mimic" where a URDF
+    cannot do better.
+    engines: "mujoco" and "pinocchio" evaluate the poses as well and must agree with this package's own kinematics to
+    1e-9 m.
     Raises DescriptionError for what cannot be read or paired.
     """
     start = time.perf_counter()
@@ -71,10 +73,14 @@ def conform(
     values = sample(tree_a, tree_b, given, poses, seed)
     links = link_rows(tree_a, tree_b, given, settled, f, at, values)
     findings = relation_findings(tree_a, tree_b, settled, f, at)
-    findings += [reflected] if reflected else geometry_findings(tree_a, tree_b, given, settled, f, at, tolerance_mm * 1e-3)
+    findings += (
+        [reflected] if reflected else geometry_findings(tree_a, tree_b, given, settled, f, at, tolerance_mm * 1e-3)
+    )
     findings = [replace(x, disagrees=False) if x.cause in accept else x for x in findings]
     ok = not any(x.disagrees for x in findings)
-    explained = _explained(tree_a, tree_b, settled, f, at, values) if not ok else max((r.rest_mm for r in links), default=0.0)
+    explained = (
+        _explained(tree_a, tree_b, settled, f, at, values) if not ok else max((r.rest_mm for r in links), default=0.0)
+    )
     if ok and explained > max(20 * tolerance_mm, 2e-3) and not any(x.cause in accept for x in findings):
         text = f"{explained:.3g} mm remain at the far links over random poses, though every axis agrees"
         findings.append(Finding("unexplained", 3, (), text, {"rest_mm": explained}))
@@ -93,9 +99,16 @@ def conform(
 
 
 def main_check(
-    a: str | Path, b: str | Path, pair: str | Path | None = None, *, fix: str | Path | None = None, json: bool = False, **options
+    a: str | Path,
+    b: str | Path,
+    pair: str | Path | None = None,
+    *,
+    fix: str | Path | None = None,
+    json: bool = False,
+    **options,
 ) -> int:
-    """`hand-model check A B [--pair pair.toml] [--fix DIR] [--json]`: print the report; 0 agree, 1 disagree, 2 bad input.
+    """`hand-model check A B [--pair pair.toml] [--fix DIR] [--json]`: print the report; 0 agree, 1 disagree, 2 bad
+    input.
 
     fix: a folder for corrected copies. options: as for `conform`.
     """
@@ -113,14 +126,16 @@ def main_check(
 
 
 def _guessed(given: Pairing, settled: Pairing) -> Pairing:
-    """A pairing that rested on geometry alone takes the exchanges as its own; one that names gave keeps what they say."""
+    """A pairing that rested on geometry alone takes the exchanges as its own; one that names gave keeps what they
+    say."""
     before, after = dict(given.joints), dict(settled.joints)
     moved = {x for x in before if before[x] != after[x]}
     return settled if moved and all(given.how.get(x) == "geometry" for x in moved) else given
 
 
 def sample(a: Tree, b: Tree, pairing: Pairing, count: int, seed: int) -> dict[str, Array]:
-    """Random values (count,) [rad or m] of a's paired joints within the limits that both files allow (else within a's, else +-1)."""
+    """Random values (count,) [rad or m] of a's paired joints within the limits that both files allow (else within a's,
+    else +-1)."""
     rng = np.random.default_rng(seed)
     out = {}
     for x, y in pairing.joints:
@@ -136,7 +151,8 @@ def sample(a: Tree, b: Tree, pairing: Pairing, count: int, seed: int) -> dict[st
 def link_rows(
     a: Tree, b: Tree, pairing: Pairing, settled: Pairing, f: Features, at: Alignment, values: Mapping[str, Array]
 ) -> list[LinkRow]:
-    """Every link pair over the poses, joint values taken as they are under the given pairing; frames as the alignment has them."""
+    """Every link pair over the poses, joint values taken as they are under the given pairing; frames as the alignment
+    has them."""
     partner = dict(pairing.joints)
     pairs = [p for p in pairing.links if p != pairing.base] or [
         (a.nodes[a.joint_node[x]].name, b.nodes[b.joint_node[y]].name)
@@ -153,13 +169,17 @@ def link_rows(
 
 
 def _frames(f: Features, at: Alignment) -> dict[str, dict]:
-    """The constant transform from each link's frame in a to its frame in b, once exchanges and offsets are taken out."""
+    """The constant transform from each link's frame in a to its frame in b, once exchanges and offsets are taken
+    out."""
     out = {}
     for k, some in f.frames.items():
         carry = at.base if k < 0 else at.fits[k].carry
         for pose_a, pose_b, name, _, _ in some:
             between = inverse(pose_a) @ carry @ pose_b
-            out[name] = {"frame_mm": tuple(float(v) for v in between[:3, 3] * 1e3), "frame_deg": float(np.degrees(_angle(between[:3, :3])))}
+            out[name] = {
+                "frame_mm": tuple(float(v) for v in between[:3, 3] * 1e3),
+                "frame_deg": float(np.degrees(_angle(between[:3, :3]))),
+            }
     return out
 
 
@@ -218,5 +238,7 @@ def _warnings(a: Tree, b: Tree) -> tuple[str, ...]:
     for tree in (a, b):
         out += tree.warnings
         if tree.missing_meshes:
-            out.append(f"{tree.path.name}: {len(tree.missing_meshes)} mesh file(s) missing, such as {tree.missing_meshes[0]}; kinematics need none")
+            out.append(
+                f"{tree.path.name}: {len(tree.missing_meshes)} mesh file(s) missing, such as {tree.missing_meshes[0]}; kinematics need none"
+            )
     return tuple(out)

@@ -31,12 +31,14 @@ def rpy(rotation: Array) -> Array:
 def quaternion(rotation: Array) -> Array:
     """Unit quaternion (w, x, y, z) of a rotation (3, 3): the largest component first (Shepperd 1978)."""
     r = rotation
-    table = np.array([
-        [1 + r[0, 0] + r[1, 1] + r[2, 2], r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]],
-        [r[2, 1] - r[1, 2], 1 + r[0, 0] - r[1, 1] - r[2, 2], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0]],
-        [r[0, 2] - r[2, 0], r[0, 1] + r[1, 0], 1 - r[0, 0] + r[1, 1] - r[2, 2], r[1, 2] + r[2, 1]],
-        [r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], 1 - r[0, 0] - r[1, 1] + r[2, 2]],
-    ])
+    table = np.array(
+        [
+            [1 + r[0, 0] + r[1, 1] + r[2, 2], r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]],
+            [r[2, 1] - r[1, 2], 1 + r[0, 0] - r[1, 1] - r[2, 2], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0]],
+            [r[0, 2] - r[2, 0], r[0, 1] + r[1, 0], 1 - r[0, 0] + r[1, 1] - r[2, 2], r[1, 2] + r[2, 1]],
+            [r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], 1 - r[0, 0] - r[1, 1] + r[2, 2]],
+        ]
+    )
     best = table[np.argmax(np.diag(table))]
     return best / np.linalg.norm(best) * (1 if best[0] >= 0 else -1)
 
@@ -64,7 +66,9 @@ class UrdfEditor:
         for part in self.links[self.tree.nodes[index].name]:
             if part.tag in ("inertial", "visual", "collision"):
                 origin = part.find("origin")
-                old = np.zeros(3) if origin is None else np.array([float(w) for w in origin.get("xyz", "0 0 0").split()])
+                old = (
+                    np.zeros(3) if origin is None else np.array([float(w) for w in origin.get("xyz", "0 0 0").split()])
+                )
                 _child(part, "origin", {"xyz": text(old + shift)})
 
     def limit(self, name: str, limits: tuple[float, float] | None) -> None:
@@ -77,7 +81,8 @@ class UrdfEditor:
         _child(self.joints[name], "limit", {"lower": repr(float(limits[0])), "upper": repr(float(limits[1]))})
 
     def couple(self, name: str, driver: str | None, coefficients: Sequence[float] | None) -> bool:
-        """Let `name` follow coefficients[0] + coefficients[1] driver; None frees it. False where a mimic cannot say it."""
+        """Let `name` follow coefficients[0] + coefficients[1] driver; None frees it. False where a mimic cannot say
+        it."""
         for mimic in self.joints[name].findall("mimic"):
             self.joints[name].remove(mimic)
         if coefficients is None:
@@ -85,7 +90,11 @@ class UrdfEditor:
         if driver is None or any(abs(c) > 1e-15 for c in coefficients[2:]):
             return False
         offset, factor = (*coefficients, 0.0)[:2]
-        _child(self.joints[name], "mimic", {"joint": driver, "multiplier": repr(float(factor)), "offset": repr(float(offset))})
+        _child(
+            self.joints[name],
+            "mimic",
+            {"joint": driver, "multiplier": repr(float(factor)), "offset": repr(float(offset))},
+        )
         return True
 
     def write(self, path: Path) -> None:
@@ -94,7 +103,8 @@ class UrdfEditor:
 
 
 class MjcfEditor:
-    """An MJCF under change. Raises DescriptionError for what it cannot change in place: includes, frames, unnamed joints."""
+    """An MJCF under change. Raises DescriptionError for what it cannot change in place: includes, frames, unnamed
+    joints."""
 
     def __init__(self, tree: Tree) -> None:
         self.tree = tree
@@ -110,11 +120,14 @@ class MjcfEditor:
         self.angle = 1.0 if angle and angle[-1] == "radian" else np.pi / 180
 
     def place(self, index: int, origin: Array, axis: Array | None, point: Array | None) -> None:
-        """Set the pose (4, 4) of a body or site at zero and, where it has a joint, axis (3,) and point (3,) [m] in its frame."""
+        """Set the pose (4, 4) of a body or site at zero and, where it has a joint, axis (3,) and point (3,) [m] in its
+        frame."""
         node = self.tree.nodes[index]
         element = (self.sites if node.kind == "site" else self.bodies).get(node.name)
         if element is None or element.getparent().tag == "frame" or node.kind == "hidden" or self._crowded(element):
-            raise DescriptionError(f'{self.tree.path}: "{node.name}" (a <frame>, or several joints in one body) is left to you')
+            raise DescriptionError(
+                f'{self.tree.path}: "{node.name}" (a <frame>, or several joints in one body) is left to you'
+            )
         for attribute in ("quat", "euler", "axisangle", "xyaxes", "zaxis"):
             element.attrib.pop(attribute, None)
         element.set("pos", text(origin[:3, 3]))
@@ -142,7 +155,8 @@ class MjcfEditor:
         element.set("limited", "true")
 
     def couple(self, name: str, driver: str | None, coefficients: Sequence[float] | None) -> bool:
-        """Let `name` follow a polynomial of driver in absolute values; None frees it. False where five coefficients do not do."""
+        """Let `name` follow a polynomial of driver in absolute values; None frees it. False where five coefficients do
+        not do."""
         for section in self.root.findall("equality"):
             for old in section.findall("joint"):
                 if old.get("joint1") == name:

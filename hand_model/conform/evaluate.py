@@ -15,13 +15,17 @@ ENGINES = ("mujoco", "pinocchio")
 AGREEMENT_M = 1e-9
 
 
-def verify(trees: Sequence[Tree], values: Mapping[str, Array], partner: Mapping[str, str], engines: Collection[str]) -> str:
-    """Evaluate every pose with the engines and compare the far links with this package's kinematics; say by how much they differ.
+def verify(
+    trees: Sequence[Tree], values: Mapping[str, Array], partner: Mapping[str, str], engines: Collection[str]
+) -> str:
+    """Evaluate every pose with the engines and compare the far links with this package's kinematics; say by how much
+    they differ.
 
     A far link carries none of the other joints: its pose holds every joint before it.
 
     values: joint of the first tree -> (n,) [rad or m]; partner: joint of the first -> joint of the second. Raises
-    DescriptionError where an engine cannot load a file or differs by more than 1e-9 m (or the same number in a rotation).
+    DescriptionError where an engine cannot load a file or differs by more than 1e-9 m (or the same number in a
+    rotation).
     """
     for name in engines:
         if name not in ENGINES:
@@ -36,10 +40,13 @@ def verify(trees: Sequence[Tree], values: Mapping[str, Array], partner: Mapping[
         positions, rotations = run(tree, mine, links)
         own = forward(tree, mine, links)
         worst = max(
-            max(float(np.abs(p - positions[:, i]).max()), float(np.abs(r - rotations[:, i]).max())) for i, (r, p) in enumerate(own)
+            max(float(np.abs(p - positions[:, i]).max()), float(np.abs(r - rotations[:, i]).max()))
+            for i, (r, p) in enumerate(own)
         )
         if worst > AGREEMENT_M:
-            raise DescriptionError(f"{tree.path}: {engine} places its links {worst:.3g} m away from this package's kinematics")
+            raise DescriptionError(
+                f"{tree.path}: {engine} places its links {worst:.3g} m away from this package's kinematics"
+            )
         said.append(f"{engine} agrees on {tree.path.name} to {worst:.1e} m")
     return "; ".join(said) if said else "no engine asked for reads these formats"
 
@@ -56,7 +63,19 @@ def skeleton(tree: Tree) -> str:
 
     root = parse_xml(tree.path).getroot()
     _include(root, tree.path, (tree.path.resolve(),))
-    for tag in ("asset", "contact", "sensor", "tendon", "actuator", "equality", "keyframe", "deformable", "custom", "extension", "visual"):
+    for tag in (
+        "asset",
+        "contact",
+        "sensor",
+        "tendon",
+        "actuator",
+        "equality",
+        "keyframe",
+        "deformable",
+        "custom",
+        "extension",
+        "visual",
+    ):
         for found in root.findall(tag):
             root.remove(found)
     for tag in ("geom", "camera", "light", "inertial", "plugin"):
@@ -64,7 +83,18 @@ def skeleton(tree: Tree) -> str:
             if not any(up.tag == "default" for up in found.iterancestors()):
                 found.getparent().remove(found)
     for default in root.findall("default"):
-        for tag in ("geom", "mesh", "material", "position", "general", "motor", "velocity", "tendon", "pair", "equality"):
+        for tag in (
+            "geom",
+            "mesh",
+            "material",
+            "position",
+            "general",
+            "motor",
+            "velocity",
+            "tendon",
+            "pair",
+            "equality",
+        ):
             for found in list(default.iter(tag)):
                 found.getparent().remove(found)
     for compiler in root.findall("compiler"):

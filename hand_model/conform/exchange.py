@@ -19,12 +19,15 @@ def exchange(
 ) -> tuple[Pairing, Features, Alignment]:
     """Look for joints that stand under each other's names: swaps that make more lines coincide, the best first.
 
-    Whole fingers are tried before single joints. Returns the pairing, its features and its alignment after all swaps that help.
+    Whole fingers are tried before single joints. Returns the pairing, its features and its alignment after all swaps
+    that help.
     start: the alignment under the pairing, where it is known already.
     """
     current, best = pairing, start or align(f)
     for _ in range(len(f.names)):
-        wrong = [k for k, fit in enumerate(best.fits) if LEVER * fit.angle_rad + fit.shift > 1e-4 or abs(fit.offset) > 1e-2]
+        wrong = [
+            k for k, fit in enumerate(best.fits) if LEVER * fit.angle_rad + fit.shift > 1e-4 or abs(fit.offset) > 1e-2
+        ]
         trials = []
         for swap in _swaps(f, best, wrong):
             named = dict(f.names)
@@ -79,7 +82,9 @@ def _swaps(f: Features, at: Alignment, wrong: list[int]) -> list[dict[int, int]]
     return out
 
 
-def _relinked(pairing: Pairing, a: Tree, b: Tree, keys: list[str], named: dict[str, str]) -> tuple[tuple[str, str], ...]:
+def _relinked(
+    pairing: Pairing, a: Tree, b: Tree, keys: list[str], named: dict[str, str]
+) -> tuple[tuple[str, str], ...]:
     """Links that hang on re-paired joints follow them; tips and sites that found no new partner are left out."""
     before = dict(pairing.joints)
     by_owner: dict[str, list[tuple[str, str]]] = {}

@@ -1,4 +1,5 @@
-"""Corrected copies where the cause is mechanical: numbers, zeros, signs, limits and couplings of one file from the other."""
+"""Corrected copies where the cause is mechanical: numbers, zeros, signs, limits and couplings of one file from the
+other."""
 
 from __future__ import annotations
 
@@ -47,10 +48,10 @@ def write_fixed(
 ) -> Fixed:
     """Write corrected copies of two descriptions and the pairing that their axes show, and compare them again.
 
-    The geometry, zeros, signs and limits of one file are taken from the other: of the file whose numbers are rounded, else of
-    the URDF (which has no `ref` to lose), else of a; `correct` ("a" or "b") says otherwise. A coupling that one file lacks is
-    added to it. Which file describes the real hand is not decided here. Raises DescriptionError where a file cannot be changed in
-    place, or would be overwritten.
+    The geometry, zeros, signs and limits of one file are taken from the other: of the file whose numbers are rounded,
+    else of the URDF (which has no `ref` to lose), else of a; `correct` ("a" or "b") says otherwise. A coupling that one
+    file lacks is added to it. Which file describes the real hand is not decided here. Raises DescriptionError where a
+    file cannot be changed in place, or would be overwritten.
     """
     tree_a, tree_b = read(a), read(b)
     given = read_pair(pair, tree_a, tree_b) if pair is not None else pair_automatically(tree_a, tree_b)
@@ -116,11 +117,15 @@ def _correct(
 def _place(
     target: Tree, f: Features, base: Array, fits: Mapping[str, Fit], pairing: Pairing, edit: UrdfEditor | MjcfEditor
 ) -> list[str]:
-    """Move every link to where the reference has it, in its own frame convention; the joints' axes become the reference's."""
+    """Move every link to where the reference has it, in its own frame convention; the joints' axes become the
+    reference's."""
     root = target.node_of_link(pairing.base[0])
     old = zero_poses(target, root)
     new, moved = old.copy(), []
-    lines = {x: (base[:3, :3] @ w, base[:3, :3] @ p + base[:3, 3]) for (x, _), w, p in zip(f.names, f.axes_b, f.points_b, strict=True)}
+    lines = {
+        x: (base[:3, :3] @ w, base[:3, :3] @ p + base[:3, 3])
+        for (x, _), w, p in zip(f.names, f.axes_b, f.points_b, strict=True)
+    }
     tips = _fixed_points(target, f, base)
     for i, node in enumerate(target.nodes):
         holder = _holder(target, i, fits)
@@ -143,7 +148,11 @@ def _place(
         origin, zero = relative(new[node.parent], new[i]), relative(old[node.parent], old[i])
         same = np.abs(origin - zero).max() < CHANGE_M
         if axis is not None:
-            same = same and np.abs(axis - node.joint.axis).max() < CHANGE_M and np.abs(point - node.joint.point).max() < CHANGE_M
+            same = (
+                same
+                and np.abs(axis - node.joint.axis).max() < CHANGE_M
+                and np.abs(point - node.joint.point).max() < CHANGE_M
+            )
         if not same:
             edit.place(i, origin, axis, point)
             moved.append(node.joint.name if node.joint else node.name)
@@ -164,8 +173,11 @@ def _holder(tree: Tree, index: int, fits: Mapping[str, Fit]) -> str | None:
     return name
 
 
-def _couple(target: Tree, reference: Tree, pairing: Pairing, fits: Mapping[str, Fit], moved: set[str], edits) -> tuple[list[str], list[str]]:
-    """Give both files one law per follower: the reference's where it has one, else the target's in the new coordinates."""
+def _couple(
+    target: Tree, reference: Tree, pairing: Pairing, fits: Mapping[str, Fit], moved: set[str], edits
+) -> tuple[list[str], list[str]]:
+    """Give both files one law per follower: the reference's where it has one, else the target's in the new
+    coordinates."""
     partner, back = dict(pairing.joints), {y: x for x, y in pairing.joints}
     changed, left = [], []
     for x, y in pairing.joints:
@@ -184,7 +196,11 @@ def _couple(target: Tree, reference: Tree, pairing: Pairing, fits: Mapping[str, 
         if driver is not None and driver not in partner:
             left.append(f'"{x}" follows "{driver}", which has no partner')
             continue
-        if driver is not None and reference.joint(partner[driver]).coupling and resolved(reference, partner[driver])[0] == y:
+        if (
+            driver is not None
+            and reference.joint(partner[driver]).coupling
+            and resolved(reference, partner[driver])[0] == y
+        ):
             edits[0].couple(x, None, None)
             changed.append(f'{target.path.name}: "{x}" no longer follows "{driver}"')
             continue
@@ -209,7 +225,11 @@ def _law(tree: Tree, name: str) -> tuple[str | None, Array]:
 def _same(tree: Tree, name: str, driver: str | None, law: Array) -> bool:
     own_driver, own = _law(tree, name)
     q = np.linspace(-2.0, 2.0, 101)
-    return own_driver == driver and np.abs(np.polynomial.polynomial.polyval(q, own) - np.polynomial.polynomial.polyval(q, law)).max() < COUPLING_TOLERANCE / 10
+    return (
+        own_driver == driver
+        and np.abs(np.polynomial.polynomial.polyval(q, own) - np.polynomial.polynomial.polyval(q, law)).max()
+        < COUPLING_TOLERANCE / 10
+    )
 
 
 def _recast(law: Array, follower: Fit, driver: Fit | None) -> Array:

@@ -1,4 +1,5 @@
-"""MJCF -> Tree: nested bodies, defaults, frames, every way to write an orientation, joints with pos and ref, equalities."""
+"""MJCF -> Tree: nested bodies, defaults, frames, every way to write an orientation, joints with pos and ref,
+equalities."""
 
 from __future__ import annotations
 
@@ -31,7 +32,8 @@ class _Reader:
 
 
 def read_mjcf(path: str | Path, root: etree._Element | None = None) -> Tree:
-    """Read the kinematics of an MJCF model as MuJoCo compiles it (https://mujoco.readthedocs.io/en/stable/XMLreference.html).
+    """Read the kinematics of an MJCF model as MuJoCo compiles it
+    (https://mujoco.readthedocs.io/en/stable/XMLreference.html).
 
     Free joints count as fixed: poses are compared relative to a base body. Raises DescriptionError for ball joints, for
     `<replicate>` and `<attach>` (save the compiled model first), and for what is not MJCF.
@@ -59,7 +61,9 @@ def _include(element: etree._Element, file: Path, seen: tuple[Path, ...]) -> Non
     for include in list(element.iter("include")):
         target = (seen[0].parent / include.get("file", "")).resolve()
         if target in seen:
-            raise DescriptionError(f'{file}:{include.sourceline}: <include file="{include.get("file")}"> includes itself')
+            raise DescriptionError(
+                f'{file}:{include.sourceline}: <include file="{include.get("file")}"> includes itself'
+            )
         inner = parse_xml(target).getroot()
         _include(inner, target, (*seen, target))
         parent, at = include.getparent(), include.getparent().index(include)
@@ -71,7 +75,9 @@ def _include(element: etree._Element, file: Path, seen: tuple[Path, ...]) -> Non
 def _compiler(root: etree._Element, reader: _Reader) -> None:
     for compiler in root.findall("compiler"):
         if compiler.get("coordinate", "local") != "local":
-            raise DescriptionError(f'{reader.file}:{compiler.sourceline}: coordinate="global" is no longer MJCF; save it as local')
+            raise DescriptionError(
+                f'{reader.file}:{compiler.sourceline}: coordinate="global" is no longer MJCF; save it as local'
+            )
         reader.angle = {"radian": 1.0, "degree": DEGREE}.get(compiler.get("angle"), reader.angle)
         reader.eulerseq = compiler.get("eulerseq", reader.eulerseq)
         reader.autolimits = compiler.get("autolimits", "true" if reader.autolimits else "false") == "true"
@@ -109,7 +115,9 @@ def _children(
             continue
         if child.tag in REFUSED or child.tag == "flexcomp":
             why = REFUSED.get(child.tag, "it is not a hand's skeleton")
-            raise DescriptionError(f"{reader.file}:{child.sourceline}: <{child.tag}> is not read ({why}: mujoco's mj_saveLastXML)")
+            raise DescriptionError(
+                f"{reader.file}:{child.sourceline}: <{child.tag}> is not read ({why}: mujoco's mj_saveLastXML)"
+            )
         if child.tag == "frame":
             inner, m, rad = _placement(child, dict(child.attrib), reader)
             deeper = (slack[0] + m, slack[1] + rad)
@@ -129,7 +137,9 @@ def _body(
     name = element.get("name") or f"body@{element.sourceline}"
     _claim("body", name, element, reader)
     placed, m, rad = _placement(element, dict(element.attrib), reader)
-    joints = [j for e, f, c in _joint_elements(element, np.eye(4), childclass, reader) if (j := _joint(e, f, c, reader))]
+    joints = [
+        j for e, f, c in _joint_elements(element, np.eye(4), childclass, reader) if (j := _joint(e, f, c, reader))
+    ]
     origin, parent, slack_m, slack_rad = frame @ placed, at, slack[0] + m, slack[1] + rad
     inertial = element.find("inertial")
     where = f'{reader.file}:{element.sourceline}: body "{name}"'
@@ -163,7 +173,9 @@ def _joint(element: etree._Element, frame: Array, childclass: str | None, reader
     if kind == "free":
         return None
     if kind not in ("hinge", "slide"):
-        raise DescriptionError(f"{where}: type {kind!r} cannot be compared; {did_you_mean(kind, ['hinge', 'slide', 'free'])}")
+        raise DescriptionError(
+            f"{where}: type {kind!r} cannot be compared; {did_you_mean(kind, ['hinge', 'slide', 'free'])}"
+        )
     _claim("joint", name, element, reader)
     scale = reader.angle if kind == "hinge" else 1.0
     axis_text = a.get("axis", "0 0 1")
@@ -176,7 +188,9 @@ def _joint(element: etree._Element, frame: Array, childclass: str | None, reader
         units = [half_units(word)[0] * scale for word in a["range"].split()]
         limits, slack = (float(low * scale), float(high * scale)), (units[0], units[1])
     if "range" in a and limited == "auto" and not reader.autolimits:
-        reader.warnings.append(f'{where}: range without limited="true" while autolimits is off: MuJoCo leaves it unlimited')
+        reader.warnings.append(
+            f'{where}: range without limited="true" while autolimits is off: MuJoCo leaves it unlimited'
+        )
     ref = float(numbers(a.get("ref", "0"), 1, where)[0]) * scale
     point = frame[:3, :3] @ point + frame[:3, 3]
     tilt = float(np.linalg.norm(half_units(axis_text)) / np.linalg.norm(raw))
@@ -230,11 +244,13 @@ def _orientation(a: dict[str, str], element: etree._Element, where: str, reader:
 def rotation_quat(quat: Array) -> Array:
     """Rotation (3, 3) of a unit quaternion (w, x, y, z)."""
     w, x, y, z = quat
-    return np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ])
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 def rotation_euler(angles: Array, sequence: str) -> Array:
@@ -265,19 +281,22 @@ def _joint_equality(element: etree._Element, index: dict[str, int], where: str, 
         if name not in index and not (name is None and name is second):
             raise DescriptionError(f'{where}: no joint "{name}"; {did_you_mean(name or "", index)}')
     given = numbers(element.get("polycoef", "0 1 0 0 0"), None, where)
-    coefficients = tuple(given[:5]) + (0.0, 1.0, 0.0, 0.0, 0.0)[len(given):]
+    coefficients = tuple(given[:5]) + (0.0, 1.0, 0.0, 0.0, 0.0)[len(given) :]
     if second is None:
         coefficients = coefficients[:1]
     _couple(first, second, coefficients, index, where, reader)
 
 
 def _tendon_equality(element, tendons: dict, index: dict[str, int], where: str, reader: _Reader) -> None:
-    """A fixed tendon over two joints, held at its rest length, is a linear coupling; others are passed over, with a warning."""
+    """A fixed tendon over two joints, held at its rest length, is a linear coupling; others are passed over, with a
+    warning."""
     tendon = tendons.get(element.get("tendon1"))
     parts = [] if tendon is None else tendon.findall("joint")
     given = numbers(element.get("polycoef", "0 1 0 0 0"), None, where)
     if element.get("tendon2") or len(parts) != 2 or any(p.get("joint") not in index for p in parts):
-        reader.warnings.append(f'{where}: an equality of tendon "{element.get("tendon1")}" is not a coupling of two joints; not compared')
+        reader.warnings.append(
+            f'{where}: an equality of tendon "{element.get("tendon1")}" is not a coupling of two joints; not compared'
+        )
         return
     driver, follower = parts[0], parts[1]
     c1, c2 = (float(numbers(p.get("coef", "1"), 1, where)[0]) for p in (driver, follower))

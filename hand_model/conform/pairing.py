@@ -29,8 +29,8 @@ IGNORED = {"joint", "jnt", "j", "link", "body", "left", "right", "l", "r", "lh",
 class Pairing:
     """What corresponds to what. base: (link of a, link of b). joints, links: (name in a, name in b).
 
-    how: joint of a -> "pair.toml", "name", "tokens" or "geometry". explicit: a pair.toml settled it, so that names it leaves
-    out correspond to nothing. unpaired: joints of a and of b that have no partner.
+    how: joint of a -> "pair.toml", "name", "tokens" or "geometry". explicit: a pair.toml settled it, so that names it
+    leaves out correspond to nothing. unpaired: joints of a and of b that have no partner.
     """
 
     base: tuple[str, str]
@@ -44,9 +44,10 @@ class Pairing:
 def read_pair(path: str | Path, a: Tree, b: Tree) -> Pairing:
     """Read a pair.toml.
 
-    `base = { mjcf = "...", urdf = "..." }` names the two bodies that poses are relative to; the tables `[joints]` and `[links]`
-    hold lines `"name in the MJCF" = "name in the URDF"`. For two files of one format the keys of `base` are `a` and `b`, and the
-    lines are `"name in b" = "name in a"`. Names left out correspond to nothing. Raises DescriptionError for unknown names.
+    `base = { mjcf = "...", urdf = "..." }` names the two bodies that poses are relative to; the tables `[joints]` and
+    `[links]` hold lines `"name in the MJCF" = "name in the URDF"`. For two files of one format the keys of `base` are
+    `a` and `b`, and the lines are `"name in b" = "name in a"`. Names left out correspond to nothing. Raises
+    DescriptionError for unknown names.
     """
     file = Path(path)
     try:
@@ -59,10 +60,14 @@ def read_pair(path: str | Path, a: Tree, b: Tree) -> Pairing:
     left_is_a = a.format == "mjcf" and b.format == "urdf"
     unknown = set(table) - {"urdf", "mjcf", "a", "b", "base", "joints", "links"}
     if unknown:
-        raise DescriptionError(f'{file}: unknown key "{min(unknown)}"; {did_you_mean(min(unknown), ["base", "joints", "links"])}')
+        raise DescriptionError(
+            f'{file}: unknown key "{min(unknown)}"; {did_you_mean(min(unknown), ["base", "joints", "links"])}'
+        )
     joints = _table(table, "joints", file, left_is_a)
     if not joints:
-        raise DescriptionError(f'{file}: [joints] is missing or empty; a line reads "name in the MJCF" = "name in the URDF"')
+        raise DescriptionError(
+            f'{file}: [joints] is missing or empty; a line reads "name in the MJCF" = "name in the URDF"'
+        )
     links = _table(table, "links", file, left_is_a)
     for x, y in joints:
         a.joint(x), b.joint(y)
@@ -87,21 +92,26 @@ def _table(table: dict, key: str, file: Path, left_is_a: bool) -> list[tuple[str
 
 
 def pair_automatically(a: Tree, b: Tree) -> Pairing:
-    """Pair equal names, then equal tokens ("rh_FFJ3" and "index_joint_3"), then what is left by place in the tree and geometry."""
+    """Pair equal names, then equal tokens ("rh_FFJ3" and "index_joint_3"), then what is left by place in the tree and
+    geometry."""
     names_a, names_b = [j.name for j in a.joints], [j.name for j in b.joints]
     if not names_a or not names_b:
         empty = a if not names_a else b
         raise DescriptionError(f"{empty.path}: no moving joint, so there is nothing to compare")
     pairs: dict[str, str] = {n: n for n in names_a if n in set(names_b)}
     how = dict.fromkeys(pairs, "name")
-    for x, y in _by_tokens([n for n in names_a if n not in pairs], [n for n in names_b if n not in set(pairs.values())]):
+    for x, y in _by_tokens(
+        [n for n in names_a if n not in pairs], [n for n in names_b if n not in set(pairs.values())]
+    ):
         pairs[x], how[x] = y, "tokens"
     if len(pairs) < min(len(names_a), len(names_b)):
         for x, y in _by_geometry(a, b, pairs):
             pairs[x], how[x] = y, "geometry"
     joints = [(n, pairs[n]) for n in names_a if n in pairs]
     if not joints:
-        raise DescriptionError(f"{a.path} and {b.path}: no joint of one could be paired with one of the other; give a pair.toml")
+        raise DescriptionError(
+            f"{a.path} and {b.path}: no joint of one could be paired with one of the other; give a pair.toml"
+        )
     base = (_base(a, [x for x, _ in joints]), _base(b, [y for _, y in joints]))
     common = [(n, n) for n in a.link_node if n in b.link_node and n != "world"]
     rest_a = [n for n in a.link_node if n not in b.link_node]
@@ -165,7 +175,8 @@ def _by_tokens(left: Sequence[str], right: Sequence[str]) -> list[tuple[str, str
 
 
 def _by_geometry(a: Tree, b: Tree, fixed: dict[str, str]) -> list[tuple[str, str]]:
-    """Match the two joint trees top down: equal shape first, then the distance between axes in the base frame at zero."""
+    """Match the two joint trees top down: equal shape first, then the distance between axes in the base frame at
+    zero."""
     sides = []
     for tree in (a, b):
         names = [j.name for j in tree.joints]

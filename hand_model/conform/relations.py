@@ -40,7 +40,11 @@ def _partners(a: Tree, b: Tree, pairing: Pairing) -> list[Finding]:
     for x, y in pairing.joints:
         kinds = a.joint(x).kind, b.joint(y).kind
         if kinds[0] != kinds[1]:
-            out.append(Finding("joint_type", 1, (x,), f'"{x}" is a {kinds[0]} in {a.path.name} and a {kinds[1]} in {b.path.name}'))
+            out.append(
+                Finding(
+                    "joint_type", 1, (x,), f'"{x}" is a {kinds[0]} in {a.path.name} and a {kinds[1]} in {b.path.name}'
+                )
+            )
     return out
 
 
@@ -104,7 +108,7 @@ def _misplaced(a: Tree, b: Tree, wrong: list[str], of_a, of_b, partner):
         neighbour = order[(k + step) % len(order)]
         where = "next" if step > 0 else "previous"
         text = (
-            f'limits shifted by one: {a.path.name} gives {len(hit) + len(ends)} joint(s) the limits that {b.path.name} gives the '
+            f"limits shifted by one: {a.path.name} gives {len(hit) + len(ends)} joint(s) the limits that {b.path.name} gives the "
             f'{where} one, first "{hit[0]}" those of "{partner[neighbour]}"'
         )
         yield "limits_shifted", text, hit + ends
@@ -136,11 +140,16 @@ def _limit_finding(a: Tree, b: Tree, x: str, y: str, fit: Fit, gap: float) -> Fi
         free = a if la is None else b
         return Finding("limits_differ", 1, (x,), f"{said}: {free.path.name} leaves the joint unlimited")
     degrees = 180 / np.pi
-    for factor, way in ((degrees, f"{a.path.name} is in degrees where radians are read"), (1 / degrees, f"{b.path.name} is in degrees where radians are read")):
+    for factor, way in (
+        (degrees, f"{a.path.name} is in degrees where radians are read"),
+        (1 / degrees, f"{b.path.name} is in degrees where radians are read"),
+    ):
         if _gap(la, (lb[0] * factor, lb[1] * factor)) <= 2e-3 * max(map(abs, la)) + LIMIT_TOLERANCE:
             return Finding("limits_degrees", 1, (x,), f"{said}: {way} (factor {factor:.4g})", {"factor": factor})
     if _gap(la, (-lb[1], -lb[0])) <= LIMIT_TOLERANCE:
-        return Finding("limits_mirrored", 1, (x,), f"{said}: both signs are turned over", {"largest_deg": float(np.degrees(gap))})
+        return Finding(
+            "limits_mirrored", 1, (x,), f"{said}: both signs are turned over", {"largest_deg": float(np.degrees(gap))}
+        )
     figures = {"lower_deg": float(np.degrees(la[0] - lb[0])), "upper_deg": float(np.degrees(la[1] - lb[1]))}
     room = max(max(p, q) for p, q in zip(ja.limit_slack, jb.limit_slack, strict=True))
     if gap <= min(1.01 * room, ROUNDED_LIMIT):
@@ -181,7 +190,12 @@ def _couplings(a: Tree, b: Tree, joints: Sequence[tuple[str, str]], fits: Mappin
 def _reversed(a: Tree, b: Tree, x: str, y: str, back: Mapping[str, str]) -> Finding | None:
     """a: x follows d. b: d's partner follows x's partner. Either way round, told once, from a's follower."""
     ca = a.joint(x).coupling
-    if ca is None or ca.driver is None or b.joint(y).coupling is not None and back.get(b.joint(y).coupling.driver) == ca.driver:
+    if (
+        ca is None
+        or ca.driver is None
+        or b.joint(y).coupling is not None
+        and back.get(b.joint(y).coupling.driver) == ca.driver
+    ):
         return None
     partner = {v: k for k, v in back.items()}.get(ca.driver)
     cb = b.joint(partner).coupling if partner else None
@@ -190,7 +204,11 @@ def _reversed(a: Tree, b: Tree, x: str, y: str, back: Mapping[str, str]) -> Find
     driver = _span_of(a, ca.driver, b, partner)
     loop = cb.follower(ca.follower(driver)) - driver
     same = float(np.degrees(np.abs(loop).max()))
-    how = "the law is the inverse one, so only the roles differ" if same < 1e-3 else f"followed both ways round, {same:.3g} deg are lost"
+    how = (
+        "the law is the inverse one, so only the roles differ"
+        if same < 1e-3
+        else f"followed both ways round, {same:.3g} deg are lost"
+    )
     text = f'in {a.path.name} "{x}" follows "{ca.driver}", in {b.path.name} "{partner}" follows "{y}" (joint1 is the follower): {how}'
     return Finding("equality_reversed", 1, (x, ca.driver), text, {"loop_deg": same})
 
@@ -206,7 +224,9 @@ def _reversed_partner(a: Tree, b: Tree, x: str, y: str, back: Mapping[str, str])
 def _missing(a: Tree, b: Tree, x: str, y: str) -> Finding:
     has, lacks, name = (a, b, x) if a.joint(x).coupling else (b, a, y)
     coupling = has.joint(name).coupling
-    law = " + ".join(f"{c:.6g} q^{i}" if i > 1 else f"{c:.6g}" + " q" * i for i, c in enumerate(coupling.coefficients) if c)
+    law = " + ".join(
+        f"{c:.6g} q^{i}" if i > 1 else f"{c:.6g}" + " q" * i for i, c in enumerate(coupling.coefficients) if c
+    )
     text = f'in {has.path.name} "{name}" follows "{coupling.driver}" ({law}), in {lacks.path.name} it moves freely'
     return Finding("coupling_missing", 1, (x,), text)
 
@@ -247,7 +267,11 @@ def _law(a: Tree, b: Tree, x: str, y: str, back: Mapping[str, str], fits: Mappin
     loss = float(np.abs(apart[worst]))
     if loss <= COUPLING_TOLERANCE:
         return []
-    figures = {"largest_deg": float(np.degrees(loss)), "at_driver_deg": float(np.degrees(q[worst])), "rms_deg": float(np.degrees(np.sqrt((apart**2).mean())))}
+    figures = {
+        "largest_deg": float(np.degrees(loss)),
+        "at_driver_deg": float(np.degrees(q[worst])),
+        "rms_deg": float(np.degrees(np.sqrt((apart**2).mean()))),
+    }
     degrees = [max((c.degree for c in chain), default=0) for chain in (chain_a, chain_b)]
     said = f'"{x}": {figures["largest_deg"]:.3g} deg apart where "{da}" is at {figures["at_driver_deg"]:.3g} deg'
     if min(degrees) <= 1 < max(degrees):
@@ -282,5 +306,7 @@ def _chains(a: Tree, b: Tree, joints: Sequence[tuple[str, str]], back: Mapping[s
                 text = f'in {tree.path.name} "{name}" follows "{driver}", which follows "{tree.joint(driver).coupling.driver}" itself'
                 if tree.format == "urdf":
                     text += " (Pinocchio refuses such a chain and yourdfpy evaluates it wrongly)"
-                out.append(Finding("mimic_chain", 1, (x,), text, {"links": float(own)}, own != other and tree.format == "urdf"))
+                out.append(
+                    Finding("mimic_chain", 1, (x,), text, {"links": float(own)}, own != other and tree.format == "urdf")
+                )
     return out

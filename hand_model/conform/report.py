@@ -68,10 +68,11 @@ class JointRow:
 
 @dataclass(frozen=True)
 class LinkRow:
-    """A link pair. frame_*: the constant transform from the link's frame in a to that of `frame_of` in b (a convention, estimated
-    after exchanges and offsets are taken out, never used to pass).
+    """A link pair. frame_*: the constant transform from the link's frame in a to that of `frame_of` in b (a convention,
+    estimated after exchanges and offsets are taken out, never used to pass).
 
-    raw_*: largest difference over the poses as the files are written, modulo the base; rest_*: what is not constant of it.
+    raw_*: largest difference over the poses as the files are written, modulo the base; rest_*: what is not constant of
+    it.
     """
 
     a: str
@@ -123,31 +124,48 @@ class ConformReport:
         out = [f"{'AGREE' if self.ok else 'DISAGREE'}  a = {self.a}", f"{'' if self.ok else '   '}       b = {self.b}"]
         out += ["", f"Pairing ({self.paired_by}); base {self.base[0]} = {self.base[1]}"]
         out += ["", "1  Names, limits, relations", *self._findings(1)]
-        out += ["", "2  Frame conventions (estimated and shown, never used to pass)", *self._frames(), *self._findings(2)]
+        out += [
+            "",
+            "2  Frame conventions (estimated and shown, never used to pass)",
+            *self._frames(),
+            *self._findings(2),
+        ]
         out += ["", "3  Axes and points", *self._axes(), *self._findings(3)]
         out += ["", f"{self.poses} random poses, evaluated by {self.evaluated_by}, in {self.seconds:.2f} s"]
         if not self.ok and any(f.layer == 3 and f.disagrees for f in self.findings):
-            out.append(f"With exchanges, signs and offsets undone, {_mm(self.explained_mm)} remain at the farthest link.")
+            out.append(
+                f"With exchanges, signs and offsets undone, {_mm(self.explained_mm)} remain at the farthest link."
+            )
         out += [f"warning: {w}" for w in self.warnings]
         return "\n".join(out) + "\n"
 
     def _findings(self, layer: int) -> list[str]:
         rows = [f for f in self.findings if f.layer == layer]
-        return [f"   {'x' if f.disagrees else '-'} {f.cause}: {f.text}" for f in rows] or ["   nothing differs"] * (layer != 2)
+        return [f"   {'x' if f.disagrees else '-'} {f.cause}: {f.text}" for f in rows] or ["   nothing differs"] * (
+            layer != 2
+        )
 
     def _frames(self) -> list[str]:
         turned = [r for r in self.links if r.frame_deg > 1e-3 or np.linalg.norm(r.frame_mm) > 1e-3]
         shift = ", ".join(f"{v:.4g}" for v in self.base_mm)
-        out = [f"   base: {self.base_deg:.4g} deg, ({shift}) mm" if self.base_deg or any(self.base_mm) else "   base: the same frame"]
+        out = [
+            f"   base: {self.base_deg:.4g} deg, ({shift}) mm"
+            if self.base_deg or any(self.base_mm)
+            else "   base: the same frame"
+        ]
         if not turned:
             return [*out, "   links: the same frames"]
         for r in turned:
-            out.append(f"   {_names(r.a, r.frame_of)}: {r.frame_deg:.4g} deg, ({', '.join(f'{v:.4g}' for v in r.frame_mm)}) mm")
+            out.append(
+                f"   {_names(r.a, r.frame_of)}: {r.frame_deg:.4g} deg, ({', '.join(f'{v:.4g}' for v in r.frame_mm)}) mm"
+            )
         return out
 
     def _axes(self) -> list[str]:
         width = max(len(_names(j.a, j.b)) for j in self.joints)
-        out = [f"   {'joint':{width}}  {'paired by':9} {'angle/deg':>10} {'shift/mm':>10} {'sign':>4} {'offset/deg':>10}"]
+        out = [
+            f"   {'joint':{width}}  {'paired by':9} {'angle/deg':>10} {'shift/mm':>10} {'sign':>4} {'offset/deg':>10}"
+        ]
         for j in self.joints:
             numbers = f"{_small(j.angle_deg):>10} {_small(j.shift_mm):>10} {j.sign:+4d} {_small(j.offset_deg):>10}"
             out.append(f"   {_names(j.a, j.b):{width}}  {j.paired_by:9} {numbers}")
@@ -155,7 +173,9 @@ class ConformReport:
         if far and far[0].raw_mm > 1e-7:
             out.append("   largest differences at the links, as written | after one constant transform:")
             for r in far:
-                out.append(f"   {_names(r.a, r.b)}: {_mm(r.raw_mm)}, {r.raw_deg:.4g} deg | {_mm(r.rest_mm)}, {r.rest_deg:.4g} deg")
+                out.append(
+                    f"   {_names(r.a, r.b)}: {_mm(r.raw_mm)}, {r.raw_deg:.4g} deg | {_mm(r.rest_mm)}, {r.rest_deg:.4g} deg"
+                )
         return out
 
 

@@ -21,7 +21,8 @@ DECIMALS_MIN = 3
 
 @dataclass(frozen=True)
 class Coupling:
-    """follower - follower_ref = sum_i coefficients[i] (driver - driver_ref)^i [rad or m]; driver None: held at a constant."""
+    """follower - follower_ref = sum_i coefficients[i] (driver - driver_ref)^i [rad or m]; driver None: held at a
+    constant."""
 
     driver: str | None
     coefficients: tuple[float, ...]
@@ -42,9 +43,11 @@ class Coupling:
 
 @dataclass(frozen=True)
 class Joint:
-    """One degree of freedom. axis (3,) unit and point (3,) [m] in its node's frame before the motion; value - ref moves it.
+    """One degree of freedom. axis (3,) unit and point (3,) [m] in its node's frame before the motion; value - ref moves
+    it.
 
-    limits: (lower, upper) [rad or m], None where it is unlimited. slack_rad: half a unit of the axis's last written digit;
+    limits: (lower, upper) [rad or m], None where it is unlimited. slack_rad: half a unit of the axis's last written
+    digit;
     limit_slack: the same for limits. line: line in the source file.
     """
 
@@ -62,10 +65,12 @@ class Joint:
 
 @dataclass(frozen=True)
 class Node:
-    """A link, body, or site. origin: (4, 4) constant transform from the parent node to this one, before its joint moves.
+    """A link, body, or site. origin: (4, 4) constant transform from the parent node to this one, before its joint
+    moves.
 
-    kind: "link" (URDF link or MJCF body), "site", or "hidden" (between several joints of one body). com: (3,) [m] centre of
-    mass in the node's frame, where the file states one. slack_m, slack_rad: half a unit of the origin's last written digit.
+    kind: "link" (URDF link or MJCF body), "site", or "hidden" (between several joints of one body). com: (3,) [m]
+    centre of mass in the node's frame, where the file states one. slack_m, slack_rad: half a unit of the origin's last
+    written digit.
     """
 
     name: str
@@ -81,7 +86,8 @@ class Node:
 
 @dataclass(frozen=True)
 class Tree:
-    """Nodes in topological order (node 0 is the root). format: "urdf" or "mjcf". warnings: what the reader passed over."""
+    """Nodes in topological order (node 0 is the root). format: "urdf" or "mjcf". warnings: what the reader passed
+    over."""
 
     path: Path
     format: str
@@ -127,7 +133,9 @@ class Tree:
 
         def settle(name: str, seen: tuple[str, ...]) -> Array:
             if name in seen:
-                raise DescriptionError(f'{self.path}: the couplings of "{name}" form a loop: {" <- ".join((*seen, name))}')
+                raise DescriptionError(
+                    f'{self.path}: the couplings of "{name}" form a loop: {" <- ".join((*seen, name))}'
+                )
             coupling = self.joint(name).coupling
             if coupling is None:
                 return np.asarray(out.get(name, 0.0), float)
@@ -154,8 +162,8 @@ def inverse(transform: Array) -> Array:
 def forward(tree: Tree, values: Mapping[str, Array], wanted: Sequence[int], base: int = 0) -> list[tuple[Array, Array]]:
     """Rotations (n, 3, 3) and positions (n, 3) [m] of the wanted nodes in the base node's frame.
 
-    values: joint name -> (n,) [rad or m]; joints that are not named stay at zero; couplings are not applied. Nodes that are not
-    below `base` are carried through the root with everything above the base at zero.
+    values: joint name -> (n,) [rad or m]; joints that are not named stay at zero; couplings are not applied. Nodes that
+    are not below `base` are carried through the root with everything above the base at zero.
     """
     count = max((np.size(v) for v in values.values()), default=1)
     needed = {j for i in wanted for j in tree.ancestors(i)} | set(tree.ancestors(base))
@@ -212,7 +220,8 @@ _NUMBER = re.compile(r"^[+-]?(\d*)\.?(\d*)(?:[eE]([+-]?\d+))?$")
 
 
 def half_units(text: str) -> list[float]:
-    """Half a unit of the last digit that each number of an attribute is written to (trailing zeros may have been dropped).
+    """Half a unit of the last digit that each number of an attribute is written to (trailing zeros may have been
+    dropped).
 
     Decimals and significant digits are those of the longest number of the attribute, whichever leaves more room.
     """
@@ -226,7 +235,9 @@ def half_units(text: str) -> list[float]:
         digits = max(digits, len((whole + fraction).lstrip("0")))
         values.append(abs(float(word)))
     by_decimals = 0.5 * 10.0**-decimals
-    return [max(by_decimals, 0.5 * 10.0 ** (np.floor(np.log10(v)) + 1 - digits)) if v > 0 else by_decimals for v in values]
+    return [
+        max(by_decimals, 0.5 * 10.0 ** (np.floor(np.log10(v)) + 1 - digits)) if v > 0 else by_decimals for v in values
+    ]
 
 
 def numbers(text: str, count: int | None, where: str) -> Array:

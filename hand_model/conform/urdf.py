@@ -1,4 +1,5 @@
-"""URDF -> Tree: links, joints, origins, axes, limits and mimics, parsed here so that no loader's opinion comes between."""
+"""URDF -> Tree: links, joints, origins, axes, limits and mimics, parsed here so that no loader's opinion comes
+between."""
 
 from __future__ import annotations
 
@@ -24,7 +25,8 @@ ATTRIBUTES = {
 
 
 def read_urdf(path: str | Path, root: etree._Element | None = None) -> Tree:
-    """Read a URDF [m, rad] (http://wiki.ros.org/urdf/XML). `calibration`, `dynamics` and `safety_controller` are ignored.
+    """Read a URDF [m, rad] (http://wiki.ros.org/urdf/XML). `calibration`, `dynamics` and `safety_controller` are
+    ignored.
 
     Raises DescriptionError for what is not a kinematic tree: unknown links, a second parent, loops, several roots.
     """
@@ -49,13 +51,17 @@ def read_urdf(path: str | Path, root: etree._Element | None = None) -> Tree:
         if name in names:
             raise DescriptionError(f'{file}:{element.sourceline}: a second joint "{name}"')
         if child in child_of:
-            raise DescriptionError(f'{file}:{element.sourceline}: link "{child}" has two parents ("{child_of[child]}", "{parent}")')
+            raise DescriptionError(
+                f'{file}:{element.sourceline}: link "{child}" has two parents ("{child_of[child]}", "{parent}")'
+            )
         names.add(name)
         child_of[child] = parent
         by_parent[parent].append(element)
     roots = [name for name in links if name not in child_of]
     if len(roots) != 1:
-        raise DescriptionError(f"{file}: a URDF has one root link, this one has {len(roots)} ({', '.join(roots[:5]) or 'a loop'})")
+        raise DescriptionError(
+            f"{file}: a URDF has one root link, this one has {len(roots)} ({', '.join(roots[:5]) or 'a loop'})"
+        )
     nodes = [Node(roots[0], -1, np.eye(4), com=_com(links[roots[0]], file), line=links[roots[0]].sourceline)]
     index = {roots[0]: 0}
     queue = [roots[0]]
@@ -110,7 +116,9 @@ def _end(element: etree._Element, end: str, links: dict, file: Path) -> str:
         raise DescriptionError(f'{file}:{element.sourceline}: joint "{name}" has no <{end} link="..."/>')
     link = _required(found, "link", file)
     if link not in links:
-        raise DescriptionError(f'{file}:{found.sourceline}: joint "{name}": no link "{link}"; {did_you_mean(link, links)}')
+        raise DescriptionError(
+            f'{file}:{found.sourceline}: joint "{name}": no link "{link}"; {did_you_mean(link, links)}'
+        )
     return link
 
 
@@ -124,7 +132,7 @@ def _node(element: etree._Element, file: Path, warnings: list[str]) -> Node:
             for extra in sorted(set(found.attrib) - valid):
                 warnings.append(
                     f'{file.name}:{found.sourceline}: joint "{name}": <{tag}> has no attribute "{extra}", so every loader '
-                    f"ignores {extra}=\"{found.get(extra)}\"; {did_you_mean(extra, valid)}"
+                    f'ignores {extra}="{found.get(extra)}"; {did_you_mean(extra, valid)}'
                 )
     origin, slack_m, slack_rad = _origin(element.find("origin"), where)
     joint = _joint(element, KINDS[kind], where, warnings, file) if KINDS[kind] else None
@@ -146,16 +154,22 @@ def _joint(element: etree._Element, kind: str, where: str, warnings: list[str], 
     axis = unit(raw, where)
     limit, limits, slack = element.find("limit"), None, (0.0, 0.0)
     if limit is None and element.get("type") != "continuous":
-        warnings.append(f'{file.name}:{element.sourceline}: joint "{element.get("name")}" has no <limit>; taken as unlimited')
+        warnings.append(
+            f'{file.name}:{element.sourceline}: joint "{element.get("name")}" has no <limit>; taken as unlimited'
+        )
     if limit is not None and element.get("type") != "continuous":
         lower, upper = limit.get("lower", "0"), limit.get("upper", "0")
         limits = (float(numbers(lower, 1, where)[0]), float(numbers(upper, 1, where)[0]))
         slack = (half_units(lower)[0], half_units(upper)[0])
         if limits[0] > limits[1]:
-            warnings.append(f'{file.name}:{limit.sourceline}: joint "{element.get("name")}": lower limit above upper limit')
+            warnings.append(
+                f'{file.name}:{limit.sourceline}: joint "{element.get("name")}": lower limit above upper limit'
+            )
     coupling, mimic = None, element.find("mimic")
     if mimic is not None:
-        offset, factor = (float(numbers(mimic.get(a, d), 1, where)[0]) for a, d in (("offset", "0"), ("multiplier", "1")))
+        offset, factor = (
+            float(numbers(mimic.get(a, d), 1, where)[0]) for a, d in (("offset", "0"), ("multiplier", "1"))
+        )
         coupling = Coupling(mimic.get("joint"), (offset, factor))
     tilt = float(np.linalg.norm(half_units(text)) / np.linalg.norm(raw))
     return Joint(element.get("name"), kind, axis, np.zeros(3), 0.0, limits, coupling, tilt, slack, element.sourceline)
@@ -166,7 +180,9 @@ def _com(link: etree._Element, file: Path) -> Array | None:
     if inertial is None:
         return None
     origin = inertial.find("origin")
-    return numbers("0 0 0" if origin is None else origin.get("xyz", "0 0 0"), 3, f"{file}:{inertial.sourceline}: <inertial>")
+    return numbers(
+        "0 0 0" if origin is None else origin.get("xyz", "0 0 0"), 3, f"{file}:{inertial.sourceline}: <inertial>"
+    )
 
 
 def _missing_meshes(root: etree._Element, file: Path) -> tuple[str, ...]:

@@ -1,4 +1,5 @@
-"""`python -m hand_model.diagnose SESSION OUTPUT [SESSION OUTPUT ...]`: sessions diagnosed in a process of its own, models written and proved."""
+"""`python -m hand_model.diagnose SESSION OUTPUT [SESSION OUTPUT ...]`: sessions diagnosed in a process of its own,
+models written and proved."""
 
 from __future__ import annotations
 

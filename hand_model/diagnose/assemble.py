@@ -26,39 +26,56 @@ TILT = 0.2  # the same, of a wobble's or a travelling centre's, in the angles of
 ANGULAR = {e.name for station in ("encoder", "linkage") for e in catalogue(station)} - {"clock_drift"}
 REFUSED = "command_as_measurement"  # a channel that tells nothing: no other finding is small beside it
 TRIFLE = 0.01  # of the square of the heaviest weight
-MINUTE = 0.15  # of that magnitude: less, where the lack-of-fit test sees nothing, is left to the imperfections of reading angles and speeds
+# of that magnitude: less, where the lack-of-fit test sees nothing, is left to the imperfections of reading angles and
+# speeds
+MINUTE = 0.15
 SIGNALS = {"drive": "current", "motors": "current", "command": "current", "encoder": "encoder", "linkage": "markers"}
 SHOWN_IN = {e.name: SIGNALS[e.station] for e in catalogue() if e.station in SIGNALS}
 NAMES = {e.name for e in catalogue()}
 
 
-def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding]], notes: list[str],
-             unexplained: Sequence[dict[str, Any]] = ()) -> Findings:
-    """One ranked list from all stations: by what a finding shows in its channel (its weight, `findings.weighed`) and, three times as much, by how
-    large it is for its kind (weighted geometric mean). unexplained: of the markers."""
+def assemble(
+    stations: list[Station],
+    marker_findings: list[tuple[float, Finding]],
+    notes: list[str],
+    unexplained: Sequence[dict[str, Any]] = (),
+) -> Findings:
+    """One ranked list from all stations: by what a finding shows in its channel (its weight, `findings.weighed`) and,
+    three times as much, by how large it is for its kind (weighted geometric mean). unexplained: of the markers."""
     ranked: list[tuple[float, Finding]] = _heaviest(marker_findings, _palm_marker)
     rejected: list[dict[str, str]] = []
     unexplained = list(unexplained)
-    loose = {entry["where"]["finger"] for entry in unexplained if entry["shape"] == NOT_RIGID or NO_HINGE in entry["shape"]}
+    loose = {
+        entry["where"]["finger"] for entry in unexplained if entry["shape"] == NOT_RIGID or NO_HINGE in entry["shape"]
+    }
     for station in stations:
         stands = station.believed and not (station.finger in loose and _leave_something(station, stations))
         if stands:
             unexplained += [outsider_of(station, f) for f in station.outsiders]
             for weight, finding in (finding_of(station, *merged) for merged in _merged(station.kept)):
                 if station.naming.before.p >= ALPHA and _magnitude(finding, stations) < MINUTE:
-                    rejected.append({"effect": finding.effect, "where": str(station.finger),
-                                     "reason": "no test sees it beside the noise, and it is minute for one of its kind"})
+                    rejected.append(
+                        {
+                            "effect": finding.effect,
+                            "where": str(station.finger),
+                            "reason": "no test sees it beside the noise, and it is minute for one of its kind",
+                        }
+                    )
                 else:
                     ranked.append((weight, finding))
         elif station.missing:
             unexplained.append(unexplained_of(station, 1.0))
         if stands and station.naming.after.p < ALPHA and station.explained < 0.95:
             unexplained.append(unexplained_of(station, 1 - station.explained))
-        rejected += [{"effect": name, "where": str(station.finger), "reason": _reason(value)}
-                     for name, value in station.naming.rejected[:4] if name in NAMES]
+        rejected += [
+            {"effect": name, "where": str(station.finger), "reason": _reason(value)}
+            for name, value in station.naming.rejected[:4]
+            if name in NAMES
+        ]
     unexplained += [unrepeated_of(s) for s in stations if _wanders(s, stations)]
     ranked = _without_tilts(_without_shadows(_one_clock(_of_hinges(ranked, unexplained))))
-    # how far a hinge that is none moves is told only beside what another hinge would explain: that it is none is sure all the same
+    # how far a hinge that is none moves is told only beside what another hinge would explain: that it is none is sure
+    # all the same
     sized = [(_magnitude(f, stations, sure=f.effect not in HINGE), weight, f) for weight, f in ranked]
     ranked = sorted(((float((m**3 * weight) ** 0.25), f) for m, weight, f in sized), key=lambda item: -item[0])
     ranked = _heaviest(ranked, _same_place)
@@ -72,22 +89,42 @@ def assemble(stations: list[Station], marker_findings: list[tuple[float, Finding
     if worst is not None:
         n = worst.naming.balance
         count = max(int((~n.train & n.steady).sum()) or int(n.steady.sum()), 1)
-        lack = {"before": variance_ratio(worst.naming, worst.naming.declared),
-                "after": variance_ratio(worst.naming, worst.naming.fit), "limit": 1 + 2.6 * float(np.sqrt(2 / count))}
-    return Findings(verdict, lack, _protocol(stations), found, tuple(rejected), tuple(unexplained), _next(found),
-                    tuple(channel_of(s) for s in stations), tuple(notes))
+        lack = {
+            "before": variance_ratio(worst.naming, worst.naming.declared),
+            "after": variance_ratio(worst.naming, worst.naming.fit),
+            "limit": 1 + 2.6 * float(np.sqrt(2 / count)),
+        }
+    return Findings(
+        verdict,
+        lack,
+        _protocol(stations),
+        found,
+        tuple(rejected),
+        tuple(unexplained),
+        _next(found),
+        tuple(channel_of(s) for s in stations),
+        tuple(notes),
+    )
 
 
 def _leave_something(station: Station, stations: Sequence[Station]) -> bool:
-    """Whether a station is of angles, and angles of its finger leave something beside their names: where markers leave their segments or
-    their hinge by no known way, what is wrong with the markers may be behind both."""
+    """Whether a station is of angles, and angles of its finger leave something beside their names: where markers leave
+    their segments or their hinge by no known way, what is wrong with the markers may be behind both."""
     angles = [s for s in stations if s.finger == station.finger and s.signal != "current"]
     return station.signal != "current" and any(s.naming.after.p < ALPHA for s in angles)
 
 
 def _magnitude(finding: Finding, stations: Sequence[Station], sure: bool = False) -> float:
-    """How large a finding is for its kind, measured by the channel in which effects of its kind show; or how large it is for sure."""
-    states = next((s.naming.balance.states for s in stations if s.signal == SHOWN_IN.get(finding.effect) and s.finger == finding.where["finger"]), None)
+    """How large a finding is for its kind, measured by the channel in which effects of its kind show; or how large it
+    is for sure."""
+    states = next(
+        (
+            s.naming.balance.states
+            for s in stations
+            if s.signal == SHOWN_IN.get(finding.effect) and s.finger == finding.where["finger"]
+        ),
+        None,
+    )
     channel = None if states is None else channel_figures(states)
     if sure:
         return sure_magnitude(finding.effect, finding.parameters, channel)
@@ -113,32 +150,42 @@ def _same_place(finding: Finding) -> Any:
 
 
 def _trifles(ranked: list[tuple[float, Finding]], magnitudes: Mapping[int, float]) -> list[tuple[Finding, str]]:
-    """Findings that are small for their kind and hardly show beside the heaviest one of the same finger, each with the reason: they may
-    be no more than its form being another. What markers alone show shapes no current."""
+    """Findings that are small for their kind and hardly show beside the heaviest one of the same finger, each with the
+    reason: they may be no more than its form being another. What markers alone show shapes no current."""
     out = []
     for weight, finding in ranked:
-        beside = ((w, f) for w, f in ranked if f.where["finger"] == finding.where["finger"] and f.effect != REFUSED
-                  and not (f.where["signal"] == "markers" and finding.where["signal"] == "current"))
+        beside = (
+            (w, f)
+            for w, f in ranked
+            if f.where["finger"] == finding.where["finger"]
+            and f.effect != REFUSED
+            and not (f.where["signal"] == "markers" and finding.where["signal"] == "current")
+        )
         heaviest, main = next(beside, (0.0, finding))
         if weight**2 < TRIFLE * heaviest**2 and magnitudes[id(finding)] < SLIGHT:
-            out.append((finding, f"a trifle beside {main.effect.replace('_', ' ')}, whose form may be slightly another"))
+            out.append(
+                (finding, f"a trifle beside {main.effect.replace('_', ' ')}, whose form may be slightly another")
+            )
     return out
 
 
 def _shared(ranked: list[tuple[float, Finding]]) -> tuple[Finding, ...]:
-    """The findings with their shares of the whole session's mismatch, by the squares of the weights that rank them, times what the names of
-    their channels explain. A channel that is refused counts as the heaviest of the others."""
+    """The findings with their shares of the whole session's mismatch, by the squares of the weights that rank them,
+    times what the names of their channels explain. A channel that is refused counts as the heaviest of the others."""
     heaviest = max((w for w, f in ranked if f.effect != REFUSED), default=1.0)
     power = np.array([min(w, heaviest) ** 2 for w, _ in ranked])
     channels = [tuple(f.where[k] for k in ("finger", "joint", "actuator", "signal")) for _, f in ranked]
     own = [f.where["share_of_mismatch"] for _, f in ranked]
     explained = [min(sum(s for s, c in zip(own, channels, strict=True) if c == channel), 1.0) for channel in channels]
     shares = power / max(power.sum(), 1e-300) * (np.average(explained, weights=power) if power.sum() > 0 else 1.0)
-    return tuple(replace(f, where={**f.where, "share_of_mismatch": float(s)}) for (_, f), s in zip(ranked, shares, strict=True))
+    return tuple(
+        replace(f, where={**f.where, "share_of_mismatch": float(s)}) for (_, f), s in zip(ranked, shares, strict=True)
+    )
 
 
 def _wanders(station: Station, stations: Sequence[Station]) -> bool:
-    """Whether one finger repeats itself clearly less well than the others do: how all of them are is how this hand is."""
+    """Whether one finger repeats itself clearly less well than the others do: how all of them are is how this hand
+    is."""
     wander = station.naming.wander
     if wander is None or not wander.real:
         return False
@@ -157,9 +204,14 @@ def _one_clock(ranked: list[tuple[float, Finding]]) -> list[tuple[float, Finding
 
 
 def _without_shadows(ranked: list[tuple[float, Finding]]) -> list[tuple[float, Finding]]:
-    """Without what a motor's encoder error leaves in its current after it was put right: a position that errs by a percent errs by
-    many percent in speed. Small effects there, and ripples at the error's period or a harmonic of it, are no evidence."""
-    wrong = {f.where["actuator"]: (weight, f.parameters["period"]["value"]) for weight, f in ranked if f.effect == "encoder_periodic_error"}
+    """Without what a motor's encoder error leaves in its current after it was put right: a position that errs by a
+    percent errs by many percent in speed. Small effects there, and ripples at the error's period or a harmonic of it,
+    are no evidence."""
+    wrong = {
+        f.where["actuator"]: (weight, f.parameters["period"]["value"])
+        for weight, f in ranked
+        if f.effect == "encoder_periodic_error"
+    }
 
     def shadow(weight: float, finding: Finding) -> bool:
         if finding.where["actuator"] not in wrong or finding.where["signal"] != "current":
@@ -172,18 +224,25 @@ def _without_shadows(ranked: list[tuple[float, Finding]]) -> list[tuple[float, F
     return [item for item in ranked if not shadow(*item)]
 
 
-def _of_hinges(ranked: list[tuple[float, Finding]], unexplained: Sequence[Mapping[str, Any]]) -> list[tuple[float, Finding]]:
-    """Without what markers and angles tell where several fingers' markers leave the hinges' motion by no known way: it is the cameras
-    that bend space."""
+def _of_hinges(
+    ranked: list[tuple[float, Finding]], unexplained: Sequence[Mapping[str, Any]]
+) -> list[tuple[float, Finding]]:
+    """Without what markers and angles tell where several fingers' markers leave the hinges' motion by no known way: it
+    is the cameras that bend space."""
     bent = {entry["where"]["finger"] for entry in unexplained if NO_HINGE in entry["shape"]}
     wrong = ANGULAR | {*HINGE, *SLIPS} if len(bent) > 1 else set()
     return [item for item in ranked if item[1].where["finger"] not in bent or item[1].effect not in wrong]
 
 
 def _without_tilts(ranked: list[tuple[float, Finding]]) -> list[tuple[float, Finding]]:
-    """Without what a joint that is no plain hinge leaves in its angle: small departures of that finger's angles are no evidence."""
+    """Without what a joint that is no plain hinge leaves in its angle: small departures of that finger's angles are no
+    evidence."""
     crooked = {f.where["finger"]: weight for weight, f in ranked if f.effect in HINGE}
-    return [(weight, f) for weight, f in ranked if f.effect not in ANGULAR or weight >= TILT * crooked.get(f.where["finger"], 0.0)]
+    return [
+        (weight, f)
+        for weight, f in ranked
+        if f.effect not in ANGULAR or weight >= TILT * crooked.get(f.where["finger"], 0.0)
+    ]
 
 
 def _merged(found: tuple[Named, ...]) -> list[tuple[Named, float, float]]:
@@ -202,7 +261,8 @@ def _reason(log_evidence: float) -> str:
 
 
 def _protocol(stations: list[Station]) -> dict[str, Any]:
-    """What the first motor's recordings can tell apart: how many, rows a second, commanded speeds, and pairs of effects."""
+    """What the first motor's recordings can tell apart: how many, rows a second, commanded speeds, and pairs of
+    effects."""
     drives = [s for s in stations if s.signal == "current"]
     if not drives:
         return {"repeats": 0, "rate_hz": None, "speeds": 0, "isolable": [], "not_isolable": []}
@@ -210,8 +270,13 @@ def _protocol(stations: list[Station]) -> dict[str, Any]:
     speeds = {v for s in states if "speed" in s.extra for v in np.unique(s.extra["speed"]).tolist()}
     step = sample_interval(states)
     told, alike = protocol_pairs(drives[0].naming.balance, catalogue("drive"))
-    return {"repeats": len(states), "rate_hz": round(1 / step, 1), "speeds": len(speeds), "isolable": told,
-            "not_isolable": [["asymmetric_friction", "spring_preload"], *alike]}
+    return {
+        "repeats": len(states),
+        "rate_hz": round(1 / step, 1),
+        "speeds": len(speeds),
+        "isolable": told,
+        "not_isolable": [["asymmetric_friction", "spring_preload"], *alike],
+    }
 
 
 EXPERIMENTS = {
@@ -229,6 +294,8 @@ def _next(found: tuple[Finding, ...]) -> str | None:
             for pair, text in EXPERIMENTS.items():
                 if pair <= set(finding.members):
                     return f"{text}: it would separate {' from '.join(sorted(pair))}"
-            return (f"slow and fast full-range moves repeated five times on {finding.where['finger']}, and half-range moves "
-                    f"from both ends: they would separate {', '.join(finding.members)}")
+            return (
+                f"slow and fast full-range moves repeated five times on {finding.where['finger']}, and half-range moves "
+                f"from both ends: they would separate {', '.join(finding.members)}"
+            )
     return None

@@ -49,21 +49,28 @@ from .prove.improve import read_model, refuse_other, write_improved
 from .prove.replays import Replay
 
 EARLY = 3.0  # standard deviations by which answers that come before the command say so for sure
-DELAY_TOLD = 2.0  # log likelihood that a shift of a drive's current must bring: less, and its drive tells none (two standard deviations)
+# log likelihood that a shift of a drive's current must bring: less, and its drive tells none (two standard deviations)
+DELAY_TOLD = 2.0
 
 
 @single_threaded()
-def diagnose(session: Session | str | Path, model: Any = None, output: str | Path | None = None,
-             say: Callable[[str], None] | None = None, progress: Callable[[float], None] | None = None) -> Findings:
+def diagnose(
+    session: Session | str | Path,
+    model: Any = None,
+    output: str | Path | None = None,
+    say: Callable[[str], None] | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Findings:
     """Say what physics is missing from the declared model of a recorded hand, or of a rig (findings: `RigFindings`).
 
-    session: a session or its folder. model: a Hand, a .hand file or a compiled folder into which the effects are written
-    (what is missing is judged by the declared model fitted to the session itself); None identifies the session's own, False
-    writes none; a rig brings its own. output: folder that gets `findings.json`, `report.html` and, where physics was named, `model_before` and `model`,
-    compiled; where the recording was put right, `corrected`, a session. say: called with one line per result as it comes. progress:
+    session: a session or its folder. model: a Hand, a .hand file or a compiled folder into which the effects are
+    written (what is missing is judged by the declared model fitted to the session itself); None identifies the
+    session's own, False writes none; a rig brings its own. output: folder that gets `findings.json`, `report.html` and,
+    where physics was named, `model_before` and `model`, compiled; where the recording was put right, `corrected`, a
+    session. say: called with one line per result as it comes. progress:
     called with the share of the work that is done, 0 to 1.
-    Raises SessionError for a session that breaks its format or a rig with a model, HandFileError for a model that is none or of another
-    hand, HandModelError for an output that is a file or holds a `corrected` that no diagnosis wrote.
+    Raises SessionError for a session that breaks its format or a rig with a model, HandFileError for a model that is
+    none or of another hand, HandModelError for an output that is a file or holds a `corrected` that no diagnosis wrote.
     """
     session = session if isinstance(session, Session) else read_session(session)
     if session.rig is not None:
@@ -84,9 +91,12 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
     heard = _Heard(session, tell, step)
     owned = output is not None and model is None
     read = [a for a in drive_trials(session) if a not in heard.unread]
-    beside = (*(partial(simulated_drive, session, a) for a in read), *((partial(_identified, session),) if owned else ()))
+    beside = (
+        *(partial(simulated_drive, session, a) for a in read),
+        *((partial(_identified, session),) if owned else ()),
+    )
     told = heard.listen_to_fingers(beside)
-    simulated = delays_apart({d.actuator: d for d in told[:len(read)] if d is not None})
+    simulated = delays_apart({d.actuator: d for d in told[: len(read)] if d is not None})
     drives = heard.drives(simulated)
     facts = _command(session, drives)
     heard.found += command_findings(facts, {a: _finger_of(session, a) for a in facts})
@@ -111,7 +121,9 @@ def diagnose(session: Session | str | Path, model: Any = None, output: str | Pat
     return findings
 
 
-def _diagnosed_rig(session: Session, model: Any, output: str | Path | None, say: Callable[[str], None] | None) -> Findings:
+def _diagnosed_rig(
+    session: Session, model: Any, output: str | Path | None, say: Callable[[str], None] | None
+) -> Findings:
     """A rig's findings, its report written beside them."""
     from ..report.rig_findings import write_rig_findings
     from ..rig.diagnose import diagnose_rig
@@ -125,7 +137,8 @@ def _diagnosed_rig(session: Session, model: Any, output: str | Path | None, say:
 
 
 class _Heard:
-    """What a session has said so far. found: findings with their weight. tell: called with a line per result; step: with nothing, after each."""
+    """What a session has said so far. found: findings with their weight. tell: called with a line per result; step:
+    with nothing, after each."""
 
     def __init__(self, session: Session, tell: Callable[[str], None], step: Callable[[], None]) -> None:
         self.session, self.tell, self.step = session, tell, step
@@ -135,13 +148,18 @@ class _Heard:
         self.stations: list[Station] = []
         distrusted = _distrusted(session)
         self.unexplained = [_false_stamps(session, a, s) for a, s in distrusted.items()]
-        unmeasured = {a: why for a, trials in drive_trials(session).items() if (why := _no_measurement([t.log() for t in trials]))}
+        unmeasured = {
+            a: why for a, trials in drive_trials(session).items() if (why := _no_measurement([t.log() for t in trials]))
+        }
         self.found: list[tuple[float, Finding]] = [
-            refused(a, _finger_of(session, a), tuple(t.name for t in drive_trials(session)[a]), "position", why) for a, why in unmeasured.items()]
+            refused(a, _finger_of(session, a), tuple(t.name for t in drive_trials(session)[a]), "position", why)
+            for a, why in unmeasured.items()
+        ]
         self.unread = (*distrusted, *unmeasured)  # actuators whose log is not believed
 
     def listen_to_fingers(self, beside: tuple[Callable[[], Any], ...] = ()) -> list[Any]:
-        """What the cameras say of each finger. beside: further calls, made where a core is free meanwhile; what they return."""
+        """What the cameras say of each finger. beside: further calls, made where a core is free meanwhile; what they
+        return."""
         calls, done = finger_calls(self.session, self.unread), []
         for reading in Background(_made, [(call,) for call in (*calls, *beside)]).results():
             if not isinstance(reading, FingerReading):
@@ -161,23 +179,33 @@ class _Heard:
         return done
 
     def drives(self, simulated: dict[str, SimulatedDrive]) -> dict[str, tuple[DriveState, ...]]:
-        """The drives' balances while they carry their fingers, encoders put right; those whose current is no measurement are refused.
+        """The drives' balances while they carry their fingers, encoders put right; those whose current is no
+        measurement are refused.
 
         Raises SessionError where a drive's signs contradict each other.
         """
         session = self.session
-        drives = {a: with_gravity(session, self.fingers, states)
-                  for a, states in drive_states(session, _encoder_corrections(self.stations), self.unread, simulated).items()}
+        drives = {
+            a: with_gravity(session, self.fingers, states)
+            for a, states in drive_states(session, _encoder_corrections(self.stations), self.unread, simulated).items()
+        }
         for station in (s for s in self.stations if s.believed and s.actuator in drives):
             for term in (f.term for f in station.kept if f.term.effect.name == "spring_decoupling"):
                 states = drives[station.actuator]
-                drives[station.actuator] = (while_driven(states, term.shape["below"]) if term.shape["form"] > 0.5 else
-                                            without_excursions(states, station.naming.balance.states, self.fingers[station.finger]))
+                drives[station.actuator] = (
+                    while_driven(states, term.shape["below"])
+                    if term.shape["form"] > 0.5
+                    else without_excursions(states, station.naming.balance.states, self.fingers[station.finger])
+                )
         for actuator in [a for a, states in drives.items() if not is_measured(states)]:
-            self.found.append(refused(actuator, _finger_of(session, actuator), tuple(s.trial for s in drives.pop(actuator))))
+            self.found.append(
+                refused(actuator, _finger_of(session, actuator), tuple(s.trial for s in drives.pop(actuator)))
+            )
         for actuator in (a for a, states in drives.items() if opposes(states)):
-            raise SessionError(f'{session.path}: actuator "{actuator}": friction would drive the motion; `position` must increase with flexion and '
-                               "positive `current` drive flexion, and one of them has the other sign")
+            raise SessionError(
+                f'{session.path}: actuator "{actuator}": friction would drive the motion; `position` must increase with flexion and '
+                "positive `current` drive flexion, and one of them has the other sign"
+            )
         return drives
 
     def listen_to_drives(self, drives: dict[str, tuple[DriveState, ...]], late: dict[str, bool]) -> None:
@@ -198,15 +226,24 @@ class _Heard:
         self.found = _without_settled_sags([*self.found, *odd], self.stations)
 
 
-def _without_settled_sags(found: list[tuple[float, Finding]], stations: Sequence[Station]) -> list[tuple[float, Finding]]:
-    """Without losses of speed of drives whose current settles the matter: a reading that clips says little of the load on which such a sag is
-    judged, and one that the current shows, too, is named there, with a law to write."""
-    settled = {s.actuator for s in stations if s.believed for f in s.kept if f.term.effect.clips or f.term.effect.name == "drive_sag"}
+def _without_settled_sags(
+    found: list[tuple[float, Finding]], stations: Sequence[Station]
+) -> list[tuple[float, Finding]]:
+    """Without losses of speed of drives whose current settles the matter: a reading that clips says little of the load
+    on which such a sag is judged, and one that the current shows, too, is named there, with a law to write."""
+    settled = {
+        s.actuator
+        for s in stations
+        if s.believed
+        for f in s.kept
+        if f.term.effect.clips or f.term.effect.name == "drive_sag"
+    }
     return [i for i in found if i[1].effect != "drive_sag" or i[1].where["actuator"] not in settled]
 
 
-def _timed(drives: dict[str, tuple[DriveState, ...]], facts: dict[str, CommandFacts],
-           simulated: dict[str, SimulatedDrive]) -> tuple[dict[str, tuple[DriveState, ...]], dict[str, bool]]:
+def _timed(
+    drives: dict[str, tuple[DriveState, ...]], facts: dict[str, CommandFacts], simulated: dict[str, SimulatedDrive]
+) -> tuple[dict[str, tuple[DriveState, ...]], dict[str, bool]]:
     """The drives with what is known of their current's lateness, and whether each may be late."""
     timed = with_lateness(drives, facts, simulated)
     late = _delays_apart(timed)
@@ -233,9 +270,12 @@ def _distrusted(session: Session) -> dict[str, Stamps]:
 
 def _false_stamps(session: Session, actuator: str, judged: Stamps) -> dict[str, Any]:
     where = {"finger": _finger_of(session, actuator), "joint": None, "actuator": actuator, "signal": "log"}
-    return {"where": where, "share_of_mismatch": 1.0,
-            "shape": f"the rows' time stamps do not follow the motion (off by some {1e3 * judged.wrong_s:.0f} ms, as if given in "
-                     "packets): speed, current and encoder against time were not judged"}
+    return {
+        "where": where,
+        "share_of_mismatch": 1.0,
+        "shape": f"the rows' time stamps do not follow the motion (off by some {1e3 * judged.wrong_s:.0f} ms, as if given in "
+        "packets): speed, current and encoder against time were not judged",
+    }
 
 
 def _counts_corrected(session: Session, stations: list[Station]) -> dict[str, Callable[[Any], Any]]:
@@ -271,8 +311,15 @@ def _identified(session: Session) -> Hand | HandModelError:
         return error
 
 
-def _modelled(findings: Findings, session: Session, hand: Hand | HandModelError, stations: list[Station], courses: dict[str, FingerCourses],
-              output: Path, tell: Callable[[str], None]) -> tuple[Findings, tuple[Replay, ...]]:
+def _modelled(
+    findings: Findings,
+    session: Session,
+    hand: Hand | HandModelError,
+    stations: list[Station],
+    courses: dict[str, FingerCourses],
+    output: Path,
+    tell: Callable[[str], None],
+) -> tuple[Findings, tuple[Replay, ...]]:
     """The findings with the model that holds them written, and its replays."""
     from .locate.angles import ranges_of_counts
 
@@ -289,15 +336,20 @@ def _modelled(findings: Findings, session: Session, hand: Hand | HandModelError,
 
 
 def _encoder_corrections(stations: list[Station]) -> dict[str, Callable[[Any], Any]]:
-    """Actuator -> correction of its position [%] for a periodic encoder error: the recording is put right before physics."""
+    """Actuator -> correction of its position [%] for a periodic encoder error: the recording is put right before
+    physics."""
     out: dict[str, Callable[[Any], Any]] = {}
     for station in stations:
         for named in station.naming.found:
             if named.term.effect.name == "encoder_periodic_error" and station.believed and station.actuator is not None:
                 slope = float(np.median(np.concatenate([s.slope for s in station.naming.balance.states])))
                 before = out.get(station.actuator)
-                out[station.actuator] = _periodic(named.term.shape["period"], named.amplitudes["sine"] / slope,
-                                                  named.amplitudes["cosine"] / slope, before)
+                out[station.actuator] = _periodic(
+                    named.term.shape["period"],
+                    named.amplitudes["sine"] / slope,
+                    named.amplitudes["cosine"] / slope,
+                    before,
+                )
     return out
 
 
@@ -311,8 +363,8 @@ def _periodic(period: float, sine: float, cosine: float, further: Callable[[Any]
 
 
 def _delays_apart(drives: dict[str, tuple[DriveState, ...]]) -> dict[str, bool]:
-    """Whether each drive's current may be delayed: a delay that all drives of a session share is how the log is read. Answers to
-    commands tell a late or an early current better than the balance does, and must bear it out."""
+    """Whether each drive's current may be delayed: a delay that all drives of a session share is how the log is read.
+    Answers to commands tell a late or an early current better than the balance does, and must bear it out."""
     best: dict[str, float] = {}
     for actuator, states in drives.items():
         balance = Balance(tuple(replace(s, extra={k: v for k, v in s.extra.items() if k != "late"}) for s in states))

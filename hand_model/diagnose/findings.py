@@ -20,8 +20,8 @@ UNWRITTEN = {"native": False, "mjcf": None, "urdf": "not expressible"}  # `model
 class Finding:
     """One named departure. members: the class of effects that these recordings cannot tell from it (itself included).
 
-    parameters: name -> {"value", "unit", "ci95" (null where none is given)}; fit: before, after and noise floor on held-out recordings; model: where it
-    is written; correction: for recordings, what was corrected.
+    parameters: name -> {"value", "unit", "ci95" (null where none is given)}; fit: before, after and noise floor on
+    held-out recordings; model: where it is written; correction: for recordings, what was corrected.
     """
 
     effect: str
@@ -95,8 +95,9 @@ class Findings:
 
 
 def weighed(size: float, contrast: float) -> float:
-    """What findings of different channels are ranked by: the geometric mean of what an effect adds over the noise of one reading (size) and over
-    all that the channel tells (all root mean squares). By noise alone the best sensor would come first, by the signal alone the best motion.
+    """What findings of different channels are ranked by: the geometric mean of what an effect adds over the noise of
+    one reading (size) and over all that the channel tells (all root mean squares). By noise alone the best sensor would
+    come first, by the signal alone the best motion.
 
     contrast: standard deviation of the channel's signal over that of its noise.
     """

@@ -1,4 +1,5 @@
-"""What the cameras say of each finger: markers on rigid segments first, then encoder against segment, then segment against segment."""
+"""What the cameras say of each finger: markers on rigid segments first, then encoder against segment, then segment
+against segment."""
 
 from __future__ import annotations
 
@@ -30,8 +31,10 @@ from .prove.markers import OWN, marker_fit, of_chain
 
 @dataclass(frozen=True)
 class FingerReading:
-    """One finger seen by the cameras. stations: encoder and linkages, in this order. found: of its markers, each with its weight.
-    angles: None where nothing could be read, and notes say why. lines: for a progress display. courses: of joints that are no plain hinges."""
+    """One finger seen by the cameras. stations: encoder and linkages, in this order. found: of its markers, each with
+    its weight.
+    angles: None where nothing could be read, and notes say why. lines: for a progress display. courses: of joints that
+    are no plain hinges."""
 
     finger: str
     angles: FingerAngles | None = None
@@ -73,7 +76,9 @@ def _reading(session: Session, finger: Finger, shape: Any, counts: dict[str, tup
 
 def _leaves(encoder: Station) -> bool:
     """Whether a finger is found to run ahead of its drive for a while."""
-    return encoder.believed and any(f.term.effect.name == "spring_decoupling" and f.term.shape["form"] < 0.5 for f in encoder.kept)
+    return encoder.believed and any(
+        f.term.effect.name == "spring_decoupling" and f.term.shape["form"] < 0.5 for f in encoder.kept
+    )
 
 
 def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, float]]) -> FingerReading:
@@ -99,7 +104,11 @@ def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, f
             states = beside_excursions(states, stations[0].naming.balance.states)
         if states:
             effects = [*catalogue("linkage"), *outsiders("linkage")]
-            stations.append(judged("markers", finger.name, finger.actuator, finger.segments[joint].name, states, effects))
+            stations.append(
+                judged("markers", finger.name, finger.actuator, finger.segments[joint].name, states, effects)
+            )
     lines += [s.line() for s in stations]
     found = with_steps(found, seen, markers, {s.joint: s.naming.fit.declared for s in stations})
-    return FingerReading(finger.name, seen, tuple(stations), found, tuple(unexplained_of(seen, markers)), (), tuple(lines), courses)
+    return FingerReading(
+        finger.name, seen, tuple(stations), found, tuple(unexplained_of(seen, markers)), (), tuple(lines), courses
+    )

@@ -1,8 +1,8 @@
 """How large a named effect is for one of its kind: one where it is plain in a hand that has it.
 
-Shares of noise or of signal do not compare across channels: a marker tells a tenth of a slip better than a motor's current tells a
-worn gear. The figures are conventions, from what the published hands and recordings with one known effect show; they rank
-findings and decide nothing else. An effect without an entry counts as plain.
+Shares of noise or of signal do not compare across channels: a marker tells a tenth of a slip better than a motor's
+current tells a worn gear. The figures are conventions, from what the published hands and recordings with one known
+effect show; they rank findings and decide nothing else. An effect without an entry counts as plain.
 """
 
 from __future__ import annotations
@@ -21,8 +21,9 @@ LEAST, MOST = 1e-3, 3.0  # beyond, a figure says nothing more about its kind
 
 @dataclass(frozen=True)
 class Channel:
-    """What magnitudes refer to. effort, load: standard deviations; low, high: range of positions; fastest: speed; ahead: farthest that
-    a joint ran ahead of its drive; granted: length of bristles that any drive of the session may have."""
+    """What magnitudes refer to. effort, load: standard deviations; low, high: range of positions; fastest: speed;
+    ahead: farthest that a joint ran ahead of its drive; granted: length of bristles that any drive of the session may
+    have."""
 
     effort: float = 1.0
     load: float = 0.0
@@ -41,15 +42,24 @@ class Channel:
 def channel_figures(states: tuple[DriveState, ...]) -> Channel:
     """The figures of one balance's recordings."""
     effort = np.concatenate([s.effort[np.isfinite(s.effort)] for s in states])
-    load, ahead, granted = (np.concatenate([s.extra.get(name, np.zeros(1)) for s in states]) for name in ("load", "ahead", "granted"))
+    load, ahead, granted = (
+        np.concatenate([s.extra.get(name, np.zeros(1)) for s in states]) for name in ("load", "ahead", "granted")
+    )
     low, high = position_range(states)
-    return Channel(max(float(np.std(effort)), 1e-12), float(np.nanstd(load)), low, high, speed_range(states)[1],
-                   float(np.nanmax(ahead)), float(np.max(granted)))
+    return Channel(
+        max(float(np.std(effort)), 1e-12),
+        float(np.nanstd(load)),
+        low,
+        high,
+        speed_range(states)[1],
+        float(np.nanmax(ahead)),
+        float(np.max(granted)),
+    )
 
 
 def magnitude(effect: str, parameters: Mapping[str, float], channel: Channel | None = None) -> float:
-    """Size of an effect over one at which it is plain, within [LEAST, MOST]. parameters: name -> value, as in a finding; channel: of the
-    balance that named it, where it is one."""
+    """Size of an effect over one at which it is plain, within [LEAST, MOST]. parameters: name -> value, as in a
+    finding; channel: of the balance that named it, where it is one."""
     rule = PLAIN.get(effect)
     if rule is None:
         return 1.0
@@ -62,8 +72,9 @@ def magnitude(effect: str, parameters: Mapping[str, float], channel: Channel | N
 
 
 def sure_magnitude(effect: str, figures: Mapping[str, Mapping[str, Any]], channel: Channel | None = None) -> float:
-    """The magnitude less what the 95 % intervals of its figures leave open, as if their errors were independent (square root of the sum of
-    squares). figures: name -> entry with `value` and, where there is one, `ci95`, as a finding's parameters."""
+    """The magnitude less what the 95 % intervals of its figures leave open, as if their errors were independent (square
+    root of the sum of squares). figures: name -> entry with `value` and, where there is one, `ci95`, as a finding's
+    parameters."""
     values = {name: entry["value"] for name, entry in figures.items()}
     size, lost = magnitude(effect, values, channel), 0.0
     for name, entry in figures.items():
@@ -86,7 +97,11 @@ def _asymmetry(p: Mapping[str, float], _: Channel) -> float:
 
 def _depth(p: Mapping[str, float], c: Channel) -> float:
     """Load of a stop or an obstacle at the end of the range, for half of the effort's deviation."""
-    return p["stiffness"] * max(c.high - p["begin"], p["begin"] - c.low if p["begin"] < c.low + c.span / 4 else 0.0) / (0.6 * c.effort)
+    return (
+        p["stiffness"]
+        * max(c.high - p["begin"], p["begin"] - c.low if p["begin"] < c.low + c.span / 4 else 0.0)
+        / (0.6 * c.effort)
+    )
 
 
 def _apart(p: Mapping[str, float], c: Channel) -> float:
@@ -100,7 +115,9 @@ def _give(p: Mapping[str, float], c: Channel) -> float:
 PLAIN: Mapping[str, Rule] = {
     "asymmetric_friction": lambda p, c: p["half_difference"] / (0.3 * c.effort),
     "asymmetric_viscous_friction": _asymmetry,
-    "stribeck_friction": lambda p, c: p["static_excess"] * min(p["stribeck_speed"] / (0.25 * c.fastest), 1.0) / (0.5 * c.effort),
+    "stribeck_friction": lambda p, c: (
+        p["static_excess"] * min(p["stribeck_speed"] / (0.25 * c.fastest), 1.0) / (0.5 * c.effort)
+    ),
     "load_dependent_friction": lambda p, _: p["load_coefficient"] / 0.4,
     "position_dependent_friction": lambda p, c: p["extra_friction"] / (0.4 * c.effort),
     "quadratic_damping": lambda p, c: p["drag"] * c.fastest**2 / (0.6 * c.effort),

@@ -1,4 +1,5 @@
-"""`report.html` of a diagnosis: verdict, ranked findings, the replay before and after, residual maps, the effects' curves."""
+"""`report.html` of a diagnosis: verdict, ranked findings, the replay before and after, residual maps, the effects'
+curves."""
 
 from __future__ import annotations
 
@@ -29,9 +30,11 @@ VERDICTS = {
 }
 
 
-def write_page(findings: Findings, stations: Sequence[Any], replays: Sequence[Replay], title: str, folder: Path) -> Path:
-    """Write `report.html` into `folder`, whole or not at all; stations: those of the diagnosis, with their balances. replays: of
-    the compiled files, before and after."""
+def write_page(
+    findings: Findings, stations: Sequence[Any], replays: Sequence[Replay], title: str, folder: Path
+) -> Path:
+    """Write `report.html` into `folder`, whole or not at all; stations: those of the diagnosis, with their balances.
+    replays: of the compiled files, before and after."""
     target = folder / FILES[1]
     with new_file(target) as staging:
         staging.write_bytes(render(findings, stations, replays, title))
@@ -49,14 +52,30 @@ def render(findings: Findings, stations: Sequence[Any], replays: Sequence[Replay
     shapes = {_where(u["where"]): u["shape"] for u in findings.unexplained}
     places = [_where(vars(s)) for s in stations]
     apart = [s.missing or s.believed or p in shapes for s, p in zip(stations, places, strict=True)]
-    sections += [_station(s, f"station-{i}", shapes.get(p, "")) for i, (s, p, own) in enumerate(zip(stations, places, apart, strict=True)) if own]
+    sections += [
+        _station(s, f"station-{i}", shapes.get(p, ""))
+        for i, (s, p, own) in enumerate(zip(stations, places, apart, strict=True))
+        if own
+    ]
     calm = [s for s, own in zip(stations, apart, strict=True) if not own]
     if calm:
-        sections.append(Section("consistent", "Consistent channels", "Nothing is missing here; residual of the declared model, mean over strokes.",
-                                (figures(*(_first_map(s) for s in calm)), _key())))
+        sections.append(
+            Section(
+                "consistent",
+                "Consistent channels",
+                "Nothing is missing here; residual of the declared model, mean over strokes.",
+                (figures(*(_first_map(s) for s in calm)), _key()),
+            )
+        )
     if findings.channels:
-        sections.append(Section("channels", "Every channel", "p: probability of residuals as structured as these if nothing is missing.",
-                                (_channels(findings),)))
+        sections.append(
+            Section(
+                "channels",
+                "Every channel",
+                "p: probability of residuals as structured as these if nothing is missing.",
+                (_channels(findings),),
+            )
+        )
     return page(f"Diagnosis of {title}", VERDICTS[findings.verdict], tiles, sections)
 
 
@@ -74,23 +93,55 @@ def _ranked(findings: Findings) -> list[Any]:
     rows = []
     for f in findings.findings:
         unit, scale = _unit(f.fit.get("unit"))
-        place, share = str(f.where.get("finger") or f.where.get("actuator") or "all"), f"{f.where.get('share_of_mismatch', 0):.0%}"
-        rows.append([_words(f.effect), place, unit, share, f"{f.probability:.3f}",
-                     *(_number(f.fit.get(k), scale) for k in ("before", "after", "noise_floor")), _interval(f.fit.get("ci95_reduction"), scale)])
-    columns = ("effect", "finger", "unit", "share", "probability", "error before", "after", "noise", "95 % of the reduction")
+        place, share = (
+            str(f.where.get("finger") or f.where.get("actuator") or "all"),
+            f"{f.where.get('share_of_mismatch', 0):.0%}",
+        )
+        rows.append(
+            [
+                _words(f.effect),
+                place,
+                unit,
+                share,
+                f"{f.probability:.3f}",
+                *(_number(f.fit.get(k), scale) for k in ("before", "after", "noise_floor")),
+                _interval(f.fit.get("ci95_reduction"), scale),
+            ]
+        )
+    columns = (
+        "effect",
+        "finger",
+        "unit",
+        "share",
+        "probability",
+        "error before",
+        "after",
+        "noise",
+        "95 % of the reduction",
+    )
     out = [table(columns, rows, text_columns=3), note("; ".join(sorted({_proof(f) for f in findings.findings})) + ".")]
     held = []
     sized = ((f.effect, *item) for f in findings.findings for item in f.parameters.items() if item[0] not in DISCRETE)
     for effect, name, value in sized:
         unit, scale = _unit(value.get("unit"))
-        held.append([_words(effect), str(name), unit, _number(value["value"], scale), _interval(value.get("ci95"), scale)])
+        held.append(
+            [_words(effect), str(name), unit, _number(value["value"], scale), _interval(value.get("ci95"), scale)]
+        )
     if held:
         out.append(table(("of", "parameter", "unit", "value", "95 % interval"), held, text_columns=3))
-    out.append(table(("effect", "where it is put right"), [[_words(f.effect), Cell(_kept(f), "wrap")] for f in findings.findings],
-                     text_columns=2))
+    out.append(
+        table(
+            ("effect", "where it is put right"),
+            [[_words(f.effect), Cell(_kept(f), "wrap")] for f in findings.findings],
+            text_columns=2,
+        )
+    )
     said = [f.statement for f in findings.findings[1:]]  # the first one leads
-    more = [f"Not told apart from {', '.join(_words(m) for m in f.members if m != f.effect)}: {_words(f.effect)}."
-            for f in findings.findings if len(f.members) > 1]
+    more = [
+        f"Not told apart from {', '.join(_words(m) for m in f.members if m != f.effect)}: {_words(f.effect)}."
+        for f in findings.findings
+        if len(f.members) > 1
+    ]
     more += [f"Next experiment: {findings.next_experiment}."] if findings.next_experiment else []
     more += [f"Unexplained: {_place(u['where'])}, {u['shape']}." for u in findings.unexplained]
     out = [listing(said), *out] if said else out
@@ -113,7 +164,11 @@ def _kept(finding: Finding) -> str:
 def _proof(finding: Finding) -> str:
     kept = finding.fit.get("held_out") or []
     engine = str(finding.fit.get("engine") or "no replay")
-    told = [engine, f"{len(kept)} recording{'s' if len(kept) > 1 else ''} kept out" if kept else "in-sample", str(finding.fit.get("note") or "")]
+    told = [
+        engine,
+        f"{len(kept)} recording{'s' if len(kept) > 1 else ''} kept out" if kept else "in-sample",
+        str(finding.fit.get("note") or ""),
+    ]
     return f"{_words(finding.effect)}: {', '.join(t for i, t in enumerate(told) if t and not (i and t in engine))}"
 
 
@@ -135,8 +190,17 @@ def _interval(value: Any, scale: float = 1.0) -> str:
 
 
 def _channels(findings: Findings) -> Any:
-    rows = [[str(c["finger"] or ""), str(c["joint"] or ""), str(c["signal"]), ", ".join(c["effects"]).replace("_", " "),
-             f"{c['p_before']:.2g}", f"{c['p_after']:.2g}"] for c in findings.channels]
+    rows = [
+        [
+            str(c["finger"] or ""),
+            str(c["joint"] or ""),
+            str(c["signal"]),
+            ", ".join(c["effects"]).replace("_", " "),
+            f"{c['p_before']:.2g}",
+            f"{c['p_after']:.2g}",
+        ]
+        for c in findings.channels
+    ]
     return table(("finger", "joint", "signal", "named", "p before", "p after"), rows, text_columns=4)
 
 
@@ -149,32 +213,56 @@ def _replayed(replay: Replay, name: str) -> Section:
     """The compiled files' residual map before and after, on recordings that took no part."""
     fit = replay.finding.fit
     place = _place({**replay.finding.where, "signal": None})
-    at, axis = _axis(replay.finding.effect, replay.finding.where.get("region"), replay.position, replay.velocity, replay.position_unit)
+    at, axis = _axis(
+        replay.finding.effect,
+        replay.finding.where.get("region"),
+        replay.position,
+        replay.velocity,
+        replay.position_unit,
+    )
     largest = _largest(at, replay.velocity, replay.before)
-    drawn = [(f"{label} [{replay.unit}]", _map(at, replay.velocity, residual, replay.noise, axis, replay.unit, largest))
-             for label, residual in (("model as it was: recorded minus replayed", replay.before), ("model with its effects", replay.after))]
-    said = (f"{_words(replay.finding.effect)}, {place}: {fit['before']:.4g} to {fit['after']:.4g} {replay.unit}, noise {fit['noise_floor']:.4g}, "
-            f"replayed by MuJoCo on {', '.join(replay.trials)}.")
+    drawn = [
+        (f"{label} [{replay.unit}]", _map(at, replay.velocity, residual, replay.noise, axis, replay.unit, largest))
+        for label, residual in (
+            ("model as it was: recorded minus replayed", replay.before),
+            ("model with its effects", replay.after),
+        )
+    ]
+    said = (
+        f"{_words(replay.finding.effect)}, {place}: {fit['before']:.4g} to {fit['after']:.4g} {replay.unit}, noise {fit['noise_floor']:.4g}, "
+        f"replayed by MuJoCo on {', '.join(replay.trials)}."
+    )
     return Section(name, f"Replay: {place} {_words(replay.finding.effect)}", said, (figures(*drawn), _key()))
 
 
 def _maps(station: Any) -> tuple[Array, Array, list[Array], float, str, str]:
-    """Steady samples of a station: position, velocity, residuals of the declared and of the final model, noise, units."""
+    """Steady samples of a station: position, velocity, residuals of the declared and of the final model, noise,
+    units."""
     balance = station.naming.balance
     use = balance.steady
     residuals = [(balance.effort - f.prediction)[use] for f in (station.naming.declared, station.naming.fit)]
-    return (balance.gather(lambda s: s.position)[use], balance.gather(lambda s: s.velocity)[use], residuals, balance.sigma,
-            balance.states[0].position_unit, balance.states[0].effort_unit)
+    return (
+        balance.gather(lambda s: s.position)[use],
+        balance.gather(lambda s: s.velocity)[use],
+        residuals,
+        balance.sigma,
+        balance.states[0].position_unit,
+        balance.states[0].effort_unit,
+    )
 
 
 def _place(where: Mapping[str, Any]) -> str:
     """Finger (or its motor), joint and signal, as far as they are known."""
-    return " ".join(str(x) for x in (where.get("finger") or where.get("actuator"), where.get("joint"), where.get("signal")) if x)
+    return " ".join(
+        str(x) for x in (where.get("finger") or where.get("actuator"), where.get("joint"), where.get("signal")) if x
+    )
 
 
 def _first_map(station: Any) -> tuple[str, bytes]:
     position, velocity, residuals, sigma, unit, effort = _maps(station)
-    return f"{_place(vars(station))} [{effort}]", _map(position, velocity, residuals[0], sigma, f"position [{unit}]", effort)
+    return f"{_place(vars(station))} [{effort}]", _map(
+        position, velocity, residuals[0], sigma, f"position [{unit}]", effort
+    )
 
 
 def _where(where: Mapping[str, Any]) -> tuple[Any, ...]:
@@ -186,18 +274,36 @@ def _station(station: Any, name: str, unexplained: str) -> Section:
     position, velocity, residuals, sigma, unit, effort = _maps(station)
     stands = (*station.kept, *station.outsiders) if station.believed else ()
     first = stands[0].term if stands else None
-    at, axis = (position, f"position [{unit}]") if first is None else _axis(
-        first.effect.name, first.effect.region(station.naming.balance.states, first.shape), position, velocity, unit)
+    at, axis = (
+        (position, f"position [{unit}]")
+        if first is None
+        else _axis(
+            first.effect.name, first.effect.region(station.naming.balance.states, first.shape), position, velocity, unit
+        )
+    )
     largest = _largest(at, velocity, residuals[0])
-    drawn = [(f"{label} [{effort}]", _map(at, velocity, residual, sigma, axis, effort, largest))
-             for label, residual in zip(("declared model, fitted: residual", "with what was named"), residuals, strict=True)]
-    drawn += [(f"{_words(f.term.effect.name)}: its part through the data less the rest [{effort}]", _curve(station.naming, f, unit, effort))
-              for f in stands[:3]]
-    said = f"{_place(vars(station))}: unexplained, {unexplained}" if unexplained and not station.missing else station.line().replace("_", " ")
+    drawn = [
+        (f"{label} [{effort}]", _map(at, velocity, residual, sigma, axis, effort, largest))
+        for label, residual in zip(("declared model, fitted: residual", "with what was named"), residuals, strict=True)
+    ]
+    drawn += [
+        (
+            f"{_words(f.term.effect.name)}: its part through the data less the rest [{effort}]",
+            _curve(station.naming, f, unit, effort),
+        )
+        for f in stands[:3]
+    ]
+    said = (
+        f"{_place(vars(station))}: unexplained, {unexplained}"
+        if unexplained and not station.missing
+        else station.line().replace("_", " ")
+    )
     return Section(name, _place(vars(station)), said + ".", (figures(*drawn), _key()))
 
 
-def _axis(effect: str, region: Mapping[str, Any] | None, position: Array, velocity: Array, unit: str) -> tuple[Array, str]:
+def _axis(
+    effect: str, region: Mapping[str, Any] | None, position: Array, velocity: Array, unit: str
+) -> tuple[Array, str]:
     """Over what (n,) an effect shows best, speed or position, and its name."""
     if "speed" in (region or {}) or effect in BY_SPEED:
         return np.abs(velocity), f"speed [{unit}/s]"
@@ -224,7 +330,8 @@ def _means(at: Array, velocity: Array, residual: Array) -> list[tuple[Array, Arr
 
 
 def _edges(at: Array) -> Array:
-    """Edges (k,) of cells of equal occupation, or wider where many samples share a value: moves at one speed are one cell, not a zigzag."""
+    """Edges (k,) of cells of equal occupation, or wider where many samples share a value: moves at one speed are one
+    cell, not a zigzag."""
     quantiles = np.quantile(at, np.linspace(0, 1, CELLS + 1))
     least = 0.5 * (quantiles[-1] - quantiles[0]) / CELLS
     edges = [quantiles[0]]
@@ -234,8 +341,11 @@ def _edges(at: Array) -> Array:
     return np.array([*edges[: max(len(edges) - 1, 1)], quantiles[-1]])
 
 
-def _map(at: Array, velocity: Array, residual: Array, sigma: float, axis: str, effort: str, largest: float = 0.0) -> bytes:
-    """Mean residual over position or speed (n,), whose name is `axis`, per direction, with the noise of one sample as a band."""
+def _map(
+    at: Array, velocity: Array, residual: Array, sigma: float, axis: str, effort: str, largest: float = 0.0
+) -> bytes:
+    """Mean residual over position or speed (n,), whose name is `axis`, per direction, with the noise of one sample as a
+    band."""
     with drawing() as d:
         d.axes.axhspan(-sigma, sigma, color=MUTED, alpha=0.15, linewidth=0)
         d.axes.axhline(0, color=INK, linewidth=0.6)

@@ -23,13 +23,14 @@ def _modules(package: str = __name__) -> tuple[Any, ...]:
 
 
 def catalogue(station: str | None = None) -> tuple[Any, ...]:
-    """Every effect in this folder, by name; `station` keeps those of one balance ("drive", "encoder", "linkage", ...)."""
+    """Every effect in this folder, by name; `station` keeps those of one balance ("drive", "encoder", "linkage",
+    ...)."""
     return tuple(e for e in _modules() if station is None or e.station == station)
 
 
 def outsiders(station: str) -> tuple[Any, ...]:
-    """What no row of the table holds and would be taken for one, of one balance: it competes beside the catalogue and is never a
-    finding."""
+    """What no row of the table holds and would be taken for one, of one balance: it competes beside the catalogue and
+    is never a finding."""
     return tuple(e for e in _modules(f"{__name__}.outside") if e.station == station)
 
 

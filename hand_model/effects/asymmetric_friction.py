@@ -9,8 +9,8 @@ from .base import Effect
 
 
 class AsymmetricFriction(Effect):
-    """What lopsided friction adds to the current is constant, as a preload is: the declared preload takes it up, and only other
-    motors tell that it is unlike them (`diagnose.locate.preload`)."""
+    """What lopsided friction adds to the current is constant, as a preload is: the declared preload takes it up, and
+    only other motors tell that it is unlike them (`diagnose.locate.preload`)."""
 
     name = "asymmetric_friction"
     station = "motors"
@@ -21,8 +21,10 @@ class AsymmetricFriction(Effect):
         """How much, which way, and what else it may be."""
         half = parameters["half_difference"]
         way = "flexing" if half > 0 else "extending"
-        return (f"the motor needs some {abs(half):.0f} raw more {way}, and less the other way, than the hand's others: lopsided friction or "
-                "another preload (from current alone the same)")
+        return (
+            f"the motor needs some {abs(half):.0f} raw more {way}, and less the other way, than the hand's others: lopsided friction or "
+            "another preload (from current alone the same)"
+        )
 
 
 EFFECT = AsymmetricFriction()

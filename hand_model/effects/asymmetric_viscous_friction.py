@@ -24,12 +24,16 @@ class AsymmetricViscousFriction(Effect):
         """|v|, (n, 1)."""
         return np.abs(state.velocity)[:, None]
 
-    def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
-                   declared: Mapping[str, float]) -> dict[str, float]:
+    def parameters(
+        self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]
+    ) -> dict[str, float]:
         """Coefficients of flexion and extension."""
         half, viscous = amplitude["half_difference"], declared.get("viscous", np.nan)
-        return {"viscous_flexion": viscous + half, "viscous_extension": viscous - half,
-                "ratio": (viscous + half) / (viscous - half) if viscous != half else np.inf}
+        return {
+            "viscous_flexion": viscous + half,
+            "viscous_extension": viscous - half,
+            "ratio": (viscous + half) / (viscous - half) if viscous != half else np.inf,
+        }
 
     def units(self, shape: Mapping[str, float]) -> Mapping[str, str]:
         """Effort over velocity."""
@@ -38,7 +42,9 @@ class AsymmetricViscousFriction(Effect):
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """How much each way."""
         flexion, extension = figure(parameters["viscous_flexion"]), figure(parameters["viscous_extension"])
-        return f"viscous friction differs with direction: {flexion} raw s/% in flexion, {extension} raw s/% in extension"
+        return (
+            f"viscous friction differs with direction: {flexion} raw s/% in flexion, {extension} raw s/% in extension"
+        )
 
     def law(self, parameters: Mapping[str, float]) -> Law:
         """Half the difference of the coefficients times |v|."""

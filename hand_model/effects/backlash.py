@@ -21,12 +21,21 @@ class Backlash(Effect):
     family = "lost motion"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """Full width of the gap in the driver's unit; form 0: at the driver, hard ends; form 1: ends that give (half to one and a
-        half gap); forms 2 and 3: the same at what follows, that wide where its map has its mean slope."""
+        """Full width of the gap in the driver's unit; form 0: at the driver, hard ends; form 1: ends that give (half to
+        one and a half gap); forms 2 and 3: the same at what follows, that wide where its map has its mean slope."""
         low, high = position_range(states)
         span = high - low
-        return (Shape("gap", states[0].position_unit, 1e-4 * span, 0.15 * span, tuple(span * np.geomspace(0.002, 0.1, 8)), True),
-                Shape("form", "1", HARD, SOFT_BEHIND, (HARD, SOFT, HARD_BEHIND, SOFT_BEHIND)))
+        return (
+            Shape(
+                "gap",
+                states[0].position_unit,
+                1e-4 * span,
+                0.15 * span,
+                tuple(span * np.geomspace(0.002, 0.1, 8)),
+                True,
+            ),
+            Shape("form", "1", HARD, SOFT_BEHIND, (HARD, SOFT, HARD_BEHIND, SOFT_BEHIND)),
+        )
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """No amplitude: the map is fitted anew behind the gap."""
@@ -40,7 +49,9 @@ class Backlash(Effect):
         path, rate = path_behind(state)
         return driven(state, lambda x: x + (soft_play(path, shape["gap"], softness) - path) / rate)
 
-    def further(self, states: tuple[DriveState, ...], parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    def further(
+        self, states: tuple[DriveState, ...], parameters: Mapping[str, Mapping[str, Any]]
+    ) -> dict[str, dict[str, Any]]:
         """The gap as what follows shows it."""
         return {"segment_gap": segment_gap(states, parameters["gap"])}
 

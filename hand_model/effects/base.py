@@ -32,14 +32,15 @@ Amplitude = tuple[str, str, float, float]
 
 @dataclass(frozen=True)
 class DriveState:
-    """One balance (a motor of a hand, a joint of a rig, an angle against an angle) during one trial, as an effect sees it.
+    """One balance (a motor of a hand, a joint of a rig, an angle against an angle) during one trial, as an effect sees
+    it.
 
     time_s: (n,) [s]. position, velocity, acceleration: (n,) in the drive's unit ([%], [rad] or [m], and per second).
     effort: (n,) measured left side, raw or SI, nan where it is not to be compared. declared: (n, k) columns of the
     declared model, declared_names: their names ("inertia", "viscous", "coulomb", "spring", "preload", ...).
     extra: further channels by name, (n,) each: "elapsed" [s] since the first sample of the session, "load", "setpoint",
-    "speed" (commanded), "temperature", "supply", "gravity_along|across" in the finger's plane, "sigma" (standard deviation, in effort
-    units, of what the state estimate cannot know, beside the noise).
+    "speed" (commanded), "temperature", "supply", "gravity_along|across" in the finger's plane, "sigma" (standard
+    deviation, in effort units, of what the state estimate cannot know, beside the noise).
     """
 
     trial: str
@@ -65,7 +66,8 @@ class DriveState:
 
     @property
     def friction_position(self) -> Array:
-        """Position (n,) to which the present friction belongs: bristles lag behind by their length, "give" in `extra`."""
+        """Position (n,) to which the present friction belongs: bristles lag behind by their length, "give" in
+        `extra`."""
         return self.position - self.direction * self.extra.get("give", np.zeros(len(self.position)))
 
     @property
@@ -81,8 +83,8 @@ class DriveState:
 
 @dataclass(frozen=True)
 class Shape:
-    """A nonlinear parameter of an effect: its unit, bounds, and the starting values that a multi-start fit tries. size: it says how
-    much of the effect there is, as an amplitude does."""
+    """A nonlinear parameter of an effect: its unit, bounds, and the starting values that a multi-start fit tries. size:
+    it says how much of the effect there is, as an amplitude does."""
 
     name: str
     unit: str
@@ -108,7 +110,8 @@ class DriveEffect(Protocol):
         ...
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
-        """Name, unit, lower and upper bound of each amplitude (j of them); bounds carry the sign that physics allows."""
+        """Name, unit, lower and upper bound of each amplitude (j of them); bounds carry the sign that physics
+        allows."""
         ...
 
     def statement(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
@@ -116,7 +119,8 @@ class DriveEffect(Protocol):
         ...
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
-        """Write the effect into an MJCF tree (lxml); the element's path, or None where only the passive callback can."""
+        """Write the effect into an MJCF tree (lxml); the element's path, or None where only the passive callback
+        can."""
         ...
 
 
@@ -131,15 +135,20 @@ class Effect:
     station: ClassVar[str] = "drive"
     replaces: ClassVar[str | None] = None  # name of the declared column that `declared` changes
     warps: ClassVar[bool] = False
-    asks: ClassVar[bool] = False  # its columns are of what is asked of a drive, "required" in `extra`, which it changes itself
+    # its columns are of what is asked of a drive, "required" in `extra`, which it changes itself
+    asks: ClassVar[bool] = False
     clips: ClassVar[bool] = False
     rubs: ClassVar[bool] = False  # its columns carry friction's direction, which bristles turn over
-    needs: ClassVar[str | None] = None  # declared column without which the effect is none (a ratio to a friction of zero)
+    # declared column without which the effect is none (a ratio to a friction of zero)
+    needs: ClassVar[str | None] = None
     of_the_hand: ClassVar[bool] = True  # False of what only one recording had, such as an obstacle
-    recorded: ClassVar[bool] = False  # of the recording, not of the machine: the machine is compared with what is left without it
-    drifting: ClassVar[bool] = False  # seen as a level that changes slowly or with the recording, as a zero that wanders is
+    # of the recording, not of the machine: the machine is compared with what is left without it
+    recorded: ClassVar[bool] = False
+    # seen as a level that changes slowly or with the recording, as a zero that wanders is
+    drifting: ClassVar[bool] = False
     unwritten: ClassVar[str | None] = None  # why no file can hold it or no replay show it, where that is so
-    family: ClassVar[str | None] = None  # effects of one family move alike: a small one beside a large one may be its form
+    # effects of one family move alike: a small one beside a large one may be its form
+    family: ClassVar[str | None] = None
     listed: ClassVar[bool] = True  # False of an outsider: no row of the table of effects, told as unexplained
     repeats: ClassVar[bool] = False  # may be named more than once in one balance, with other shapes
 
@@ -185,13 +194,15 @@ class Effect:
         """The prediction as it is."""
         return prediction
 
-    def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
-                   declared: Mapping[str, float]) -> dict[str, float]:
+    def parameters(
+        self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]
+    ) -> dict[str, float]:
         """Parameters by their textbook names, from shapes, amplitudes and declared coefficients."""
         return {**shape, **amplitude}
 
     def units(self, shape: Mapping[str, float]) -> Mapping[str, str]:
-        """Units of what `parameters` makes of shapes and amplitudes, with "effort" and "position" for those of the state."""
+        """Units of what `parameters` makes of shapes and amplitudes, with "effort" and "position" for those of the
+        state."""
         return {}
 
     def possible(self, states: tuple[DriveState, ...], parameters: Mapping[str, float]) -> bool:
@@ -203,10 +214,13 @@ class Effect:
         return 0.0
 
     def derived(self, states: tuple[DriveState, ...], parameters: Mapping[str, float]) -> dict[str, float]:
-        """What follows from these parameters and the recorded range, beside them and with an interval of its own; nothing."""
+        """What follows from these parameters and the recorded range, beside them and with an interval of its own;
+        nothing."""
         return {}
 
-    def further(self, states: tuple[DriveState, ...], parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    def further(
+        self, states: tuple[DriveState, ...], parameters: Mapping[str, Mapping[str, Any]]
+    ) -> dict[str, dict[str, Any]]:
         """Further parameters (value, unit, ci95) that follow from the fitted ones and the recorded range; none."""
         return {}
 
@@ -215,7 +229,8 @@ class Effect:
         return None
 
     def statement(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
-        """The place and the effect's sentence; the name and the figures there are, where one that it needs is missing or not finite."""
+        """The place and the effect's sentence; the name and the figures there are, where one that it needs is missing
+        or not finite."""
         known = {key: float(v) for key, v in parameters.items() if isinstance(v, Real) and math.isfinite(v)}
         of_motor = self.station in ("drive", "command", "motors")
         place = (of_motor and where.get("actuator")) or where.get("finger") or where.get("actuator")
@@ -226,7 +241,8 @@ class Effect:
             return f"{place}: " + f"{self.name}{f' ({listed})' if listed else ''}.".replace("_", " ")
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
-        """What was left out, in plain words with figures and units, without place and full stop. parameters: the finite ones.
+        """What was left out, in plain words with figures and units, without place and full stop. parameters: the finite
+        ones.
 
         Raises KeyError where a figure that it needs is missing: `statement` then falls back to a list.
         """
@@ -237,7 +253,8 @@ class Effect:
         return None
 
     def reading(self, effort: Array, time_s: Array, parameters: Mapping[str, float]) -> Array:
-        """What a channel shows of the drive's effort (n,) [raw]: as it is, unless the effect is in the reading and no sensor holds it."""
+        """What a channel shows of the drive's effort (n,) [raw]: as it is, unless the effect is in the reading and no
+        sensor holds it."""
         return effort
 
     def started(self, state: DriveState, parameters: Mapping[str, float]) -> dict[str, float]:
@@ -245,7 +262,8 @@ class Effect:
         return {}
 
     def law(self, parameters: Mapping[str, float]) -> Law | None:
-        """What the passive-force callback applies (`hand_model.effects_on`); None where MJCF holds it, or nothing can."""
+        """What the passive-force callback applies (`hand_model.effects_on`); None where MJCF holds it, or nothing
+        can."""
         return None
 
 
@@ -260,8 +278,8 @@ def sample_interval(states: Sequence[DriveState]) -> float:
 
 
 def least_delay(states: Sequence[DriveState]) -> float:
-    """Least delay [s] of a channel that these recordings tell: three quarters of a sample interval, or what is known better of the current's
-    lateness ("late" in `extra`: value and standard deviation)."""
+    """Least delay [s] of a channel that these recordings tell: three quarters of a sample interval, or what is known
+    better of the current's lateness ("late" in `extra`: value and standard deviation)."""
     late = states[0].extra.get("late")
     least = UNSEEN_DELAY * sample_interval(states)
     return least if late is None else min(least, SURE_DELAY * float(late[1]))

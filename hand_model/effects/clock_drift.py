@@ -11,7 +11,8 @@ from .base import Amplitude, Array, DriveState, Effect
 
 
 class ClockDrift(Effect):
-    """angle(t) = map(encoder(t + drift (t - middle))): a column of velocity times time from the middle of the recording."""
+    """angle(t) = map(encoder(t + drift (t - middle))): a column of velocity times time from the middle of the
+    recording."""
 
     name = "clock_drift"
     drifting = True
@@ -30,8 +31,9 @@ class ClockDrift(Effect):
         middle = 0.5 * (state.time_s[0] + state.time_s[-1])
         return (state.slope * state.velocity * (state.time_s - middle))[:, None]
 
-    def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
-                   declared: Mapping[str, float]) -> dict[str, float]:
+    def parameters(
+        self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]
+    ) -> dict[str, float]:
         """Rate of the log's clock over the mocap clock, minus one: a correction divides the log's times by the rate."""
         return {"rate_minus_one": 1 / (1 - amplitude["drift"]) - 1}
 

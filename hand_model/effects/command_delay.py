@@ -10,7 +10,8 @@ from .mjcf import delay, motor_joint
 
 
 class CommandDelay(Effect):
-    """The current leaves its resting level a dead time after the setpoint changed; read from events, not from a balance."""
+    """The current leaves its resting level a dead time after the setpoint changed; read from events, not from a
+    balance."""
 
     name = "command_delay"
     station = "command"

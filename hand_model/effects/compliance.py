@@ -12,7 +12,8 @@ from .law import Law
 
 
 class Compliance(Effect):
-    """The part behind stays back by compliance * load, at the driver's end (follower = map(driver - give)) or at its own.
+    """The part behind stays back by compliance * load, at the driver's end (follower = map(driver - give)) or at its
+    own.
 
     The load is what the motor's current passes on. What of it depends on position alone is in the map already: the
     compliance is known from what friction and speed add.

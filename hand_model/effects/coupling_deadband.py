@@ -14,7 +14,8 @@ from .input import map_of, write_bound
 
 
 class CouplingDeadband(Effect):
-    """distal = coupling(max(proximal, until)), the corner rounded: s ln(1 + exp((q - until) / s)) of the motion passes."""
+    """distal = coupling(max(proximal, until)), the corner rounded: s ln(1 + exp((q - until) / s)) of the motion
+    passes."""
 
     name = "coupling_deadband"
     station = "linkage"
@@ -24,8 +25,10 @@ class CouplingDeadband(Effect):
         """Proximal angle at which the distal segment starts to move, and the width of the corner."""
         low, high = position_range(states)
         span, unit = high - low, states[0].position_unit
-        return (Shape("until", unit, low + 0.01 * span, low + 0.5 * span, tuple(low + span * np.linspace(0.03, 0.45, 12))),
-                Shape("corner", unit, 1e-4 * span, 0.05 * span, (0.002 * span, 0.015 * span)))
+        return (
+            Shape("until", unit, low + 0.01 * span, low + 0.5 * span, tuple(low + span * np.linspace(0.03, 0.45, 12))),
+            Shape("corner", unit, 1e-4 * span, 0.05 * span, (0.002 * span, 0.015 * span)),
+        )
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """No amplitude: the coupling is fitted anew beyond the deadband."""

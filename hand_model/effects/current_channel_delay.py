@@ -14,7 +14,8 @@ FIRST_SEEN = 0.1  # of a filter's time constant: a rise of ten times what is not
 
 
 class CurrentChannelDelay(Effect):
-    """measured(t) = current(t - delay) (form 0), or the current behind a first-order filter of that time constant (form 1)."""
+    """measured(t) = current(t - delay) (form 0), or the current behind a first-order filter of that time constant (form
+    1)."""
 
     name = "current_channel_delay"
     warps = True
@@ -22,8 +23,16 @@ class CurrentChannelDelay(Effect):
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """Delay of the effort behind the position, up to eight samples either way."""
         step = sample_interval(states)
-        return (Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),
-                Shape("delay", "s", -8 * step, 8 * step, tuple(step * k for k in (-6, -4, -2.5, -1.5, -0.75, 0.75, 1.5, 2.5, 4, 6))))
+        return (
+            Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),
+            Shape(
+                "delay",
+                "s",
+                -8 * step,
+                8 * step,
+                tuple(step * k for k in (-6, -4, -2.5, -1.5, -0.75, 0.75, 1.5, 2.5, 4, 6)),
+            ),
+        )
 
     def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
         """A filter only looks back."""
@@ -45,14 +54,16 @@ class CurrentChannelDelay(Effect):
         return (1 - share) * columns[after - 1] + share * columns[after]
 
     def lateness(self, shape: Mapping[str, float]) -> tuple[float, float]:
-        """How late [s] a sudden rise of the current is seen, at least and at most: behind a filter that depends on its height over the
-        noise; of a negative delay, on whether the current comes early or the position late."""
+        """How late [s] a sudden rise of the current is seen, at least and at most: behind a filter that depends on its
+        height over the noise; of a negative delay, on whether the current comes early or the position late."""
         delay_s = shape["delay"]
         return (FIRST_SEEN * delay_s, delay_s) if _filters(shape) else (delay_s, max(delay_s, 0.0))
 
-    def further(self, states: tuple[DriveState, ...], parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
-        """The delay by the answers to commands, where they tell it to a sample interval ("late" in `extra`): what a motion shows of it
-        is its starts, whose estimate is smoothed."""
+    def further(
+        self, states: tuple[DriveState, ...], parameters: Mapping[str, Mapping[str, Any]]
+    ) -> dict[str, dict[str, Any]]:
+        """The delay by the answers to commands, where they tell it to a sample interval ("late" in `extra`): what a
+        motion shows of it is its starts, whose estimate is smoothed."""
         late = states[0].extra.get("late")
         step = sample_interval(states)
         if late is None or late[1] > step or parameters["form"]["value"] > 0.5 or parameters["delay"]["value"] <= 0:
@@ -69,7 +80,8 @@ class CurrentChannelDelay(Effect):
         return f"the current was sampled {abs(delay_ms):.1f} ms {when} than the position beside it in the log"
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
-        """The delay of the sensor of the motor's current, or of its encoder where the current is read early; a sensor cannot filter."""
+        """The delay of the sensor of the motor's current, or of its encoder where the current is read early; a sensor
+        cannot filter."""
         if _filters(parameters):
             return None
         found = motor_sensor(root, where, "current" if parameters["delay"] >= 0 else "encoder")

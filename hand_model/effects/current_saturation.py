@@ -18,7 +18,8 @@ class CurrentSaturation(Effect):
     clips = True
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """Clipping level, among the highest recorded efforts; readings cut for nearly half of the time leave room below it."""
+        """Clipping level, among the highest recorded efforts; readings cut for nearly half of the time leave room below
+        it."""
         effort = np.concatenate([np.abs(s.effort[np.isfinite(s.effort)]) for s in states])
         low, high = (min(np.percentile(effort, 60), effort.max() / 2), effort.max()) if len(effort) else (0.0, 1.0)
         return (Shape("limit", states[0].effort_unit, float(low), float(high), tuple(np.linspace(low, high, 16)[1:])),)
@@ -31,12 +32,16 @@ class CurrentSaturation(Effect):
         """The prediction within the limits."""
         return np.clip(prediction, -shape["limit"], shape["limit"])
 
-    def further(self, states: tuple[DriveState, ...], parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    def further(
+        self, states: tuple[DriveState, ...], parameters: Mapping[str, Mapping[str, Any]]
+    ) -> dict[str, dict[str, Any]]:
         """Share of the readings whose motion requires more than the limit."""
         required = [np.abs(s.extra["required"][np.isfinite(s.effort)]) for s in states if "required" in s.extra]
         if not required:
             return {}
-        return {"share_cut": {"value": float(np.mean(np.concatenate(required) > parameters["limit"]["value"])), "unit": "1"}}
+        return {
+            "share_cut": {"value": float(np.mean(np.concatenate(required) > parameters["limit"]["value"])), "unit": "1"}
+        }
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """The limit."""

@@ -13,7 +13,8 @@ from .law import Law, Moment
 
 
 class DetentLoad(Effect):
-    """F = A exp(-u^2 / 2), u = (x - c) / w, either sign (form 0); or F = A u exp((1 - u^2) / 2), in and out of a notch (form 1)."""
+    """F = A exp(-u^2 / 2), u = (x - c) / w, either sign (form 0); or F = A u exp((1 - u^2) / 2), in and out of a notch
+    (form 1)."""
 
     name = "detent_load"
 
@@ -21,9 +22,13 @@ class DetentLoad(Effect):
         """Centre over the range, width from 1.5 % to 20 % of it (wider is a spring)."""
         low, high = position_range(states)
         span, unit = high - low, states[0].position_unit
-        return (Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),
-                Shape("centre", unit, low + 0.08 * span, high - 0.08 * span, tuple(low + span * np.linspace(0.08, 0.92, 18))),
-                Shape("width", unit, 0.015 * span, 0.2 * span, (0.03 * span, 0.06 * span, 0.12 * span)))
+        return (
+            Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),
+            Shape(
+                "centre", unit, low + 0.08 * span, high - 0.08 * span, tuple(low + span * np.linspace(0.08, 0.92, 18))
+            ),
+            Shape("width", unit, 0.015 * span, 0.2 * span, (0.03 * span, 0.06 * span, 0.12 * span)),
+        )
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Load at the centre, either sign."""
@@ -45,8 +50,10 @@ class DetentLoad(Effect):
         at, width, load = parameters["centre"], parameters["width"], parameters["load"]
         if parameters["form"] < 0.5:
             side = "against" if load > 0 else "towards"
-            return (f"between {at - 2 * width:.1f} and {at + 2 * width:.1f} % a load acts {side} flexion whichever way the motor moves, "
-                    f"up to {figure(abs(load))} raw at {at:.1f} %")
+            return (
+                f"between {at - 2 * width:.1f} and {at + 2 * width:.1f} % a load acts {side} flexion whichever way the motor moves, "
+                f"up to {figure(abs(load))} raw at {at:.1f} %"
+            )
         kind, way = ("notch", "towards") if load > 0 else ("hump", "away from")
         return f"a {kind} at {at:.1f} %: a load of up to {figure(abs(load))} raw {way} it, largest {width:.1f} % on either side"
 

@@ -24,9 +24,16 @@ class DistalStop(Effect):
         """Proximal angle at which the distal segment stops, and the share of the motion that passes beyond."""
         low, high = position_range(states)
         span = high - low
-        return (Shape("from", states[0].position_unit, high - 0.5 * span, high - 0.01 * span,
-                      tuple(high - span * np.linspace(0.03, 0.45, 12))),
-                Shape("passing", "1", 0.0, 0.5, (0.0, 0.2)))
+        return (
+            Shape(
+                "from",
+                states[0].position_unit,
+                high - 0.5 * span,
+                high - 0.01 * span,
+                tuple(high - span * np.linspace(0.03, 0.45, 12)),
+            ),
+            Shape("passing", "1", 0.0, 0.5, (0.0, 0.2)),
+        )
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """No amplitude: the coupling is fitted anew before the stop."""
@@ -34,7 +41,9 @@ class DistalStop(Effect):
 
     def declared(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """The coupling's columns of the angle that passes."""
-        return driven(state, lambda q: np.where(q > shape["from"], shape["from"] + shape["passing"] * (q - shape["from"]), q))
+        return driven(
+            state, lambda q: np.where(q > shape["from"], shape["from"] + shape["passing"] * (q - shape["from"]), q)
+        )
 
     def region(self, states: tuple[DriveState, ...], shape: Mapping[str, float]) -> dict[str, Any] | None:
         """From where it stops to the end of the range."""

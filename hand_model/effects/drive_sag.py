@@ -16,8 +16,9 @@ ROUNDS = 12
 
 
 class DriveSag(Effect):
-    """Of a drive that follows its command in speed: steady speed = commanded speed (1 - sag * load), the load being the current in the direction of
-    motion. Of one whose current is what its controller asks for: effort = current (1 - share lost), which grows with the current (form 0) or its square.
+    """Of a drive that follows its command in speed: steady speed = commanded speed (1 - sag * load), the load being the
+    current in the direction of motion. Of one whose current is what its controller asks for: effort = current (1 -
+    share lost), which grows with the current (form 0) or its square.
     """
 
     name = "drive_sag"
@@ -42,7 +43,9 @@ class DriveSag(Effect):
 
     def possible(self, states: tuple[DriveState, ...], parameters: Mapping[str, float]) -> bool:
         """Whether the drive still had more to give where most was asked of it: no controller holds a speed beyond."""
-        most = max((float(np.nanquantile(np.abs(s.effort), 0.99)) for s in states if np.isfinite(s.effort).any()), default=0.0)
+        most = max(
+            (float(np.nanquantile(np.abs(s.effort), 0.99)) for s in states if np.isfinite(s.effort).any()), default=0.0
+        )
         return bool(_rise(most, parameters) > LEAST_RISE)
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
@@ -82,7 +85,8 @@ def _rise(asked: Any, parameters: Mapping[str, float]) -> Any:
 
 
 def _lost(asked: Any, parameters: Mapping[str, float]) -> Any:
-    """Share of the effort that is lost, where a current of that size [raw] is asked for; what is delivered never falls."""
+    """Share of the effort that is lost, where a current of that size [raw] is asked for; what is delivered never
+    falls."""
     power, within = 1 + parameters.get("form", 0.0), np.minimum(asked, _bend(parameters))
     delivered = within * (1 - parameters["torque_loss"] * (within / ASKED) ** power) + LEAST_RISE * (asked - within)
     return 1 - delivered / np.maximum(asked, 1e-9)

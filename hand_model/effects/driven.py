@@ -14,10 +14,11 @@ LEAST_SLOPE = 0.1  # of the mean: flatter, what follows as good as stands
 
 
 def driven(state: DriveState, change: Callable[[Array], Array]) -> Array:
-    """Declared columns (n, k) with the powers of the driver taken of `change(driver)`, driver in the state's position unit.
+    """Declared columns (n, k) with the powers of the driver taken of `change(driver)`, driver in the state's position
+    unit.
 
-    The columns "power_0", "power_1", ... are powers of driver / extra["scale"]; further columns stay. Changes follow one
-    another: the driver is what the present columns hold.
+    The columns "power_0", "power_1", ... are powers of driver / extra["scale"]; further columns stay. Changes follow
+    one another: the driver is what the present columns hold.
     """
     if "power_1" not in state.declared_names:
         return state.declared
@@ -58,8 +59,8 @@ def soft_play(path: Array, gap: float, softness: float) -> Array:
 
 
 def path_behind(state: DriveState) -> tuple[Array, Array]:
-    """The path of what follows (n,) by its map, scaled to the driver's unit at the map's mean slope, and how fast it goes with the
-    driver (n,), one on the average."""
+    """The path of what follows (n,) by its map, scaled to the driver's unit at the map's mean slope, and how fast it
+    goes with the driver (n,), one on the average."""
     order = np.argsort(state.position, kind="stable")
     slope = np.maximum(state.slope, LEAST_SLOPE * mean_slope((state,))) / mean_slope((state,))
     x, rate = state.position[order], slope[order]

@@ -17,13 +17,17 @@ class EncoderPeriodicError(Sinusoid):
     name = "encoder_periodic_error"
     station = "encoder"
     recorded = True
-    unwritten = "the reading of the encoder is not what a simulation moves: kept in hand.json, the log is corrected in a copy"
+    unwritten = (
+        "the reading of the encoder is not what a simulation moves: kept in hand.json, the log is corrected in a copy"
+    )
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """Period, dense in wavenumber; what does not come three times in the range is no period."""
         low, high = position_range(states)
         span = high - low
-        return (Shape("period", states[0].position_unit, 0.015 * span, span / 3, tuple(span / np.arange(3.0, 60.01, 0.25))),)
+        return (
+            Shape("period", states[0].position_unit, 0.015 * span, span / 3, tuple(span / np.arange(3.0, 60.01, 0.25))),
+        )
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """Error in degrees of the segment, and its period."""

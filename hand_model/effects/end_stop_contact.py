@@ -23,8 +23,10 @@ class EndStopContact(Effect):
         """Side (1 upper, -1 lower) and how far before the end of the range the stop begins."""
         low, high = position_range(states)
         span = high - low
-        return (Shape("side", "1", -1.0, 1.0, (-1.0, 1.0)),
-                Shape("inward", states[0].position_unit, 0.015 * span, span / 3, tuple(span * np.linspace(0.03, 0.31, 10))))
+        return (
+            Shape("side", "1", -1.0, 1.0, (-1.0, 1.0)),
+            Shape("inward", states[0].position_unit, 0.015 * span, span / 3, tuple(span * np.linspace(0.03, 0.31, 10))),
+        )
 
     def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
         """Each shape with the end of the range on its side."""
@@ -40,8 +42,9 @@ class EndStopContact(Effect):
         side, begin = _side(shape), _begin(shape)
         return (side * np.maximum(side * (state.position - begin), 0.0))[:, None]
 
-    def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
-                   declared: Mapping[str, float]) -> dict[str, float]:
+    def parameters(
+        self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]
+    ) -> dict[str, float]:
         """Side, where the stop begins, and its stiffness."""
         return {"side": shape["side"], "begin": _begin(shape), **amplitude}
 
@@ -60,13 +63,16 @@ class EndStopContact(Effect):
         return f"{side} {parameters['begin']:.1f} % the motor runs into an elastic stop, {stiffness} raw for every further %"
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
-        """A fixed tendon along the motor joint that is slack until the stop begins: the same line of force, exact in MuJoCo."""
+        """A fixed tendon along the motor joint that is slack until the stop begins: the same line of force, exact in
+        MuJoCo."""
         found = motor_joint(root, where)
         if found is None:
             return None
         joint, unit = found
         ends = (-1e6, parameters["begin"]) if parameters["side"] >= 0 else (parameters["begin"], 1e6)
-        return joint_tendon(root, joint, f"{where['actuator']}_stop", springlength=ends, stiffness=unit * parameters["stiffness"])
+        return joint_tendon(
+            root, joint, f"{where['actuator']}_stop", springlength=ends, stiffness=unit * parameters["stiffness"]
+        )
 
 
 def _side(shape: Mapping[str, float]) -> float:

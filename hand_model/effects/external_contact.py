@@ -10,14 +10,17 @@ import numpy as np
 from .base import Amplitude, Array, DriveState, Effect, Shape, figure, position_range
 
 WHILES = ((0.0, 1.0), (0.2, 1.0), (0.35, 1.0), (0.5, 1.0), (0.65, 1.0), (0.8, 1.0), (0.0, 0.5), (0.2, 0.5), (0.4, 0.7))
-LASTING = 0.85  # share of each recording, or of the session: what is there for longer in all of them is a spring or a stop
-ALL, EACH = -1.0, -2.0  # instead of the number of a trial: the while is one of the whole session; it is the same one of every trial
+# share of each recording, or of the session: what is there for longer in all of them is a spring or a stop
+LASTING = 0.85
+# instead of the number of a trial: the while is one of the whole session; it is the same one of every trial
+ALL, EACH = -1.0, -2.0
 MOST_VALIDATION = 4  # validation recordings in which an obstacle can still be told
 
 
 class ExternalContact(Effect):
-    """F = k max(0, x - x0) (form 0) or k max(0, x - x0)^2 (form 1) for a while of one trial, of every trial or of the session: an
-    elastic obstacle that was not always there, met after some free motion. Whether it is there in validation recordings is for each of those to say.
+    """F = k max(0, x - x0) (form 0) or k max(0, x - x0)^2 (form 1) for a while of one trial, of every trial or of the
+    session: an elastic obstacle that was not always there, met after some free motion. Whether it is there in
+    validation recordings is for each of those to say.
     """
 
     name = "external_contact"
@@ -28,32 +31,44 @@ class ExternalContact(Effect):
     unwritten = "an obstacle of one recording is no part of the hand"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """Which trial (index into the states; ALL of them as one, EACH of them), from and until which share of it, form, and where the
-        contact begins."""
+        """Which trial (index into the states; ALL of them as one, EACH of them), from and until which share of it,
+        form, and where the contact begins."""
         low, high = position_range(states)
         span = high - low
         trials = tuple(float(i) for i, s in enumerate(states) if not s.validate)
         every = () if len(trials) < 2 else (EACH, ALL) if all("session_s" in s.extra for s in states) else (EACH,)
-        return (Shape("trial", "1", EACH, len(states) - 1.0, (*trials, *every)),
-                Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),
-                Shape("since", "1", 0.0, 0.9, tuple(sorted({a for a, _ in WHILES}))),
-                Shape("until", "1", 0.1, 1.0, tuple(sorted({b for _, b in WHILES}))),
-                Shape("begin", states[0].position_unit, low + 0.08 * span, high - 0.02 * span,
-                      tuple(low + span * np.linspace(0.1, 0.9, 9))))
+        return (
+            Shape("trial", "1", EACH, len(states) - 1.0, (*trials, *every)),
+            Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),
+            Shape("since", "1", 0.0, 0.9, tuple(sorted({a for a, _ in WHILES}))),
+            Shape("until", "1", 0.1, 1.0, tuple(sorted({b for _, b in WHILES}))),
+            Shape(
+                "begin",
+                states[0].position_unit,
+                low + 0.08 * span,
+                high - 0.02 * span,
+                tuple(low + span * np.linspace(0.1, 0.9, 9)),
+            ),
+        )
 
     def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
         """Every start of trial, form and place, in some whiles of the trial."""
-        return [point for point in super().grid(states)
-                if (point["since"], point["until"]) in WHILES and not _all_along(point)]
+        return [
+            point
+            for point in super().grid(states)
+            if (point["since"], point["until"]) in WHILES and not _all_along(point)
+        ]
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Stiffness of the contact in that trial, and in each validation recording; never negative."""
-        return (("stiffness", "effort/position", 0.0, np.inf),
-                *((f"stiffness_validation_{i}", "effort/position", 0.0, np.inf) for i in range(MOST_VALIDATION)))
+        return (
+            ("stiffness", "effort/position", 0.0, np.inf),
+            *((f"stiffness_validation_{i}", "effort/position", 0.0, np.inf) for i in range(MOST_VALIDATION)),
+        )
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """Depth into the contact in that trial and in each validation recording, (n, 1 + MOST_VALIDATION); none of what is there in all of
-        them nearly all along."""
+        """Depth into the contact in that trial and in each validation recording, (n, 1 + MOST_VALIDATION); none of what
+        is there in all of them nearly all along."""
         out = np.zeros((len(state.time_s), 1 + MOST_VALIDATION))
         index = state.extra.get("trial_index", np.zeros(len(state.time_s)))[0]
         every, mine = shape["trial"] < 0, index == round(shape["trial"])
@@ -72,11 +87,17 @@ class ExternalContact(Effect):
             out[:, 1 + rank % MOST_VALIDATION] = within if every else depth
         return out
 
-    def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
-                   declared: Mapping[str, float]) -> dict[str, float]:
+    def parameters(
+        self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]
+    ) -> dict[str, float]:
         """Where it begins and how stiff it is."""
-        return {"trial": shape["trial"], "since": shape["since"], "until": shape["until"],
-                "begin": shape["begin"], "stiffness": amplitude["stiffness"]}
+        return {
+            "trial": shape["trial"],
+            "since": shape["since"],
+            "until": shape["until"],
+            "begin": shape["begin"],
+            "stiffness": amplitude["stiffness"],
+        }
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """When, from where on, and the load a tenth of the range further (of either form the same)."""
@@ -85,8 +106,10 @@ class ExternalContact(Effect):
         name = several.get(parameters["trial"]) or (trials[index] if 0 <= index < len(trials) else "one recording")
         since, until = (round(100 * parameters[k]) for k in ("since", "until"))
         part = "" if since <= 0 and until >= 100 else f", {since} to {until} % of the way through"
-        return (f"in {name}{part}, the finger meets an elastic obstacle at {parameters['begin']:.1f} %: "
-                f"10 % further it takes {figure(10 * parameters['stiffness'])} raw more current")
+        return (
+            f"in {name}{part}, the finger meets an elastic obstacle at {parameters['begin']:.1f} %: "
+            f"10 % further it takes {figure(10 * parameters['stiffness'])} raw more current"
+        )
 
 
 def _all_along(shape: Mapping[str, float]) -> bool:

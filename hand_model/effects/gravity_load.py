@@ -24,12 +24,13 @@ class GravityLoad(Effect):
         return (Shape("sweep", "rad", 0.5, 2.5, (0.8, 1.4, 2.0)),)
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
-        """Weight times lever along the open finger and across it; and what it does in the one pose of all recordings that show none."""
+        """Weight times lever along the open finger and across it; and what it does in the one pose of all recordings
+        that show none."""
         return tuple((name, "effort", -np.inf, np.inf) for name in ("along", "across", "unseen_cosine", "unseen_sine"))
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """Torque of a unit weight on the finger's line and across it, in parts of 9.81 m/s^2, and cosine and sine of the angle where the
-        pose was not recorded, (n, 4); none where no recording has a pose."""
+        """Torque of a unit weight on the finger's line and across it, in parts of 9.81 m/s^2, and cosine and sine of
+        the angle where the pose was not recorded, (n, 4); none where no recording has a pose."""
         out = np.zeros((len(state.time_s), 4))
         if not shape or not ("gravity_along" in state.extra or "pose_unseen" in state.extra):
             return out
@@ -42,8 +43,9 @@ class GravityLoad(Effect):
         out[:, 0], out[:, 1] = across * cosine - along * sine, along * cosine + across * sine
         return out
 
-    def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
-                   declared: Mapping[str, float]) -> dict[str, float]:
+    def parameters(
+        self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]
+    ) -> dict[str, float]:
         """The weight; not what it did in a pose that nobody knows."""
         return {**shape, "along": amplitude["along"], "across": amplitude["across"]}
 
@@ -63,7 +65,9 @@ class GravityLoad(Effect):
         def load(now: Moment) -> float:
             angle = sweep * now.position / 100.0
             x, y = now.gravity_along / 9.81, now.gravity_across / 9.81
-            return along * (y * math.cos(angle) - x * math.sin(angle)) + across * (x * math.cos(angle) + y * math.sin(angle))
+            return along * (y * math.cos(angle) - x * math.sin(angle)) + across * (
+                x * math.cos(angle) + y * math.sin(angle)
+            )
 
         return load
 

@@ -1,7 +1,8 @@
 """An input joint in a compiled MJCF: what an equality's driver becomes before the equality's polynomial takes it.
 
-Lost motion, a dead band and a stop are changes of the driver: follower = map(input), with the input tied to the driver by
-tendons with a one- or two-sided range. The input is a joint without mass worth mentioning, on a body of its own on the palm.
+Lost motion, a dead band and a stop are changes of the driver: follower = map(input), with the input tied to the driver
+by tendons with a one- or two-sided range. The input is a joint without mass worth mentioning, on a body of its own on
+the palm.
 """
 
 from __future__ import annotations
@@ -13,18 +14,20 @@ import numpy as np
 
 from .mjcf import fixed_tendon, free_name, motor_joint
 
-HOLD = 2e-4  # friction that keeps a loose part where it is [N m per unit of the driver]; the weight of a finger may move it
+# friction that keeps a loose part where it is [N m per unit of the driver]; the weight of a finger may move it
+HOLD = 2e-4
 INERTIA = 1e-7  # of an input joint, that of a compiled lever
 YIELD_RATE = 150.0  # rad/s: of a follower on the spring that lets a stop hold it back, as of a finger on its actuator
-FIRM_RATE = 400.0  # rad/s: of a finger on its lever then; what is tied to it by springs or rubs would lift it off otherwise
+# rad/s: of a finger on its lever then; what is tied to it by springs or rubs would lift it off otherwise
+FIRM_RATE = 400.0
 HARD = {"solreflimit": (0.002, 1.0), "solimplimit": (0.9999, 0.9999, 0.001, 0.5, 2.0)}
 FRICTION = {"solreffriction": "0.004 1", "solimpfriction": "0.9999 0.9999 0.001 0.5 2"}
 SUFFIX = "_input"
 
 
 def map_of(root: Any, where: Mapping[str, Any], station: str) -> Any:
-    """The joint equality that maps a driver to the place's follower: of the lever ("encoder") or of a joint ("linkage"); None
-    where the file has none."""
+    """The joint equality that maps a driver to the place's follower: of the lever ("encoder") or of a joint
+    ("linkage"); None where the file has none."""
     if station == "encoder":
         found = motor_joint(root, where)
         wanted = None if found is None else (lambda e: source(root, e.get("joint2")) == found[0].get("name"))
@@ -52,15 +55,24 @@ def _put_between(root: Any, equality: Any) -> tuple[str, str]:
     palm = root.find("worldbody").find("body")
     body = etree.SubElement(palm, "body", name=free_name(root, f"{name}_link"))
     etree.SubElement(body, "inertial", pos="0 0 0", mass="1e-9", diaginertia="1e-9 1e-9 1e-9")
-    etree.SubElement(body, "joint", name=name, type="hinge", pos="0 0 0", axis="0 0 1", ref="0", limited="false",
-                     armature=repr(INERTIA))
+    etree.SubElement(
+        body,
+        "joint",
+        name=name,
+        type="hinge",
+        pos="0 0 0",
+        axis="0 0 1",
+        ref="0",
+        limited="false",
+        armature=repr(INERTIA),
+    )
     equality.set("joint2", name)
     return driver, name
 
 
 def _hold_firmly(root: Any, follower: str, driver: str) -> None:
-    """Make the spring that holds a finger on its lever as fast as `FIRM_RATE`, where a tendon has one at either joint; a lever that
-    is to follow a play as heavy as its finger, or the gap's ends would be too soft for both."""
+    """Make the spring that holds a finger on its lever as fast as `FIRM_RATE`, where a tendon has one at either joint;
+    a lever that is to follow a play as heavy as its finger, or the gap's ends would be too soft for both."""
     for tendon in root.iterfind("tendon/fixed"):
         finger, *lever = (j.get("joint") for j in tendon.findall("joint"))
         if not tendon.get("name", "").endswith("_push") or not {follower, driver} & {finger, *lever}:
@@ -68,7 +80,9 @@ def _hold_firmly(root: Any, follower: str, driver: str) -> None:
         stiffness, damping = float(tendon.get("stiffness")), float(tendon.get("damping"))
         rate = 2 * stiffness / damping  # critically damped
         if follower in lever:
-            next(j for j in root.find("worldbody").iter("joint") if j.get("name") == follower).set("armature", repr(stiffness / rate**2))
+            next(j for j in root.find("worldbody").iter("joint") if j.get("name") == follower).set(
+                "armature", repr(stiffness / rate**2)
+            )
         more = max(FIRM_RATE / rate, 1.0)
         tendon.set("stiffness", repr(stiffness * more**2))
         tendon.set("damping", repr(damping * more))
@@ -85,7 +99,8 @@ def write_play(root: Any, equality: Any, gap: float) -> str:
 
 
 def write_bound(root: Any, equality: Any, side: int, at: float, passing: float = 0.0) -> str:
-    """The input follows the driver up to `at` (side 1) or down to it (side -1), and a share `passing` of the motion beyond;
+    """The input follows the driver up to `at` (side 1) or down to it (side -1), and a share `passing` of the motion
+    beyond;
     a spring holds it on the driver elsewhere. `at` in the driver's unit. Path of the tendon that bounds it."""
     driver, name = _put_between(root, equality)
     inertia = _inertia(root, equality)
@@ -114,11 +129,17 @@ def _inertia(root: Any, equality: Any) -> float:
 
 
 def settle(root: Any, pose: dict[str, float]) -> None:
-    """Put every input joint of `pose` (joint -> coordinate, changed in place) within its tendons, near its driver, and every
-    follower on its map."""
-    tendons = [(float(t.get("range").split()[0]), float(t.get("range").split()[1]),
-                {j.get("joint"): float(j.get("coef")) for j in t.findall("joint")})
-               for t in root.iterfind("tendon/fixed") if t.get("range")]
+    """Put every input joint of `pose` (joint -> coordinate, changed in place) within its tendons, near its driver, and
+    every follower on its map."""
+    tendons = [
+        (
+            float(t.get("range").split()[0]),
+            float(t.get("range").split()[1]),
+            {j.get("joint"): float(j.get("coef")) for j in t.findall("joint")},
+        )
+        for t in root.iterfind("tendon/fixed")
+        if t.get("range")
+    ]
     for equality in root.iterfind("equality/joint"):
         driver = equality.get("joint2")
         if driver not in pose:

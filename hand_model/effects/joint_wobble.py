@@ -28,7 +28,8 @@ class JointWobble(Effect):
         return f"{joint} tilts by up to {tilt_deg:.2f} deg about a second axis as its angle grows"
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
-        """Its joints are the segment's own, from the course in hand.json: where they are; None in a file without them."""
+        """Its joints are the segment's own, from the course in hand.json: where they are; None in a file without
+        them."""
         return extra_joint(root, where, "wobble")
 
 

@@ -9,10 +9,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Moment:
-    """One instant of a drive. time_s: since the simulation began [s]. step_s: since the last instant [s], zero where the same
-    instant is asked again. position [%], velocity [%/s]. direction: of friction in [-1, 1], a bristle of length `give` [%].
-    load: what the motor delivers [raw]. gravity_along, gravity_across: in the plane of the finger's first joint, along the open finger
-    and where flexion takes it [m/s^2]. Of a follower: position in the driver's unit [%] or [deg], slope of its map there [rad per that unit]."""
+    """One instant of a drive. time_s: since the simulation began [s]. step_s: since the last instant [s], zero where
+    the same instant is asked again. position [%], velocity [%/s]. direction: of friction in [-1, 1], a bristle of
+    length `give` [%].
+    load: what the motor delivers [raw]. gravity_along, gravity_across: in the plane of the finger's first joint, along
+    the open finger and where flexion takes it [m/s^2]. Of a follower: position in the driver's unit [%] or [deg], slope
+    of its map there [rad per that unit]."""
 
     time_s: float
     step_s: float
@@ -32,7 +34,8 @@ Law = Callable[[Moment], float]
 
 
 class Bristle:
-    """Dahl friction state in [-1, 1], step by step: dz/ds = (1 - z sign(ds)) / length, exact for each step (Dahl 1968)."""
+    """Dahl friction state in [-1, 1], step by step: dz/ds = (1 - z sign(ds)) / length, exact for each step (Dahl
+    1968)."""
 
     def __init__(self, length: float) -> None:
         self.length, self.state, self.last = max(length, 1e-9), 0.0, math.nan

@@ -17,7 +17,10 @@ class LinkageCompliance(Compliance):
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """How far the segment stays back, at which end."""
-        give, end = figure(100 * parameters["compliance"]), "of the joint before it" if parameters["form"] == 0.0 else "of its own"
+        give, end = (
+            figure(100 * parameters["compliance"]),
+            "of the joint before it" if parameters["form"] == 0.0 else "of its own",
+        )
         segment = where.get("joint") or "distal"
         return f"the linkage gives: the {segment} segment stays back by {give} deg {end} for every 100 raw of the motor's load"
 

@@ -26,11 +26,15 @@ class LoadDependentFriction(Effect):
         load = np.abs(state.extra["load"]) if "load" in state.extra else state.position
         return (state.direction * load)[:, None]
 
-    def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
-                   declared: Mapping[str, float]) -> dict[str, float]:
+    def parameters(
+        self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]
+    ) -> dict[str, float]:
         """Friction per unit of load (coefficient), from friction per position and the spring's stiffness."""
         spring = declared.get("spring", np.nan)
-        return {"load_coefficient": amplitude["per_load"] / spring if spring else np.nan, "per_load": amplitude["per_load"]}
+        return {
+            "load_coefficient": amplitude["per_load"] / spring if spring else np.nan,
+            "per_load": amplitude["per_load"],
+        }
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """Friction over the whole range, and as a part of the spring's load."""

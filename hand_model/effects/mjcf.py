@@ -9,8 +9,8 @@ SHORT_BRISTLE = 0.1  # in the joint's unit, percent: Coulomb friction to any enc
 
 
 def motor_joint(root: Any, where: Mapping[str, Any]) -> tuple[Any, float] | None:
-    """The motor joint (coordinate in percent) of `where["actuator"]` in an MJCF tree (lxml), and the file's effort per raw
-    unit of current; None where the file has no identified motor of that name."""
+    """The motor joint (coordinate in percent) of `where["actuator"]` in an MJCF tree (lxml), and the file's effort per
+    raw unit of current; None where the file has no identified motor of that name."""
     name = where.get("actuator")
     drive = next((a for a in root.iterfind("actuator/*") if isinstance(a.tag, str) and a.get("name") == name), None)
     unit = next((e for e in root.iterfind("custom/numeric") if e.get("name") == f"{name}_effort_per_raw"), None)
@@ -35,12 +35,13 @@ def free_name(root: Any, name: str) -> str:
 
 
 def lugre_friction(root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
-    """Give the motor joint the LuGre friction of a passive `dcmotor`, in place of its `frictionloss` or of such an element that is
-    there; its path, or None without friction.
+    """Give the motor joint the LuGre friction of a passive `dcmotor`, in place of its `frictionloss` or of such an
+    element that is there; its path, or None without friction.
 
-    parameters: bristle_length (give before sliding) and stribeck_speed in the joint's unit; bristle_time [s]: damping over stiffness;
-    coulomb_ratio and static_ratio (sliding and static friction over the Coulomb friction that is there). What is not given stays, or is a
-    short bristle without excess.
+    parameters: bristle_length (give before sliding) and stribeck_speed in the joint's unit; bristle_time [s]: damping
+    over stiffness;
+    coulomb_ratio and static_ratio (sliding and static friction over the Coulomb friction that is there). What is not
+    given stays, or is a short bristle without excess.
     """
     found = motor_joint(root, where)
     if found is None:
@@ -63,11 +64,14 @@ def lugre_friction(root: Any, where: Mapping[str, Any], parameters: Mapping[str,
     static = max(sliding, coulomb * parameters.get("static_ratio", static / coulomb))
     stiffness = coulomb / parameters.get("bristle_length", length)
     damping = stiffness * parameters.get("bristle_time", time_s)
-    return bristle_friction(root, joint, name, (stiffness, damping, sliding, static, parameters.get("stribeck_speed", speed)))
+    return bristle_friction(
+        root, joint, name, (stiffness, damping, sliding, static, parameters.get("stribeck_speed", speed))
+    )
 
 
 def add_damping(joint: Any, linear: float, quadratic: float) -> bool:
-    """Add to a joint's `damping`, whose force is -(a v + b v |v| + c v^3); False, and nothing done, where `a` would fall below zero."""
+    """Add to a joint's `damping`, whose force is -(a v + b v |v| + c v^3); False, and nothing done, where `a` would
+    fall below zero."""
     a, b, c = ([float(x) for x in (joint.get("damping") or "0").split()] + [0.0, 0.0])[:3]
     if a + linear < 0:
         return False
@@ -81,7 +85,8 @@ def joint_tendon(root: Any, joint: Any, name: str, **attributes: Any) -> str:
 
 
 def fixed_tendon(root: Any, name: str, coefficients: Mapping[str, float], **attributes: Any) -> str:
-    """A fixed tendon, its length the sum of coefficient times joint; attributes: numbers or tuples of them. Its path."""
+    """A fixed tendon, its length the sum of coefficient times joint; attributes: numbers or tuples of them. Its
+    path."""
     from lxml import etree
 
     texts = {k: " ".join(repr(float(x)) for x in (v if isinstance(v, tuple) else (v,))) for k, v in attributes.items()}
@@ -92,19 +97,26 @@ def fixed_tendon(root: Any, name: str, coefficients: Mapping[str, float], **attr
 
 
 def bristle_friction(root: Any, joint: Any, name: str, lugre: tuple[float, ...]) -> str:
-    """A passive DC motor with LuGre friction (bristle stiffness and damping, Coulomb and static level, Stribeck speed); its path."""
+    """A passive DC motor with LuGre friction (bristle stiffness and damping, Coulomb and static level, Stribeck speed);
+    its path."""
     from lxml import etree
 
     free = free_name(root, name)
-    motor = {"name": free, "joint": joint.get("name"), "input": "none", "motorconst": "0 0", "resistance": "1",
-             "lugre": " ".join(repr(float(v)) for v in lugre)}
+    motor = {
+        "name": free,
+        "joint": joint.get("name"),
+        "input": "none",
+        "motorconst": "0 0",
+        "resistance": "1",
+        "lugre": " ".join(repr(float(v)) for v in lugre),
+    }
     etree.SubElement(section(root, "actuator"), "dcmotor", motor)
     return f"actuator/dcmotor[@name='{free}']"
 
 
 def motor_sensor(root: Any, where: Mapping[str, Any], kind: str) -> Any:
-    """The sensor `<actuator>_current` (the drive's force) or `<actuator>_encoder` (the motor joint's position), made where it is
-    missing; None where the file has no such motor."""
+    """The sensor `<actuator>_current` (the drive's force) or `<actuator>_encoder` (the motor joint's position), made
+    where it is missing; None where the file has no such motor."""
     from lxml import etree
 
     found = motor_joint(root, where)
@@ -113,8 +125,10 @@ def motor_sensor(root: Any, where: Mapping[str, Any], kind: str) -> Any:
     name = f"{where['actuator']}_{kind}"
     sensor = next((s for s in root.iterfind("sensor/*") if isinstance(s.tag, str) and s.get("name") == name), None)
     if sensor is None:
-        tag, key, value = {"current": ("actuatorfrc", "actuator", where["actuator"]),
-                           "encoder": ("jointpos", "joint", found[0].get("name"))}[kind]
+        tag, key, value = {
+            "current": ("actuatorfrc", "actuator", where["actuator"]),
+            "encoder": ("jointpos", "joint", found[0].get("name")),
+        }[kind]
         sensor = etree.SubElement(section(root, "sensor"), tag, {"name": free_name(root, name), key: value})
     return sensor
 

@@ -23,10 +23,13 @@ class MovingCentre(Effect):
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """The longest way."""
         joint = f"the {where['joint']} joint" if where.get("joint") else "a joint"
-        return f"the centre of rotation of {joint} travels by up to {1e3 * parameters['travel']:.2f} mm as the angle grows"
+        return (
+            f"the centre of rotation of {joint} travels by up to {1e3 * parameters['travel']:.2f} mm as the angle grows"
+        )
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
-        """Its joints are the segment's own, from the course in hand.json: where they are; None in a file without them."""
+        """Its joints are the segment's own, from the course in hand.json: where they are; None in a file without
+        them."""
         return extra_joint(root, where, "travel")
 
 

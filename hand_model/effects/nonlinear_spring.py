@@ -14,7 +14,8 @@ from .mjcf import joint_tendon, motor_joint
 
 
 class NonlinearSpring(Effect):
-    """Beyond the declared line: b x^2 + c x^3 (form 0), or another stiffness from a knee on, c max(0, x - knee) (form 1).
+    """Beyond the declared line: b x^2 + c x^3 (form 0), or another stiffness from a knee on, c max(0, x - knee) (form
+    1).
 
     A knee lies in the inner part of the range; what bends in the outer third is an end stop.
     """
@@ -25,8 +26,16 @@ class NonlinearSpring(Effect):
         """Smooth or with a knee, and where that lies."""
         low, high = position_range(states)
         span = high - low
-        return (Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),
-                Shape("knee", states[0].position_unit, low + 0.15 * span, high - span / 3, tuple(low + span * np.linspace(0.2, 0.65, 7))))
+        return (
+            Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),
+            Shape(
+                "knee",
+                states[0].position_unit,
+                low + 0.15 * span,
+                high - span / 3,
+                tuple(low + span * np.linspace(0.2, 0.65, 7)),
+            ),
+        )
 
     def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
         """One smooth spring, and every knee."""
@@ -35,8 +44,10 @@ class NonlinearSpring(Effect):
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Quadratic and cubic stiffness, or, with a knee, none and the change of stiffness; either sign."""
-        return (("quadratic_stiffness", "effort/position^2", -np.inf, np.inf),
-                ("cubic_stiffness", "effort/position^3", -np.inf, np.inf))
+        return (
+            ("quadratic_stiffness", "effort/position^2", -np.inf, np.inf),
+            ("cubic_stiffness", "effort/position^3", -np.inf, np.inf),
+        )
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """x^2 and x^3, or nothing and the way beyond the knee, (n, 2), x in the drive's unit."""
@@ -45,8 +56,9 @@ class NonlinearSpring(Effect):
             return np.stack([np.zeros(len(x)), np.maximum(x - shape["knee"], 0.0)], axis=-1)
         return np.stack([x**2, x**3], axis=-1)
 
-    def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
-                   declared: Mapping[str, float]) -> dict[str, float]:
+    def parameters(
+        self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]
+    ) -> dict[str, float]:
         """The two stiffnesses of a smooth spring; the knee and the stiffness that begins there."""
         if shape.get("form", 0.0) > 0.5:
             return {"form": 1.0, "knee": shape["knee"], "stiffness_beyond": amplitude["cubic_stiffness"]}
@@ -57,7 +69,8 @@ class NonlinearSpring(Effect):
         return {"stiffness_beyond": "effort/position", "bend": "effort"}
 
     def derived(self, states: tuple[DriveState, ...], parameters: Mapping[str, float]) -> dict[str, float]:
-        """Half of the band about a straight line in which the spring's load stays over the recorded range: what it is bent by."""
+        """Half of the band about a straight line in which the spring's load stays over the recorded range: what it is
+        bent by."""
         x = np.linspace(*position_range(states), 101)
         if parameters["form"] > 0.5:
             load = parameters["stiffness_beyond"] * np.maximum(x - parameters["knee"], 0.0)
@@ -69,18 +82,23 @@ class NonlinearSpring(Effect):
         """Where it is stiffer or softer, and by how much."""
         if parameters["form"] > 0.5:
             change = parameters["stiffness_beyond"]
-            return f"beyond {parameters['knee']:.1f} % the return spring is {figure(abs(change))} raw/% {_stiffer(change)}"
+            return (
+                f"beyond {parameters['knee']:.1f} % the return spring is {figure(abs(change))} raw/% {_stiffer(change)}"
+            )
         square, cubic = parameters["quadratic_stiffness"], parameters["cubic_stiffness"]
         turn = -square / (3 * cubic) if cubic else math.inf  # where the stiffness is largest or smallest
         if 0 < turn < 100:
             early, late = square * turn, cubic * (100 - turn) ** 2 * 3
-            return (f"the return spring is {figure(abs(early))} raw/% {_stiffer(early)} at {turn:.1f} % than at 0 %, "
-                    f"and {figure(abs(late))} raw/% {_stiffer(late)} at 100 % than there")
+            return (
+                f"the return spring is {figure(abs(early))} raw/% {_stiffer(early)} at {turn:.1f} % than at 0 %, "
+                f"and {figure(abs(late))} raw/% {_stiffer(late)} at 100 % than there"
+            )
         change = 200 * square + 3e4 * cubic
         return f"the return spring is {figure(abs(change))} raw/% {_stiffer(change)} at 100 % than at 0 %"
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
-        """`stiffness` and `springref`: k x + p + b x^2 + c x^3 around its root r; MuJoCo's force is -(A y + B y^2 + C y^3), y = x - r.
+        """`stiffness` and `springref`: k x + p + b x^2 + c x^3 around its root r; MuJoCo's force is -(A y + B y^2 + C
+        y^3), y = x - r.
         A knee: a fixed tendon that is slack until there."""
         found = motor_joint(root, where)
         if found is None:
@@ -89,7 +107,11 @@ class NonlinearSpring(Effect):
         if parameters.get("form", 0.0) > 0.5:
             stiffness = unit * parameters["stiffness_beyond"]
             name = f"{where['actuator']}_spring"
-            return joint_tendon(root, joint, name, springlength=(-1e6, parameters["knee"]), stiffness=stiffness) if stiffness >= 0 else None
+            return (
+                joint_tendon(root, joint, name, springlength=(-1e6, parameters["knee"]), stiffness=stiffness)
+                if stiffness >= 0
+                else None
+            )
         square, cubic = unit * parameters.get("quadratic_stiffness", 0.0), unit * parameters["cubic_stiffness"]
         linear = float((joint.get("stiffness") or "0").split()[0])
         preload = -linear * float(joint.get("springref") or 0.0)

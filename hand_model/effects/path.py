@@ -36,7 +36,8 @@ def turning_points(position: Array, threshold: float) -> list[int]:
 
 
 def default_threshold(position: Array) -> float:
-    """Reversals below this are noise: six standard deviations of the sample-to-sample jitter, at least 0.5 % of the span."""
+    """Reversals below this are noise: six standard deviations of the sample-to-sample jitter, at least 0.5 % of the
+    span."""
     x = np.asarray(position, float)
     if len(x) < 5:
         return 0.0
@@ -105,7 +106,8 @@ def dahl(position: Array, length: float, start: float = 0.0, threshold: float | 
 
 
 def jenkins(position: Array, length: float, start: float = 0.0, threshold: float | None = None) -> Array:
-    """Jenkins element state (n,) in [-1, 1]: an elastic element of reach `length` [position unit] that yields (stop operator)."""
+    """Jenkins element state (n,) in [-1, 1]: an elastic element of reach `length` [position unit] that yields (stop
+    operator)."""
     x = np.asarray(position, float)
     out = np.empty(len(x))
     z = start

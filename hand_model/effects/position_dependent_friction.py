@@ -22,8 +22,12 @@ class PositionDependentFriction(Effect):
         """Centre over the range, width from 2 % to 25 % of it."""
         low, high = position_range(states)
         span, unit = high - low, states[0].position_unit
-        return (Shape("centre", unit, low + 0.03 * span, high - 0.03 * span, tuple(low + span * np.linspace(0.05, 0.95, 19))),
-                Shape("width", unit, 0.015 * span, 0.25 * span, (0.03 * span, 0.06 * span, 0.12 * span)))
+        return (
+            Shape(
+                "centre", unit, low + 0.03 * span, high - 0.03 * span, tuple(low + span * np.linspace(0.05, 0.95, 19))
+            ),
+            Shape("width", unit, 0.015 * span, 0.25 * span, (0.03 * span, 0.06 * span, 0.12 * span)),
+        )
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Extra friction at the centre, never negative."""
@@ -34,8 +38,9 @@ class PositionDependentFriction(Effect):
         bell = np.exp(-0.5 * ((state.friction_position - shape["centre"]) / shape["width"]) ** 2)
         return (state.direction * bell)[:, None]
 
-    def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
-                   declared: Mapping[str, float]) -> dict[str, float]:
+    def parameters(
+        self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]
+    ) -> dict[str, float]:
         """Bell and its height, also as a ratio to Coulomb friction."""
         return {**shape, **amplitude, "ratio": amplitude["extra_friction"] / (declared.get("coulomb") or np.nan)}
 
@@ -47,9 +52,13 @@ class PositionDependentFriction(Effect):
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """Where, how large, and against the friction elsewhere."""
         at, width, extra = parameters["centre"], parameters["width"], parameters["extra_friction"]
-        ratio = f", {figure(parameters['ratio'])} times the Coulomb friction" if parameters.get("ratio", 0.0) > 0 else ""
-        return (f"a tight spot between {at - 2 * width:.1f} and {at + 2 * width:.1f} %: up to {figure(extra)} raw more friction "
-                f"both ways{ratio}, most at {at:.1f} %")
+        ratio = (
+            f", {figure(parameters['ratio'])} times the Coulomb friction" if parameters.get("ratio", 0.0) > 0 else ""
+        )
+        return (
+            f"a tight spot between {at - 2 * width:.1f} and {at + 2 * width:.1f} %: up to {figure(extra)} raw more friction "
+            f"both ways{ratio}, most at {at:.1f} %"
+        )
 
     def law(self, parameters: Mapping[str, float]) -> Law:
         """Friction under a bell, read where the bristles are."""

@@ -15,23 +15,32 @@ FULL_SPEED = 100.0  # a range of 100 % in a second
 
 
 class PreslidingFriction(Effect):
-    """The declared Coulomb friction builds up over a distance instead of at once: dz/ds = (1 - z sign(ds)) / length, with z + time dz/dt in
-    its place where the bristles are damped (form 0), or evenly, as a stiff bristle that then breaks away (form 1; Dupont 2002).
+    """The declared Coulomb friction builds up over a distance instead of at once: dz/ds = (1 - z sign(ds)) / length,
+    with z + time dz/dt in its place where the bristles are damped (form 0), or evenly, as a stiff bristle that then
+    breaks away (form 1; Dupont 2002).
     """
 
     name = "presliding_friction"
     replaces = "coulomb"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """Bristle length: from what is granted to any drive of the session (or 1.2 % of the range) to a third of it; their damping over their
-        stiffness."""
+        """Bristle length: from what is granted to any drive of the session (or 1.2 % of the range) to a third of it;
+        their damping over their stiffness."""
         low, high = position_range(states)
         span = high - low
         granted = states[0].extra.get("granted")
         least = 0.012 * span if granted is None else float(np.max(granted))
-        return (Shape("bristle_length", states[0].position_unit, least, 0.35 * span,
-                      tuple(np.geomspace(1.1 * least, 0.25 * span, 11))),
-                Shape("bristle_time", "s", 0.0, 0.1, (0.0, 0.03)), Shape("form", "1", 0.0, 1.0, (0.0, 1.0)))
+        return (
+            Shape(
+                "bristle_length",
+                states[0].position_unit,
+                least,
+                0.35 * span,
+                tuple(np.geomspace(1.1 * least, 0.25 * span, 11)),
+            ),
+            Shape("bristle_time", "s", 0.0, 0.1, (0.0, 0.03)),
+            Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),
+        )
 
     def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
         """What breaks away is not damped."""
@@ -55,15 +64,20 @@ class PreslidingFriction(Effect):
         out[:, place] = z + _time(shape) * rate
         return out
 
-    def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
-                   declared: Mapping[str, float]) -> dict[str, float]:
+    def parameters(
+        self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]
+    ) -> dict[str, float]:
         """Length, and damping over stiffness as far as it counts."""
         return {**shape, "bristle_time": _time(shape)}
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """The way over which friction turns over."""
         length = parameters["bristle_length"]
-        way = f"it turns over within {2 * length:.1f} %" if parameters.get("form") else f"two thirds of it turn over within {length:.1f} %"
+        way = (
+            f"it turns over within {2 * length:.1f} %"
+            if parameters.get("form")
+            else f"two thirds of it turn over within {length:.1f} %"
+        )
         return f"the drive gives before it slides: after a reversal friction needs a way, {way} of travel"
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
@@ -72,8 +86,8 @@ class PreslidingFriction(Effect):
 
 
 def _time(shape: Mapping[str, float]) -> float:
-    """Damping over stiffness [s], at most what lets friction turn over at once at full speed: beyond, bristles would give nothing, and it is
-    the estimate of starts that is described."""
+    """Damping over stiffness [s], at most what lets friction turn over at once at full speed: beyond, bristles would
+    give nothing, and it is the estimate of starts that is described."""
     return min(shape.get("bristle_time", 0.0), shape["bristle_length"] / FULL_SPEED)
 
 

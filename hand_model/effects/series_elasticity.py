@@ -17,7 +17,10 @@ class SeriesElasticity(Compliance):
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """How far the segment stays back, at which end."""
-        give, end = figure(100 * parameters["compliance"]), "% of the encoder's range" if parameters["form"] == 0.0 else "deg"
+        give, end = (
+            figure(100 * parameters["compliance"]),
+            "% of the encoder's range" if parameters["form"] == 0.0 else "deg",
+        )
         segment = where.get("joint") or "proximal"
         return f"the drive train gives: the {segment} segment stays back by {give} {end} for every 100 raw of the motor's load"
 

@@ -23,11 +23,15 @@ class Sinusoid(Effect):
         phase = 2 * np.pi * state.position / shape["period"]
         return np.stack([np.sin(phase), np.cos(phase)], axis=-1)
 
-    def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
-                   declared: Mapping[str, float]) -> dict[str, float]:
+    def parameters(
+        self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]
+    ) -> dict[str, float]:
         """Amplitude, period and phase [rad]."""
-        return {"amplitude": float(np.hypot(amplitude["sine"], amplitude["cosine"])), "period": shape["period"],
-                "phase": float(np.arctan2(amplitude["cosine"], amplitude["sine"]))}
+        return {
+            "amplitude": float(np.hypot(amplitude["sine"], amplitude["cosine"])),
+            "period": shape["period"],
+            "phase": float(np.arctan2(amplitude["cosine"], amplitude["sine"])),
+        }
 
     def units(self, shape: Mapping[str, float]) -> Mapping[str, str]:
         """Amplitude as the effort, phase as an angle."""

@@ -16,15 +16,25 @@ class SpringDecoupling(Effect):
 
     name = "spring_decoupling"
     station = "encoder"
-    unwritten = "the finger runs ahead under a force from outside, which no recording holds; the compiled push tendon lets it"
+    unwritten = (
+        "the finger runs ahead under a force from outside, which no recording holds; the compiled push tendon lets it"
+    )
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """form 0: for a while, "ahead" in `extra`; form 1: below an encoder position, at which the finger stays behind."""
+        """form 0: for a while, "ahead" in `extra`; form 1: below an encoder position, at which the finger stays
+        behind."""
         low, high = position_range(states)
         span = high - low
-        return (Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),
-                Shape("below", states[0].position_unit, low + 0.01 * span, low + 0.6 * span,
-                      tuple(low + span * np.linspace(0.03, 0.5, 12))))
+        return (
+            Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),
+            Shape(
+                "below",
+                states[0].position_unit,
+                low + 0.01 * span,
+                low + 0.6 * span,
+                tuple(low + span * np.linspace(0.03, 0.5, 12)),
+            ),
+        )
 
     def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
         """One start for what passes, several for the open end."""
@@ -55,15 +65,19 @@ class SpringDecoupling(Effect):
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """When the finger runs ahead, or where it stays behind."""
         if parameters["form"] > 0.5:
-            return (f"below {parameters['below']:.1f} % of the encoder's range the finger does not follow its motor open: it stays bent by "
-                    f"{figure(parameters['lead'])} deg more for every %")
+            return (
+                f"below {parameters['below']:.1f} % of the encoder's range the finger does not follow its motor open: it stays bent by "
+                f"{figure(parameters['lead'])} deg more for every %"
+            )
         times = (where.get("region") or {}).get("time") or {}
         spans = [(b - a, a, b, trial) for trial, some in times.items() for a, b in some]
         if not spans:
             return "the finger leaves its actuator and runs ahead of it for a while"
         _, begin, end, trial = max(spans)
         longest = "" if len(spans) == 1 else f"{len(spans)} times, longest "
-        return f"the finger leaves its actuator and runs ahead of it, {longest}from {begin:.1f} to {end:.1f} s of {trial}"
+        return (
+            f"the finger leaves its actuator and runs ahead of it, {longest}from {begin:.1f} to {end:.1f} s of {trial}"
+        )
 
 
 def spans(state: DriveState) -> list[list[float]]:

@@ -16,8 +16,8 @@ MOVING = 1.0  # %/s: below, a drive is at rest
 
 
 class ThermalFrictionDrift(Effect):
-    """F = sign(v) A (1 - h): the change still to come. h rises to 1 with the time since the session began (form 0), or with the
-    time in motion, and falls back at rest between recordings (form 1).
+    """F = sign(v) A (1 - h): the change still to come. h rises to 1 with the time since the session began (form 0), or
+    with the time in motion, and falls back at rest between recordings (form 1).
     """
 
     name = "thermal_friction_drift"
@@ -27,9 +27,11 @@ class ThermalFrictionDrift(Effect):
         """Warm-up time between 5 s and four times the session, cooling time at rest, form."""
         total = max(max(float(s.elapsed_s[-1]) for s in states), 10.0)
         forms = (0.0, 1.0) if all("moving" in s.extra for s in states) else (0.0,)
-        return (Shape("form", "1", 0.0, 1.0, forms),
-                Shape("warm_up_time", "s", 5.0, 4 * total, tuple(np.geomspace(max(5.0, 0.04 * total), 2 * total, 7))),
-                Shape("cooling_time", "s", 2.0, 40 * total, (5.0, 25.0, 60.0, 120.0, 400.0)))
+        return (
+            Shape("form", "1", 0.0, 1.0, forms),
+            Shape("warm_up_time", "s", 5.0, 4 * total, tuple(np.geomspace(max(5.0, 0.04 * total), 2 * total, 7))),
+            Shape("cooling_time", "s", 2.0, 40 * total, (5.0, 25.0, 60.0, 120.0, 400.0)),
+        )
 
     def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
         """Nothing cools in form 0."""
@@ -48,8 +50,9 @@ class ThermalFrictionDrift(Effect):
             return (state.direction * np.exp(-state.elapsed_s / shape["warm_up_time"]))[:, None]
         return (state.direction * _cold(state, shape["warm_up_time"], shape["cooling_time"]))[:, None]
 
-    def parameters(self, shape: Mapping[str, float], amplitude: Mapping[str, float],
-                   declared: Mapping[str, float]) -> dict[str, float]:
+    def parameters(
+        self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]
+    ) -> dict[str, float]:
         """Cold excess, also as a ratio to the warm Coulomb friction, and the times."""
         return {**amplitude, **shape, "ratio": amplitude["cold_excess"] / (declared.get("coulomb") or np.nan)}
 
@@ -60,7 +63,9 @@ class ThermalFrictionDrift(Effect):
         if parameters["form"] < 0.5:
             return f"{cold} settles with a time constant of {warm_up} s from the session's first sample on"
         cooling = figure(parameters["cooling_time"])
-        return f"{cold} settles with a time constant of {warm_up} s in motion; at rest it returns with one of {cooling} s"
+        return (
+            f"{cold} settles with a time constant of {warm_up} s in motion; at rest it returns with one of {cooling} s"
+        )
 
     def started(self, state: DriveState, parameters: Mapping[str, float]) -> dict[str, float]:
         """Share of the excess that is left when a recording begins."""

@@ -24,8 +24,9 @@ HOLD = 1.0  # kg m^2 of armature on a prescribed joint: some 1e5 times a finger,
 
 @dataclass(frozen=True)
 class Model:
-    """A MuJoCo model. joints: its hinges and slides. points: sites and bodies without joints, by name. courses: joint id -> (driver's
-    id, polycoef (5,)) of those that an equality ties to another one of their body: where they are not given, they follow it."""
+    """A MuJoCo model. joints: its hinges and slides. points: sites and bodies without joints, by name. courses: joint
+    id -> (driver's id, polycoef (5,)) of those that an equality ties to another one of their body: where they are not
+    given, they follow it."""
 
     mj: Any
     joints: tuple[str, ...]
@@ -220,8 +221,8 @@ def _roll(mj: Any, prescribed: list[int], grid: Array, spline: Any) -> tuple[Arr
 
 @contextmanager
 def divergence() -> Iterator[list[str]]:
-    """What MuJoCo says of states that are no numbers or too large, after which it goes on from the model's own start; unheard it
-    would write that to a file in the user's folder."""
+    """What MuJoCo says of states that are no numbers or too large, after which it goes on from the model's own start;
+    unheard it would write that to a file in the user's folder."""
     import mujoco
 
     said: list[str] = []

@@ -1,8 +1,8 @@
 """Pinocchio: kinematics of a URDF or MJCF. Mimic is not left to it: every joint's angle is passed (it refuses chains of
 mimics).
 
-Its MJCF parser makes one composite joint of the joints of a body, under the first one's name, and drops the equalities: names and ties
-(those of a course, between joints of one body) are read from the file beside it.
+Its MJCF parser makes one composite joint of the joints of a body, under the first one's name, and drops the equalities:
+names and ties (those of a course, between joints of one body) are read from the file beside it.
 """
 
 from __future__ import annotations
@@ -25,8 +25,9 @@ COMPOSITE = "Composite_"  # what its parser puts before the name of a body's fir
 
 @dataclass(frozen=True)
 class Model:
-    """A Pinocchio model. joints: those with one angle, and the parts of composite ones; address: their places in q. frames: name ->
-    (parent joint id, placement (4, 4)); links: names of bodies, points: names of sites and of links without a joint of their own.
+    """A Pinocchio model. joints: those with one angle, and the parts of composite ones; address: their places in q.
+    frames: name -> (parent joint id, placement (4, 4)); links: names of bodies, points: names of sites and of links
+    without a joint of their own.
     courses: joint -> (driver, polycoef (5,)) of those that follow another one of their body."""
 
     pin: Any

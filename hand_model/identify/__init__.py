@@ -1,4 +1,5 @@
-"""Session -> Hand: rigid bodies and probe, frames, axes, centres, the whole chain, clocks, encoder maps, linkages, surfaces."""
+"""Session -> Hand: rigid bodies and probe, frames, axes, centres, the whole chain, clocks, encoder maps, linkages,
+surfaces."""
 
 from .identification import Identification, identify, identify_all
 from .surface import Surface, identify_surfaces

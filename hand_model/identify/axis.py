@@ -11,7 +11,8 @@ Array = NDArray[np.float64]
 
 
 def gamage_lasenby_axis(position: ArrayLike) -> Array:
-    """Axis (3,) unit, sign arbitrary, of markers (n, m, 3) that turn about a fixed line; frames with gaps are left out per marker.
+    """Axis (3,) unit, sign arbitrary, of markers (n, m, 3) that turn about a fixed line; frames with gaps are left out
+    per marker.
 
     Smallest singular vector of sum over markers of E[v v'] - E[v] E[v]' (Gamage & Lasenby 2002, J. Biomech. 35, eq. 8).
     Raises IdentificationError where fewer than three frames show a marker.
@@ -29,10 +30,10 @@ def gamage_lasenby_axis(position: ArrayLike) -> Array:
 def dominant_axis(position: ArrayLike, start_axis: ArrayLike, start_centre: ArrayLike) -> tuple[Array, Array]:
     """Axis (3,) and centre (3,) of the cylinders on which markers (n, m, 3) [m] move: planar plus radial cost.
 
-    Minimises over axis a, point c, and per marker the plane height and the radius, the squared distance of every sample from
-    its circle: (a . (v - c) - h)^2 + (|v - c - a a.(v - c)| - r)^2 (Chang & Pollard 2007, J. Biomech. 40, "Robust estimation
-    of dominant axis of rotation", eq. 3 to 8). Heights and radii are eliminated (they are means). Starts near start_axis [-],
-    start_centre [m]; the centre returned is the point of the axis nearest to start_centre.
+    Minimises over axis a, point c, and per marker the plane height and the radius, the squared distance of every sample
+    from its circle: (a . (v - c) - h)^2 + (|v - c - a a.(v - c)| - r)^2 (Chang & Pollard 2007, J. Biomech. 40, "Robust
+    estimation of dominant axis of rotation", eq. 3 to 8). Heights and radii are eliminated (they are means). Starts
+    near start_axis [-], start_centre [m]; the centre returned is the point of the axis nearest to start_centre.
     """
     from scipy.optimize import least_squares
 

@@ -1,7 +1,8 @@
 """How far the information matrix can be trusted: parametric bootstrap of the chain estimate on short arcs.
 
 With many poses to estimate beside a few shared unknowns, maximum likelihood is biased to second order in noise over arc
-(Neyman & Scott 1948). On the usual arcs that is nothing; on short ones the true error is larger than the covariance says.
+(Neyman & Scott 1948). On the usual arcs that is nothing; on short ones the true error is larger than the covariance
+says.
 Recordings of the fitted chain with the fitted noise, fitted again, show by how much.
 """
 

@@ -14,10 +14,10 @@ Array = NDArray[np.float64]
 def sphere_centre(position: ArrayLike) -> Array:
     """Common centre (3,) [m] of the spheres on which markers (n, m, 3) [m] move: normalised algebraic fit.
 
-    Each sample gives a |v|^2 + b . v + c = 0 with a and b shared and one c per marker; the normalisation |b|^2 - 4 a c = 1,
-    summed over markers, leads to D'D u = lambda C u, whose eigenvector of the smallest positive lambda is taken (Pratt's
-    normalisation; Chang & Pollard 2007, J. Biomech. 40, "Constrained least-squares optimization for robust estimation of
-    center of rotation", eq. 13 to 17). Raises IdentificationError where the motion determines no centre.
+    Each sample gives a |v|^2 + b . v + c = 0 with a and b shared and one c per marker; the normalisation |b|^2 - 4 a c
+    = 1, summed over markers, leads to D'D u = lambda C u, whose eigenvector of the smallest positive lambda is taken
+    (Pratt's normalisation; Chang & Pollard 2007, J. Biomech. 40, "Constrained least-squares optimization for robust
+    estimation of center of rotation", eq. 13 to 17). Raises IdentificationError where the motion determines no centre.
     """
     x = np.asarray(position, float)
     shift = np.nanmean(x, axis=(0, 1))
@@ -34,7 +34,11 @@ def sphere_centre(position: ArrayLike) -> Array:
     constraint[1:4, 1:4] = np.eye(3) * m
     constraint[0, 4:] = constraint[4:, 0] = -2.0
     values, vectors = scipy.linalg.eig(rows.T @ rows / len(rows), constraint)
-    real = np.isfinite(values) & (np.abs(np.imag(values)) < 1e-9 * (1 + np.abs(np.real(values)))) & (np.real(values) > -1e-12)
+    real = (
+        np.isfinite(values)
+        & (np.abs(np.imag(values)) < 1e-9 * (1 + np.abs(np.real(values))))
+        & (np.real(values) > -1e-12)
+    )
     if not real.any():
         raise IdentificationError("the markers' motion determines no centre of rotation; a larger arc is needed")
     best = np.flatnonzero(real)[np.argmin(np.real(values[real]))]

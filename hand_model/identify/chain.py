@@ -47,8 +47,8 @@ class ChainData:
 
 @dataclass(frozen=True)
 class Chain:
-    """What all frames share, at rest. marker_palm: (m, 3) [m]. axis_palm: (k, 3) unit. centre_palm: (k, 3) [m]. courses: (k,) of joints that
-    are no plain hinges; empty where all are."""
+    """What all frames share, at rest. marker_palm: (m, 3) [m]. axis_palm: (k, 3) unit. centre_palm: (k, 3) [m].
+    courses: (k,) of joints that are no plain hinges; empty where all are."""
 
     marker_palm: Array
     axis_palm: Array
@@ -79,7 +79,8 @@ class Chain:
         return self.courses[k] if self.courses else None
 
     def at(self, angle_rad: Array, body: Array) -> Chain:
-        """The chain (of plain hinges) with its zero moved to the joint angles (k,) [rad]: the same mechanism, that pose called rest."""
+        """The chain (of plain hinges) with its zero moved to the joint angles (k,) [rad]: the same mechanism, that pose
+        called rest."""
         x, _, joints = propagate(self, body, np.asarray(angle_rad, float)[None])
         return Chain(x[0], np.stack([a[0] for a, _ in joints]), np.stack([c[0] for _, c in joints]))
 
@@ -116,7 +117,8 @@ def marker_body(finger: Finger) -> NDArray[np.int64]:
 
 
 def propagate(chain: Chain, body: Array, angle_rad: Array) -> tuple[Array, Array, list[tuple[Array, Array]]]:
-    """Forward kinematics: markers (n, m, 3), body rotations (n, k + 1, 3, 3), per joint its moved axis and centre (n, 3).
+    """Forward kinematics: markers (n, m, 3), body rotations (n, k + 1, 3, 3), per joint its moved axis and centre (n,
+    3).
 
     angle_rad: (n, k). All in the palm frame, lengths in metres.
     """
@@ -147,8 +149,8 @@ def propagate(chain: Chain, body: Array, angle_rad: Array) -> tuple[Array, Array
 def jacobians(chain: Chain, body: Array, angle_rad: Array) -> tuple[Array, Array, Array, Array]:
     """Positions and their derivatives.
 
-    Returns x (n, m, 3) [m]; by frame unknowns (n, m, 3, 6 + k) as in `Pose.moved`; by marker (n, m, 3, 3): the rotation of
-    its body; by joint unknowns (n, m, 3, 4 k) as in `Chain.moved`, those of a plain hinge (a course is small).
+    Returns x (n, m, 3) [m]; by frame unknowns (n, m, 3, 6 + k) as in `Pose.moved`; by marker (n, m, 3, 3): the rotation
+    of its body; by joint unknowns (n, m, 3, 4 k) as in `Chain.moved`, those of a plain hinge (a course is small).
     """
     x, rotations, joints = propagate(chain, body, angle_rad)
     n, m, n_joints = len(x), len(body), angle_rad.shape[1]
@@ -169,7 +171,8 @@ def jacobians(chain: Chain, body: Array, angle_rad: Array) -> tuple[Array, Array
             spin, drift = ((outer @ v[..., None])[:, None, :, 0] for v in (own.spin, own.drift))
             by_frame[..., 6 + k][:, moved] = np.cross(spin, arm) + drift
         for i in range(2):
-            turn = np.cross(chain.axis_palm[k], tangent[k, i])  # tilting the axis along the tangent = turning it about this
+            # tilting the axis along the tangent = turning it about this
+            turn = np.cross(chain.axis_palm[k], tangent[k, i])
             tilt_after = np.cross((outer @ turn)[:, None], arm)
             tilt_before = np.einsum("nij,nmj->nmi", inner, np.cross(turn, arm_rest))
             by_joint[..., 4 * k + i][:, moved] = tilt_after - tilt_before
@@ -178,10 +181,11 @@ def jacobians(chain: Chain, body: Array, angle_rad: Array) -> tuple[Array, Array
 
 
 def palm_pose(chain: Chain, data: ChainData, weight: Array | None = None) -> Pose:
-    """Start values: palm by Kabsch on its markers, then each joint angle in closed form (least squares about a known line).
+    """Start values: palm by Kabsch on its markers, then each joint angle in closed form (least squares about a known
+    line).
 
-    weight: (n, m), zero to leave a marker out. A frame whose palm markers are hidden or out of shape starts from the palm pose
-    of the nearest sound frame.
+    weight: (n, m), zero to leave a marker out. A frame whose palm markers are hidden or out of shape starts from the
+    palm pose of the nearest sound frame.
     """
     n, n_joints = len(data.position_world), len(chain.axis_palm)
     w = np.isfinite(data.position_world[..., 0]) * (1.0 if weight is None else weight)

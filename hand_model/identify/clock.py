@@ -16,7 +16,8 @@ from ..errors import IdentificationError, SessionError
 
 Array = NDArray[np.float64]
 
-# Degree of the encoder map used while aligning: one above what a map may have, so that its shape does not pull on the clock.
+# Degree of the encoder map used while aligning: one above what a map may have, so that its shape does not pull on the
+# clock.
 MAP_DEGREE = 4
 # Below this share of explained variance the two recordings show no common motion.
 LEAST_EXPLAINED = 0.5
@@ -27,8 +28,8 @@ FALLING = 0.9  # counts of the other sign explain more than this, as recorded le
 class Clock:
     """log time = offset_s + rate * mocap time. rate is 1 unless the recording shows that it is not.
 
-    offset_sd_s, rate_sd: standard deviations (of the rate as estimated freely, rate_free). explained: share of the angle's
-    variance that the aligned encoder explains. lags_s, correlation: the search, for a picture.
+    offset_sd_s, rate_sd: standard deviations (of the rate as estimated freely, rate_free). explained: share of the
+    angle's variance that the aligned encoder explains. lags_s, correlation: the search, for a picture.
     """
 
     offset_s: float
@@ -54,9 +55,13 @@ def align(mocap_time_s: Array, angle_rad: Array, log_time_s: Array, counts: Arra
     seen, kept = np.isfinite(angle_rad), np.isfinite(counts) & np.isfinite(log_time_s)
     t, q, s, c = mocap_time_s[seen], angle_rad[seen], log_time_s[kept], counts[kept]
     if len(t) < 20 or len(s) < 20:
-        raise IdentificationError(f"{name}: {len(t)} marker frames and {len(s)} log samples; 20 of each are needed to align the clocks")
+        raise IdentificationError(
+            f"{name}: {len(t)} marker frames and {len(s)} log samples; 20 of each are needed to align the clocks"
+        )
     if np.ptp(c) == 0 or np.std(q) == 0:
-        raise IdentificationError(f"{name}: nothing moves; a flexion through the whole range is needed to align the clocks")
+        raise IdentificationError(
+            f"{name}: nothing moves; a flexion through the whole range is needed to align the clocks"
+        )
     lags, correlation = _correlate(t, q, s, c)
     offset, rate = float(lags[np.argmax(correlation)]), 1.0
     offset, rate, offset_sd, rate_sd, explained = _refine(t, q, s, c, offset)
@@ -78,7 +83,8 @@ def align(mocap_time_s: Array, angle_rad: Array, log_time_s: Array, counts: Arra
 
 
 def _correlate(t: Array, q: Array, s: Array, c: Array) -> tuple[Array, Array]:
-    """Correlation coefficient at every lag (log start time on the mocap clock) with at least half of the shorter overlapping."""
+    """Correlation coefficient at every lag (log start time on the mocap clock) with at least half of the shorter
+    overlapping."""
     step = max(float(np.median(np.diff(s))), float(np.median(np.diff(t))))
     a = np.interp(np.arange(t[0], t[-1], step), t, q)
     b = np.interp(np.arange(s[0], s[-1], step), s, c)
@@ -92,7 +98,10 @@ def _correlate(t: Array, q: Array, s: Array, c: Array) -> tuple[Array, Array]:
     with np.errstate(divide="ignore", invalid="ignore"):
         mean_a, mean_b = slide(a, ones_b) / overlap, slide(ones_a, b) / overlap
         covariance = slide(a, b) / overlap - mean_a * mean_b
-        spread = np.sqrt(np.maximum(slide(a**2, ones_b) / overlap - mean_a**2, 0) * np.maximum(slide(ones_a, b**2) / overlap - mean_b**2, 0))
+        spread = np.sqrt(
+            np.maximum(slide(a**2, ones_b) / overlap - mean_a**2, 0)
+            * np.maximum(slide(ones_a, b**2) / overlap - mean_b**2, 0)
+        )
         correlation = covariance / spread
     enough = overlap >= min(len(a), len(b)) / 2
     correlation = np.where(enough & (spread > 1e-3), correlation, -1.0)
@@ -101,7 +110,8 @@ def _correlate(t: Array, q: Array, s: Array, c: Array) -> tuple[Array, Array]:
 
 
 def _refine(t: Array, q: Array, s: Array, c: Array, offset: float) -> tuple[float, float, float, float, float]:
-    """Gauss-Newton on offset and rate, encoder map eliminated; standard deviations from one-second blocks (sandwich)."""
+    """Gauss-Newton on offset and rate, encoder map eliminated; standard deviations from one-second blocks
+    (sandwich)."""
     centre, spread = float(c.mean()), float(np.ptp(c)) / 2
     middle = float(t.mean())
     rate = 1.0

@@ -25,7 +25,8 @@ REST_S = 1.0
 MOST_SLIPS = 6
 # Residuals of a marker that sits on its segment are noise, alike for all; this many times larger and it does not.
 LOOSE = 1.4
-# Noise of a joint angle over the spread of that angle from which on a single start and a linearised covariance are not enough.
+# Noise of a joint angle over the spread of that angle from which on a single start and a linearised covariance are not
+# enough.
 SHORT_ARC = 0.12
 # Doubt added to an axis whose search did not settle [rad].
 UNSETTLED_RAD = 0.1
@@ -33,7 +34,8 @@ UNSETTLED_RAD = 0.1
 
 @dataclass(frozen=True)
 class FlexionRecord:
-    """One flexion trial as the chain sees it. frames: slice into the finger's frames. clock, log: None without a log."""
+    """One flexion trial as the chain sees it. frames: slice into the finger's frames. clock, log: None without a
+    log."""
 
     trial: Trial
     mocap: Mocap
@@ -47,8 +49,8 @@ class FlexionRecord:
 class FingerFit:
     """Everything learned of one finger, in the frame of the palm markers.
 
-    fit: chain and poses over all frames, angles zero at rest. covariance: (3 m + 6 k,) squared: markers, then per joint axis
-    and centre. rest: frames that define zero. slips: markers that moved on their segment.
+    fit: chain and poses over all frames, angles zero at rest. covariance: (3 m + 6 k,) squared: markers, then per joint
+    axis and centre. rest: frames that define zero. slips: markers that moved on their segment.
     """
 
     finger: Finger
@@ -86,7 +88,8 @@ def sound_frames(data: ChainData, weight: Array) -> NDArray[np.bool_]:
 def observations(session: Session, finger: Finger, mocap: Mocap) -> tuple[ChainData, tuple[Swap, ...]]:
     """Marker observations of a finger in one recording, exchanged labels put right.
 
-    Raises SessionError for a missing label, IdentificationError for a marker that is never seen or a cluster on one line.
+    Raises SessionError for a missing label, IdentificationError for a marker that is never seen or a cluster on one
+    line.
     """
     if session.palm is None:
         raise IdentificationError(f"{session.path}: the session has no palm markers")
@@ -101,18 +104,22 @@ def observations(session: Session, finger: Finger, mocap: Mocap) -> tuple[ChainD
 def identify_finger(session: Session, finger: Finger, palm_shape: Array) -> FingerFit:
     """Chain of one finger from its flexion trials that are not kept for validation.
 
-    palm_shape: (3, 3) [m] origin, medial, lateral in the frame of the palm markers. Raises IdentificationError where there is
-    no such trial or it does not hold what the chain needs.
+    palm_shape: (3, 3) [m] origin, medial, lateral in the frame of the palm markers. Raises IdentificationError where
+    there is no such trial or it does not hold what the chain needs.
     """
     trials = session.select("flexion", finger.name, validate=False)
     if not trials:
-        raise IdentificationError(f'{session.path}: finger "{finger.name}" has no flexion trial that is not kept for validation')
+        raise IdentificationError(
+            f'{session.path}: finger "{finger.name}" has no flexion trial that is not kept for validation'
+        )
     try:
         mocaps = [trial.mocap() for trial in trials]
         parts = [observations(session, finger, mocap) for mocap in mocaps]
         lengths = np.cumsum([0] + [len(mocap.time_s) for mocap in mocaps])
         data = ChainData(np.concatenate([p.position_world for p, _ in parts]), parts[0][0].body, parts[0][0].labels)
-        rest = np.concatenate([start + np.flatnonzero(m.time_s < REST_S) for start, m in zip(lengths, mocaps, strict=False)])
+        rest = np.concatenate(
+            [start + np.flatnonzero(m.time_s < REST_S) for start, m in zip(lengths, mocaps, strict=False)]
+        )
         fit, slips = _fit_with_slips(_best_fit(data, rest, palm_shape))
     except IdentificationError as error:
         raise IdentificationError(f'{trials[0].name}: finger "{finger.name}": {error}') from None
@@ -141,8 +148,8 @@ def _best_fit(data: ChainData, rest: NDArray[np.int64], palm_shape: Array) -> Ch
 
 
 def _fit_with_slips(fit: ChainFit) -> tuple[ChainFit, tuple[Slip, ...]]:
-    """The fit with every marker that slips in two, and the slips; none is sought where the chain settles neither with it nor without: what
-    moves there moves all the time."""
+    """The fit with every marker that slips in two, and the slips; none is sought where the chain settles neither with
+    it nor without: what moves there moves all the time."""
     slips: list[Slip] = []
     while len(slips) < MOST_SLIPS:
         slip = find_slip(fit)
@@ -160,7 +167,8 @@ def _fit_with_slips(fit: ChainFit) -> tuple[ChainFit, tuple[Slip, ...]]:
 
 
 def _without_loose(fit: ChainFit, columns: tuple[int, int]) -> ChainFit:
-    """The fit without that epoch of a slipped marker which does not sit on its segment: its residuals stand out from the rest."""
+    """The fit without that epoch of a slipped marker which does not sit on its segment: its residuals stand out from
+    the rest."""
     size = np.sqrt(np.nanmedian(np.sum(fit.residual_palm**2, axis=-1), axis=0))
     others = np.median(np.delete(size, columns))
     worst = max(columns, key=lambda j: size[j])
@@ -172,7 +180,8 @@ def _without_loose(fit: ChainFit, columns: tuple[int, int]) -> ChainFit:
 
 
 def _zero_at_rest(fit: ChainFit, rest: NDArray[np.int64]) -> tuple[ChainFit, Array]:
-    """The same fit with every joint at zero at rest and flexing positively; covariance (3 m + 6 k) of markers, axes, centres."""
+    """The same fit with every joint at zero at rest and flexing positively; covariance (3 m + 6 k) of markers, axes,
+    centres."""
     good = sound_frames(fit.data, fit.weight)
     still = rest[good[rest]] if good[rest].any() else np.flatnonzero(good)[:1]
     angle = fit.pose.angle_rad
@@ -198,8 +207,8 @@ def _zero_at_rest(fit: ChainFit, rest: NDArray[np.int64]) -> tuple[ChainFit, Arr
 
 
 def _honest(covariance: Array, fit: ChainFit) -> Array:
-    """Covariance with each joint's rows and columns scaled up by what a bootstrap shows, and beyond SHORT_ARC by the square of
-    noise over arc [rad]: there the estimate can be anywhere within that."""
+    """Covariance with each joint's rows and columns scaled up by what a bootstrap shows, and beyond SHORT_ARC by the
+    square of noise over arc [rad]: there the estimate can be anywhere within that."""
     factor, ratio = variance_inflation(fit), angle_noise_ratio(fit)
     scale = np.ones(len(covariance))
     for k in range(len(factor)):
@@ -217,4 +226,6 @@ def _record(trial: Trial, mocap: Mocap, frames: slice, swaps: tuple[Swap, ...], 
     log = trial.log()
     good = sound_frames(fit.data, fit.weight)[frames]
     angle = np.where(good, fit.pose.angle_rad[frames, 0], np.nan)
-    return FlexionRecord(trial, mocap, frames, log, align(mocap.time_s, angle, log.time_s, log.column("position"), trial.name), swaps)
+    return FlexionRecord(
+        trial, mocap, frames, log, align(mocap.time_s, angle, log.time_s, log.column("position"), trial.name), swaps
+    )

@@ -13,8 +13,9 @@ Array = NDArray[np.float64]
 def palm_rotation(origin: ArrayLike, medial: ArrayLike, lateral: ArrayLike, side: str) -> Array:
     """Rotation (3, 3) whose columns are the palm frame's axes x, y, z, from three points (3,) [m].
 
-    z = (medial - origin) x (lateral - origin) on a left hand, operands swapped on a right one; y = z x ((lateral + medial) / 2
-    - origin); x = y x z, all normalised (thesis eq. 3.1 to 3.3). Raises IdentificationError where the points are on one line.
+    z = (medial - origin) x (lateral - origin) on a left hand, operands swapped on a right one; y = z x ((lateral +
+    medial) / 2 - origin); x = y x z, all normalised (thesis eq. 3.1 to 3.3). Raises IdentificationError where the
+    points are on one line.
     """
     o, m, lat = (np.asarray(p, float) for p in (origin, medial, lateral))
     z = np.cross(m - o, lat - o) if side == "left" else np.cross(lat - o, m - o)

@@ -1,4 +1,5 @@
-"""Is a joint a hinge? What the markers leave when it is taken for one, and what that does to the certainty of its axis."""
+"""Is a joint a hinge? What the markers leave when it is taken for one, and what that does to the certainty of its
+axis."""
 
 from __future__ import annotations
 
@@ -23,7 +24,8 @@ NOTABLE = 0.2
 
 @dataclass(frozen=True)
 class Misfit:
-    """Systematic part of a segment's marker residuals over its joint's angle. rms_m, most_m [m]; p: that noise makes as much."""
+    """Systematic part of a segment's marker residuals over its joint's angle. rms_m, most_m [m]; p: that noise makes as
+    much."""
 
     rms_m: float
     most_m: float
@@ -33,8 +35,8 @@ class Misfit:
 def block_inflation(fit: ChainFit) -> float:
     """By how much the variance of block means of the residuals exceeds that of white noise: one where the chain fits.
 
-    The covariance of the shared unknowns takes frames as independent; residuals that stay the same for a while carry less
-    information than their number says (effective sample size; Bayley & Hammersley 1946).
+    The covariance of the shared unknowns takes frames as independent; residuals that stay the same for a while carry
+    less information than their number says (effective sample size; Bayley & Hammersley 1946).
     """
     ratios, counts = [], []
     for _, residual in _in_body(fit):
@@ -49,7 +51,8 @@ def block_inflation(fit: ChainFit) -> float:
 
 
 def hinge_misfit(fit: ChainFit, joint: int) -> Misfit:
-    """Mean residual of the segment behind a joint in bins of the joint's angle, against the scatter of blocks within a bin."""
+    """Mean residual of the segment behind a joint in bins of the joint's angle, against the scatter of blocks within a
+    bin."""
     bins = _bins(fit.pose.angle_rad[:, joint])
     between, within, groups, blocks, largest = 0.0, 0.0, 0, 0, 0.0
     used = [(fit.weight[:, j] > 0.5, j) for j in np.flatnonzero(fit.data.body == joint + 1)]

@@ -38,7 +38,8 @@ DEGENERATE_DEG = 3.0
 
 @dataclass(frozen=True)
 class Identification:
-    """A hand with what it was found from. palm_shape: (3, 3) [m] palm markers in their own frame, the frame of `fingers`."""
+    """A hand with what it was found from. palm_shape: (3, 3) [m] palm markers in their own frame, the frame of
+    `fingers`."""
 
     hand: Hand
     session: Session
@@ -49,18 +50,22 @@ class Identification:
 def identify(session: Session | str | Path, say: Callable[[str], None] = lambda _: None, compared: bool = True) -> Hand:
     """Identify the kinematics of a recorded hand: axes, centres, encoder maps, linkages, each with its uncertainty.
 
-    session: a session or its folder. say: called with one line per step. compared: with what the published method gives on the same
-    markers, too. Raises SessionError and IdentificationError.
+    session: a session or its folder. say: called with one line per step. compared: with what the published method gives
+    on the same markers, too. Raises SessionError and IdentificationError.
     """
     return identify_all(session, say, compared).hand
 
 
 @single_threaded()
-def identify_all(session: Session | str | Path, say: Callable[[str], None] = lambda _: None, compared: bool = True) -> Identification:
+def identify_all(
+    session: Session | str | Path, say: Callable[[str], None] = lambda _: None, compared: bool = True
+) -> Identification:
     """As `identify`, keeping poses, residuals and clocks for a report or a diagnosis."""
     session = session if isinstance(session, Session) else read_session(session)
     if session.rig is not None:
-        raise IdentificationError(f'{session.path}: a rig brings its own model; "replay" and "diagnose" take it, "identify" takes a hand')
+        raise IdentificationError(
+            f'{session.path}: a rig brings its own model; "replay" and "diagnose" take it, "identify" takes a hand'
+        )
     if session.palm is None or not session.fingers:
         raise IdentificationError(f"{session.path}: a hand needs palm markers and at least one finger")
     notes = list(check_session(session))
@@ -72,7 +77,11 @@ def identify_all(session: Session | str | Path, say: Callable[[str], None] = lam
             fits.append(fit)
             say(f"{fit.finger.name}: {_finger_line(fit)}")
     probe = calibrated_probe(session)
-    landmarks = {t.landmark: probed_point(t, session, probe, shape) for t in session.select("landmark", validate=False)} if probe else {}
+    landmarks = (
+        {t.landmark: probed_point(t, session, probe, shape) for t in session.select("landmark", validate=False)}
+        if probe
+        else {}
+    )
     screws = probe_screws(session, probe, shape, fits)
     placement = screws.placement_m
     frame = _repeatable_frame(session, shape, landmarks, placement)
@@ -125,7 +134,7 @@ def palm_shape(session: Session) -> Array:
         shape = cluster_shape(np.concatenate(tracks))
         rotation, origin = palm_frame(shape, session.side)
     except IdentificationError as error:
-        raise IdentificationError(f'{session.path}: palm markers {", ".join(session.palm.labels)}: {error}') from None
+        raise IdentificationError(f"{session.path}: palm markers {', '.join(session.palm.labels)}: {error}") from None
     return (shape - origin) @ rotation
 
 
@@ -137,14 +146,21 @@ def _repeatable_frame(
         return np.eye(3), np.zeros(3), np.zeros((6, 6))
     missing = [name for name in LANDMARKS if name not in landmarks]
     if missing:
-        raise IdentificationError(f'{session.path}: no landmark trial named {", ".join(missing)}; origin, medial and lateral make the frame')
+        raise IdentificationError(
+            f"{session.path}: no landmark trial named {', '.join(missing)}; origin, medial and lateral make the frame"
+        )
     points = np.stack([landmarks[name].position_palm for name in LANDMARKS])
     rotation, origin = palm_frame(points, session.side)
 
     def outcome(step: Array) -> Array:
         turned, moved = palm_frame(points + step.reshape(3, 3), session.side)
         turn = turned @ rotation.T
-        return np.concatenate([[turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]], 2 * (moved - origin)]) / 2
+        return (
+            np.concatenate(
+                [[turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]], 2 * (moved - origin)]
+            )
+            / 2
+        )
 
     derivative = np.stack([(outcome(e) - outcome(-e)) / 2e-6 for e in 1e-6 * np.eye(9)], axis=1)
     spread = np.zeros((9, 9))
@@ -180,9 +196,14 @@ def _finger(
         arc = np.rad2deg(np.ptp(np.quantile(fit.fit.pose.angle_rad[fit.good, k], [0.01, 0.99])))
         if degenerate:
             sd = axis_sd_deg(covariance)
-            notes.append(f"{fit.finger.name} {segment.name}: the recorded arc ({arc:.0f} deg) does not determine the axis (sd {sd:.1f} deg)")
+            notes.append(
+                f"{fit.finger.name} {segment.name}: the recorded arc ({arc:.0f} deg) does not determine the axis (sd {sd:.1f} deg)"
+            )
         columns = np.flatnonzero(fit.fit.data.body == k + 1)
-        markers = {fit.fit.data.labels[j]: (turn @ fit.fit.chain.marker_palm[j] + move - origin) @ rotation for j in columns[::-1]}
+        markers = {
+            fit.fit.data.labels[j]: (turn @ fit.fit.chain.marker_palm[j] + move - origin) @ rotation
+            for j in columns[::-1]
+        }
         joints.append(
             Joint(
                 name=segment.name,
@@ -209,12 +230,15 @@ def _middle(fit: FingerFit, joint: int) -> Array:
 
 def _onto_reference(fit: FingerFit, shape: Array) -> tuple[Array, Array]:
     """From the finger's palm markers to the session's palm shape; markers that slipped count where they were first."""
-    order = [j for j in np.flatnonzero(fit.fit.data.body == 0) if fit.fit.data.labels.index(fit.fit.data.labels[j]) == j]
+    order = [
+        j for j in np.flatnonzero(fit.fit.data.body == 0) if fit.fit.data.labels.index(fit.fit.data.labels[j]) == j
+    ]
     return kabsch(fit.fit.chain.marker_palm[order], shape)
 
 
 def _moved_covariance(fit: FingerFit, joint: int, turn: Array, move: Array, near: Array, along_sd: float) -> Array:
-    """Covariance of axis and of the centre as the point of the axis nearest to the probed one, in the palm-marker frame."""
+    """Covariance of axis and of the centre as the point of the axis nearest to the probed one, in the palm-marker
+    frame."""
     axis, line = fit.fit.chain.axis_palm[joint], fit.fit.chain.centre_palm[joint]
     lever = float(axis @ (turn.T @ (near - move) - line))  # from the chain's centre to the probed one, along the axis
     across = np.eye(3) - np.outer(axis, axis)
@@ -265,11 +289,27 @@ def _repairs(fits: list[FingerFit]) -> list[dict[str, Any]]:
         for record in fit.records:
             for swap in record.swaps:
                 time = record.mocap.time_s[[swap.start, swap.stop]]
-                found.append({"kind": "swap", "trial": record.trial.name, "markers": list(swap.labels), "from_s": float(time[0]), "to_s": float(time[1])})
+                found.append(
+                    {
+                        "kind": "swap",
+                        "trial": record.trial.name,
+                        "markers": list(swap.labels),
+                        "from_s": float(time[0]),
+                        "to_s": float(time[1]),
+                    }
+                )
         for slip in fit.slips:
             record = next(r for r in fit.records if r.frames.start <= slip.frame < r.frames.stop)
             at = float(record.mocap.time_s[slip.frame - record.frames.start])
-            found.append({"kind": "slip", "trial": record.trial.name, "markers": [slip.label], "at_s": at, "shift_m": float(np.linalg.norm(slip.shift_palm))})
+            found.append(
+                {
+                    "kind": "slip",
+                    "trial": record.trial.name,
+                    "markers": [slip.label],
+                    "at_s": at,
+                    "shift_m": float(np.linalg.norm(slip.shift_palm)),
+                }
+            )
     return found
 
 
@@ -299,7 +339,10 @@ def _motors(session: Session, under_way: Background, notes: list[str]) -> tuple[
 
 
 def _motor_line(motors: tuple[Motor, ...]) -> str:
-    parts = [f"{m.actuator} (Coulomb {m.parameters['coulomb'].value:.1f}, noise {m.current_noise_raw:.1f} raw)" for m in motors]
+    parts = [
+        f"{m.actuator} (Coulomb {m.parameters['coulomb'].value:.1f}, noise {m.current_noise_raw:.1f} raw)"
+        for m in motors
+    ]
     return "motors: " + (", ".join(parts) or "none")
 
 

@@ -1,8 +1,8 @@
 """Maximum likelihood of a whole chain from its markers, with covariance.
 
 Gauss-Newton (Levenberg-damped) on all frames; the blocks of the per-frame unknowns are eliminated (Schur complement;
-Triggs et al. 2000, "Bundle adjustment: a modern synthesis", section 6), so cost is linear in frames. What remains is the
-Fisher information of the shared unknowns; its inverse is their covariance and, at the truth, the Cramer-Rao bound.
+Triggs et al. 2000, "Bundle adjustment: a modern synthesis", section 6), so cost is linear in frames. What remains is
+the Fisher information of the shared unknowns; its inverse is their covariance and, at the truth, the Cramer-Rao bound.
 """
 
 from __future__ import annotations
@@ -17,14 +17,16 @@ from .chain import Chain, ChainData, Pose, jacobians, palm_pose, propagate
 
 Array = NDArray[np.float64]
 
-# Beyond this many standard deviations a marker loses weight, with the fourth power. 99.98 % of three-dimensional Gaussian
+# Beyond this many standard deviations a marker loses weight, with the fourth power. 99.98 % of three-dimensional
+# Gaussian
 # residuals lie within, so nothing is lost on clean data, while ghosts, reflections and wrong labels fade away.
 OUTLIER_LIMIT = 4.5
 # A step of this many standard deviations (all shared unknowns together) is the last: the next would be far smaller.
 STEP_LIMIT = 0.1
 # Frames that bring the chain into its basin before all frames are used.
 START_FRAMES = 400
-# There the outlier limit starts this many times wider and halves with every step, so that a poor start is not taken for outliers.
+# There the outlier limit starts this many times wider and halves with every step, so that a poor start is not taken for
+# outliers.
 ANNEALING = 8.0
 # Frames linearised at a time: their Jacobians fit a second-level cache.
 CHUNK = 512
@@ -34,10 +36,10 @@ CHUNK = 512
 class ChainFit:
     """Result of `fit_chain`.
 
-    covariance: (s, s) of the shared unknowns, ordered as in `Chain.moved`, in the gauge where the palm markers neither move
-    nor turn as a whole and no joint's zero moves. angle_sd_rad: (n, k), chain known. noise_m: per coordinate. weight: (n, m)
-    in [0, 1], zero where unseen. residual_palm: (n, m, 3) [m] observed minus modelled, nan where unseen. cost: half the
-    robust sum of squares, in units of the noise. redundancy: observed coordinates minus unknowns.
+    covariance: (s, s) of the shared unknowns, ordered as in `Chain.moved`, in the gauge where the palm markers neither
+    move nor turn as a whole and no joint's zero moves. angle_sd_rad: (n, k), chain known. noise_m: per coordinate.
+    weight: (n, m) in [0, 1], zero where unseen. residual_palm: (n, m, 3) [m] observed minus modelled, nan where unseen.
+    cost: half the robust sum of squares, in units of the noise. redundancy: observed coordinates minus unknowns.
     """
 
     data: ChainData
@@ -55,7 +57,8 @@ class ChainFit:
 
 @dataclass(frozen=True)
 class _Normal:
-    """Normal equations with the frames eliminated. frame_block: (n, f, f). back: (n, f, s + 1) solves a frame's step."""
+    """Normal equations with the frames eliminated. frame_block: (n, f, f). back: (n, f, s + 1) solves a frame's
+    step."""
 
     frame_block: Array
     back: Array
@@ -94,8 +97,8 @@ def fit_poses(data: ChainData, chain: Chain, noise_m: float, iterations: int = 8
 
 
 def robust_weight(residual: Array, noise_m: float) -> Array:
-    """Weights (n, m) of residuals (n, m, 3) [m]: one up to `OUTLIER_LIMIT` standard deviations, then the fourth power of the
-    ratio; zero where unseen."""
+    """Weights (n, m) of residuals (n, m, 3) [m]: one up to `OUTLIER_LIMIT` standard deviations, then the fourth power
+    of the ratio; zero where unseen."""
     distance = np.linalg.norm(residual, axis=-1) / noise_m
     with np.errstate(divide="ignore", invalid="ignore"):
         weight = np.where(distance > OUTLIER_LIMIT, (OUTLIER_LIMIT / distance) ** 4, 1.0)
@@ -201,7 +204,12 @@ def _assemble_chunk(linear: tuple[Array, Array, Array, Array], weight: Array) ->
     gradient_joint = np.einsum("nrq,nr->q", weighted_joint, r.reshape(n, -1))
     back = np.linalg.solve(block, np.concatenate([frame_shared, frame_gradient[..., None]], axis=2))
     eliminated = frame_shared.reshape(n * f, size).T @ back.reshape(n * f, size + 1)
-    return block, back, shared - eliminated[:, :size], np.concatenate([gradient_marker, gradient_joint]) - eliminated[:, size]
+    return (
+        block,
+        back,
+        shared - eliminated[:, :size],
+        np.concatenate([gradient_marker, gradient_joint]) - eliminated[:, size],
+    )
 
 
 def free_directions(chain: Chain, body: Array) -> Array:
@@ -240,5 +248,15 @@ def _finish(data: ChainData, chain: Chain, pose: Pose, noise: float, converged: 
     covariance = noise**2 * free @ np.linalg.pinv(free.T @ normal.reduced @ free, rcond=1e-15, hermitian=True) @ free.T
     angle_sd = noise * np.sqrt(np.einsum("nii->ni", np.linalg.inv(normal.frame_block))[:, 6:])
     return ChainFit(
-        data, chain, pose, covariance, angle_sd, noise, weight, residual, robust_cost(residual, noise), redundancy, converged
+        data,
+        chain,
+        pose,
+        covariance,
+        angle_sd,
+        noise,
+        weight,
+        residual,
+        robust_cost(residual, noise),
+        redundancy,
+        converged,
     )

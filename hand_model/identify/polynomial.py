@@ -15,8 +15,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class PolynomialFit:
-    """coefficients: ascending. order: the one chosen. rmse, rmse_held_out: order -> RMSE in the unit of y, fitted to all
-    cycles and tested on them (as the thesis does), or fitted without and tested on each cycle in turn."""
+    """coefficients: ascending. order: the one chosen. rmse, rmse_held_out: order -> RMSE in the unit of y, fitted to
+    all cycles and tested on them (as the thesis does), or fitted without and tested on each cycle in turn."""
 
     coefficients: Array
     order: int
@@ -25,8 +25,8 @@ class PolynomialFit:
 
 
 def cycles(drive: Array, least: int = 3, blocks: int = 5) -> NDArray[np.int64]:
-    """Cycle number (n,) of each sample: a cycle starts when `drive` rises through a tenth of its range after having been
-    above half of it. Fewer than `least` cycles: `blocks` equal parts instead."""
+    """Cycle number (n,) of each sample: a cycle starts when `drive` rises through a tenth of its range after having
+    been above half of it. Fewer than `least` cycles: `blocks` equal parts instead."""
     low, high = np.nanquantile(drive, [0.02, 0.98])
     u = (drive - low) / max(high - low, 1e-300)
     starts, armed = [], False
@@ -44,11 +44,14 @@ def cycles(drive: Array, least: int = 3, blocks: int = 5) -> NDArray[np.int64]:
     return number
 
 
-def fit_polynomial(x: Array, y: Array, group: NDArray[np.int64], orders: Iterable[int], monotonic: bool = False) -> PolynomialFit:
+def fit_polynomial(
+    x: Array, y: Array, group: NDArray[np.int64], orders: Iterable[int], monotonic: bool = False
+) -> PolynomialFit:
     """Least squares polynomial y(x), robust against stray samples; order chosen on held-out groups.
 
-    x, y: (n,). group: (n,) cycle numbers. The lowest order is taken whose held-out error is not worse than the best one's by
-    more than two standard errors of their difference over groups. monotonic: y must not turn back over the range of x.
+    x, y: (n,). group: (n,) cycle numbers. The lowest order is taken whose held-out error is not worse than the best
+    one's by more than two standard errors of their difference over groups. monotonic: y must not turn back over the
+    range of x.
     """
     orders = tuple(orders)
     kept = _kept(x, y, max(orders))
@@ -76,8 +79,9 @@ def fit_polynomial(x: Array, y: Array, group: NDArray[np.int64], orders: Iterabl
 def monotonic_polynomial(x: Array, y: Array, order: int) -> Array:
     """Ascending coefficients of the least-squares polynomial that never turns back over the range of x.
 
-    In the Bernstein basis over the range, coefficients that only rise (or only fall) make a monotonic polynomial (Farouki
-    2012, "The Bernstein polynomial basis: a centennial retrospective", section 3.4); their increments are bounded at zero.
+    In the Bernstein basis over the range, coefficients that only rise (or only fall) make a monotonic polynomial
+    (Farouki 2012, "The Bernstein polynomial basis: a centennial retrospective", section 3.4); their increments are
+    bounded at zero.
     """
     low, high = float(x.min()), float(x.max())
     u = (x - low) / (high - low)

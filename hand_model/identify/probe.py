@@ -27,14 +27,15 @@ class ProbedPoint:
 def tip_path(trial: Trial, session: Session, probe: Probe, palm_shape: Array) -> Array:
     """Tip positions (n, 3) [m] in the frame of palm_shape (3, 3): probe and palm registered per frame (Kabsch).
 
-    Frames in which a palm marker or all but two probe markers are hidden are left out. Raises IdentificationError where the
-    probe has no known geometry or no frame remains.
+    Frames in which a palm marker or all but two probe markers are hidden are left out. Raises IdentificationError where
+    the probe has no known geometry or no frame remains.
     """
     return tip_and_shaft(trial, session, probe, palm_shape)[0]
 
 
 def tip_and_shaft(trial: Trial, session: Session, probe: Probe, palm_shape: Array) -> tuple[Array, Array]:
-    """As `tip_path`, with the unit directions (n, 3) from the tip to the middle of the probe's markers: away from what it touches."""
+    """As `tip_path`, with the unit directions (n, 3) from the tip to the middle of the probe's markers: away from what
+    it touches."""
     if session.palm is None or probe.position_probe is None:
         raise IdentificationError(f'trial "{trial.name}": needs palm markers and a probe whose tip is known')
     mocap = trial.mocap()
@@ -55,7 +56,9 @@ def _probe_markers(tool: Array, probe: Probe) -> Array:
     if len(probe.labels) < 4:
         return tool
     rotation, translation = kabsch(probe.position_probe, tool)
-    miss = np.linalg.norm(tool - np.einsum("nij,mj->nmi", rotation, probe.position_probe) - translation[:, None], axis=-1)
+    miss = np.linalg.norm(
+        tool - np.einsum("nij,mj->nmi", rotation, probe.position_probe) - translation[:, None], axis=-1
+    )
     limit = 6 * np.nanmedian(miss)
     worst = np.nanargmax(np.where(np.isfinite(miss), miss, -1.0), axis=1)
     bad = np.take_along_axis(miss, worst[:, None], 1)[:, 0] > limit
@@ -79,16 +82,18 @@ def probed_point(trial: Trial, session: Session, probe: Probe, palm_shape: Array
 def calibrated_probe(session: Session) -> Probe | None:
     """The session's probe; where its tip is not known, found from its `pivot` trials.
 
-    The tip stays put while the tool swings: R_f p + t_f = const, solved by robust least squares over all frames, in the room and,
-    where the palm is seen, relative to it (the tip may stand on the hand): the smaller residual tells which. Raises
-    IdentificationError where no pivot trial exists or the tool swings too little.
+    The tip stays put while the tool swings: R_f p + t_f = const, solved by robust least squares over all frames, in the
+    room and, where the palm is seen, relative to it (the tip may stand on the hand): the smaller residual tells which.
+    Raises IdentificationError where no pivot trial exists or the tool swings too little.
     """
     probe = session.probe
     if probe is None or probe.position_probe is not None:
         return probe
     trials = session.select("pivot")
     if not trials:
-        raise IdentificationError(f'{session.path}: the probe has no marker positions and there is no trial of kind "pivot"')
+        raise IdentificationError(
+            f'{session.path}: the probe has no marker positions and there is no trial of kind "pivot"'
+        )
     tracks = [trial.mocap().markers(probe.labels) for trial in trials]
     shape = cluster_shape(np.concatenate(tracks))
     tracks = [_probe_markers(track, Probe(probe.labels, shape)) for track in tracks]
@@ -124,7 +129,9 @@ def _pivot(shape: Array, tracks: list[Array], name: str) -> tuple[Array, float]:
     weight = np.ones(len(design))
     for _ in range(20):  # Cauchy weights, frame by frame
         root = np.sqrt(weight)[:, None]
-        solution, _, _, singular = np.linalg.lstsq((root[..., None] * design).reshape(-1, design.shape[2]), (root * target).reshape(-1), rcond=None)
+        solution, _, _, singular = np.linalg.lstsq(
+            (root[..., None] * design).reshape(-1, design.shape[2]), (root * target).reshape(-1), rcond=None
+        )
         miss = np.linalg.norm(design @ solution - target, axis=1)
         weight = 1 / (1 + (miss / (2.4 * np.median(miss) + 1e-12)) ** 2)
     if singular[-1] < 0.03 * np.sqrt(weight.sum()):

@@ -27,7 +27,8 @@ def in_parent(data: ChainData, chain: Chain, joint: int) -> Array:
 
 
 def published_joint(data: ChainData, chain: Chain, joint: int, probed_palm: Array | None) -> tuple[Array, Array]:
-    """Axis (3,) by Gamage & Lasenby, centre (3,) [m] by Chang & Pollard, the probed centre projected on the axis where given."""
+    """Axis (3,) by Gamage & Lasenby, centre (3,) [m] by Chang & Pollard, the probed centre projected on the axis where
+    given."""
     markers = in_parent(data, chain, joint)
     axis = gamage_lasenby_axis(markers)
     if axis @ chain.axis_palm[joint] < 0:

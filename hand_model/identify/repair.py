@@ -1,4 +1,5 @@
-"""Corrections of the recording before anything is fitted to it: exchanged labels, and markers that slip on their segment."""
+"""Corrections of the recording before anything is fitted to it: exchanged labels, and markers that slip on their
+segment."""
 
 from __future__ import annotations
 
@@ -43,11 +44,11 @@ class Slip:
 def repair_labels(data: ChainData) -> tuple[ChainData, tuple[Swap, ...]]:
     """Undo exchanged labels: where a cluster loses its shape, markers are followed from the last sound frame.
 
-    A permutation is applied only where it brings every marker nearer to its track than the labels do, by more than half of
-    the smallest distance between two markers, and leaves the clusters no more out of shape: a marker that slipped keeps its
-    cluster broken for as long as the recording lasts, and tracks may be lost meanwhile. Two labels that jump to each other's
-    places from one frame to the next are exchanged until they jump back or the cluster's shape says that they are back,
-    whether or not the shape shows the exchange (a nearly symmetrical one does not).
+    A permutation is applied only where it brings every marker nearer to its track than the labels do, by more than half
+    of the smallest distance between two markers, and leaves the clusters no more out of shape: a marker that slipped
+    keeps its cluster broken for as long as the recording lasts, and tracks may be lost meanwhile. Two labels that jump
+    to each other's places from one frame to the next are exchanged until they jump back or the cluster's shape says
+    that they are back, whether or not the shape shows the exchange (a nearly symmetrical one does not).
     """
     spacing = _spacing(data)
     shape = _Shape.of(data)
@@ -77,8 +78,8 @@ def repair_labels(data: ChainData) -> tuple[ChainData, tuple[Swap, ...]]:
 
 
 def _jumped(data: ChainData, spacing: float, shape: _Shape) -> NDArray[np.int64]:
-    """(n, m) column that each label has in truth, by pairs of labels that jump to each other's last places and back, or until
-    the clusters' shape says that they are back (they may return behind a gap)."""
+    """(n, m) column that each label has in truth, by pairs of labels that jump to each other's last places and back, or
+    until the clusters' shape says that they are back (they may return behind a gap)."""
     y = data.position_world
     n, m = y.shape[:2]
     order = np.tile(np.arange(m), (n, 1))
@@ -121,8 +122,8 @@ class _Shape:
             return (np.abs(_distances(position, self.pairs) - self.usual) > 10 * self.noise + 1e-4).any(axis=1)
 
     def until(self, position: Array, a: int, b: int) -> int:
-        """How many of the frames of positions (n, m, 3) have columns a and b exchanged, given that the first has: as many as
-        are in better shape so; all of them where the shape does not tell."""
+        """How many of the frames of positions (n, m, 3) have columns a and b exchanged, given that the first has: as
+        many as are in better shape so; all of them where the shape does not tell."""
         other = position.copy()
         other[:, [a, b]] = other[:, [b, a]]
         left = np.nancumsum(self._off(position) - self._off(other))
@@ -194,9 +195,9 @@ def _swaps(order: NDArray[np.int64], labels: tuple[str, ...]) -> tuple[Swap, ...
 def find_slip(fit: ChainFit, block: int = 25) -> Slip | None:
     """The most evident slip of one marker, or None: a lasting step of its residual, seen in its segment's frame.
 
-    The step must stand out from the scatter of block means around it (that scatter holds every slow misfit of the chain)
-    with odds that no search over markers and moments explains: t above the Gaussian quantile of 1e-9, in a direction found
-    from the data, and be larger than a third of the noise.
+    The step must stand out from the scatter of block means around it (that scatter holds every slow misfit of the
+    chain) with odds that no search over markers and moments explains: t above the Gaussian quantile of 1e-9, in a
+    direction found from the data, and be larger than a third of the noise.
     """
     rotations = propagate(fit.chain, fit.data.body, fit.pose.angle_rad)[1]
     best: tuple[float, Slip] | None = None
@@ -206,7 +207,8 @@ def find_slip(fit: ChainFit, block: int = 25) -> Slip | None:
         if len(frames) < 8 * block:
             continue
         count = len(frames) // block
-        means = np.median(turned[frames[: count * block]].reshape(count, block, 3), axis=1)  # ghosts do not reach a median
+        # ghosts do not reach a median
+        means = np.median(turned[frames[: count * block]].reshape(count, block, 3), axis=1)
         score, at, step = _step(means)
         if np.linalg.norm(step) > max(fit.noise_m / 3, SMALLEST_SLIP_M) and (best is None or score > best[0]):
             best = score, Slip(label, int(frames[at * block]), step)
@@ -234,7 +236,11 @@ def _step(means: Array) -> tuple[float, int, Array]:
 
 def split_marker(data: ChainData, slip: Slip) -> ChainData:
     """The same observations with the slipped marker as two columns: before and from the slip on."""
-    j = max(i for i, label in enumerate(data.labels) if label == slip.label and np.isfinite(data.position_world[slip.frame :, i, 0]).any())
+    j = max(
+        i
+        for i, label in enumerate(data.labels)
+        if label == slip.label and np.isfinite(data.position_world[slip.frame :, i, 0]).any()
+    )
     before, after = data.position_world[:, j].copy(), data.position_world[:, j].copy()
     before[slip.frame :], after[: slip.frame] = np.nan, np.nan
     y = np.insert(data.position_world, j + 1, after, axis=1)
@@ -246,8 +252,9 @@ def split_marker(data: ChainData, slip: Slip) -> ChainData:
 def level_last_joint(fit: ChainFit) -> ChainFit:
     """The fit with the last joint's angle made continuous where its whole support turned on the segment.
 
-    Such a turn about the joint's own axis cannot be told from an angle by the markers of that support; but the linkage can: the
-    last angle is a smooth function of the first, before and after, up to that step. Found by least squares (quartic and step).
+    Such a turn about the joint's own axis cannot be told from an angle by the markers of that support; but the linkage
+    can: the last angle is a smooth function of the first, before and after, up to that step. Found by least squares
+    (quartic and step).
     """
     k = fit.data.n_joints - 1
     late = _after_support_slip(fit, k + 1)
@@ -267,7 +274,8 @@ def level_last_joint(fit: ChainFit) -> ChainFit:
 
 
 def _after_support_slip(fit: ChainFit, body: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]] | None:
-    """Columns and frames after the moment from which on no marker of a body sits where it sat before; None where one does."""
+    """Columns and frames after the moment from which on no marker of a body sits where it sat before; None where one
+    does."""
     columns = np.flatnonzero(fit.data.body == body)
     seen = fit.weight[:, columns] > 0.5
     frames = np.arange(len(seen))

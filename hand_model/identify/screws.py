@@ -26,8 +26,8 @@ BLUNDER = 5.0
 class Screws:
     """Probed screw heads of all joints. points: (finger, joint) -> side -> point, in the frame of the palm markers.
 
-    placement_m: standard deviation per coordinate [m] of placing a tip. span_m: usual signed distance from the lateral to the
-    medial head along the axis, nan where no joint has both.
+    placement_m: standard deviation per coordinate [m] of placing a tip. span_m: usual signed distance from the lateral
+    to the medial head along the axis, nan where no joint has both.
     """
 
     points: Mapping[tuple[str, str], Mapping[str, ProbedPoint]]
@@ -37,26 +37,38 @@ class Screws:
     def middle(self, finger: str, joint: str, axis: Array, on_line: Array) -> tuple[Array | None, float, str]:
         """Middle (3,) [m] between a joint's screw heads, its standard deviation along the axis [m], and a remark or "".
 
-        axis (3,), on_line (3,) [m]: the joint's axis in the frame of the palm markers. A head that was not hit is replaced by
-        the other one and the usual span. None where nothing was probed.
+        axis (3,), on_line (3,) [m]: the joint's axis in the frame of the palm markers. A head that was not hit is
+        replaced by the other one and the usual span. None where nothing was probed.
         """
         points = self.points.get((finger, joint), {})
         if not points:
-            remark = "no joint_probe trial; the centre's place along the axis is that of the markers" if self.points else ""
+            remark = (
+                "no joint_probe trial; the centre's place along the axis is that of the markers" if self.points else ""
+            )
             return None, 0.01, remark
         off = {side: _across(p.position_palm, axis, on_line) for side, p in points.items()}
         sound = {side: points[side].position_palm for side in points if off[side] <= BLUNDER * self.placement_m}
         if len(sound) == len(points) and len(points) > 1:
             heads = list(sound.values())
             span = (points["medial"].position_palm - points["lateral"].position_palm) @ axis
-            if np.isfinite(self.span_m) and abs(span - self.span_m) > max(BLUNDER * np.sqrt(2) * self.placement_m, 0.4 * abs(self.span_m)):
+            if np.isfinite(self.span_m) and abs(span - self.span_m) > max(
+                BLUNDER * np.sqrt(2) * self.placement_m, 0.4 * abs(self.span_m)
+            ):
                 remark = f"the screw heads were probed {1e3 * abs(span):.1f} mm apart, elsewhere {1e3 * abs(self.span_m):.1f} mm"
                 return np.mean(heads, axis=0), abs(span - self.span_m) / 2, remark
             return np.mean(heads, axis=0), self.placement_m / np.sqrt(2), ""
         if not sound:
-            return np.mean([p.position_palm for p in points.values()], axis=0), max(off.values()), "the probe missed the axis on both sides"
+            return (
+                np.mean([p.position_palm for p in points.values()], axis=0),
+                max(off.values()),
+                "the probe missed the axis on both sides",
+            )
         side = next(iter(sound))
-        remark = "" if len(points) == 1 else f"the probe missed the {next(s for s in points if s not in sound)} screw head; the other one was used"
+        remark = (
+            ""
+            if len(points) == 1
+            else f"the probe missed the {next(s for s in points if s not in sound)} screw head; the other one was used"
+        )
         if not np.isfinite(self.span_m):
             return sound[side], 0.01, remark or f"only the {side} screw head was probed; the centre lies there"
         towards = -1.0 if side == "medial" else 1.0

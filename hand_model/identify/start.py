@@ -50,7 +50,8 @@ def start_chain(data: ChainData, rest: Array, palm_shape: Array, axis_palm: Arra
     """Chain estimate from cluster poses.
 
     data: observations. rest: (r,) frames that define angle zero. palm_shape: (p, 3) [m] palm markers in the palm frame.
-    Axis: dominant direction of the relative rotation vectors, or axis_palm (3,) for every joint where it is given. Centre: least squares of (I - R) c = t over all frames.
+    Axis: dominant direction of the relative rotation vectors, or axis_palm (3,) for every joint where it is given.
+    Centre: least squares of (I - R) c = t over all frames.
     Raises IdentificationError where a segment never shows with the palm.
     """
     few = np.unique(np.concatenate([rest, np.linspace(0, len(data.position_world) - 1, START_FRAMES).astype(int)]))
@@ -69,7 +70,9 @@ def start_chain(data: ChainData, rest: Array, palm_shape: Array, axis_palm: Arra
         good = np.isfinite(in_palm).all((1, 2)) & shown
         if good.sum() < 10:
             names = ", ".join(data.labels[c] for c in columns)
-            raise IdentificationError(f"markers {names} show together with the palm in {good.sum()} frames; 10 are needed")
+            raise IdentificationError(
+                f"markers {names} show together with the palm in {good.sum()} frames; 10 are needed"
+            )
         marker[columns] = _rest_shape(in_palm, good, rest)
         rotation, translation = kabsch(marker[columns], in_palm)
         relative = np.swapaxes(outer_rotation, 1, 2) @ rotation
@@ -91,7 +94,8 @@ def _rest_shape(in_palm: Array, good: Array, rest: Array) -> Array:
 
 
 def _hinge(rotation: Array, shift: Array, near: Array, given: Array | None) -> tuple[Array, Array]:
-    """Axis (3,) and centre (3,) of relative motions x -> R x + t; the centre is the point of the axis nearest to `near`."""
+    """Axis (3,) and centre (3,) of relative motions x -> R x + t; the centre is the point of the axis nearest to
+    `near`."""
     vector = rotation_vectors(rotation)
     size = np.linalg.norm(vector, axis=1)
     kept = size <= np.quantile(size, 0.98)
@@ -110,6 +114,6 @@ def _hinge(rotation: Array, shift: Array, near: Array, given: Array | None) -> t
 
 
 def other_starts(data: ChainData, rest: Array, palm_shape: Array, first: Chain) -> list[Chain]:
-    """Further starting chains for arcs so short that noise hides their axis: parallel joints along each axis already guessed
-    and along the palm's own directions."""
+    """Further starting chains for arcs so short that noise hides their axis: parallel joints along each axis already
+    guessed and along the palm's own directions."""
     return [start_chain(data, rest, palm_shape, axis) for axis in (*first.axis_palm, *np.eye(3))]

@@ -50,7 +50,14 @@ def rig_findings_page(session: Session, findings: RigFindings) -> bytes:
         sections += _motion(rig, findings)
     if findings.couplings:
         sections.append(_couplings(findings.couplings))
-    sections.append(Section("next", "Next", (findings.next_experiment or "Nothing more is asked for.").replace("_", " "), _rest(findings)))
+    sections.append(
+        Section(
+            "next",
+            "Next",
+            (findings.next_experiment or "Nothing more is asked for.").replace("_", " "),
+            _rest(findings),
+        )
+    )
     lead = (f"{session.path.name}: the declared model, fitted, against {count(len(rig.trials), 'trial')}; what is named below "
             "was chosen on the training trials and measured on the others, by MuJoCo on the written files.")  # fmt: skip
     return page(session.hand or session.path.name, lead, _tiles(findings), sections)
@@ -83,7 +90,11 @@ def _findings(findings: RigFindings) -> list[Element]:
                      f"{f.fit['before']:.4g}" if known else "–", f"{f.fit['after']:.4g}" if known else "–",
                      f.fit.get("unit") or ""])  # fmt: skip
     head = ("joint", "effect", "not told from", "probability", "held-out error before", "after", "unit")
-    parts = [table(head, rows, "By share of the mismatch; each was measured beside those found before it", text_columns=3)] if rows else []
+    parts = (
+        [table(head, rows, "By share of the mismatch; each was measured beside those found before it", text_columns=3)]
+        if rows
+        else []
+    )
     return [*parts, listing([f.statement for f in findings.findings])] if rows else []
 
 
@@ -155,7 +166,15 @@ def _effects(rig: RigModel, findings: RigFindings, pairs: Sequence[Pair]) -> Sec
 
 def _variable(effect: str) -> str:
     """What an effect acts through."""
-    return "position" if effect in BY_POSITION else "time" if effect in BY_TIME else "load" if effect == "load_dependent_friction" else "velocity"
+    return (
+        "position"
+        if effect in BY_POSITION
+        else "time"
+        if effect in BY_TIME
+        else "load"
+        if effect == "load_dependent_friction"
+        else "velocity"
+    )
 
 
 def _through(joint: str, variable: str, held: Sequence[Pair], rig: RigModel) -> bytes:
@@ -183,7 +202,8 @@ def _sides(x: Array, label: str, before: Array, after: Array, up: str) -> bytes:
 
 
 def _binned(x: Array, y: Array) -> tuple[Array, Array, Array, Array]:
-    """Centres of bins with as many samples each, or more where many share a value; tenth percentile, mean and ninetieth of y."""
+    """Centres of bins with as many samples each, or more where many share a value; tenth percentile, mean and ninetieth
+    of y."""
     parts: list[Array] = []
     for part in (p for p in np.array_split(np.argsort(x), BINS) if len(p)):
         if parts and x[part].mean() - x[parts[-1]].mean() < 0.5 * np.ptp(x) / BINS:
@@ -214,7 +234,9 @@ def _validation(rig: RigModel, findings: RigFindings, pairs: Sequence[Pair]) -> 
             d.panels[1].set_xlabel("time [s]")
         drawn.append((f"{a.trial}, {a.joint}", d.svg))
     head = ("trial", "joint", "declared", "with what was found", "ratio", "unit")
-    words = f"Effort by inverse dynamics of the two files on {count(len({a.trial for a, _ in held}), 'trial')} held out."
+    words = (
+        f"Effort by inverse dynamics of the two files on {count(len({a.trial for a, _ in held}), 'trial')} held out."
+    )
     return Section("validation", "Before and after", words, (
         table(head, rows, "Root mean square of the effort error, moving samples", text_columns=2),
         key(("c2", "recorded"), ("c1", "declared model"), ("ink", "with what was found")), figures(*drawn),
@@ -232,11 +254,14 @@ def _open_loop(findings: RigFindings) -> list[Element]:
     rows = [[j, f"{p['before']:.4g}", f"{p['after']:.4g}", f"{p['after'] / max(p['before'], 1e-300):.2f}", p["unit"]]
             for j, p in told["joints"].items()]  # fmt: skip
     head = ("joint", "declared", "with what was found", "ratio", "unit")
-    return [table(head, rows, f"Root mean square position error, simulated by MuJoCo in open loop {how}", text_columns=1)]
+    return [
+        table(head, rows, f"Root mean square position error, simulated by MuJoCo in open loop {how}", text_columns=1)
+    ]
 
 
 def _couplings(residuals: Sequence[CouplingResidual]) -> Section:
-    """Angles against angles: map before and after, residual through the load (or the velocity), one recording in time."""
+    """Angles against angles: map before and after, residual through the load (or the velocity), one recording in
+    time."""
     drawn, rows = [], []
     for c in residuals:
         scale = f"± {_limit(c.before):.2g} {c.unit}"
@@ -309,7 +334,11 @@ def _tried(rejected: Mapping[str, str]) -> str:
 def _rest(findings: RigFindings) -> tuple[Element, ...]:
     said = [f"{u['where']['joint'] or 'the joint'}: {100 * u['share_of_mismatch']:.0f} % of the mismatch stays unexplained."
             for u in findings.unexplained]  # fmt: skip
-    withdrawn = [f"{_tried(r)}{' at ' + r['where'] if 'where' in r else ''}: {r['reason']}." for r in findings.rejected if r["reason"] != NOT_TAKEN]
+    withdrawn = [
+        f"{_tried(r)}{' at ' + r['where'] if 'where' in r else ''}: {r['reason']}."
+        for r in findings.rejected
+        if r["reason"] != NOT_TAKEN
+    ]
     tried = sorted({_tried(r) for r in findings.rejected if r["reason"] == NOT_TAKEN})
     parts = [listing(said)] if said else []
     if withdrawn:

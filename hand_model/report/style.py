@@ -18,7 +18,8 @@ _VARIABLES = {INK: "--ink", MUTED: "--muted", LINE: "--line", PAPER: "--paper"} 
 }
 # Inches of a small picture; on a phone it is as wide as the screen.
 WIDTH, HEIGHT = 4.2, 2.7
-# Inches left, right, below (with and without a name of the axis) and above the panels: "-15000" and the axis' name beside each
+# Inches left, right, below (with and without a name of the axis) and above the panels: "-15000" and the axis' name
+# beside each
 # other on the left, half a "15000" on the right.
 MARGINS = (0.68, 0.18, 0.42, 0.24, 0.08)
 

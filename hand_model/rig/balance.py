@@ -61,11 +61,15 @@ class Rows:
     """The balance of one independent joint in one trial.
 
     Full-rate grid (n,): time_s, states, extra channels (never filtered: an effect reads them as they are), full_columns
-    (n, P), still_columns (n, P): the same without acceleration, carried (P,) bool and load_known (n,): of what the joint carries besides its own drive and friction. Filtered and thinned (m,): effort, columns (m, P), moving (bool): what the fit uses, neither at rest nor at the ends.
-    effort: recorded, less what the trial's own bodies add to the declared ones. states: position, velocity, acceleration (n, joints) of the whole rig; direction (n,), directions (n, joints): of
-    friction in [-1, 1]: the sign of velocity, linear where it drowns in noise, its mean around each instant (or jumps between two would
-    all be up to half a sample early or late); jacobian: joint -> (n,), what hangs on this joint by couplings, itself included; declared: the columns' names; weight (n,): of every
-    sample before the filter, zero where the joint stands (empty: one).
+    (n, P), still_columns (n, P): the same without acceleration, carried (P,) bool and load_known (n,): of what the
+    joint carries besides its own drive and friction. Filtered and thinned (m,): effort, columns (m, P), moving (bool):
+    what the fit uses, neither at rest nor at the ends.
+    effort: recorded, less what the trial's own bodies add to the declared ones. states: position, velocity,
+    acceleration (n, joints) of the whole rig; direction (n,), directions (n, joints): of friction in [-1, 1]: the sign
+    of velocity, linear where it drowns in noise, its mean around each instant (or jumps between two would all be up to
+    half a sample early or late); jacobian: joint -> (n,), what hangs on this joint by couplings, itself included;
+    declared: the columns' names; weight (n,): of every sample before the filter, zero where the joint stands (empty:
+    one).
     """
 
     trial: str
@@ -95,8 +99,10 @@ class Rows:
     weight: Array = field(default_factory=lambda: np.zeros(0))
 
     def filtered(self, values: Array, delay_s: float = 0.0) -> Array:
-        """Full-rate columns (n, ...), later by a delay, through the weight and filter of this balance, thinned to (m, ...)."""
-        stands = len(self.weight) > 0  # at rest all comes later, and the weight stays where it is; else the filter may come first
+        """Full-rate columns (n, ...), later by a delay, through the weight and filter of this balance, thinned to (m,
+        ...)."""
+        # at rest all comes later, and the weight stays where it is; else the filter may come first
+        stands = len(self.weight) > 0
         values = later(self.time_s, values, delay_s) if delay_s and stands else values
         values = low_pass(_weighed(values, self.weight), self.rate_hz, self.cutoff_hz)[:: self.step]
         return later(self.time_s[:: self.step], values, delay_s) if delay_s and not stands else values
@@ -106,7 +112,8 @@ class Rows:
         return self.full_columns @ (theta * self.carried) - self.load_known
 
     def bias(self, theta: Array) -> Array:
-        """Load (n,) without what the joints' acceleration asks for: weight, centrifugal and Coriolis forces, springs."""
+        """Load (n,) without what the joints' acceleration asks for: weight, centrifugal and Coriolis forces,
+        springs."""
         return self.still_columns @ (theta * self.carried) - self.load_known
 
     def expected(self, theta: Array) -> Array:
@@ -155,8 +162,9 @@ def _back_emf(model: Any, name: str) -> float:
 def trial_rows(rig: RigModel, trial: RigTrial, columns: tuple[Column, ...], cutoff_hz: float | None = None, trim_s: float | None = None,
                weights: Mapping[str, Array] | None = None, kept: Collection[str] = ()) -> tuple[Rows, ...]:  # fmt: skip
     """The balance of every independent joint whose effort is known (or whose drive is absent or open) in one trial.
-    trim_s [s]: what is left out at each of its ends, where the filter knows one side only; by default what the filter reaches; weights: joint ->
-    weight of its samples, as another balance of the same trial has them; kept: joints whose rest is kept (`moving_weight`)."""
+    trim_s [s]: what is left out at each of its ends, where the filter knows one side only; by default what the filter
+    reaches; weights: joint -> weight of its samples, as another balance of the same trial has them; kept: joints whose
+    rest is kept (`moving_weight`)."""
     missing = [j for j in rig.joints if j not in trial.position]
     if missing:
         return ()
@@ -309,7 +317,8 @@ def _column_values(rig: RigModel, trial: RigTrial, model: Any, columns: tuple[Co
 
 
 def _tendon_column(model: Any, name: str, q: Array) -> Array:
-    """Effort (n, joints) per unit stiffness of a fixed tendon with a dead band, what the spring takes from the joints."""
+    """Effort (n, joints) per unit stiffness of a fixed tendon with a dead band, what the spring takes from the
+    joints."""
     t = model.tendon(name).id
     coef = np.zeros(model.nv)
     for w in range(model.tendon_adr[t], model.tendon_adr[t] + model.tendon_num[t]):

@@ -107,8 +107,8 @@ def _reverses(trial: RigTrial, joint: str) -> bool:
 
 
 def _gather(rig: RigModel, joint: str, channel: str, found: dict, usable: int) -> list[ChannelIssue]:
-    """One issue per kind and reason; a command in half of the recordings or more is one in all: the column is the same. A sinusoid in
-    fewer is what a joint that swings so takes."""
+    """One issue per kind and reason; a command in half of the recordings or more is one in all: the column is the same.
+    A sinusoid in fewer is what a joint that swings so takes."""
     out = []
     flagged = {n for (kind, _), hits in found.items() if kind == "command_as_measurement" for n, _, _ in hits}
     whole = usable > 0 and len(flagged) >= 0.5 * usable
@@ -127,8 +127,8 @@ def _gather(rig: RigModel, joint: str, channel: str, found: dict, usable: int) -
 
 
 def sinusoids_left(time_s: Array, values: Array, most: int = 2) -> float:
-    """Share (residual rms over rms) that up to `most` sinusoids and a mean leave; frequencies refined from the spectrum. One where
-    the first does not come twice: any smooth curve is a piece of some sinusoid."""
+    """Share (residual rms over rms) that up to `most` sinusoids and a mean leave; frequencies refined from the
+    spectrum. One where the first does not come twice: any smooth curve is a piece of some sinusoid."""
     from scipy.optimize import minimize_scalar
 
     grid = uniform_time(time_s)
@@ -186,7 +186,8 @@ def copy_left(values: Array, other: Array) -> float:
 
 
 def check_balance(rig: RigModel, fit: DeclaredFit) -> tuple[ChannelIssue, ...]:
-    """Issues that only the balance shows: an unsigned effort, a computed one, one that explains nothing of the motion."""
+    """Issues that only the balance shows: an unsigned effort, a computed one, one that explains nothing of the
+    motion."""
     force, told = ({name: c for c, (kind, name, attribute) in rig.quantity.items() if kind == "actuator" and attribute == a}
                    for a in ("force", "ctrl"))  # fmt: skip
     start = np.array([c.value for c in fit.columns])
@@ -195,7 +196,9 @@ def check_balance(rig: RigModel, fit: DeclaredFit) -> tuple[ChannelIssue, ...]:
     looks: list[tuple[str, Rows, str, float]] = []
     for row in fit.rows:
         drive = rig.drive(row.joint)
-        name = None if drive is None or (row.trial, row.joint) not in live else force.get(drive.name, told.get(drive.name))
+        name = (
+            None if drive is None or (row.trial, row.joint) not in live else force.get(drive.name, told.get(drive.name))
+        )
         if name is None or row.moving.sum() < 30:
             continue
         y, x = row.effort[row.moving], row.columns[row.moving]
@@ -204,7 +207,14 @@ def check_balance(rig: RigModel, fit: DeclaredFit) -> tuple[ChannelIssue, ...]:
         elif drive.name not in force:  # what was put in may be any function, and need not explain anything
             continue
         elif (share := _static(row, x, start)) is not None:
-            looks.append((name, row, "is a static function of the position, without the friction and inertia of the motion", share))
+            looks.append(
+                (
+                    name,
+                    row,
+                    "is a static function of the position, without the friction and inertia of the motion",
+                    share,
+                )
+            )
         elif _rms(y) > fit.scale[row.joint] and _stranger(fit, row) and (share := _own_fit(fit, row)) > STRANGE:
             looks.append((name, row, "explains nothing of the motion, though it does in other recordings", share))
     lacking = {row.joint: (name, share) for name, row, reason, share in looks if reason == UNSIGNED}
@@ -221,8 +231,9 @@ def check_balance(rig: RigModel, fit: DeclaredFit) -> tuple[ChannelIssue, ...]:
 
 
 def _unsigned(trial: RigTrial, row: Rows, start: Array) -> float | None:
-    """Share of an effort without sign that the size of the one that the declared start (P,) expects leaves (moving samples of
-    both), where that is far less than its value, or where the effort turns back at zero; None where it has a sign."""
+    """Share of an effort without sign that the size of the one that the declared start (P,) expects leaves (moving
+    samples of both), where that is far less than its value, or where the effort turns back at zero; None where it has a
+    sign."""
     effort, expected = row.effort[row.moving], row.columns[row.moving] @ start
     raw = fill_gaps(trial.time_s, trial.effort.get(row.joint, trial.voltage.get(row.joint)))
     side = np.sign(effort.mean())
@@ -234,9 +245,9 @@ def _unsigned(trial: RigTrial, row: Rows, start: Array) -> float | None:
 
 
 def _turns_back_at_zero(time_s: Array, effort: Array, row: Rows, start: Array) -> bool:
-    """Whether an effort (n,) at time_s touches zero between the strokes of the effort that the declared start (P,) expects, and
-    goes up again on the same side: between the middles of one stroke and of the next it falls to a third of both. A force
-    that truly reverses goes through zero; one with an offset goes from one level to another."""
+    """Whether an effort (n,) at time_s touches zero between the strokes of the effort that the declared start (P,)
+    expects, and goes up again on the same side: between the middles of one stroke and of the next it falls to a third
+    of both. A force that truly reverses goes through zero; one with an offset goes from one level to another."""
     expected = np.interp(time_s, row.time_s, row.full_columns @ start - row.load_known)
     large = np.flatnonzero(np.abs(expected) > 0.5 * np.median(np.abs(expected)))
     turns = [(a + b) // 2 for a, b in pairwise(large) if expected[a] * expected[b] < 0]

@@ -1,8 +1,8 @@
 """Inertial parameters that bodies can have: least squares over pseudo-inertias that are positive definite.
 
-A body is physical exactly when its 4 x 4 pseudo-inertia is positive definite (Wensing, Kim & Slotine 2018). Least squares
-over such bodies is convex (Traversaro et al. 2016; Sousa & Cortesao 2014): a logarithmic barrier holds every body inside,
-and Newton steps follow it as it is lowered (Boyd & Vandenberghe 2004, ch. 11).
+A body is physical exactly when its 4 x 4 pseudo-inertia is positive definite (Wensing, Kim & Slotine 2018). Least
+squares over such bodies is convex (Traversaro et al. 2016; Sousa & Cortesao 2014): a logarithmic barrier holds every
+body inside, and Newton steps follow it as it is lowered (Boyd & Vandenberghe 2004, ch. 11).
 """
 
 from __future__ import annotations
@@ -102,8 +102,8 @@ def _newton(h: Array, g: Array, share: float, barrier: _Barrier, x: Array) -> Ar
 class _Barrier:
     """Minus the logarithms of every body's determinant and of the distances from the edges of the box.
 
-    own (bodies, 10): places of their parameters in x (-1: as declared (bodies, 10)); unit (n,): of x; at, sign, end (edges,): place
-    in x, side on which there is room, edge.
+    own (bodies, 10): places of their parameters in x (-1: as declared (bodies, 10)); unit (n,): of x; at, sign, end
+    (edges,): place in x, side on which there is room, edge.
     """
 
     own: Array
@@ -136,7 +136,9 @@ class _Barrier:
         return self.sign * (x[self.at.astype(int)] - self.end)
 
     def _pseudo(self, x: Array) -> Array:
-        return (np.where(self.own >= 0, x[self.own] * self.unit[self.own], self.declared) @ BASIS.reshape(10, 16)).reshape(-1, 4, 4)
+        return (
+            np.where(self.own >= 0, x[self.own] * self.unit[self.own], self.declared) @ BASIS.reshape(10, 16)
+        ).reshape(-1, 4, 4)
 
 
 def _inside(x: Array, low: Array, high: Array) -> Array:
@@ -146,7 +148,8 @@ def _inside(x: Array, low: Array, high: Array) -> Array:
 
 
 def _well_inside(p: Array, free: Array) -> Array:
-    """Declared parameters (10,) with moments of inertia raised, where they are free (10,) bool, until such a body can be."""
+    """Declared parameters (10,) with moments of inertia raised, where they are free (10,) bool, until such a body can
+    be."""
     out = p.copy()
     out[0] = max(out[0], 1e-6)
     more = 1e-3 * max(float(np.max(np.abs(out[DIAGONAL]))), 1e-12)

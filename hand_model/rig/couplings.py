@@ -15,8 +15,9 @@ Known = tuple[DeclaredFit, tuple[Term, ...], tuple[Step, ...], tuple[Score, ...]
 
 
 def with_couplings(rig: RigModel) -> RigModel:
-    """The rig with its couplings' polynomials fitted to the encoders, beside what the couplings lack: what follows projects
-    efforts through them, and a polynomial that has bent to lost motion or stretch would make loads out of nothing."""
+    """The rig with its couplings' polynomials fitted to the encoders, beside what the couplings lack: what follows
+    projects efforts through them, and a polynomial that has bent to lost motion or stretch would make loads out of
+    nothing."""
     couplings, values = [], {}
     for c in rig.couplings:
         known = coupling_terms(rig, c)
@@ -26,8 +27,8 @@ def with_couplings(rig: RigModel) -> RigModel:
 
 
 def coupling_terms(rig: RigModel, coupling: Coupling) -> Known | None:
-    """The coupling's balance, the terms it lacks, their rounds, all scores of the last round, and whether recordings have
-    zeros of their own; None where an encoder is missing."""
+    """The coupling's balance, the terms it lacks, their rounds, all scores of the last round, and whether recordings
+    have zeros of their own; None where an encoder is missing."""
     fit = fit_coupling(rig, coupling)
     if fit is None:
         return None

@@ -40,8 +40,10 @@ class DeclaredFit:
     cutoff_hz: float
     quality: dict[tuple[str, str], float]
     bodies: Array = field(default_factory=lambda: np.zeros((0, 10)))  # declared inertial parameters, in columns' order
-    anchored: bool = False  # no effort is recorded anywhere: only ratios show, and the heaviest body's declared weight is the scale
-    beside: Mapping[tuple[str, str], Array] = field(default_factory=dict)  # (trial, joint) -> effort (n,) of effects at full rate
+    # no effort is recorded anywhere: only ratios show, and the heaviest body's declared weight is the scale
+    anchored: bool = False
+    # (trial, joint) -> effort (n,) of effects at full rate
+    beside: Mapping[tuple[str, str], Array] = field(default_factory=dict)
     kept: tuple[str, ...] = ()  # joints whose rest is kept in the balance
 
     def residual(self, row: Rows) -> Array:
@@ -98,16 +100,21 @@ def fit_declared(
 ) -> DeclaredFit:  # fmt: skip
     """Fit the declared parameters to the trials that do not validate.
 
-    refused: (trial, joint) whose effort channel cannot be trusted; their balance is not fitted, nor kept; kept: joints whose rest is. A trial that
-    disagrees with the others weighs less (its residual rms over the median of all, squared, beyond two).
-    The cut-off is the highest at which the declared model, or it beside any load and friction that are smooth in position and speed, explains
-    nearly the largest share of the effort: below it the motion is lost, above it are noise and flexibility that no rigid model holds.
+    refused: (trial, joint) whose effort channel cannot be trusted; their balance is not fitted, nor kept; kept: joints
+    whose rest is. A trial that disagrees with the others weighs less (its residual rms over the median of all, squared,
+    beyond two).
+    The cut-off is the highest at which the declared model, or it beside any load and friction that are smooth in
+    position and speed, explains nearly the largest share of the effort: below it the motion is lost, above it are noise
+    and flexibility that no rigid model holds.
     """
     columns = declared_columns(rig, off_axis)
     refused = set(refused)
     cutoff = cutoff_hz or _choose_cutoff(rig, columns, refused, kept)
     rows = tuple(
-        r for t in rig.trials for r in trial_rows(rig, t, columns, cutoff, kept=kept) if (r.trial, r.joint) not in refused
+        r
+        for t in rig.trials
+        for r in trial_rows(rig, t, columns, cutoff, kept=kept)
+        if (r.trial, r.joint) not in refused
     )
     fit = _robust_fit(columns, rows, cutoff or (rows[0].cutoff_hz if rows else float("nan")))
     model = compile_model(rig)
@@ -116,17 +123,34 @@ def fit_declared(
     return replace(fit, bodies=np.array(bodies).reshape(-1, 10), kept=tuple(kept))
 
 
-def _choose_cutoff(rig: RigModel, columns: tuple[Column, ...], refused: set[tuple[str, str]], kept: Collection[str] = ()) -> float | None:
-    """The highest cut-off at which the share left is within NEAR_BEST of the least, below the first band that adds more to the residual than
-    to the effort: there is nothing of the motion in it; None where none can be tried. Shares are asked with all rests, of which a wide band
-    spreads least, and of two models, for what is missing may be seen in wide bands alone, and is no reason against them."""
+def _choose_cutoff(
+    rig: RigModel, columns: tuple[Column, ...], refused: set[tuple[str, str]], kept: Collection[str] = ()
+) -> float | None:
+    """The highest cut-off at which the share left is within NEAR_BEST of the least, below the first band that adds more
+    to the residual than to the effort: there is nothing of the motion in it; None where none can be tried. Shares are
+    asked with all rests, of which a wide band spreads least, and of two models, for what is missing may be seen in wide
+    bands alone, and is no reason against them."""
     sample, most, last = _sample(rig), 0.0, None
     shares: dict[float, tuple[float, float]] = {}
     for cutoff in CUTOFFS:
         # The same samples for all: what a low cut-off spoils near the ends counts against it.
-        moving = [r for t in sample for r in trial_rows(rig, t, columns, cutoff, END_S, kept=kept) if (r.trial, r.joint) not in refused]
+        moving = [
+            r
+            for t in sample
+            for r in trial_rows(rig, t, columns, cutoff, END_S, kept=kept)
+            if (r.trial, r.joint) not in refused
+        ]
         stands = any(len(r.weight) for r in moving)
-        rows = [r for t in sample for r in trial_rows(rig, t, columns, cutoff, END_S, kept=rig.joints) if (r.trial, r.joint) not in refused] if stands else moving
+        rows = (
+            [
+                r
+                for t in sample
+                for r in trial_rows(rig, t, columns, cutoff, END_S, kept=rig.joints)
+                if (r.trial, r.joint) not in refused
+            ]
+            if stands
+            else moving
+        )
         if not rows or cutoff > 0.3 * min(r.rate_hz for r in rows):
             continue
         seen = float(np.mean([r.moving.mean() for r in rows]))
@@ -143,8 +167,9 @@ def _choose_cutoff(rig: RigModel, columns: tuple[Column, ...], refused: set[tupl
 
 
 def _drowns(rows: Sequence[Rows]) -> bool:
-    """Whether noise of the positions is so large a part of the accelerations that a fit would read too small an inertia (errors in
-    variables, Fuller 1987). Within one band white noise leaves sqrt(3 / 5) 2 pi c times as much in them as in velocities."""
+    """Whether noise of the positions is so large a part of the accelerations that a fit would read too small an inertia
+    (errors in variables, Fuller 1987). Within one band white noise leaves sqrt(3 / 5) 2 pi c times as much in them as
+    in velocities."""
     parts = []
     for r in rows:
         velocity = r.rest_speed / 3.0 / STATE_CUTOFF**1.5  # its noise within the balance's own band
@@ -162,7 +187,8 @@ def _powers(fit: DeclaredFit) -> Array:
 
 
 def _only_noise(before: Array, after: Array) -> bool:
-    """Whether a wider band adds more to the residual than to the effort, and enough of it to matter; powers (joints, 2)."""
+    """Whether a wider band adds more to the residual than to the effort, and enough of it to matter; powers (joints,
+    2)."""
     effort, left = np.mean((after - before) / (after[:, :1] + 1e-300), 0)
     return bool(left > max(effort, ENOUGH_POWER))
 
@@ -174,8 +200,8 @@ def _sample(rig: RigModel, most: int = 5) -> list[RigTrial]:
 
 
 def _unexplained(fit: DeclaredFit, beside: bool) -> float:
-    """Share of the training effort left (rms over rms, all trials of a joint pooled), geometric mean over joints; beside: where any smooth
-    load and friction stand beside the declared columns."""
+    """Share of the training effort left (rms over rms, all trials of a joint pooled), geometric mean over joints;
+    beside: where any smooth load and friction stand beside the declared columns."""
     shares = []
     for joint in {r.joint for r in fit.rows}:
         rows = [r for r in fit.rows if r.joint == joint and not r.validate and r.moving.any()]
@@ -192,12 +218,15 @@ def _unexplained(fit: DeclaredFit, beside: bool) -> float:
 
 
 def _smooth(row: Rows) -> Array:
-    """Columns (m, k) of any load that is smooth in position, of any friction that is so in position or falls with speed, of drag."""
+    """Columns (m, k) of any load that is smooth in position, of any friction that is so in position or falls with
+    speed, of drag."""
     low, size = row.position.min(), float(np.percentile(np.abs(row.velocity), 95)) + 1e-300
     at = (row.position - low) / (float(np.ptp(row.position)) + 1e-300) * (PLACES - 1)
     hats, v = np.maximum(1 - np.abs(at[:, None] - np.arange(PLACES)), 0.0), row.velocity / size
     slow = np.exp(-((v[:, None] / SLOW) ** 2))
-    return row.filtered(np.column_stack([hats, np.column_stack([hats, slow]) * row.direction[:, None], np.abs(v), v * np.abs(v)]))
+    return row.filtered(
+        np.column_stack([hats, np.column_stack([hats, slow]) * row.direction[:, None], np.abs(v), v * np.abs(v)])
+    )
 
 
 def _rms(values: Array) -> float:
@@ -224,7 +253,8 @@ def _robust_fit(columns: tuple[Column, ...], rows: tuple[Rows, ...], cutoff: flo
     for r in rows:
         m = r.moving
         quality[r.trial, r.joint] = _rms((r.effort - r.columns @ theta)[m]) / (_rms(_known(r, columns)[m]) + 1e-300)
-    fitted = tuple(r for r in rows if r.joint in scale)  # of a joint that no training recording moves there is nothing to hold out
+    # of a joint that no training recording moves there is nothing to hold out
+    fitted = tuple(r for r in rows if r.joint in scale)
     return DeclaredFit(columns, theta, scale, fitted, cutoff, quality, anchored=anchored)
 
 

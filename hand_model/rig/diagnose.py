@@ -1,4 +1,5 @@
-"""What a rig's declared model lacks: channels first, then couplings, then every joint; each claim on held-out trials."""
+"""What a rig's declared model lacks: channels first, then couplings, then every joint; each claim on held-out
+trials."""
 
 from __future__ import annotations
 
@@ -48,13 +49,15 @@ def diagnose_rig(session: Session, output: str | Path | None = None, progress: C
                  model: bool = True) -> RigFindings:  # fmt: skip
     """Diagnose a rig session; with `output`, also write findings.json there and, with `model`, the improved rig.xml.
 
-    Raises SessionError or DescriptionError where the session or its MJCF cannot be read, HandModelError for an output that is a file
-    or the session's own folder, whose model would be lost.
+    Raises SessionError or DescriptionError where the session or its MJCF cannot be read, HandModelError for an output
+    that is a file or the session's own folder, whose model would be lost.
     """
     if output is not None:
         refuse_file(output)
         if Path(output).resolve() == session.path.resolve():
-            raise HandModelError(f"{output}: is the session itself, whose model would be written over; name another folder")
+            raise HandModelError(
+                f"{output}: is the session itself, whose model would be written over; name another folder"
+            )
     say = progress or (lambda _: None)
     rig = with_couplings(load_rig(session))
     if not rig.select(validate=False):
@@ -105,8 +108,8 @@ def diagnose_rig(session: Session, output: str | Path | None = None, progress: C
 
 
 def _rank(finding: Finding) -> tuple[int, int]:
-    """What is refused first, for all else was found without it; then by share of the mismatch, in steps that are worth a name
-    (within one in the order found: efforts before angles between encoders); clipped samples last."""
+    """What is refused first, for all else was found without it; then by share of the mismatch, in steps that are worth
+    a name (within one in the order found: efforts before angles between encoders); clipped samples last."""
     place = 1 if finding.model is not None else 0 if finding.effect == "command_as_measurement" else 2
     return place, -round(float(finding.where.get("share_of_mismatch") or 0.0) / LEAST_SHARE)
 
@@ -143,8 +146,9 @@ def _channel_finding(issue: ChannelIssue) -> Finding:
 
 @dataclass(frozen=True)
 class _Search:
-    """What competition found in a balance. base, fit: the declared fit before and after centres of mass are freed (freed: the finding that
-    says so); offsets, stories: rounds and winners, offsets first; left: keys of what was not taken; floor: joint -> noise."""
+    """What competition found in a balance. base, fit: the declared fit before and after centres of mass are freed
+    (freed: the finding that says so); offsets, stories: rounds and winners, offsets first; left: keys of what was not
+    taken; floor: joint -> noise."""
 
     base: DeclaredFit
     fit: DeclaredFit
@@ -156,8 +160,8 @@ class _Search:
 
 
 def _diagnose_balance(rig: RigModel, fit: DeclaredFit, say: Callable[[str], None]) -> tuple:
-    """Findings, rejections, lack of fit, patched and declared MJCF of a rig whose efforts are recorded: of its motion alone, or, where what
-    the motion shows says what holds a joint at rest as well, of all that is recorded there."""
+    """Findings, rejections, lack of fit, patched and declared MJCF of a rig whose efforts are recorded: of its motion
+    alone, or, where what the motion shows says what holds a joint at rest as well, of all that is recorded there."""
     if not fit.rows:
         return [], [], {"metric": None, "before": None, "after": None}, rig.xml, rig.xml
     told, known = _held_out(rig, _searched(rig, fit, say))
@@ -193,7 +197,8 @@ def _balanced(rig: RigModel, fit: DeclaredFit) -> list[str]:
 
 
 def _held_out(rig: RigModel, search: _Search) -> tuple[tuple, tuple[str, ...]]:
-    """What of a search the validation recordings bear out, as `_diagnose_balance` hands it on, and the joints of which it says what holds them at rest."""
+    """What of a search the validation recordings bear out, as `_diagnose_balance` hands it on, and the joints of which
+    it says what holds them at rest."""
     base_fit, fit, bench = search.base, search.fit, Bench(rig, floor=search.floor)
     rejected: list[dict[str, Any]] = [{"effect": key, "reason": NOT_TAKEN} for key in search.left]
     plain = (base_fit, (), solution(pose(base_fit), []))
@@ -207,7 +212,9 @@ def _held_out(rig: RigModel, search: _Search) -> tuple[tuple, tuple[str, ...]]:
             "after": bench.ratio(plain, every), "one_effect": bench.ratio(plain, one),
             "two_effects": bench.ratio(plain, two), "engine": bench.engine,
             "joints": {j: bench.proof(j, plain, every) for j in _balanced(rig, fit)}}  # fmt: skip
-    return (shares(found, lack["joints"]), rejected, lack, bench.file(*every), bench.file(*plain)), known_at_rest(*every)
+    return (shares(found, lack["joints"]), rejected, lack, bench.file(*every), bench.file(*plain)), known_at_rest(
+        *every
+    )
 
 
 def _off_axis(bench: Bench, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple[DeclaredFit, Finding] | None:
@@ -234,7 +241,9 @@ def _off_axis(bench: Bench, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple[
         return None
     moved = {c.label: {"value": float(v), "unit": "kg m"} for c, v in zip(freed.columns, after)
              if c.kind == "inertial" and c.value == 0}  # fmt: skip
-    where = whereabouts(best, None, "effort", proofs[best]["held_out"], proofs[best]["before"] ** 2 - proofs[best]["after"] ** 2)
+    where = whereabouts(
+        best, None, "effort", proofs[best]["held_out"], proofs[best]["before"] ** 2 - proofs[best]["after"] ** 2
+    )
     words = (
         f"Centres of mass lie off the axes on which they are declared: held-out effort error falls to "
         f"{100 * ratio:.0f} % over all joints (most at {best}: {proofs[best]['before']:.4g} to {proofs[best]['after']:.4g})."
@@ -266,13 +275,16 @@ def _diagnose_coupling(
     named = []
     for f in found:
         where = {**f.where, "actuator": None, "signal": "position", "coupling": coupling.name}
-        zero = " The zero between the two encoders differs between recordings and was taken out of each." if moved else ""
+        zero = (
+            " The zero between the two encoders differs between recordings and was taken out of each." if moved else ""
+        )
         named.append(replace(f, where=where, statement=f.statement + zero))
     declared = {f.where["joint"]: f.fit for f in reversed(named)}  # the first was held to nothing else
     return shares(named, declared), rejected, angle_residual(rig, coupling, fit, kept)
 
 
-# --- verdict -----------------------------------------------------------------------------------------------------------
+# --- verdict
+# -----------------------------------------------------------------------------------------------------------
 
 
 def _verdict(found: Sequence[Finding], lack: Mapping[str, Any]) -> str:

@@ -25,7 +25,8 @@ def _axis_rotation(axis: Array, angle: Array) -> Array:
 def inertial_columns(model: Any, position: Array, velocity: Array, acceleration: Array, gravity: Array) -> Array:
     """Regressor (n, joints, bodies, 10) so that joint effort = sum over bodies and INERTIAL of column x parameter.
 
-    model: compiled mjModel with hinges and slides only. position, velocity, acceleration: (n, joints) SI. gravity: (3,).
+    model: compiled mjModel with hinges and slides only. position, velocity, acceleration: (n, joints) SI. gravity:
+    (3,).
     Parameters of a body: m [kg], h = m x centre [kg m], inertia about the body frame's origin [kg m2], body frame axes.
     """
     n, bodies = len(position), model.nbody

@@ -3,8 +3,9 @@
 Cluster bootstrap (Davison & Hinkley 1997, sec. 3.8): whole recordings are drawn where there are enough of them, since
 blocks of one recording share what is peculiar to it; else blocks. A tie goes to the simpler rival within one standard
 error of the best (Breiman et al. 1984). That anything is there at all is asked first, of
-the best of so many rivals: the largest of their gains against its own distribution with signs turned at random (Westfall
-& Young 1993; Romano & Wolf 2005), so that rivals that say the same count once (a protected comparison, Fisher 1935).
+the best of so many rivals: the largest of their gains against its own distribution with signs turned at random
+(Westfall & Young 1993; Romano & Wolf 2005), so that rivals that say the same count once (a protected comparison, Fisher
+1935).
 """
 
 from __future__ import annotations
@@ -25,8 +26,10 @@ ENOUGH = 6  # recordings from which on they are drawn whole
 @dataclass(frozen=True)
 class Verdict:
     """best, chosen: indices among those that surely beat nothing (chosen is the simplest as good as the best);
-    probability: of the chosen one against nothing; wins (rivals,): share of resamples in which each is best of all; close:
-    not told from the best, in order of error; tied: within one standard error of it; gain: share of the error of "nothing" that the chosen one takes away."""
+    probability: of the chosen one against nothing; wins (rivals,): share of resamples in which each is best of all;
+    close:
+    not told from the best, in order of error; tied: within one standard error of it; gain: share of the error of
+    "nothing" that the chosen one takes away."""
 
     best: int
     chosen: int
@@ -52,10 +55,10 @@ def multiplicities(group: Array, count: int = RESAMPLES, seed: int = 0) -> Array
 
 
 def beyond_chance(none: Array, errors: Array, worth: float = 0.0, flips: int = RESAMPLES, seed: int = 0) -> float:
-    """Probability that the best of several rivals' gains is no chance: had none of them anything to gain, a unit's gain might as
-    well have had the other sign, of all rivals at once; the largest self-normalised sum is held to its distribution under
-    such flips. none (units,), errors (rivals, units); worth: share of "nothing" that a rival has to take away to be chosen,
-    here as there."""
+    """Probability that the best of several rivals' gains is no chance: had none of them anything to gain, a unit's gain
+    might as well have had the other sign, of all rivals at once; the largest self-normalised sum is held to its
+    distribution under such flips. none (units,), errors (rivals, units); worth: share of "nothing" that a rival has to
+    take away to be chosen, here as there."""
     apart = none - errors
     gains = apart / (none + errors + 1e-300)  # relative, or the loudest recording would speak for all
     size = np.sqrt(np.sum(gains**2, 1)) + 1e-300
@@ -71,9 +74,9 @@ def beyond_chance(none: Array, errors: Array, worth: float = 0.0, flips: int = R
 
 def weigh(none: Array, errors: Array, sizes: Sequence[int], group: Array,
           least: float = BEYOND_DOUBT, by_chance: bool = True, worth: float = 0.0) -> Verdict | None:  # fmt: skip
-    """Compare rivals (errors (rivals, blocks), sizes: parameters) with each other and with "nothing" (none (blocks,)); None
-    where none of them beats nothing with probability `least`, the choice among them allowed for (by_chance: that they are
-    more than chance is asked here), or gains enough (worth: share of the error of "nothing")."""
+    """Compare rivals (errors (rivals, blocks), sizes: parameters) with each other and with "nothing" (none (blocks,));
+    None where none of them beats nothing with probability `least`, the choice among them allowed for (by_chance: that
+    they are more than chance is asked here), or gains enough (worth: share of the error of "nothing")."""
     draws = multiplicities(group)
     resampled, base, total = errors @ draws.T, draws @ none, errors.sum(1)
     against = np.mean(resampled < base, 1)

@@ -21,8 +21,11 @@ NOT_TOLD = "interval of its size holds zero"
 NOT_BORNE_OUT = "error on validation recordings does not fall enough"
 
 
-def whereabouts(joint: str | None, drive: Drive | None, signal: str, trials: Sequence[str], share: float) -> dict[str, Any]:
-    """Where a finding of a rig is; share: of the mismatch, squared [effort or position unit] until `shares` divides it."""
+def whereabouts(
+    joint: str | None, drive: Drive | None, signal: str, trials: Sequence[str], share: float
+) -> dict[str, Any]:
+    """Where a finding of a rig is; share: of the mismatch, squared [effort or position unit] until `shares` divides
+    it."""
     return {"finger": None, "joint": joint, "actuator": drive.name if drive else None, "signal": signal, "marker": None,
             "trials": list(trials), "region": None, "share_of_mismatch": share}  # fmt: skip
 
@@ -63,8 +66,8 @@ class RigFindings(Findings):
         return {**super().to_dict(), "session": self.session, "declared": dict(self.declared)}
 
     def write(self, folder: str | Path, model: bool = True) -> None:
-        """Write findings.json and, with `model`, rig.xml (improved) and rig_declared.xml (fitted, nothing added), each whole or not at
-        all; without, those of an earlier run go.
+        """Write findings.json and, with `model`, rig.xml (improved) and rig_declared.xml (fitted, nothing added), each
+        whole or not at all; without, those of an earlier run go.
         """
         path = Path(folder)
         earlier = (path / FILES[0]).is_file()

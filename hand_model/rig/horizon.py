@@ -1,4 +1,5 @@
-"""How far a rig's files predict its motion: MuJoCo in open loop, over whole recordings or as far as a simulation carries.
+"""How far a rig's files predict its motion: MuJoCo in open loop, over whole recordings or as far as a simulation
+carries.
 
 An unstable or chaotic mechanism leaves its recording however good the model is; there the simulation is started again
 from the recorded state after a horizon (multiple shooting, Bock 1981), and the horizon is said.
@@ -29,9 +30,10 @@ def open_loop(rig: RigModel, before: bytes, after: bytes, refused: Collection[tu
               validate: bool = True, known: dict[tuple[bytes, float, bool], Array] | None = None) -> dict[str, Any]:  # fmt: skip
     """Position error of both files on the trials held out (on all where none is), at the longest horizon that carries.
 
-    refused: (trial, joint) whose effort cannot be trusted; their trials are left out. validate: False for the training trials; known:
-    errors of files kept from one call to the next, of one rig and one `refused`. Returns {"not_run": reason} where the files cannot
-    be simulated so, else the horizon ("whole" or [s]), the ratio and each joint's figures.
+    refused: (trial, joint) whose effort cannot be trusted; their trials are left out. validate: False for the training
+    trials; known:
+    errors of files kept from one call to the next, of one rig and one `refused`. Returns {"not_run": reason} where the
+    files cannot be simulated so, else the horizon ("whole" or [s]), the ratio and each joint's figures.
     """
     wrong = {t for t, _ in refused}
     trials = [t for t in (rig.select(validate) or rig.trials) if t.name not in wrong and can_simulate(rig, t)]

@@ -56,7 +56,9 @@ def effort_residuals(
         rows = None  # the file declares more than the balances were made for
     if rows is None:
         how = next((r for r in records if "cutoff_hz" in r), {})
-        rows = tuple(r for t in rig.trials for r in trial_rows(rig, t, columns, how.get("cutoff_hz"), kept=how.get("rests", ())))
+        rows = tuple(
+            r for t in rig.trials for r in trial_rows(rig, t, columns, how.get("cutoff_hz"), kept=how.get("rests", ()))
+        )
     rows = tuple(r for r in rows if keep is None or (r.trial, r.joint) in keep)
     fit = DeclaredFit(columns, theta, {}, _recolumned(rows, columns), 0.0, {})
     terms = _acting(rig, fit, [r for r in records if "effect" in r])
@@ -68,14 +70,19 @@ def effort_residuals(
         for row in mine:
             full = sum(own[:, rig.joints.index(j)] * w for j, w in row.jacobian.items())
             full = full + beside([row], terms).get((name, row.joint), 0.0)
-            delay = sum(shape["delay"] for candidate, shape, _ in terms if candidate.delays and candidate.joint == row.joint)
+            delay = sum(
+                shape["delay"] for candidate, shape, _ in terms if candidate.delays and candidate.joint == row.joint
+            )
             expected = row.filtered(full, delay)
-            out.append(EffortResidual(name, row.joint, row.validate, (row.effort - expected)[row.moving], row, expected))
+            out.append(
+                EffortResidual(name, row.joint, row.validate, (row.effort - expected)[row.moving], row, expected)
+            )
     return tuple(out)
 
 
 def joint_efforts(rig: RigModel, trial: RigTrial, row: Rows) -> Array:
-    """What each joint's drive has to give (n, joints) at the recorded states of a balance, by mj_inverse and friction."""
+    """What each joint's drive has to give (n, joints) at the recorded states of a balance, by mj_inverse and
+    friction."""
     import mujoco
 
     model = compile_model(rig, trial, bodies=False)  # the balance has taken the trial's own bodies from the effort
@@ -101,7 +108,8 @@ def joint_efforts(rig: RigModel, trial: RigTrial, row: Rows) -> Array:
 
 
 def apply_levels(model: Any, rig: RigModel, trial: RigTrial) -> None:
-    """Put the fitted Coulomb level in place of the starting one that the trial sets, where the file keeps such levels."""
+    """Put the fitted Coulomb level in place of the starting one that the trial sets, where the file keeps such
+    levels."""
     for record in read_effects(rig.xml):
         for level, value in record.get("frictionloss_levels", {}).items():
             start = trial.set.get(f"joint:{record['joint']}:frictionloss")
@@ -130,13 +138,23 @@ def _recolumned(rows: Sequence[Rows], columns: Sequence[Column]) -> tuple[Rows, 
         blank = np.concatenate([row.full_columns, np.zeros((len(row.full_columns), 1))], 1)
         carried = np.append(row.carried, False)
         still = np.concatenate([row.still_columns, np.zeros((len(row.still_columns), 1))], 1)
-        out.append(replace(row, full_columns=blank[:, pick], still_columns=still[:, pick], carried=carried[pick], declared=tuple(columns)))
+        out.append(
+            replace(
+                row,
+                full_columns=blank[:, pick],
+                still_columns=still[:, pick],
+                carried=carried[pick],
+                declared=tuple(columns),
+            )
+        )
     return tuple(out)
 
 
-def _acting(rig: RigModel, fit: DeclaredFit, records: Sequence[Mapping[str, Any]]) -> list[tuple[Candidate, Mapping, Array]]:
-    """Candidates that the file's records name, with shapes and amplitudes, at the loads of the file's parameters and, by
-    turns, of the effects themselves."""
+def _acting(
+    rig: RigModel, fit: DeclaredFit, records: Sequence[Mapping[str, Any]]
+) -> list[tuple[Candidate, Mapping, Array]]:
+    """Candidates that the file's records name, with shapes and amplitudes, at the loads of the file's parameters and,
+    by turns, of the effects themselves."""
     turns = TURNS if any(r["effect"] == "load_dependent_friction" for r in records) else 1
     acting: list[tuple[Candidate, Mapping, Array]] = []
     for _ in range(turns):

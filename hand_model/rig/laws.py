@@ -24,8 +24,8 @@ OF_STATE = FRICTION | {"nonlinear_spring", "end_stop_contact", "detent_load", "t
 
 @dataclass(frozen=True)
 class Now:
-    """One instant of a joint. position [rad or m], velocity [per s]; load: what the joint carries [N m or N]; drive: what
-    its own drive puts in; bias: the load without what acceleration asks for."""
+    """One instant of a joint. position [rad or m], velocity [per s]; load: what the joint carries [N m or N]; drive:
+    what its own drive puts in; bias: the load without what acceleration asks for."""
 
     position: float
     velocity: float
@@ -39,7 +39,8 @@ Law = Callable[[Now], tuple[float, float]]
 
 
 def law(record: Mapping[str, Any]) -> Law | None:
-    """The law of a record {"effect", "variant", "shape", "amplitude"} of a file; None where it has none in open loop."""
+    """The law of a record {"effect", "variant", "shape", "amplitude"} of a file; None where it has none in open
+    loop."""
     name, variant = record["effect"], record.get("variant", "")
     shape, size = record.get("shape", {}), tuple(record.get("amplitude", {}).values())
     if variant == TURNING:
@@ -52,7 +53,8 @@ def law(record: Mapping[str, Any]) -> Law | None:
         "asymmetric_friction": lambda n: (size[0], 0.0),
         "asymmetric_viscous_friction": lambda n: (size[0] * abs(n.velocity), 0.0),
         "quadratic_damping": lambda n: (size[0] * n.velocity * abs(n.velocity), 0.0),
-        "current_channel_delay": lambda n: (0.0, 0.0),  # the channel was read at another instant: the control is shifted
+        # the channel was read at another instant: the control is shifted
+        "current_channel_delay": lambda n: (0.0, 0.0),
         "command_delay": lambda n: (0.0, 0.0),
     }
     return _of_state(record) if name in OF_STATE else simple.get(name)
@@ -96,15 +98,29 @@ def _gear(now: Now) -> float:
     return 0.5 * abs(now.drive + now.bias)
 
 
-_SIDES = {LOW: _joint, MORE: _joint, MOTOR: _motor, MOTOR_LOW: _motor, MOTOR_MORE: _motor, GEAR: _gear, GEAR_LOW: _gear, GEAR_MORE: _gear}
+_SIDES = {
+    LOW: _joint,
+    MORE: _joint,
+    MOTOR: _motor,
+    MOTOR_LOW: _motor,
+    MOTOR_MORE: _motor,
+    GEAR: _gear,
+    GEAR_LOW: _gear,
+    GEAR_MORE: _gear,
+}
 
 
 class _Stop:
-    """Stop operator (form 0) or exponential build-up (form 1) along the path, step by step; by_load: times the load; slower than
-    a Stribeck speed where the shape has one."""
+    """Stop operator (form 0) or exponential build-up (form 1) along the path, step by step; by_load: times the load;
+    slower than a Stribeck speed where the shape has one."""
 
     def __init__(self, shape: Mapping[str, float], size: float, by_load: bool = False) -> None:
-        self.reach, self.abrupt, self.size, self.by_load = max(shape["reach"], 1e-12), shape["form"] < 0.5, size, by_load
+        self.reach, self.abrupt, self.size, self.by_load = (
+            max(shape["reach"], 1e-12),
+            shape["form"] < 0.5,
+            size,
+            by_load,
+        )
         self.slow, self.state, self.last = shape.get("stribeck_speed", math.inf), 0.0, math.nan
 
     def __call__(self, now: Now) -> tuple[float, float]:

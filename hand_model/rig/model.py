@@ -18,7 +18,8 @@ QUANTITIES = {"joint": ("position", "velocity"), "actuator": ("force", "ctrl", "
 
 @dataclass(frozen=True)
 class Drive:
-    """An actuator on one joint. kind: "force" (torque or force is the control), "voltage" (dcmotor), "position" (servo).
+    """An actuator on one joint. kind: "force" (torque or force is the control), "voltage" (dcmotor), "position"
+    (servo).
 
     gear: control to joint transmission. gain: joint effort per unit of ctrl. offset: declares a constant (affine bias).
     """
@@ -33,7 +34,8 @@ class Drive:
 
 @dataclass(frozen=True)
 class Coupling:
-    """An equality between joints: `dependent` = polynomial of `independent`, coefficients ascending (MuJoCo polycoef)."""
+    """An equality between joints: `dependent` = polynomial of `independent`, coefficients ascending (MuJoCo
+    polycoef)."""
 
     name: str
     dependent: str
@@ -45,8 +47,9 @@ class Coupling:
 class RigTrial:
     """One recording mapped onto the model.
 
-    time_s: (n,) [s] from zero. position, velocity, effort: joint -> (n,), SI, nan where a cell was empty; effort is what
-    the drive is recorded to put on the joint (absent where only a voltage or nothing is recorded). voltage, setpoint:
+    time_s: (n,) [s] from zero. position, velocity, effort: joint -> (n,), SI, nan where a cell was empty; effort is
+    what the drive is recorded to put on the joint (absent where only a voltage or nothing is recorded). voltage,
+    setpoint:
     joint -> (n,). extra: columns that no signal names. live: joints whose drive is connected (gear not zero).
     """
 
@@ -129,7 +132,9 @@ def load_rig(session: Session, xml: bytes | None = None) -> RigModel:
     drives = _drives(model, mujoco)
     quantity = {c: _parse(session, c, q, joints, tuple(d.name for d in drives)) for c, q in session.rig.signals.items()}
     if all(attribute != "position" for _, _, attribute in quantity.values()):
-        raise SessionError(f'{session.path}: [signals] names no position; a log column with "joint:NAME:position" is needed')
+        raise SessionError(
+            f'{session.path}: [signals] names no position; a log column with "joint:NAME:position" is needed'
+        )
     chosen = [t for t in session.trials if t.kind == "motion"]
     if not chosen:
         raise SessionError(f'{session.path}: a rig needs trials of kind "motion"; there is none')

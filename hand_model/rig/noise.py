@@ -1,7 +1,7 @@
 """What the sensors' own noise leaves in a balance of effort: the floor that no model can go below.
 
-Parametric bootstrap (Efron & Tibshirani 1993, ch. 6): some white noise, a share of what the recordings hold, is added to
-them once more; what that changes of the residual tells the noise in it, states differentiated from noisy positions
+Parametric bootstrap (Efron & Tibshirani 1993, ch. 6): some white noise, a share of what the recordings hold, is added
+to them once more; what that changes of the residual tells the noise in it, states differentiated from noisy positions
 included.
 """
 
@@ -24,8 +24,8 @@ SMALL = 0.3  # share of the noise that is added, so that it acts linearly (on th
 
 
 def effort_noise(rig: RigModel, fit: DeclaredFit) -> dict[str, float]:
-    """Root mean square of sensor noise in the residual of every joint's balance [N m or N], moving samples, over some of the
-    recordings."""
+    """Root mean square of sensor noise in the residual of every joint's balance [N m or N], moving samples, over some
+    of the recordings."""
     rows = {(r.trial, r.joint): r for r in fit.rows}
     trials = [t for t in rig.trials if any(t.name == name for name, _ in rows)]
     squares: dict[str, list[float]] = {}

@@ -20,7 +20,11 @@ from .physical import physical
 BODY = ("mass", "inertia", "ipos", "iquat")
 VIEW = {("body", "diaginertia"): "inertia", ("joint", "ref"): "qpos0", ("joint", "springref"): "qpos_spring"}
 # Attributes that MuJoCo keeps in vectors with others.
-PLACE = {"kp": (("gainprm", 0, 1.0), ("biasprm", 1, -1.0)), "kv": (("biasprm", 2, -1.0),), "resistance": (("gainprm", 0, 1.0),)}
+PLACE = {
+    "kp": (("gainprm", 0, 1.0), ("biasprm", 1, -1.0)),
+    "kv": (("biasprm", 2, -1.0),),
+    "resistance": (("gainprm", 0, 1.0),),
+}
 
 
 def apply_overrides(
@@ -28,9 +32,9 @@ def apply_overrides(
 ) -> None:
     """Set the overrides on a compiled mjModel.
 
-    declared: body -> (10,) inertial parameters as first declared, where the file's differ (a fitted file); bodies: False
-    leaves mass, centre and inertia of bodies as the file has them. Raises SessionError where an override names nothing
-    in the model, or its value does not fit.
+    declared: body -> (10,) inertial parameters as first declared, where the file's differ (a fitted file); bodies:
+    False leaves mass, centre and inertia of bodies as the file has them. Raises SessionError where an override names
+    nothing in the model, or its value does not fit.
     """
     import mujoco
 

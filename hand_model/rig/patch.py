@@ -1,10 +1,12 @@
 """Fitted numbers and named effects written into the rig's MJCF.
 
 What MuJoCo has an attribute for goes there. The rest is kept in the same file, as JSON in
-`custom/text[@name="hand_model"]`. Records with "swing" are applied by `replay.EffectStepper` while MuJoCo steps; records
-with "effect" and "amplitude" are columns at the recorded motion, added by `inverse.effort_residuals` to what mj_inverse
-says, and in open loop laws that the stepper applies, where `laws.law` has one; "cutoff_hz" is the filter of that balance;
-"frictionloss_levels" are Coulomb levels of trials that set their own; "bodies" are those that trials override, as declared.
+`custom/text[@name="hand_model"]`. Records with "swing" are applied by `replay.EffectStepper` while MuJoCo steps;
+records with "effect" and "amplitude" are columns at the recorded motion, added by `inverse.effort_residuals` to what
+mj_inverse says, and in open loop laws that the stepper applies, where `laws.law` has one; "cutoff_hz" is the filter of
+that balance;
+"frictionloss_levels" are Coulomb levels of trials that set their own; "bodies" are those that trials override, as
+declared.
 """
 
 from __future__ import annotations

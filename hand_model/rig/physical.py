@@ -9,7 +9,8 @@ Array = NDArray[np.float64]
 
 
 def physical(p: Array) -> tuple[float, Array, Array]:
-    """Mass [kg], centre (3,) [m], inertia about it (3, 3) [kg m2] of parameters (10,), the nearest that a body can have.
+    """Mass [kg], centre (3,) [m], inertia about it (3, 3) [kg m2] of parameters (10,), the nearest that a body can
+    have.
 
     Moments that the motion does not show may be contradicted by those it does: they are raised until each principal
     moment is at most the sum of the other two (triangle inequality; Traversaro et al. 2016).

@@ -28,8 +28,9 @@ PARTS = 24  # blocks that the held-out recordings of a joint are cut into
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """Measures fits. mujoco: efforts by inverse dynamics of the file that holds them (each file once); else angles of a coupling by the
-    columns. floor: joint -> noise in its residual, where that is known; moved: what `open_loop` keeps of files."""
+    """Measures fits. mujoco: efforts by inverse dynamics of the file that holds them (each file once); else angles of a
+    coupling by the columns. floor: joint -> noise in its residual, where that is known; moved: what `open_loop` keeps
+    of files."""
 
     rig: RigModel
     mujoco: bool = True
@@ -47,7 +48,12 @@ class Bench:
         p = len(fit.columns)
         cutoffs = {r.cutoff_hz for r in fit.rows}
         analysis = [{"cutoff_hz": cutoffs.pop(), "rests": list(fit.kept)}] if len(cutoffs) == 1 else []
-        records = [*analysis, *body_records(self.rig), *level_records(fit.columns, theta[:p]), *term_records(terms, theta[p:])]
+        records = [
+            *analysis,
+            *body_records(self.rig),
+            *level_records(fit.columns, theta[:p]),
+            *term_records(terms, theta[p:]),
+        ]
         return write_effects(write_declared(self.rig, fit.columns, theta[:p]), records)
 
     def residuals(self, fit: DeclaredFit, terms: Sequence[Term], theta: Array, joint: str) -> list[tuple[str, Array]]:
@@ -75,7 +81,9 @@ class Bench:
         rms = np.sqrt(squares[:, draw].sum(2) / count[draw].sum(1))
         fall = np.percentile(rms[0] - rms[1], [2.5, 97.5])
         whole = np.sqrt(squares.sum(1) / count.sum())
-        metric, unit = ("effort_rmse", self.rig.effort_unit(joint)) if self.mujoco else ("angle_rmse", self.rig.unit(joint))
+        metric, unit = (
+            ("effort_rmse", self.rig.effort_unit(joint)) if self.mujoco else ("angle_rmse", self.rig.unit(joint))
+        )
         return {"metric": metric, "unit": unit, "before": float(whole[0]),
                 "after": float(whole[1]), "noise_floor": self._floor(before[0], joint),
                 "ci95_reduction": [float(fall[0]), float(fall[1])], "held_out": [t for t, _ in a],

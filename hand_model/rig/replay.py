@@ -166,8 +166,8 @@ def simulate_trial(
 
 def _asked_start(model: Any, effects: EffectStepper, trial: RigTrial, joint: str, start: tuple[Array, Array],
                  period_s: float) -> tuple[Array, Array]:  # fmt: skip
-    """Position and velocity (1, 1) each that fit the first period best (Gauss and Newton): a speed differentiated from an
-    encoder is wrong by more than friction does within it, and the error stays for good."""
+    """Position and velocity (1, 1) each that fit the first period best (Gauss and Newton): a speed differentiated from
+    an encoder is wrong by more than friction does within it, and the error stays for good."""
     recorded, step = fill_gaps(trial.time_s, trial.position[joint]), float(model.opt.timestep)
     seen = trial.time_s <= period_s
     grid = np.arange(0.0, trial.time_s[seen][-1] + step, step)
@@ -180,7 +180,9 @@ def _asked_start(model: Any, effects: EffectStepper, trial: RigTrial, joint: str
     state = np.array([float(s[0, 0]) for s in start])
     error = left(state)
     for _ in range(STEPS if seen.sum() > len(state) else 0):
-        slopes = np.stack([(left(state + size * e) - error) / size for size, e in zip(sizes, np.eye(2), strict=True)], 1)
+        slopes = np.stack(
+            [(left(state + size * e) - error) / size for size, e in zip(sizes, np.eye(2), strict=True)], 1
+        )
         moved = state - np.linalg.lstsq(slopes, error)[0]
         if not (after := left(moved)) @ after < error @ error:
             break
@@ -194,9 +196,11 @@ def _period_s(recorded: States) -> float:
     return float(min(2 * np.pi * np.std(q) / max(np.std(v), 1e-300), 0.25 * time_s[-1]))
 
 
-def _simulated(model: Any, effects: EffectStepper, control: Array, applied: Array, starts: tuple[Array, Array], stride: int) -> Array:
-    """Positions (n, nq) at every step, from starts (positions and velocities, (n / stride, nq) each), taken again after every
-    stride steps."""
+def _simulated(
+    model: Any, effects: EffectStepper, control: Array, applied: Array, starts: tuple[Array, Array], stride: int
+) -> Array:
+    """Positions (n, nq) at every step, from starts (positions and velocities, (n / stride, nq) each), taken again after
+    every stride steps."""
     import mujoco
 
     data = mujoco.MjData(model)
@@ -276,7 +280,8 @@ def replay_rig(session: Session, model: bytes | RigModel | None = None, simulate
                efforts: bool = True, validate: bool | None = None) -> RigResiduals:  # fmt: skip
     """Replay the trials of a rig session on its own file, or on `model` (MJCF bytes, or a RigModel).
 
-    simulate, efforts: which of the two comparisons to make; validate: only trials that do, or do not (None: all). Raises SessionError and DescriptionError as `load_rig` does.
+    simulate, efforts: which of the two comparisons to make; validate: only trials that do, or do not (None: all).
+    Raises SessionError and DescriptionError as `load_rig` does.
     """
     rig = model if isinstance(model, RigModel) else load_rig(session, model)
     known = {(r.trial, r.joint): r.error for r in effort_residuals(rig)} if efforts else {}

@@ -1,4 +1,5 @@
-"""Whether the effects that motion shows say as well what holds a joint that stands: then its rests may be asked, too."""
+"""Whether the effects that motion shows say as well what holds a joint that stands: then its rests may be asked,
+too."""
 
 from __future__ import annotations
 
@@ -14,13 +15,16 @@ from .name.settled import at_loads
 from .states import later, low_pass
 
 Array = NDArray[np.float64]
-MOST = 3.0  # times the error in motion: beside a tenth of the samples are at rest or next to it, and what these then add is as much as all others leave
+# times the error in motion: beside a tenth of the samples are at rest or next to it, and what these then add is as much
+# as all others leave
+MOST = 3.0
 LEAST_SAMPLES = 20  # of a filtered balance, on both sides
 
 
 def known_at_rest(fit: DeclaredFit, terms: Sequence[Term], theta: Array) -> tuple[str, ...]:
-    """Joints that stand at times, but where parameters theta (P + J,) of the declared columns and of the terms leave hardly more of the effort
-    then than while they move. Dry friction is anything within its bounds there; one that turns round over a distance is known."""
+    """Joints that stand at times, but where parameters theta (P + J,) of the declared columns and of the terms leave
+    hardly more of the effort then than while they move. Dry friction is anything within its bounds there; one that
+    turns round over a distance is known."""
     known, at = [], at_loads(fit, terms, theta)
     for joint in dict.fromkeys(r.joint for r in fit.rows):
         sides = [_apart(r, _left(at, r, terms)) for r in at.rows if r.joint == joint and len(r.weight)]

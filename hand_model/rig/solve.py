@@ -25,7 +25,9 @@ def solve_bounded(gram: Array, moment: Array, low: Array, high: Array, prior: Ar
         trial = theta.copy()
         if free.any():
             rows = h[free]
-            trial[free] = np.linalg.solve(rows[:, free] + 1e-13 * np.eye(len(rows)), g[free] - rows[:, fixed] @ theta[fixed])
+            trial[free] = np.linalg.solve(
+                rows[:, free] + 1e-13 * np.eye(len(rows)), g[free] - rows[:, fixed] @ theta[fixed]
+            )
         beyond = free & ((trial < low) | (trial > high))
         if beyond.any():
             theta = np.clip(trial, low, high)

@@ -1,4 +1,5 @@
-"""Which effects of a balance stand: each is held to validation recordings beside those before it, all in the shapes that suit them."""
+"""Which effects of a balance stand: each is held to validation recordings beside those before it, all in the shapes
+that suit them."""
 
 from __future__ import annotations
 
@@ -23,15 +24,16 @@ from .words import alternatives, joint_unit, shape_unit, statement
 Array = NDArray[np.float64]
 FITS = 1.6**0.5  # an error within so many noise floors is taken to be noise: a variance 1.6 times as large
 END = 0.99  # of the longest delay that is tried
-# What two effects leave at a joint may be the form of their laws, which no catalogue has to better than 7 % of its amplitude: share of the mismatch.
+# What two effects leave at a joint may be the form of their laws, which no catalogue has to better than 7 % of its
+# amplitude: share of the mismatch.
 FORMED, FORM = 2, 0.07**2
 OF_FORM = "it takes no more than the forms of the effects before it may be off by"
 
 
 def proved(bench: Bench, fit: DeclaredFit, stories: Sequence[tuple[Step, Term]], kept: Sequence[Term],
            rejected: list[dict[str, Any]]) -> tuple[list[Finding], list[Term]]:  # fmt: skip
-    """Findings that hold on the validation recordings, one after the other beside `kept`, all in the shapes that are best without the
-    later ones; the rest goes to rejected. Returns them and the terms that hold."""
+    """Findings that hold on the validation recordings, one after the other beside `kept`, all in the shapes that are
+    best without the later ones; the rest goes to rejected. Returns them and the terms that hold."""
     terms, found = list(kept), list(kept)
     proofs: list[tuple[Step, dict[str, Any]]] = []
     whole = Counter(t.candidate.joint for t in [*kept, *(t for _, t in stories)])
@@ -40,7 +42,9 @@ def proved(bench: Bench, fit: DeclaredFit, stories: Sequence[tuple[Step, Term]],
         more = _shaped(fit, terms, [*found, term], whole)
         many = solved(bench, fit, more)
         proof = bench.proof(term.candidate.joint, (fit, *few), (fit, *many))
-        reason = _withdrawn(bench, proof, plain, (fit, *few), (fit, *many)) or _of_form(bench, term, found, proof, plain)
+        reason = _withdrawn(bench, proof, plain, (fit, *few), (fit, *many)) or _of_form(
+            bench, term, found, proof, plain
+        )
         if reason is not None:
             rejected.append({"effect": term.candidate.key, "reason": reason})
             continue
@@ -50,8 +54,9 @@ def proved(bench: Bench, fit: DeclaredFit, stories: Sequence[tuple[Step, Term]],
 
 
 def _shaped(fit: DeclaredFit, standing: Sequence[Term], found: Sequence[Term], whole: Mapping[str, int]) -> list[Term]:
-    """Terms with the last of `found`, its joint last: there in their best shapes beside each other, as they were found where the joint has
-    them all (whole: joint -> how many), else those without the others; at other joints as they stand."""
+    """Terms with the last of `found`, its joint last: there in their best shapes beside each other, as they were found
+    where the joint has them all (whole: joint -> how many), else those without the others; at other joints as they
+    stand."""
     joint = found[-1].candidate.joint
     mine = [t for t in found if t.candidate.joint == joint]
     best = mine if len(mine) == whole[joint] else refit(pose(fit, joint), mine)
@@ -64,23 +69,27 @@ def _in_order(terms: Sequence[Term], found: Sequence[Term]) -> list[Term]:
     return [next(left[t.candidate.joint]) for t in found]
 
 
-def _told(bench: Bench, fit: DeclaredFit, terms: Sequence[Term], proofs: Sequence[tuple[Step, dict[str, Any]]]) -> list[Finding]:
-    """Findings of the last terms, one for each proof: the size of each beside those before it, in the shapes that stand in the end."""
+def _told(
+    bench: Bench, fit: DeclaredFit, terms: Sequence[Term], proofs: Sequence[tuple[Step, dict[str, Any]]]
+) -> list[Finding]:
+    """Findings of the last terms, one for each proof: the size of each beside those before it, in the shapes that stand
+    in the end."""
     found, first = [], len(terms) - len(proofs)
     for k, (step, proof) in enumerate(proofs, first + 1):
         told, theta = solved(bench, fit, terms[:k])
         term = terms[k - 1]
         last = slice(len(theta) - len(term.candidate.amplitudes), None)
         spread = None
-        if proof["after"] <= FITS * proof["noise_floor"]:  # beside what does not fit, an interval would promise too much
+        # beside what does not fit, an interval would promise too much
+        if proof["after"] <= FITS * proof["noise_floor"]:
             spread = resampled(pose(fit), told)[:, last]
         found.append(_joint_finding(bench.rig, fit, step, term, theta[last], proof, spread))
     return found
 
 
 def _withdrawn(bench: Bench, proof: Mapping[str, Any], plain: tuple, before: tuple, after: tuple) -> str | None:
-    """Why an effect does not hold on the validation recordings (its proof; fits of the declared model, without it and with it), or None
-    where it does."""
+    """Why an effect does not hold on the validation recordings (its proof; fits of the declared model, without it and
+    with it), or None where it does."""
     if _beyond_reach(after[1][-1]):
         return "its delay is the longest that is asked: what is best may lie beyond"
     if proof["before"] <= proof["noise_floor"]:
@@ -93,8 +102,8 @@ def _withdrawn(bench: Bench, proof: Mapping[str, Any], plain: tuple, before: tup
 
 
 def _of_form(bench: Bench, term: Term, found: Sequence[Term], proof: Mapping[str, Any], plain: tuple) -> str | None:
-    """Why an effect may be the form of those found before it at its joint, two or more, or None where it takes more of what the declared
-    model leaves."""
+    """Why an effect may be the form of those found before it at its joint, two or more, or None where it takes more of
+    what the declared model leaves."""
     joint = term.candidate.joint
     if sum(t.candidate.joint == joint for t in found) < FORMED:
         return None
@@ -109,11 +118,12 @@ def _beyond_reach(term: Term) -> bool:
 
 
 def _motion_says(bench: Bench, before: tuple, after: tuple) -> str | None:
-    """What the motion of the training recordings says against the file with one term more: that it moves further from them, by as much as
-    would be worth a name, or that it cannot be simulated; never anything where efforts are recorded.
+    """What the motion of the training recordings says against the file with one term more: that it moves further from
+    them, by as much as would be worth a name, or that it cannot be simulated; never anything where efforts are
+    recorded.
 
-    Where they are not, the balance holds what the drives' declared law makes of their commands: only the motion can tell
-    whether they act so. Where it hardly depends on the term it says nothing against it.
+    Where they are not, the balance holds what the drives' declared law makes of their commands: only the motion can
+    tell whether they act so. Where it hardly depends on the term it says nothing against it.
     """
     if any(t.effort for t in bench.rig.trials) or not bench.rig.drives:
         return None
@@ -146,7 +156,8 @@ def _joint_finding(rig: RigModel, fit: DeclaredFit, step: Step, term: Term, ampl
     for k, ((name, unit, _, _), v) in enumerate(zip(c.amplitudes, amplitude, strict=True)):
         ends = None if spread is None else [float(x) for x in np.percentile(spread[:, k], [2.5, 97.5])]
         parameters[name] = {"value": float(v), "unit": joint_unit(unit, position, effort), "ci95": ends}
-    sign = -1.0 if c.effect == "command_delay" else 1.0  # what a late drive leaves comes early in the balance: its command is ahead
+    # what a late drive leaves comes early in the balance: its command is ahead
+    sign = -1.0 if c.effect == "command_delay" else 1.0
     parameters |= {k: {"value": sign * float(v) if k == "delay" else float(v), "unit": shape_unit(k, position), "ci95": None}
                    for k, v in term.shape.items()}  # fmt: skip
     fall = max(proof["before"] ** 2 - proof["after"] ** 2, 0.0)

@@ -15,7 +15,8 @@ Array = NDArray[np.float64]
 
 NOISE_SHARE = 0.03  # acceleration noise allowed, as a share of the acceleration itself
 ORDER = 4
-STEEP = 8  # of states: they lose nothing of the band in which a balance weighs them, and of noise only what lies in their own
+# of states: they lose nothing of the band in which a balance weighs them, and of noise only what lies in their own
+STEEP = 8
 PASSED = 0.45  # of the sampling rate: a filter above lets everything through
 WINDOWS = (5, 7, 11, 15, 21, 29, 41, 57, 81, 113, 159, 225, 317, 447)  # samples
 ROUNDING = 8.2 / 70.0**0.5  # steps: weights of a fourth difference add up to 16; a little for the motion itself
@@ -47,7 +48,8 @@ def noise_std(values: Array, time_s: Array | None = None) -> float:
 
 
 def ladder_step(values: Array) -> float:
-    """Step of a ladder (a coarse encoder, few digits) on whose rungs all values (n,) stand; zero where they stand anywhere."""
+    """Step of a ladder (a coarse encoder, few digits) on whose rungs all values (n,) stand; zero where they stand
+    anywhere."""
     grain = 1e-7 * np.ptp(values) + 1e-300  # what differs by less is equal but for rounding
     apart = grain * np.diff(np.unique(np.round(values / grain)))
     if len(apart) < 2:
@@ -60,16 +62,20 @@ def ladder_step(values: Array) -> float:
 
 
 def _median(size: Array, step: float) -> float:
-    """Median of sizes (n,) that come in steps, each spread over its own: few different values hide where the middle is (median
-    of grouped data)."""
+    """Median of sizes (n,) that come in steps, each spread over its own: few different values hide where the middle is
+    (median of grouped data)."""
     if step <= 0:
         return float(np.median(size))
     rung, count = np.unique(np.round(size / step), return_counts=True)
-    return float(step * np.interp(0.5 * len(size), np.append(0, np.cumsum(count)), np.append(max(rung[0] - 0.5, 0.0), rung + 0.5)))
+    return float(
+        step
+        * np.interp(0.5 * len(size), np.append(0, np.cumsum(count)), np.append(max(rung[0] - 0.5, 0.0), rung + 0.5))
+    )
 
 
 def _fourth(time_s: Array, values: Array) -> Array:
-    """Fourth divided differences (n - 4,), each scaled so that white noise of one gives one: no cubic is seen by them."""
+    """Fourth divided differences (n - 4,), each scaled so that white noise of one gives one: no cubic is seen by
+    them."""
     at = np.lib.stride_tricks.sliding_window_view(time_s, 5)
     at = (at - at[:, :1]) / (at[:, -1:] - at[:, :1])
     weights = 1.0 / np.prod(at[:, :, None] - at[:, None, :] + np.eye(5), 2)
@@ -78,7 +84,8 @@ def _fourth(time_s: Array, values: Array) -> Array:
 
 
 def low_pass(values: Array, rate_hz: float, cutoff_hz: float, order: int = ORDER) -> Array:
-    """Zero-phase Butterworth low-pass (both ways, together of that order) along the first axis; no change where the cut-off is too high.
+    """Zero-phase Butterworth low-pass (both ways, together of that order) along the first axis; no change where the
+    cut-off is too high.
 
     Ends are extended by their point reflection and the filter starts settled there: what scipy.signal.filtfilt
     does, without working out the start anew in each of many thousand calls.
@@ -98,7 +105,8 @@ def low_pass(values: Array, rate_hz: float, cutoff_hz: float, order: int = ORDER
 
 @lru_cache(maxsize=256)
 def _butterworth(cutoff: float, order: int) -> tuple[Array, Array, Array]:
-    """Numerator and denominator of the filter, one way, and its state on a constant one; cutoff: share of half the sampling rate; order: both ways."""
+    """Numerator and denominator of the filter, one way, and its state on a constant one; cutoff: share of half the
+    sampling rate; order: both ways."""
     from scipy.signal import butter, lfilter_zi
 
     b, a = butter(order // 2, cutoff)
@@ -106,17 +114,17 @@ def _butterworth(cutoff: float, order: int) -> tuple[Array, Array, Array]:
 
 
 def later(time_s: Array, values: Array, delay_s: float) -> Array:
-    """Values (n, ...) that come later by delay_s (earlier where negative), constant beyond the ends: cubic spline, since a
-    line between samples of a thinned grid would smooth and so favour delays of whole samples."""
+    """Values (n, ...) that come later by delay_s (earlier where negative), constant beyond the ends: cubic spline,
+    since a line between samples of a thinned grid would smooth and so favour delays of whole samples."""
     from scipy.interpolate import CubicSpline
 
     return CubicSpline(time_s, values)(np.clip(time_s - delay_s, time_s[0], time_s[-1]))
 
 
 def differentiate(values: Array, rate_hz: float, resolved: bool = True) -> Array:
-    """Central differences, sixth order, second at the ends, (n, ...): at a tenth of the sampling rate second order would lose 6 %
-    of a slope and 13 % of an acceleration, and these would pass for physics. resolved: False where values jump from sample to
-    sample, about which sixth order would ring."""
+    """Central differences, sixth order, second at the ends, (n, ...): at a tenth of the sampling rate second order
+    would lose 6 % of a slope and 13 % of an acceleration, and these would pass for physics. resolved: False where
+    values jump from sample to sample, about which sixth order would ring."""
     out = np.gradient(values, 1.0 / rate_hz, axis=0, edge_order=2)
     if resolved and len(values) > 6:
         apart = [values[3 + k : len(values) - 3 + k] - values[3 - k : len(values) - 3 - k] for k in (1, 2, 3)]
@@ -125,7 +133,8 @@ def differentiate(values: Array, rate_hz: float, resolved: bool = True) -> Array
 
 
 def choose_cutoff(position: Array, rate_hz: float) -> float:
-    """Highest cut-off [Hz] at which white position noise is at most NOISE_SHARE of the acceleration, (n,) even samples."""
+    """Highest cut-off [Hz] at which white position noise is at most NOISE_SHARE of the acceleration, (n,) even
+    samples."""
     sigma = noise_std(position)
     best = 1.0
     for cutoff in np.geomspace(1.0, 0.25 * rate_hz, 25) if rate_hz > 4 else [0.25 * rate_hz]:
@@ -144,17 +153,17 @@ def velocity_noise(position: Array, rate_hz: float, cutoff_hz: float) -> float:
 
 
 def recorded_states(time_s: Array, values: Array) -> tuple[Array, Array, Array]:
-    """Even times (m,) [s] of a recording (n,) at time_s (gaps: nan), with position and velocity (m,) there. Its noise is that of what was
-    recorded: on a line between two samples there is less, and rounding no longer shows."""
+    """Even times (m,) [s] of a recording (n,) at time_s (gaps: nan), with position and velocity (m,) there. Its noise
+    is that of what was recorded: on a line between two samples there is less, and rounding no longer shows."""
     filled, grid = fill_gaps(time_s, values), uniform_time(time_s)
     sigma = noise_std(filled, time_s) if np.ptp(filled) > 0 else None
     return grid, *local_states(np.interp(grid, time_s, filled), 1.0 / (grid[1] - grid[0]), sigma)
 
 
 def local_states(values: Array, rate_hz: float, sigma: float | None = None) -> tuple[Array, Array]:
-    """Position and velocity (n,) at every sample of an even recording (n,), ends included: local cubics (Savitzky & Golay
-    1964), each over the longest window on which shorter ones do not contradict it (intersection of confidence intervals,
-    Katkovnik 1999). sigma: standard deviation of the noise, where it is known."""
+    """Position and velocity (n,) at every sample of an even recording (n,), ends included: local cubics (Savitzky &
+    Golay 1964), each over the longest window on which shorter ones do not contradict it (intersection of confidence
+    intervals, Katkovnik 1999). sigma: standard deviation of the noise, where it is known."""
     from scipy.signal import savgol_filter
 
     sigma, n = noise_std(values) if sigma is None else sigma, len(values)

@@ -1,4 +1,5 @@
-"""The supply of a drive, where a recording holds it: an extra channel to look at, noisy and coarse as servos read it."""
+"""The supply of a drive, where a recording holds it: an extra channel to look at, noisy and coarse as servos read
+it."""
 
 from __future__ import annotations
 

@@ -106,10 +106,14 @@ def angle_residual(rig: RigModel, coupling: Coupling, fit: DeclaredFit, terms: S
     sides = [(t, solution(pose(fit), t)) for t in ((), terms)]
     rows = [r for r in fit.rows if r.validate] or list(fit.rows)
     before, after = ([(r.effort - design(r, t) @ theta)[r.moving] for r in rows] for t, theta in sides)
-    channel = next((f"effort:{t.candidate.variant.split()[-1]}" for t in terms if "load at" in t.candidate.variant), None)
+    channel = next(
+        (f"effort:{t.candidate.variant.split()[-1]}" for t in terms if "load at" in t.candidate.variant), None
+    )
     load = None if channel is None else np.concatenate([_load(r, channel)[r.moving] for r in rows])
     trial = np.concatenate([np.full(int(r.moving.sum()), r.trial) for r in rows])
-    time_s, position, velocity = (np.concatenate([getattr(r, k)[r.moving] for r in rows]) for k in ("time_s", "position", "velocity"))
+    time_s, position, velocity = (
+        np.concatenate([getattr(r, k)[r.moving] for r in rows]) for k in ("time_s", "position", "velocity")
+    )
     return CouplingResidual(coupling.name, coupling.dependent, rig.unit(coupling.dependent), trial, time_s, position, velocity,
                             load, np.concatenate(before), np.concatenate(after))  # fmt: skip
 

@@ -21,13 +21,15 @@ def shape_unit(name: str, position: str) -> str:
 
 
 def joint_unit(unit: str, position: str, effort: str) -> str:
-    """A unit with the words "effort" and "position" put as the joint has them: "effort s/position" is "N m s/rad" at a hinge."""
+    """A unit with the words "effort" and "position" put as the joint has them: "effort s/position" is "N m s/rad" at a
+    hinge."""
     below = f"/({effort})" if " " in effort else f"/{effort}"
     return unit.replace("/effort", below).replace("effort", effort).replace("position", position)
 
 
 def alternatives(rivals: Sequence[tuple[str, float]], effect: str) -> tuple[tuple[str, float], ...]:
-    """Other effects with their probability, the likeliest variant of each: rivals are keys "effect/variant@joint" with theirs."""
+    """Other effects with their probability, the likeliest variant of each: rivals are keys "effect/variant@joint" with
+    theirs."""
     out: dict[str, float] = {}
     for key, probability in rivals:
         name, _, _ = named(key)
@@ -39,7 +41,12 @@ def alternatives(rivals: Sequence[tuple[str, float]], effect: str) -> tuple[tupl
 def rejection(key: str, reason: str) -> dict[str, str]:
     """What was tried and not taken, as the format has it. key: "effect/variant@joint"."""
     name, variant, joint = named(key)
-    return {"effect": name, **({"variant": variant} if variant else {}), **({"where": joint} if joint else {}), "reason": reason}
+    return {
+        "effect": name,
+        **({"variant": variant} if variant else {}),
+        **({"where": joint} if joint else {}),
+        "reason": reason,
+    }
 
 
 def named(key: str) -> tuple[str, str, str]:
@@ -50,21 +57,30 @@ def named(key: str) -> tuple[str, str, str]:
 
 
 def shares(found: Sequence[Finding], declared: Mapping[str, Mapping[str, Any]]) -> list[Finding]:
-    """share_of_mismatch as a part of all that could be explained at a joint: what the declared model leaves there (declared: joint -> a
-    proof with what it leaves `before` any effect) beyond the sensors' noise. As a part of what is explained, whatever is named
-    alone at a joint would be all of it."""
+    """share_of_mismatch as a part of all that could be explained at a joint: what the declared model leaves there
+    (declared: joint -> a proof with what it leaves `before` any effect) beyond the sensors' noise. As a part of what is
+    explained, whatever is named alone at a joint would be all of it."""
     explained: dict[str, float] = {}
     for f in found:
         explained[f.where["joint"]] = explained.get(f.where["joint"], 0.0) + f.where["share_of_mismatch"]
     beyond = {j: p["before"] ** 2 - (p.get("noise_floor") or 0.0) ** 2 for j, p in declared.items()}
     whole = {j: max(e, beyond.get(j, 0.0), 1e-300) for j, e in explained.items()}
-    return [replace(f, where={**f.where, "share_of_mismatch": f.where["share_of_mismatch"] / whole[f.where["joint"]]}) for f in found]
+    return [
+        replace(f, where={**f.where, "share_of_mismatch": f.where["share_of_mismatch"] / whole[f.where["joint"]]})
+        for f in found
+    ]
 
 
-def statement(effect: str, variant: str, joint: str, parameters: Mapping[str, Mapping[str, Any]], proof: Mapping[str, Any]) -> str:
-    """One plain sentence: what, where, how much, and what it is worth on recordings held out. parameters: name -> value and unit, as in a
-    finding; which form of an effect it is, is no figure."""
-    figures = {k: f"{v['value']:.4g}{'' if v['unit'] == '1' else ' ' + v['unit']}" for k, v in parameters.items() if k not in DISCRETE}
+def statement(
+    effect: str, variant: str, joint: str, parameters: Mapping[str, Mapping[str, Any]], proof: Mapping[str, Any]
+) -> str:
+    """One plain sentence: what, where, how much, and what it is worth on recordings held out. parameters: name -> value
+    and unit, as in a finding; which form of an effect it is, is no figure."""
+    figures = {
+        k: f"{v['value']:.4g}{'' if v['unit'] == '1' else ' ' + v['unit']}"
+        for k, v in parameters.items()
+        if k not in DISCRETE
+    }
     listed = ", ".join(f"{k.replace('_', ' ')}{': ' if k[-1].isdigit() else ' '}{v}" for k, v in figures.items())
     return (f"{joint}: {effect.replace('_', ' ')}{f' ({variant})' if variant else ''}: {listed}; held-out "
             f"{proof['metric'].replace('_', ' ')} falls from {proof['before']:.4g} to {proof['after']:.4g} {proof['unit']}.")  # fmt: skip

@@ -2,20 +2,23 @@
 
 The session format names the columns; this module says which messages carry them:
 
-- a message with one number in a field `data` (std_msgs/Float64, Float32, Int32, ...): the column is the last component of
+- a message with one number in a field `data` (std_msgs/Float64, Float32, Int32, ...): the column is the last component
+of
   the topic, `/hand/index/position` -> `position`, less the actuator's name, `/index_position` -> `position`;
-- sensor_msgs/JointState: `position`, `velocity`, `effort` of a joint, `effort` also as `current`; with several joints in
-  the message the columns are `<joint>_position` and so on, and those of the joint named like the actuator also go by the
-  plain names;
+- sensor_msgs/JointState: `position`, `velocity`, `effort` of a joint, `effort` also as `current`; with several joints
+in
+  the message the columns are `<joint>_position` and so on, and those of the joint named like the actuator also go by
+  the plain names;
 - any other message: each scalar number field at its top level is a column of that name.
 
 Where several topics give the same column, the topic with the actuator's name among its components is meant; the others
 are called `<component before the last>_<column>` (for a message of named fields `<last component>_<column>`).
 
-Time is the header's stamp, or the time of reception where there is no header or its stamp is zero. The times of the log are those of
-the topic that gives `position` (or of the busiest topic); from every other topic the nearest message is taken, if it is
-no further away than half the longer of the two sampling intervals: otherwise the sample is lost (nan). Commands
-(`setpoint`, `speed`, `current_limit`) hold until the next message, since a command is often sent only when it changes.
+Time is the header's stamp, or the time of reception where there is no header or its stamp is zero. The times of the log
+are those of the topic that gives `position` (or of the busiest topic); from every other topic the nearest message is
+taken, if it is no further away than half the longer of the two sampling intervals: otherwise the sample is lost (nan).
+Commands (`setpoint`, `speed`, `current_limit`) hold until the next message, since a command is often sent only when it
+changes.
 """
 
 from __future__ import annotations

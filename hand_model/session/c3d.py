@@ -114,7 +114,8 @@ def _value(data: bytes, at: int, processor: int) -> Any:
 
 
 def _labels(parameters: Parameters, points: int) -> list[str]:
-    """Labels of all points; POINT:LABELS2 and so on continue where a list of 255 is full, points without one are unnamed."""
+    """Labels of all points; POINT:LABELS2 and so on continue where a list of 255 is full, points without one are
+    unnamed."""
     labels: list[str] = []
     for i in range(1, 260):
         more = parameters.get(f"POINT:LABELS{i if i > 1 else ''}")

@@ -18,7 +18,8 @@ Array = NDArray[np.float64]
 PROBED = ("landmark", "joint_probe", "surface")
 # What a hand, or a limb in its place, can measure across all its markers [m]. A wrong unit is off by 1000.
 EXTENT_M = (0.005, 3.0)
-# Lengths that must agree (a palm in two files, a probe and its declaration) and do not by this ratio are in other units.
+# Lengths that must agree (a palm in two files, a probe and its declaration) and do not by this ratio are in other
+# units.
 UNIT_RATIO = 1.5
 # A rigid body whose markers are nearer to a line than this share of its length does not show its turns about the line.
 FLATNESS = 0.03
@@ -35,9 +36,9 @@ def check_session(session: Session, dead: bool = False) -> tuple[str, ...]:
 
     dead: whether an encoder that never moves is let through, for a diagnosis to name.
 
-    Returns notes: what was mended or ignored, one sentence each, the session's own included. Raises SessionError for the
-    first recording that lacks a marker or column, has one that is never seen, markers on one line, a length or time that
-    cannot be in the unit stated, or no motion where motion is needed.
+    Returns notes: what was mended or ignored, one sentence each, the session's own included. Raises SessionError for
+    the first recording that lacks a marker or column, has one that is never seen, markers on one line, a length or time
+    that cannot be in the unit stated, or no motion where motion is needed.
     """
     notes = list(session.notes)
     palm_sizes: dict[str, float] = {}
@@ -124,7 +125,8 @@ def _bodies(session: Session, trial: Trial) -> dict[str, tuple[str, ...]]:
 
 
 def check_extent(mocap: Mocap, labels: Sequence[str]) -> float:
-    """How far apart the named markers are [m], the median over the frames; raises SessionError where no hand can be so."""
+    """How far apart the named markers are [m], the median over the frames; raises SessionError where no hand can be
+    so."""
     position = mocap.markers(labels)
     seen = np.isfinite(position[..., 0]).sum(axis=1) >= 2
     if not seen.any():
@@ -196,7 +198,8 @@ def _check_palm_sizes(sizes: dict[str, float]) -> None:
 
 
 def check_log(session: Session, trial: Trial, log: Log, dead: bool = False) -> list[str]:
-    """Columns of one log: there, not empty, in seconds, and moving where they must (unless `dead`). Returns notes; raises SessionError."""
+    """Columns of one log: there, not empty, in seconds, and moving where they must (unless `dead`). Returns notes;
+    raises SessionError."""
     interval_s = float(np.median(np.diff(log.time_s)))
     if interval_s > INTERVAL_S:
         raise SessionError(f"{log.path}: samples are {interval_s:.3g} s apart by `time`; `time` in seconds is needed")
@@ -219,7 +222,8 @@ def check_log(session: Session, trial: Trial, log: Log, dead: bool = False) -> l
 
 
 def missing_direction(values: Array) -> str:
-    """"flexion" or "extension", where a channel (n,) that increases with flexion never goes that way by a tenth of its range; "" where it goes both ways."""
+    """ "flexion" or "extension", where a channel (n,) that increases with flexion never goes that way by a tenth of its
+    range; "" where it goes both ways."""
     values = values[np.isfinite(values)]
     if len(values) < 2:
         return ""

@@ -1,4 +1,5 @@
-"""CSV logs: a header with `time`, then samples. Separators `,` `;` or tab, decimal commas where the separator allows."""
+"""CSV logs: a header with `time`, then samples. Separators `,` `;` or tab, decimal commas where the separator
+allows."""
 
 from __future__ import annotations
 
@@ -16,8 +17,8 @@ from .text import number_table, read_lines
 def read_csv_log(path: Path) -> Log:
     """Read a CSV log; an empty cell is a lost sample (nan).
 
-    Raises SessionError where the header is missing, names a column twice or has no `time`, or a line has the wrong width
-    or a cell that is no finite number.
+    Raises SessionError where the header is missing, names a column twice or has no `time`, or a line has the wrong
+    width or a cell that is no finite number.
     """
     lines = read_lines(path)
     separator = max((";", "\t", ","), key=lines[0].count)

@@ -45,8 +45,9 @@ class Log:
 def build_log(time_s: Array, columns: Mapping[str, Array], path: Path, notes: Iterable[str] = ()) -> Log:
     """A log as every reader hands it over: rows in the order of their times, each time once.
 
-    time_s: (n,) [s], as recorded. notes: what the reader has to say. Rows without a time, or that repeat one, are dropped and rows out of order sorted, with
-    a note, as long as they are few. Raises SessionError where they are many, or where fewer than two rows are left.
+    time_s: (n,) [s], as recorded. notes: what the reader has to say. Rows without a time, or that repeat one, are
+    dropped and rows out of order sorted, with a note, as long as they are few. Raises SessionError where they are many,
+    or where fewer than two rows are left.
     """
     total = len(time_s)
     notes = list(notes)
@@ -83,9 +84,9 @@ def _tolerate(rows: int, total: int, what: str, path: Path) -> None:
 def read_log(path: Path, actuator: str | None = None) -> Log:
     """Read a CSV log, a rosbag2 folder or an MCAP file.
 
-    actuator: whose channel to take from a bag that holds several; a CSV log holds one. A second call on an unchanged log
-    returns the same object. Raises SessionError where the log is missing, empty, has no `time` column, or holds a cell
-    that is no number.
+    actuator: whose channel to take from a bag that holds several; a CSV log holds one. A second call on an unchanged
+    log returns the same object. Raises SessionError where the log is missing, empty, has no `time` column, or holds a
+    cell that is no number.
     """
     path = Path(path)
     if not path.exists():

@@ -2,8 +2,10 @@
 
 Where the format is silent:
 
-- A probe whose tip is not known is declared by its labels alone, `[probe] markers = ["T1", "T2", "T3"]`, together with one
-  or more trials `kind = "pivot"` (mocap: the tip stays in a fixed hole while the tool swings); Probe.position_probe is None.
+- A probe whose tip is not known is declared by its labels alone, `[probe] markers = ["T1", "T2", "T3"]`, together with
+one
+  or more trials `kind = "pivot"` (mocap: the tip stays in a fixed hole while the tool swings); Probe.position_probe is
+  None.
 - A session of kinematics only has fingers without actuator and `flexion` trials without log. Probe and landmark trials
   are optional; where there are landmark trials, all three landmarks are needed.
 - `thumb_0` and `thumb_1` are one thumb in two positions and may carry the same markers; other fingers may not.
@@ -142,7 +144,8 @@ def _probe(node: Node | None) -> Probe | None:
 
 
 def _determines_tip(position: np.ndarray) -> bool:
-    """Whether markers (n, 3) [m] fix the tip at the origin: off a line by three percent, or on one that meets the tip."""
+    """Whether markers (n, 3) [m] fix the tip at the origin: off a line by three percent, or on one that meets the
+    tip."""
     if len(position) < 2:
         return False
     middle = position.mean(axis=0)

@@ -1,8 +1,9 @@
 """OptiTrack Motive's CSV export, format versions 1.2x.
 
-Line 1 holds `Format Version` and further key, value pairs (`Export Frame Rate`, `Length Units`); then rows Type, Name, ID
-(Parent), the quantity (Rotation, Position, ...), and the axis letters after `Frame, Time (Seconds)`. Only columns of type
-`Marker` are measured markers: rigid bodies, bones and `Rigid Body Marker` columns are Motive's own fits and are ignored.
+Line 1 holds `Format Version` and further key, value pairs (`Export Frame Rate`, `Length Units`); then rows Type, Name,
+ID (Parent), the quantity (Rotation, Position, ...), and the axis letters after `Frame, Time (Seconds)`. Only columns of
+type `Marker` are measured markers: rigid bodies, bones and `Rigid Body Marker` columns are Motive's own fits and are
+ignored.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ from .units import metres_per
 def read_motive_csv(path: Path) -> Mocap:
     """Read a Motive CSV file; labels keep their name, without the asset's prefix where they stay unique.
 
-    Raises SessionError where the header is foreign, no measured marker is exported, a line has the wrong width, or there
-    are fewer frames than stated.
+    Raises SessionError where the header is foreign, no measured marker is exported, a line has the wrong width, or
+    there are fewer frames than stated.
     """
     lines = read_lines(path)
     top = next(csv.reader([lines[0]]), [])

@@ -1,4 +1,5 @@
-"""A table of a TOML file with its place in the file: typed look-ups that refuse in one sentence, unknown keys counted."""
+"""A table of a TOML file with its place in the file: typed look-ups that refuse in one sentence, unknown keys
+counted."""
 
 from __future__ import annotations
 

@@ -17,7 +17,8 @@ from .units import metres_per
 def read_qtm_tsv(path: Path) -> Mocap:
     """Read a QTM TSV file.
 
-    Raises SessionError where it has no MARKER_NAMES or FREQUENCY, a line of the wrong width, or fewer frames than stated.
+    Raises SessionError where it has no MARKER_NAMES or FREQUENCY, a line of the wrong width, or fewer frames than
+    stated.
     """
     lines = read_lines(path)
     header, columns, start = _header(lines)

@@ -1,4 +1,5 @@
-"""What a session holds: hand, palm, probe, actuators, fingers, rig, trials. Plain data; the manifest reader fills it."""
+"""What a session holds: hand, palm, probe, actuators, fingers, rig, trials. Plain data; the manifest reader fills
+it."""
 
 from __future__ import annotations
 

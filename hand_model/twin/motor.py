@@ -29,8 +29,8 @@ class DriveNow:
     [raw].
 
     direction: of the motion, or of the push while sticking. transmitted: load behind the gearbox [raw]. gravity_palm:
-    unit vector of gravity in the palm frame. bristle: deflection [%] of the friction's bristles. level: what friction slides at, as of
-    the step before [raw].
+    unit vector of gravity in the palm frame. bristle: deflection [%] of the friction's bristles. level: what friction
+    slides at, as of the step before [raw].
     """
 
     time_s: float = 0.0
@@ -93,7 +93,8 @@ class Motion:
 
 def _controller(control: Controller, now: DriveNow, step_s: float) -> Callable[[float, float, float], float]:
     """The control law: (setpoint [%], speed limit [%/s], sensed position [%]) -> wanted current [raw]."""
-    # ramp: the reference [%]; profile: the reference and its speed [%/s]; cascade: the integral [raw], the wanted velocity
+    # ramp: the reference [%]; profile: the reference and its speed [%/s]; cascade: the integral [raw], the wanted
+    # velocity
     state = [0.0, 0.0]
 
     def ramp(setpoint: float, limit: float, sensed: float) -> float:
@@ -105,7 +106,9 @@ def _controller(control: Controller, now: DriveNow, step_s: float) -> Callable[[
     def profile(setpoint: float, limit: float, sensed: float) -> float:
         left, most = setpoint - state[0], control.acceleration * step_s
         # as fast as it can still stop from, in whole steps
-        wanted = math.copysign(min(limit, math.sqrt(2.0 * control.acceleration * abs(left) + 0.25 * most**2) - 0.5 * most), left)
+        wanted = math.copysign(
+            min(limit, math.sqrt(2.0 * control.acceleration * abs(left) + 0.25 * most**2) - 0.5 * most), left
+        )
         state[1] += max(-most, min(most, wanted - state[1]))
         if abs(left) < abs(state[1]) * step_s:
             state[0], state[1] = setpoint, 0.0
@@ -225,7 +228,8 @@ def _bristles(motor: MotorTruth, now: DriveNow, drive: float, level: float, step
     now.bristle = max(-level / stiffness, min(level / stiffness, now.bristle))  # the level may have fallen since
     # midpoint rule: a step that is late in the bristles adds to inertia and friction at every stop
     free = motor.inertia * now.velocity + half * (drive - stiffness * now.bristle)  # its sign is that of the motion
-    share = 1.0 - math.copysign(now.bristle, now.bristle * free) * stiffness / level  # of the motion that bends the bristles
+    # of the motion that bends the bristles
+    share = 1.0 - math.copysign(now.bristle, now.bristle * free) * stiffness / level
     reach = half * stiffness + damping
     middle = free / (motor.inertia + half * (motor.viscous + reach * share))
     new, friction = 2.0 * middle - now.velocity, stiffness * now.bristle + reach * share * middle

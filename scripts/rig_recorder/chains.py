@@ -1,4 +1,5 @@
-"""Machines with more than one joint or station: a two-joint arm, a drive with an encoder behind each stage, a band brake."""
+"""Machines with more than one joint or station: a two-joint arm, a drive with an encoder behind each stage, a band
+brake."""
 
 from __future__ import annotations
 
@@ -39,7 +40,13 @@ def arm(folder: Path, effects: tuple[str, ...], fault: str, random: np.random.Ge
     l1, m1, m2 = random.uniform(0.2, 0.4), random.uniform(0.3, 1.0), random.uniform(0.3, 1.0)
     c1, c2 = l1 * random.uniform(0.5, 0.9), random.uniform(0.1, 0.2)
     i1, i2, rotor = 0.1 * m1 * l1**2, 0.2 * m2 * c2**2, 0.002
-    body = Arm((m1 * c1**2 + i1, m2 * c2**2 + i2), (rotor, rotor), m2 * l1 * c2, m2 * l1**2, (9.81 * (m1 * c1 + m2 * l1), 9.81 * m2 * c2))
+    body = Arm(
+        (m1 * c1**2 + i1, m2 * c2**2 + i2),
+        (rotor, rotor),
+        m2 * l1 * c2,
+        m2 * l1**2,
+        (9.81 * (m1 * c1 + m2 * l1), 9.81 * m2 * c2),
+    )
     at, laws = int(random.integers(2)), []
     for j in (0, 1):
         law = Law(1.0, viscous=0.015 * body.weights[j], coulomb=0.04 * body.weights[j] * random.uniform(0.5, 1.5))
@@ -59,7 +66,9 @@ def arm(folder: Path, effects: tuple[str, ...], fault: str, random: np.random.Ge
         for j, name in enumerate(("shoulder", "elbow")):
             effort = loggers[j].effort(instants, track.time_s, track.effort[:, j], random)
             columns[f"{name}_position"] = loggers[j].position(instants, track.time_s, track.position[:, j])
-            columns[f"{name}_torque"] = spoiled(fault if j == at else "", effort, 0.9 * effort, instants, 0.5 * float(np.abs(effort).max()))
+            columns[f"{name}_torque"] = spoiled(
+                fault if j == at else "", effort, 0.9 * effort, instants, 0.5 * float(np.abs(effort).max())
+            )
         logs.append((columns, k >= count, {}))
     xml = ARM.format(joint=_declared(random, armature=rotor, damping=0.02, frictionloss=0.05), z1=-c1, m1=_wrong(random, m1, 1.4), i1=i1,
                      l1=-l1, z2=-c2, m2=_wrong(random, m2, 1.4), i2=i2)  # fmt: skip
@@ -80,7 +89,8 @@ def _held_back(path: np.ndarray, gap: float) -> np.ndarray:
 
 
 def stages(folder: Path, effects: tuple[str, ...], fault: str, random: np.random.Generator) -> Made:
-    """Motor, gear with an encoder on both sides, a load that the laboratory sets; slow motions. Efforts by the true balance."""
+    """Motor, gear with an encoder on both sides, a load that the laboratory sets; slow motions. Efforts by the true
+    balance."""
     ratio, level = random.uniform(5, 40), random.uniform(0.3, 1.5)
     law = Law(random.uniform(1e-4, 1e-3) * level, viscous=0.05 * level, coulomb=random.uniform(0.05, 0.15) * level)
     scale = Scale(0.5 * level, 2.0, 2.0)
@@ -108,23 +118,34 @@ def stages(folder: Path, effects: tuple[str, ...], fault: str, random: np.random
         at, stamps = logger.times(seconds, random)
         logs.append(({"time": stamps, "motor_position": np.round(np.interp(at, t, motor) * 300) / 300, "output_position": logger.position(at, t, q),
                       "jaw_position": logger.position(at, t, 0.9 * q - 0.01 * load / level), "torque": logger.effort(at, t, effort, random), "load_torque": logger.effort(at, t, -load / 0.9, random)}, k >= count, {}))  # fmt: skip
-    xml = STAGES.format(joint=_declared(random, damping=law.viscous, frictionloss=law.coulomb), own=_wrong(random, law.inertia, 3), ratio=_wrong(random, ratio, 1.1))
+    xml = STAGES.format(
+        joint=_declared(random, damping=law.viscous, frictionloss=law.coulomb),
+        own=_wrong(random, law.inertia, 3),
+        ratio=_wrong(random, ratio, 1.1),
+    )
     write_session(folder, folder.name, xml, {"motor_position": "joint:motor:position", "output_position": "joint:output:position", "jaw_position": "joint:jaw:position",
                                              "torque": "actuator:output:force", "load_torque": "actuator:load:force"}, logs)  # fmt: skip
     return Made(asdict(law), 0.0, {"gap": gap, "give": give, "ratio": ratio})
 
 
 def brake(folder: Path, effects: tuple[str, ...], fault: str, random: np.random.Generator) -> Made:
-    """A band holds a drum whose motion is imposed; the laboratory sets the tension, and so the level of friction, of each trial."""
+    """A band holds a drum whose motion is imposed; the laboratory sets the tension, and so the level of friction, of
+    each trial."""
     levels = np.sort(random.uniform(500, 5000, 2)) * np.array([1.0, 2.0])
     law = Law(random.uniform(5, 40), viscous=0.03 * levels.mean() / 0.1)
     reach = random.uniform(1e-3, 4e-3) if "elastoplastic_hysteresis" in effects else 0.0
     scale = Scale(float(levels.mean()), 0.1, 0.06)
     for effect in effects:
-        law = law if effect == "elastoplastic_hysteresis" else hidden(replace(law, coulomb=float(levels.mean())), effect, scale, random)
+        law = (
+            law
+            if effect == "elastoplastic_hysteresis"
+            else hidden(replace(law, coulomb=float(levels.mean())), effect, scale, random)
+        )
     logger = _logger(random, (500, 1024), 1e5, float(levels.mean()))
     logs = []
-    for k, (level, size, rate) in enumerate((lv, s, r) for lv in levels for s in (0.01, 0.02, 0.035) for r in (0.5, 1.0)):
+    for k, (level, size, rate) in enumerate(
+        (lv, s, r) for lv in levels for s in (0.01, 0.02, 0.035) for r in (0.5, 1.0)
+    ):
         seconds, rate = 8 / rate, rate * random.uniform(0.9, 1.1)
         t = np.arange(0, seconds, TICK_S)
         q = size * np.sin(2 * np.pi * rate * t) * np.clip(t, 0, 1)
@@ -132,12 +153,24 @@ def brake(folder: Path, effects: tuple[str, ...], fault: str, random: np.random.
         state, friction = 0.0, np.empty(len(q))
         for n in range(len(q)):
             state = min(max(state + TICK_S * v[n] / reach, -1.0), 1.0) if reach else float(np.tanh(v[n] / 5e-4))
-            bound = replace(law, coulomb=level).dry(q[n], v[n], 0.0, 0.0, 0.0) if law.stribeck or law.tight[2] else level
+            bound = (
+                replace(law, coulomb=level).dry(q[n], v[n], 0.0, 0.0, 0.0) if law.stribeck or law.tight[2] else level
+            )
             friction[n] = bound * state + law.smooth(q[n], v[n])
         effort = law.inertia * np.gradient(v, TICK_S) + friction * (1 + random.normal(0, 0.01))
         at, stamps = logger.times(seconds, random)
         own = {"joint:slide:frictionloss": round(float(level) * 1.3)}
-        logs.append(({"time": stamps, "position": logger.position(at, t, q), "force": logger.effort(at, t, effort, random)}, k % 3 == 1, own))
-    xml = BRAKE.format(damping=_wrong(random, law.viscous, 3), friction=float(levels.mean()), mass=_wrong(random, law.inertia, 3))
-    write_session(folder, folder.name, xml, {"position": "joint:slide:position", "force": "actuator:pusher:force"}, logs)
+        logs.append(
+            (
+                {"time": stamps, "position": logger.position(at, t, q), "force": logger.effort(at, t, effort, random)},
+                k % 3 == 1,
+                own,
+            )
+        )
+    xml = BRAKE.format(
+        damping=_wrong(random, law.viscous, 3), friction=float(levels.mean()), mass=_wrong(random, law.inertia, 3)
+    )
+    write_session(
+        folder, folder.name, xml, {"position": "joint:slide:position", "force": "actuator:pusher:force"}, logs
+    )
     return Made(asdict(law), 0.0, {"reach": reach, "levels": [float(v) for v in levels]})

@@ -40,7 +40,13 @@ def hidden(law: Law, effect: str, scale: Scale, random: np.random.Generator) -> 
     place = (scale.centre + scale.range * random.uniform(-0.25, 0.25), scale.range * random.uniform(0.05, 0.12))
     if effect == "load_dependent_friction":
         if random.uniform() < 0.3:
-            return replace(law, slow_load=0.25 * strong, by_load=0.05, stribeck_speed=0.25 * scale.speed, load_side=str(random.choice(LOAD_SIDES)))
+            return replace(
+                law,
+                slow_load=0.25 * strong,
+                by_load=0.05,
+                stribeck_speed=0.25 * scale.speed,
+                load_side=str(random.choice(LOAD_SIDES)),
+            )
         return replace(law, by_load=0.2 * strong, load_side=str(random.choice(LOAD_SIDES)))
     if effect == "stribeck_friction":
         return replace(law, stribeck=1.2 * strong * friction, stribeck_speed=random.uniform(0.12, 0.35) * scale.speed)
@@ -54,7 +60,11 @@ def hidden(law: Law, effect: str, scale: Scale, random: np.random.Generator) -> 
     if effect == "detent_load":
         return replace(law, spot=(*place, 0.25 * strong * scale.effort))
     if effect == "elastoplastic_hysteresis":
-        return replace(law, coulomb=0.3 * law.coulomb, stop=(1.2 * strong * friction + 0.7 * law.coulomb, random.uniform(0.03, 0.1) * scale.range))
+        return replace(
+            law,
+            coulomb=0.3 * law.coulomb,
+            stop=(1.2 * strong * friction + 0.7 * law.coulomb, random.uniform(0.03, 0.1) * scale.range),
+        )
     if effect == "asymmetric_friction":
         return replace(law, offset=1.2 * strong * friction * random.choice([-1, 1]))
     if effect == "off_axis":
@@ -69,5 +79,14 @@ def hidden(law: Law, effect: str, scale: Scale, random: np.random.Generator) -> 
 
 def imperfect(law: Law, scale: Scale, random: np.random.Generator) -> Law:
     """The law with what every machine has besides: a ripple, a zero that is not quite zero."""
-    ripple = (scale.effort * random.uniform(0.002, 0.008), scale.range * random.uniform(0.03, 0.3), random.uniform(0, 6))
-    return replace(law, ripple=ripple, tilt=law.tilt + random.normal(0, 0.004), offset=law.offset + 0.004 * scale.effort * random.normal())
+    ripple = (
+        scale.effort * random.uniform(0.002, 0.008),
+        scale.range * random.uniform(0.03, 0.3),
+        random.uniform(0, 6),
+    )
+    return replace(
+        law,
+        ripple=ripple,
+        tilt=law.tilt + random.normal(0, 0.004),
+        offset=law.offset + 0.004 * scale.effort * random.normal(),
+    )

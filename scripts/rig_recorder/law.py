@@ -10,12 +10,15 @@ LOAD_SIDES = ("joint", "motor", "gear")
 
 @dataclass(frozen=True)
 class Law:
-    """One joint [SI; N m, rad for a hinge, N, m for a slide]. weight: m g l; tilt: of gravity or of the weight off its axis [rad].
+    """One joint [SI; N m, rad for a hinge, N, m for a slide]. weight: m g l; tilt: of gravity or of the weight off its
+    axis [rad].
 
-    by_load: friction per load, reckoned from what the joint carries, from its motor or from the mean of both (load_side);
-    slow_load: the same at low speed only. tight, spot: (centre, width, height) of a friction or a one-sided load tied to a
-    place. stop: (yield load, reach). ripple: (amplitude, period, phase). grit: friction that wanders in time (amplitude,
-    correlation time [s]); slosh: (stiffness, inertia, damping) of a second mass on a spring that nobody declared.
+    by_load: friction per load, reckoned from what the joint carries, from its motor or from the mean of both
+    (load_side);
+    slow_load: the same at low speed only. tight, spot: (centre, width, height) of a friction or a one-sided load tied
+    to a place. stop: (yield load, reach). ripple: (amplitude, period, phase). grit: friction that wanders in time
+    (amplitude, correlation time [s]); slosh: (stiffness, inertia, damping) of a second mass on a spring that nobody
+    declared.
     """
 
     inertia: float
@@ -40,15 +43,28 @@ class Law:
     slosh: tuple[float, float, float] = (0.0, 1.0, 0.0)
 
     def dry(self, q: float, v: float, load: float, drive: float, grit: float) -> float:
-        """Bound of dry friction at position q, velocity v, with the load that the joint carries and its motor's effort."""
+        """Bound of dry friction at position q, velocity v, with the load that the joint carries and its motor's
+        effort."""
         slow = math.exp(-((v / self.stribeck_speed) ** 2))
         side = {"joint": abs(load), "motor": abs(drive), "gear": 0.5 * (abs(load) + abs(drive))}[self.load_side]
         place = self.tight[2] * math.exp(-0.5 * ((q - self.tight[0]) / self.tight[1]) ** 2) if self.tight[2] else 0.0
-        return max(self.coulomb + self.stribeck * slow + (self.by_load + self.slow_load * slow) * side + place + self.grit[0] * grit, 0.0)
+        return max(
+            self.coulomb
+            + self.stribeck * slow
+            + (self.by_load + self.slow_load * slow) * side
+            + place
+            + self.grit[0] * grit,
+            0.0,
+        )
 
     def smooth(self, q: float, v: float) -> float:
         """Effort that opposes the drive, without inertia and dry friction: viscous, drag, springs, ripple."""
-        out = self.viscous * (1.0 + math.copysign(self.asymmetry, v)) * v + self.drag * v * abs(v) - self.offset + self.stiffness * q
+        out = (
+            self.viscous * (1.0 + math.copysign(self.asymmetry, v)) * v
+            + self.drag * v * abs(v)
+            - self.offset
+            + self.stiffness * q
+        )
         if self.ripple[0]:
             out += self.ripple[0] * math.sin(2 * math.pi * q / self.ripple[1] + self.ripple[2])
         if self.spot[2]:

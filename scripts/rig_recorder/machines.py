@@ -35,7 +35,9 @@ class Made:
     extra: dict[str, Any] | None = None
 
 
-def _logger(random: np.random.Generator, rates: tuple[float, ...], counts: float, effort: float, late_s: float = 0.0) -> Logger:
+def _logger(
+    random: np.random.Generator, rates: tuple[float, ...], counts: float, effort: float, late_s: float = 0.0
+) -> Logger:
     rate = float(random.choice(rates))
     jitter = float(random.choice([0.0, 0.0, 0.05, 0.3]))
     return Logger(rate, jitter, float(random.choice([0.0, 0.0, 0.05])), float(random.choice([0.0, random.uniform(0, 2e4)])), counts,
@@ -59,16 +61,31 @@ def hinge(folder: Path, effects: tuple[str, ...], fault: str, random: np.random.
     weight, length = random.uniform(0.3, 4.0), random.uniform(0.1, 0.5)
     mass = weight / 9.81 / length
     speed, reach = random.uniform(1.5, 4.0), random.uniform(0.5, 1.4)
-    law = Law(mass * length**2 + 0.002 * weight, weight, viscous=0.02 * weight * random.uniform(0.2, 1), coulomb=0.05 * weight * random.uniform(0.4, 1.2))
+    law = Law(
+        mass * length**2 + 0.002 * weight,
+        weight,
+        viscous=0.02 * weight * random.uniform(0.2, 1),
+        coulomb=0.05 * weight * random.uniform(0.4, 1.2),
+    )
     scale = Scale(0.6 * weight, speed, 2 * reach)
     for effect in effects:
         law = hidden(law, effect, scale, random)
     law = imperfect(law, scale, random)
-    logger = _logger(random, (200, 333, 500, 1000), random.choice([4096, 16384, 65536]) / 2 / np.pi, 0.6 * weight, _delay(effects, "late_channel", random))
+    logger = _logger(
+        random,
+        (200, 333, 500, 1000),
+        random.choice([4096, 16384, 65536]) / 2 / np.pi,
+        0.6 * weight,
+        _delay(effects, "late_channel", random),
+    )
     logs, count, rate = [], int(random.integers(3, 9)), speed / 2 / np.pi / reach
     for k in range(count + max(1, count // 3)):
         seconds = random.uniform(6, 16)
-        kinds = (sines(seconds, reach, rate, random), steps(seconds, reach, random), growing(seconds, 0.7 * reach, 1.3 * rate))
+        kinds = (
+            sines(seconds, reach, rate, random),
+            steps(seconds, reach, random),
+            growing(seconds, 0.7 * reach, 1.3 * rate),
+        )
         target = kinds[int(random.choice(3, p=[0.6, 0.25, 0.15]))]
         bandwidth = 2 * np.pi * random.uniform(2.5, 6)
         control = follow(target, law.inertia * bandwidth**2, 1.4 * law.inertia * bandwidth, 6 * weight)
@@ -81,21 +98,34 @@ def hinge(folder: Path, effects: tuple[str, ...], fault: str, random: np.random.
     joint = _declared(random, armature=0.002 * weight, damping=law.viscous, frictionloss=law.coulomb)
     xml = HINGE.format(joint=joint, z=-length, mass=_wrong(random, mass), own=0.05 * mass * length**2,
                        actuator='<actuator><motor name="motor" joint="hinge"/></actuator>')  # fmt: skip
-    write_session(folder, folder.name, xml, {"position": "joint:hinge:position", "torque": "actuator:motor:force"}, logs)
+    write_session(
+        folder, folder.name, xml, {"position": "joint:hinge:position", "torque": "actuator:motor:force"}, logs
+    )
     return Made(asdict(law), logger.effort_late_s)
 
 
-def _columns(track: Track, logger: Logger, seconds: float, random: np.random.Generator, channel: str, fault: str) -> dict[str, np.ndarray]:
+def _columns(
+    track: Track, logger: Logger, seconds: float, random: np.random.Generator, channel: str, fault: str
+) -> dict[str, np.ndarray]:
     at, stamps = logger.times(seconds, random)
     effort = logger.effort(at, track.time_s, track.effort[:, 0], random)
     command = np.interp(at, track.time_s, track.input[:, 0])
     limit = 0.5 * float(np.abs(effort).max())
-    return {"time": stamps, "position": logger.position(at, track.time_s, track.position[:, 0]), channel: spoiled(fault, effort, command, at, limit)}
+    return {
+        "time": stamps,
+        "position": logger.position(at, track.time_s, track.position[:, 0]),
+        channel: spoiled(fault, effort, command, at, limit),
+    }
 
 
 def slide(folder: Path, effects: tuple[str, ...], fault: str, random: np.random.Generator) -> Made:
     """A carriage on a screw, position loop closed, one trajectory of several cycles and its repetition."""
-    mass, coulomb, period, stroke = random.uniform(20, 150), random.uniform(10, 40), random.uniform(2.5, 6), random.uniform(0.1, 0.4)
+    mass, coulomb, period, stroke = (
+        random.uniform(20, 150),
+        random.uniform(10, 40),
+        random.uniform(2.5, 6),
+        random.uniform(0.1, 0.4),
+    )
     speed = 2.5 * stroke / period
     effort = coulomb + random.uniform(0.5, 1.5) * coulomb + 6 * mass * stroke / period**2
     law = Law(mass, viscous=random.uniform(0.5, 1.5) * coulomb / speed, coulomb=coulomb)
@@ -103,7 +133,9 @@ def slide(folder: Path, effects: tuple[str, ...], fault: str, random: np.random.
     for effect in effects:
         law = hidden(law, effect, scale, random)
     law = replace(imperfect(law, scale, random), tilt=0.0)
-    logger = _logger(random, (250, 500, 1000), random.choice([1e5, 1e6]), effort, _delay(effects, "late_channel", random))
+    logger = _logger(
+        random, (250, 500, 1000), random.choice([1e5, 1e6]), effort, _delay(effects, "late_channel", random)
+    )
     logs = []
     count = int(random.integers(1, 4))
     for k in range(count + 1):
@@ -111,7 +143,14 @@ def slide(folder: Path, effects: tuple[str, ...], fault: str, random: np.random.
         faster = 1.0 if count == 1 else random.uniform(0.7, 1.5)
         target = cycles(seconds, 0.0, stroke, period / faster, 0.25)
         bandwidth = 2 * np.pi * 12
-        track = one_joint(law, Drive(), follow(target, mass * bandwidth**2, 1.2 * mass * bandwidth, 30 * effort), seconds, (0.0, 0.0), random)
+        track = one_joint(
+            law,
+            Drive(),
+            follow(target, mass * bandwidth**2, 1.2 * mass * bandwidth, 30 * effort),
+            seconds,
+            (0.0, 0.0),
+            random,
+        )
         logs.append((_columns(track, logger, seconds, random, "force", fault), k >= count, {}))
     xml = SLIDE.format(joint=_declared(random, damping=law.viscous, frictionloss=coulomb), mass=_wrong(random, mass))
     write_session(folder, folder.name, xml, {"position": "joint:slide:position", "force": "actuator:motor:force"}, logs)
@@ -119,11 +158,17 @@ def slide(folder: Path, effects: tuple[str, ...], fault: str, random: np.random.
 
 
 def servo(folder: Path, effects: tuple[str, ...], fault: str, random: np.random.Generator) -> Made:
-    """A hobby servo with a weight: only its voltage is recorded; gains and motions vary, one gain validates, some drops are open."""
+    """A hobby servo with a weight: only its voltage is recorded; gains and motions vary, one gain validates, some drops
+    are open."""
     weight, length = random.uniform(0.2, 1.2), random.uniform(0.08, 0.2)
     stall, top, volts = weight * random.uniform(2.0, 3.0), random.uniform(6, 12), float(random.choice([7.4, 12.0]))
     gain, back = stall / volts, stall / top
-    law = Law(weight * length / 9.81 + 0.004 * weight, weight, viscous=0.01 * stall, coulomb=0.06 * weight * random.uniform(0.5, 1.2))
+    law = Law(
+        weight * length / 9.81 + 0.004 * weight,
+        weight,
+        viscous=0.01 * stall,
+        coulomb=0.06 * weight * random.uniform(0.5, 1.2),
+    )
     scale = Scale(0.5 * weight, 0.35 * top, 2.5)
     for effect in effects:
         law = hidden(law, effect, scale, random)
@@ -139,7 +184,11 @@ def servo(folder: Path, effects: tuple[str, ...], fault: str, random: np.random.
             seconds = random.uniform(3.5, 6)
             targets = (sines(seconds, 1.2, 0.5, random), steps(seconds, 1.4, random), growing(seconds, 0.8, 1.0), None)
             if targets[kind] is None:  # leads open: it falls freely
-                own, start, now = {"actuator:motor:gear": [0, 0, 0, 0, 0, 0]}, (random.uniform(0.8, 1.5), 0.0), Drive(0.0)
+                own, start, now = (
+                    {"actuator:motor:gear": [0, 0, 0, 0, 0, 0]},
+                    (random.uniform(0.8, 1.5), 0.0),
+                    Drive(0.0),
+                )
                 control = play(np.zeros(10000))
             else:
                 own, start, now = {}, (0.0, 0.0), drive
@@ -154,7 +203,9 @@ def servo(folder: Path, effects: tuple[str, ...], fault: str, random: np.random.
     joint = _declared(random, armature=0.004 * weight, damping=0.01 * stall, frictionloss=law.coulomb)
     motor = f'<actuator><dcmotor name="motor" joint="hinge" motorconst="{constant} {constant}" resistance="{resistance:.3g}"/></actuator>'
     xml = HINGE.format(joint=joint, z=-length, mass=weight / 9.81 / length, own=1e-5, actuator=motor)
-    write_session(folder, folder.name, xml, {"position": "joint:hinge:position", "voltage": "actuator:motor:ctrl"}, logs)
+    write_session(
+        folder, folder.name, xml, {"position": "joint:hinge:position", "voltage": "actuator:motor:ctrl"}, logs
+    )
     return Made(asdict(law), late, {"starts": starts, "gain": gain, "back_emf": back, "sag": sag / volts})
 
 
@@ -164,7 +215,12 @@ def swing(folder: Path, effects: tuple[str, ...], fault: str, random: np.random.
     weight = mass * 9.81 * length
     inertia = mass * length**2 * random.uniform(1.1, 1.5)
     rate = np.sqrt(weight / inertia)
-    law = Law(inertia, weight, viscous=weight / rate * random.uniform(0.002, 0.008), coulomb=weight * random.uniform(0.0005, 0.002))
+    law = Law(
+        inertia,
+        weight,
+        viscous=weight / rate * random.uniform(0.002, 0.008),
+        coulomb=weight * random.uniform(0.0005, 0.002),
+    )
     # Of what damps a swing, not of its weight.
     scale = Scale(0.1 * weight, 1.2 * rate, 2.5)
     for effect in effects:
@@ -186,6 +242,12 @@ def swing(folder: Path, effects: tuple[str, ...], fault: str, random: np.random.
             logs.append(({"time": stamps[part], "position": q[part]}, held, {}))
             k = min(np.searchsorted(track.time_s, at[part][0]), len(track.time_s) - 1)
             starts.append((float(track.position[k, 0]), float(track.velocity[k, 0])))
-    xml = HINGE.format(joint=_declared(random, damping=law.viscous, frictionloss=law.coulomb), z=-length, mass=mass, own=0.2 * mass * length**2, actuator="")
+    xml = HINGE.format(
+        joint=_declared(random, damping=law.viscous, frictionloss=law.coulomb),
+        z=-length,
+        mass=mass,
+        own=0.2 * mass * length**2,
+        actuator="",
+    )
     write_session(folder, folder.name, xml, {"position": "joint:hinge:position"}, logs)
     return Made(asdict(law), 0.0, {"starts": starts})

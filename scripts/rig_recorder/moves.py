@@ -26,7 +26,9 @@ def cycles(seconds: float, low: float, high: float, period_s: float, share: floa
     phase = (t / period_s) % 1.0
     stroke = np.where(phase < 0.5, 2 * phase, 2 - 2 * phase)
     x = np.clip((stroke - 0.05) / 0.9, 0, 1)
-    ramp = np.where(x < share, x**2 / (2 * share), np.where(x > 1 - share, 1 - share - (1 - x) ** 2 / (2 * share), x - share / 2))
+    ramp = np.where(
+        x < share, x**2 / (2 * share), np.where(x > 1 - share, 1 - share - (1 - x) ** 2 / (2 * share), x - share / 2)
+    )
     return low + (high - low) * ramp / (1 - share)
 
 

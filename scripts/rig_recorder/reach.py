@@ -1,6 +1,8 @@
-"""How far the true law itself takes the held-out error: by regression in the band that was looked at, or by its own simulation.
+"""How far the true law itself takes the held-out error: by regression in the band that was looked at, or by its own
+simulation.
 
-An analysis that knows the effect and its shape; the strengths it fits to the training recordings, states it takes from the encoders.
+An analysis that knows the effect and its shape; the strengths it fits to the training recordings, states it takes from
+the encoders.
 """
 
 from __future__ import annotations
@@ -20,7 +22,8 @@ from .steps import Drive, one_joint
 Array = NDArray[np.float64]
 Log = dict[str, Array]
 WIDE = 3.0  # states are filtered so much wider than the balance
-STATES, WEIGHED = 4, 2  # orders of the filters of states and of the balance: what they let through is part of what is attainable
+# orders of the filters of states and of the balance: what they let through is part of what is attainable
+STATES, WEIGHED = 4, 2
 SLOW = 0.01  # of the greatest speed: below, friction is not known
 
 
@@ -49,29 +52,40 @@ def balance(folder: Path, answer: Mapping[str, Any], cutoff_hz: float) -> list[f
             squares.setdefault(some, []).append(_error(rows, answer["machine"], law, answer, known) ** 2)
     base = np.array(squares[()])
     ratios = {some: float(np.sqrt(np.mean(np.array(s) / base))) for some, s in squares.items()}
-    return [min((ratios[(e,)] for e in effects), default=1.0), ratios[tuple(effects)]], {e: ratios[(e,)] for e in effects}
+    return [min((ratios[(e,)] for e in effects), default=1.0), ratios[tuple(effects)]], {
+        e: ratios[(e,)] for e in effects
+    }
 
 
 def _filtered(values: Array, rate: float, cutoff_hz: float, order: int) -> Array:
     """Values (n, ...) through a filter of that order, run both ways."""
     from scipy.signal import butter, sosfiltfilt
 
-    return values if cutoff_hz >= 0.45 * rate else sosfiltfilt(butter(order, cutoff_hz, fs=rate, output="sos"), values, axis=0)
+    return (
+        values
+        if cutoff_hz >= 0.45 * rate
+        else sosfiltfilt(butter(order, cutoff_hz, fs=rate, output="sos"), values, axis=0)
+    )
 
 
 def _states(log: Log, answer: Mapping[str, Any], joint: int, cutoff_hz: float) -> dict[str, Any]:
-    """Position, velocity, acceleration (n, joints), effort (n,) on an even grid, with its rate and the band of the balance."""
+    """Position, velocity, acceleration (n, joints), effort (n,) on an even grid, with its rate and the band of the
+    balance."""
     t = log["time"] - log["time"][0]
     grid = np.linspace(0, t[-1], len(t))
     rate = (len(t) - 1) / t[-1]
-    names = {"arm": ("shoulder_position", "elbow_position"), "stages": ("output_position",)}.get(answer["machine"], ("position",))
+    names = {"arm": ("shoulder_position", "elbow_position"), "stages": ("output_position",)}.get(
+        answer["machine"], ("position",)
+    )
     q = np.stack([_filtered(np.interp(grid, t, log[n]), rate, WIDE * cutoff_hz, STATES) for n in names], 1)
     v = np.gradient(q, 1 / rate, axis=0)
     effort = next(log[n] for n in (("shoulder_torque", "elbow_torque")[joint], "torque", "force") if n in log)
     if answer["machine"] == "stages":
         effort = effort + 0.9 * log["load_torque"]
     effort = np.interp(grid + answer["late_s"] * ("late_channel" in answer["effects"]), t, effort)
-    late = np.interp(grid, t, next(log[n] for n in (("shoulder_torque", "elbow_torque")[joint], "torque", "force") if n in log))
+    late = np.interp(
+        grid, t, next(log[n] for n in (("shoulder_torque", "elbow_torque")[joint], "torque", "force") if n in log)
+    )
     return {"q": q, "v": v, "a": np.gradient(v, 1 / rate, axis=0), "effort": effort, "late": late, "rate": rate, "cutoff": cutoff_hz,
             "joint": joint, "load": np.interp(grid, t, log.get("load_torque", 0 * t))}  # fmt: skip
 
@@ -95,19 +109,35 @@ def _declared(s: Mapping[str, Any], machine: str, own: Mapping[str, Any], levels
     return np.stack([*loads, *friction, *more], 1), len(loads)
 
 
-def _hidden(s: Mapping[str, Any], law: Law, effect: str, load: Array, answer: Mapping[str, Any], own: Mapping[str, Any], levels: Sequence[float]) -> Array:
+def _hidden(
+    s: Mapping[str, Any],
+    law: Law,
+    effect: str,
+    load: Array,
+    answer: Mapping[str, Any],
+    own: Mapping[str, Any],
+    levels: Sequence[float],
+) -> Array:
     """Columns (n, k) of a hidden effect at its true shape; load: what the joint carries."""
     q, v = (s[k][:, s["joint"]] for k in ("q", "v"))
     sign, slow = np.clip(v / (SLOW * np.abs(v).max()), -1, 1), np.exp(-((v / law.stribeck_speed) ** 2))
     if effect == "load_dependent_friction":
-        side = {"joint": np.abs(load), "motor": np.abs(s["expected"]), "gear": 0.5 * (np.abs(load) + np.abs(s["expected"]))}[law.load_side]
+        side = {
+            "joint": np.abs(load),
+            "motor": np.abs(s["expected"]),
+            "gear": 0.5 * (np.abs(load) + np.abs(s["expected"])),
+        }[law.load_side]
         return np.stack([sign * side, sign * side * slow] if law.slow_load else [sign * side], 1)
     if effect == "elastoplastic_hysteresis":
         reach = answer["extra"].get("reach") or law.stop[1]
         state, out = 0.0, np.zeros(len(q))
         for k, (x, y) in enumerate(pairwise(q)):
             state = out[k + 1] = min(max(state + (y - x) / reach, -1.0), 1.0)
-        return np.stack([out * (float(own["joint:slide:frictionloss"]) == x) for x in levels], 1) if levels else out[:, None]
+        return (
+            np.stack([out * (float(own["joint:slide:frictionloss"]) == x) for x in levels], 1)
+            if levels
+            else out[:, None]
+        )
     column = {
         "stribeck_friction": sign * slow,
         "asymmetric_viscous_friction": np.abs(v),
@@ -136,17 +166,28 @@ def _error(rows: list, machine: str, law: Law, answer: Mapping[str, Any], effect
             moving = np.abs(s["v"][:, s["joint"]]) > SLOW * np.abs(s["v"][:, s["joint"]]).max()
             end = min(int(s["rate"] / s["cutoff"]), len(y) // 20)
             moving[:end] = moving[len(y) - end :] = False
-            parts.append((_filtered(x, s["rate"], s["cutoff"], WEIGHED)[moving], _filtered(y, s["rate"], s["cutoff"], WEIGHED)[moving], held, x))
+            parts.append(
+                (
+                    _filtered(x, s["rate"], s["cutoff"], WEIGHED)[moving],
+                    _filtered(y, s["rate"], s["cutoff"], WEIGHED)[moving],
+                    held,
+                    x,
+                )
+            )
         x, y = (np.concatenate([p[i] for p in parts if not p[2]]) for i in (0, 1))
         size = np.abs(x).max(0) + 1e-300
         theta = np.linalg.lstsq(x / size, y, rcond=1e-9)[0] / size
-        load_theta, full = theta[:count], [p[3] @ theta - s["load"] * 0.9 for p, (s, _, _) in zip(parts, rows, strict=True)]
+        load_theta, full = (
+            theta[:count],
+            [p[3] @ theta - s["load"] * 0.9 for p, (s, _, _) in zip(parts, rows, strict=True)],
+        )
     left = np.concatenate([y - x @ theta for x, y, held, _ in parts if held])
     return float(np.sqrt(np.mean(left**2)))
 
 
 def motion(folder: Path, answer: Mapping[str, Any]) -> float:
-    """Position error [rad] of the true law, without its small imperfections, simulated in open loop from the true starts."""
+    """Position error [rad] of the true law, without its small imperfections, simulated in open loop from the true
+    starts."""
     law = Law(**{k: tuple(v) if isinstance(v, list) else v for k, v in answer["law"].items()} | {"ripple": (0.0, 1.0, 0.0)}
               | {"grit": (0.0, 1.0), "slosh": (0.0, 1.0, 0.0)})  # fmt: skip
     more, left = answer["extra"], []
@@ -154,9 +195,15 @@ def motion(folder: Path, answer: Mapping[str, Any]) -> float:
         if not held:
             continue
         t = log["time"] - log["time"][0]
-        drive = Drive(0.0) if own or "voltage" not in log else Drive(more["gain"], more["back_emf"], answer["late_s"], 0.0, more["sag"])
+        drive = (
+            Drive(0.0)
+            if own or "voltage" not in log
+            else Drive(more["gain"], more["back_emf"], answer["late_s"], 0.0, more["sag"])
+        )
         volts = log.get("voltage", 0 * t)
         asked = volts[np.clip(np.searchsorted(t, np.arange(int(t[-1] * 1e3) + 2) * 1e-3, side="right") - 1, 0, None)]
-        track = one_joint(law, drive, lambda k, q, v, u=asked: u[k], t[-1] + 1e-3, tuple(start), np.random.default_rng(0))
+        track = one_joint(
+            law, drive, lambda k, q, v, u=asked: u[k], t[-1] + 1e-3, tuple(start), np.random.default_rng(0)
+        )
         left.append(np.interp(t, track.time_s, track.position[:, 0]) - log["position"])
     return float(np.sqrt(np.mean(np.concatenate(left) ** 2)))

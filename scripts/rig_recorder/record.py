@@ -1,4 +1,5 @@
-"""What a laboratory's log keeps of a motion: stamps, encoder steps, noisy, late and quantised channels, and faults of them."""
+"""What a laboratory's log keeps of a motion: stamps, encoder steps, noisy, late and quantised channels, and faults of
+them."""
 
 from __future__ import annotations
 
@@ -16,8 +17,9 @@ FAULTS = ("command", "dead", "unsigned", "clipped")
 
 @dataclass(frozen=True)
 class Logger:
-    """rate_hz; jitter: of the interval between samples (share, known to the stamps); stamp_error: of the stamps (share, not known); start_s: where
-    stamps begin; counts: encoder steps per unit; effort_noise, effort_step [effort]; effort_late_s: how much later the effort channel is read."""
+    """rate_hz; jitter: of the interval between samples (share, known to the stamps); stamp_error: of the stamps (share,
+    not known); start_s: where stamps begin; counts: encoder steps per unit; effort_noise, effort_step [effort];
+    effort_late_s: how much later the effort channel is read."""
 
     rate_hz: float
     jitter: float
@@ -41,7 +43,9 @@ class Logger:
     def effort(self, at: Array, time_s: Array, values: Array, random: np.random.Generator) -> Array:
         """Effort channel, read late, noisy, in steps."""
         late = np.interp(at - self.effort_late_s, time_s, values)
-        return np.round((late + self.effort_noise * random.standard_normal(len(at))) / self.effort_step) * self.effort_step
+        return (
+            np.round((late + self.effort_noise * random.standard_normal(len(at))) / self.effort_step) * self.effort_step
+        )
 
 
 def spoiled(fault: str, effort: Array, command: Array, at: Array, limit: float) -> Array:
@@ -57,7 +61,13 @@ def spoiled(fault: str, effort: Array, command: Array, at: Array, limit: float) 
     return effort
 
 
-def write_session(folder: Path, name: str, xml: str, signals: Mapping[str, str], logs: Sequence[tuple[Mapping[str, Array], bool, Mapping[str, Any]]]) -> None:
+def write_session(
+    folder: Path,
+    name: str,
+    xml: str,
+    signals: Mapping[str, str],
+    logs: Sequence[tuple[Mapping[str, Array], bool, Mapping[str, Any]]],
+) -> None:
     """A session of logs (columns, whether it validates, what the trial sets); file names say nothing."""
     (folder / "log").mkdir(parents=True)
     (folder / "rig.xml").write_text(xml)
@@ -65,7 +75,11 @@ def write_session(folder: Path, name: str, xml: str, signals: Mapping[str, str],
     text += "".join(f'{c} = "{q}"\n' for c, q in signals.items())
     for k, (columns, validate, own) in enumerate(logs):
         table = np.stack(list(columns.values()), 1)
-        np.savetxt(folder / f"log/run_{k:02d}.csv", table, delimiter=",", header=",".join(columns), comments="", fmt="%.11g")
-        text += f'\n[[trial]]\nkind = "motion"\nlog = "log/run_{k:02d}.csv"\n' + ('purpose = "validate"\n' if validate else "")
+        np.savetxt(
+            folder / f"log/run_{k:02d}.csv", table, delimiter=",", header=",".join(columns), comments="", fmt="%.11g"
+        )
+        text += f'\n[[trial]]\nkind = "motion"\nlog = "log/run_{k:02d}.csv"\n' + (
+            'purpose = "validate"\n' if validate else ""
+        )
         text += "".join(f'set = {{ "{key}" = {value} }}\n' for key, value in own.items())
     (folder / "session.toml").write_text(text)

@@ -20,8 +20,8 @@ Control = Callable[[int, float, float], float]  # (tick, position, velocity) -> 
 
 @dataclass(frozen=True)
 class Drive:
-    """gain: effort per input; back_emf: effort per velocity; delay_s: until an input acts; lag_s: of a first order; sag: share
-    of the gain lost at an input of one (a supply that gives way)."""
+    """gain: effort per input; back_emf: effort per velocity; delay_s: until an input acts; lag_s: of a first order;
+    sag: share of the gain lost at an input of one (a supply that gives way)."""
 
     gain: float = 1.0
     back_emf: float = 0.0
@@ -32,7 +32,8 @@ class Drive:
 
 @dataclass(frozen=True)
 class Track:
-    """What happened, at fine steps: time_s (n,), position, velocity, effort of the drive (n, joints), its input (n, joints)."""
+    """What happened, at fine steps: time_s (n,), position, velocity, effort of the drive (n, joints), its input (n,
+    joints)."""
 
     time_s: Array
     position: Array
@@ -88,8 +89,10 @@ def one_joint(law: Law, drive: Drive, control: Control, seconds: float, start: t
 
 @dataclass(frozen=True)
 class Arm:
-    """Two links in a vertical plane, angles from hanging, the second relative. own: inertia about the own joint with rotor (two);
-    cross: m2 l1 c2; carried: m2 l1^2; rotors: (two); weights: of the first link with all it carries at l1, of the second."""
+    """Two links in a vertical plane, angles from hanging, the second relative. own: inertia about the own joint with
+    rotor (two);
+    cross: m2 l1 c2; carried: m2 l1^2; rotors: (two); weights: of the first link with all it carries at l1, of the
+    second."""
 
     own: tuple[float, float]
     rotors: tuple[float, float]
@@ -114,16 +117,24 @@ def two_joints(arm: Arm, laws: Sequence[Law], controls: Callable[[int, Sequence[
         rigid = (h * v[1] * (2 * v[0] + v[1]) - arm.weights[0] * math.sin(q[0]) - g1, -h * v[0] ** 2 - g1)
         force = [rigid[j] + torque[j] - laws[j].smooth(q[j], v[j]) for j in (0, 1)]
         det = m00 * m11 - m01 * m01
-        free = [v[0] + step_s * (m11 * force[0] - m01 * force[1]) / det, v[1] + step_s * (m00 * force[1] - m01 * force[0]) / det]
+        free = [
+            v[0] + step_s * (m11 * force[0] - m01 * force[1]) / det,
+            v[1] + step_s * (m00 * force[1] - m01 * force[0]) / det,
+        ]
         limit = [step_s * laws[j].dry(q[j], v[j], load[j], torque[j], 0.0) for j in (0, 1)]
         impulse = [0.0, 0.0]
         for _ in range(4):  # projected Gauss-Seidel
             for j, inverse in ((0, m11 / det), (1, m00 / det)):
                 now = free[j] + inverse * impulse[j] - m01 / det * impulse[1 - j]
                 impulse[j] = min(max(impulse[j] - now / inverse, -limit[j]), limit[j])
-        new = [free[0] + (m11 * impulse[0] - m01 * impulse[1]) / det, free[1] + (m00 * impulse[1] - m01 * impulse[0]) / det]
+        new = [
+            free[0] + (m11 * impulse[0] - m01 * impulse[1]) / det,
+            free[1] + (m00 * impulse[1] - m01 * impulse[0]) / det,
+        ]
         for j in (0, 1):
-            carried = torque[j] + impulse[j] / step_s - laws[j].smooth(q[j], v[j]) - arm.rotors[j] * (new[j] - v[j]) / step_s
+            carried = (
+                torque[j] + impulse[j] / step_s - laws[j].smooth(q[j], v[j]) - arm.rotors[j] * (new[j] - v[j]) / step_s
+            )
             load[j] += 0.2 * (carried - load[j])
         v = new
         q = [q[0] + step_s * v[0], q[1] + step_s * v[1]]

@@ -1,4 +1,6 @@
-"""python -m second_recorder OUT --seed S --single 36 --none 4 --pair 10 --weak 10 --messy 10 --outside 10 [--only EFFECT]"""
+"""python -m second_recorder OUT --seed S --single 36 --none 4 --pair 10 --weak 10 --messy 10 --outside 10 [--only
+EFFECT]"""
+
 from __future__ import annotations
 
 import argparse
@@ -12,17 +14,27 @@ KINDS = ("single", "none", "pair", "weak", "messy", "outside")
 
 def main() -> None:
     """Command line."""
-    parser = argparse.ArgumentParser(prog="second_recorder", description="Record sessions of a hand with something hidden in them.")
+    parser = argparse.ArgumentParser(
+        prog="second_recorder", description="Record sessions of a hand with something hidden in them."
+    )
     parser.add_argument("out", type=Path, help="folder of the sessions; the answers go to OUT.answers")
     parser.add_argument("--seed", type=int, default=1)
     for kind in KINDS:
         parser.add_argument(f"--{kind}", type=int, default=0, help=f"number of {kind} sessions")
     parser.add_argument("--only", choices=sorted(EFFECTS), help="use this effect alone")
-    parser.add_argument("--anywhere", action="store_true", help="each session in a laboratory of its own: rates, noise, speeds")
+    parser.add_argument(
+        "--anywhere", action="store_true", help="each session in a laboratory of its own: rates, noise, speeds"
+    )
     arguments = parser.parse_args()
     if arguments.out.exists() and any(arguments.out.iterdir()):
         parser.error(f"{arguments.out} is not empty")
-    make_set(arguments.out, arguments.seed, {kind: getattr(arguments, kind) for kind in KINDS}, arguments.only, arguments.anywhere)
+    make_set(
+        arguments.out,
+        arguments.seed,
+        {kind: getattr(arguments, kind) for kind in KINDS},
+        arguments.only,
+        arguments.anywhere,
+    )
 
 
 if __name__ == "__main__":

@@ -1,4 +1,5 @@
 """Sets of sessions: which effect hides where, and the answers, kept apart."""
+
 from __future__ import annotations
 
 import json
@@ -96,16 +97,29 @@ def make_case(case: Case, folder: Path, seed: int, anywhere: bool = False) -> di
         if "skew" in settings[finger.name].get("rec", {}):
             for each in settings.values():
                 each.setdefault("rec", {})["skew"] = settings[finger.name]["rec"]["skew"]
-    Recorder(folder, hand, settings, rng, noise=1.5 if case.kind == "weak" else 1.0, short=case.kind == "weak",
-             laboratory=laboratory).write()
+    Recorder(
+        folder,
+        hand,
+        settings,
+        rng,
+        noise=1.5 if case.kind == "weak" else 1.0,
+        short=case.kind == "weak",
+        laboratory=laboratory,
+    ).write()
     if not entries:
         entries = [{"effect": "none", "finger": target.name, "joint": None, "signal": "current"}]
     flat: Settings = {}
     for finger in (target, other):
         merge(flat, settings[finger.name])
     answer: dict[str, Any] = {
-        "case": folder.name, "seed": seed, "kind": case.kind, "background": case.kind == "messy", "effects": entries,
-        "laboratory": asdict(laboratory), "settings": flat, "settings_by_finger": settings,
+        "case": folder.name,
+        "seed": seed,
+        "kind": case.kind,
+        "background": case.kind == "messy",
+        "effects": entries,
+        "laboratory": asdict(laboratory),
+        "settings": flat,
+        "settings_by_finger": settings,
     }
     answer.update(describe(hand, settings))
     return answer

@@ -1,4 +1,5 @@
 """Every effect of the table: how it is drawn. Strength 1 is clear, 0.1 a trace; 0 would be the healthy hand."""
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -59,13 +60,20 @@ def load_friction(rng: np.random.Generator, s: float, finger: Finger) -> Setting
 
 def tight_spot(rng: np.random.Generator, s: float, finger: Finger) -> Settings:
     """More friction in one part of the range."""
-    return {"dyn": {"pos_amp": s * rng.uniform(0.6, 1.1), "pos_c": rng.uniform(30.0, 70.0), "pos_w": rng.uniform(5.0, 10.0)}}
+    return {
+        "dyn": {"pos_amp": s * rng.uniform(0.6, 1.1), "pos_c": rng.uniform(30.0, 70.0), "pos_w": rng.uniform(5.0, 10.0)}
+    }
 
 
 def detent(rng: np.random.Generator, s: float, finger: Finger) -> Settings:
     """A load in one part of the range, the same both ways."""
-    return {"dyn": {"detent_amp": s * sign(rng) * rng.uniform(14.0, 24.0), "detent_c": rng.uniform(25.0, 75.0),
-                    "detent_w": rng.uniform(4.0, 9.0)}}
+    return {
+        "dyn": {
+            "detent_amp": s * sign(rng) * rng.uniform(14.0, 24.0),
+            "detent_c": rng.uniform(25.0, 75.0),
+            "detent_w": rng.uniform(4.0, 9.0),
+        }
+    }
 
 
 def spring_shape(rng: np.random.Generator, s: float, finger: Finger) -> Settings:
@@ -85,8 +93,13 @@ def gravity(rng: np.random.Generator, s: float, finger: Finger) -> Settings:
 
 def ripple(rng: np.random.Generator, s: float, finger: Finger) -> Settings:
     """Load periodic in motor position."""
-    return {"dyn": {"ripple_amp": s * rng.uniform(6.0, 11.0), "ripple_period": rng.uniform(5.0, 12.0),
-                    "ripple_phase": rng.uniform(0.0, 2 * np.pi)}}
+    return {
+        "dyn": {
+            "ripple_amp": s * rng.uniform(6.0, 11.0),
+            "ripple_period": rng.uniform(5.0, 12.0),
+            "ripple_phase": rng.uniform(0.0, 2 * np.pi),
+        }
+    }
 
 
 def square_drag(rng: np.random.Generator, s: float, finger: Finger) -> Settings:
@@ -162,14 +175,25 @@ def decoupling(rng: np.random.Generator, s: float, finger: Finger) -> Settings:
 def contact(rng: np.random.Generator, s: float, finger: Finger) -> Settings:
     """A springy object in the way for a part of each trial."""
     start = rng.uniform(0.3, 0.5)
-    return {"dyn": {"contact_k": s * rng.uniform(1.0, 2.0), "contact_x": rng.uniform(55.0, 75.0),
-                    "contact_window": [start, start + rng.uniform(0.3, 0.45)]}}
+    return {
+        "dyn": {
+            "contact_k": s * rng.uniform(1.0, 2.0),
+            "contact_x": rng.uniform(55.0, 75.0),
+            "contact_window": [start, start + rng.uniform(0.3, 0.45)],
+        }
+    }
 
 
 def wobble(rng: np.random.Generator, s: float, finger: Finger) -> Settings:
     """A second rotation about an axis across the first."""
-    return {"kin": {"wobble_amp": s * rng.uniform(0.03, 0.06), "wobble_waves": float(rng.choice([1.0, 2.0])),
-                    "wobble_joint": int(rng.random() < 0.3), "wobble_direction": direction(rng).tolist()}}
+    return {
+        "kin": {
+            "wobble_amp": s * rng.uniform(0.03, 0.06),
+            "wobble_waves": float(rng.choice([1.0, 2.0])),
+            "wobble_joint": int(rng.random() < 0.3),
+            "wobble_direction": direction(rng).tolist(),
+        }
+    }
 
 
 def travelling_centre(rng: np.random.Generator, s: float, finger: Finger) -> Settings:
@@ -182,8 +206,13 @@ def travelling_centre(rng: np.random.Generator, s: float, finger: Finger) -> Set
 
 def encoder_wave(rng: np.random.Generator, s: float, finger: Finger) -> Settings:
     """Reading error periodic in counts."""
-    return {"rec": {"encoder_amp": s * rng.uniform(25.0, 55.0), "encoder_period": rng.uniform(300.0, 1000.0),
-                    "encoder_phase": rng.uniform(0.0, 2 * np.pi)}}
+    return {
+        "rec": {
+            "encoder_amp": s * rng.uniform(25.0, 55.0),
+            "encoder_period": rng.uniform(300.0, 1000.0),
+            "encoder_phase": rng.uniform(0.0, 2 * np.pi),
+        }
+    }
 
 
 def sagging(rng: np.random.Generator, s: float, finger: Finger) -> Settings:
@@ -199,7 +228,7 @@ def late_command(rng: np.random.Generator, s: float, finger: Finger) -> Settings
 def saturation(rng: np.random.Generator, s: float, finger: Finger) -> Settings:
     """The reading clips, or the drive does."""
     motor = finger.motor
-    holding = motor.Fc + motor.tau0 + 100.0 * motor.k          # needed to creep at full flexion
+    holding = motor.Fc + motor.tau0 + 100.0 * motor.k  # needed to creep at full flexion
     top = holding + 115.0 * motor.b
     slack = 30.0 * (1.0 - s) ** 4  # a trace of it must not bite because other loads are there too
     if rng.random() < 0.3:
@@ -226,8 +255,12 @@ def skew(rng: np.random.Generator, s: float, finger: Finger) -> Settings:
 def slip(rng: np.random.Generator, s: float, finger: Finger) -> Settings:
     """One marker jumps in each trial."""
     vector = s * rng.uniform(0.0013, 0.003) * direction(rng)
-    return {"marker": {"slip": [int(rng.integers(0, 2)), int(rng.integers(0, 3)), rng.uniform(0.25, 0.7), vector.tolist()],
-                       "slip_frame": "segment" if rng.random() < 0.5 else "palm"}}
+    return {
+        "marker": {
+            "slip": [int(rng.integers(0, 2)), int(rng.integers(0, 3)), rng.uniform(0.25, 0.7), vector.tolist()],
+            "slip_frame": "segment" if rng.random() < 0.5 else "palm",
+        }
+    }
 
 
 def support_turn(rng: np.random.Generator, s: float, finger: Finger) -> Settings:
@@ -249,45 +282,50 @@ def swapped(rng: np.random.Generator, s: float, finger: Finger) -> Settings:
     for start in rng.uniform(0.1, 0.85, max(1, round(3 * s))):
         i, j = rng.choice(3, 2, replace=False)
         labels = finger.labels
-        swaps.append([labels[3 * segment + i], labels[3 * segment + j], float(start), max(5, int(s * rng.uniform(60, 220)))])
+        swaps.append(
+            [labels[3 * segment + i], labels[3 * segment + j], float(start), max(5, int(s * rng.uniform(60, 220)))]
+        )
     return {"marker": {"swaps": swaps}}
 
 
-EFFECTS: dict[str, Effect] = {effect.name: effect for effect in (
-    Effect("stribeck_friction", "dyn", "current", None, stribeck),
-    Effect("asymmetric_viscous_friction", "dyn", "current", None, asymmetric_viscous),
-    Effect("asymmetric_friction", "dyn", "current", None, asymmetric_coulomb),
-    Effect("load_dependent_friction", "dyn", "current", None, load_friction),
-    Effect("position_dependent_friction", "dyn", "current", None, tight_spot),
-    Effect("detent_load", "dyn", "current", None, detent),
-    Effect("nonlinear_spring", "dyn", "current", None, spring_shape),
-    Effect("gravity_load", "dyn", "current", None, gravity),
-    Effect("torque_ripple", "dyn", "current", None, ripple),
-    Effect("quadratic_damping", "dyn", "current", None, square_drag),
-    Effect("elastoplastic_hysteresis", "dyn", "current", None, hysteresis),
-    Effect("viscoelastic_spring", "dyn", "current", None, relaxing_spring),
-    Effect("presliding_friction", "dyn", "current", None, presliding),
-    Effect("end_stop_contact", "dyn", "current", None, end_stop),
-    Effect("thermal_friction_drift", "dyn", "current", None, warming),
-    Effect("drive_backlash", "kin", "markers", "proximal", drive_play),
-    Effect("series_elasticity", "kin", "markers", "proximal", series_give),
-    Effect("linkage_backlash", "kin", "markers", "distal", linkage_play),
-    Effect("linkage_compliance", "kin", "markers", "distal", linkage_give),
-    Effect("coupling_deadband", "kin", "markers", "distal", deadband),
-    Effect("distal_stop", "kin", "markers", "distal", distal_stop),
-    Effect("spring_decoupling", "kin", "markers", "proximal", decoupling),
-    Effect("external_contact", "dyn", "current", None, contact),
-    Effect("joint_wobble", "kin", "markers", "proximal", wobble),
-    Effect("moving_centre", "kin", "markers", "proximal", travelling_centre),
-    Effect("encoder_periodic_error", "rec", "position", "proximal", encoder_wave),
-    Effect("drive_sag", "dyn", "current", None, sagging),
-    Effect("command_delay", "dyn", "position", None, late_command),
-    Effect("current_saturation", "rec", "current", None, saturation),
-    Effect("current_channel_delay", "rec", "current", None, current_late),
-    Effect("command_as_measurement", "rec", "log", None, faked_channel, scalable=False),
-    Effect("clock_drift", "rec", "log", None, skew),
-    Effect("marker_slip", "marker", "markers", None, slip),
-    Effect("support_slip", "marker", "markers", None, support_turn),
-    Effect("palm_marker_slip", "marker", "markers", None, palm_slip),
-    Effect("marker_swap", "marker", "markers", None, swapped),
-)}
+EFFECTS: dict[str, Effect] = {
+    effect.name: effect
+    for effect in (
+        Effect("stribeck_friction", "dyn", "current", None, stribeck),
+        Effect("asymmetric_viscous_friction", "dyn", "current", None, asymmetric_viscous),
+        Effect("asymmetric_friction", "dyn", "current", None, asymmetric_coulomb),
+        Effect("load_dependent_friction", "dyn", "current", None, load_friction),
+        Effect("position_dependent_friction", "dyn", "current", None, tight_spot),
+        Effect("detent_load", "dyn", "current", None, detent),
+        Effect("nonlinear_spring", "dyn", "current", None, spring_shape),
+        Effect("gravity_load", "dyn", "current", None, gravity),
+        Effect("torque_ripple", "dyn", "current", None, ripple),
+        Effect("quadratic_damping", "dyn", "current", None, square_drag),
+        Effect("elastoplastic_hysteresis", "dyn", "current", None, hysteresis),
+        Effect("viscoelastic_spring", "dyn", "current", None, relaxing_spring),
+        Effect("presliding_friction", "dyn", "current", None, presliding),
+        Effect("end_stop_contact", "dyn", "current", None, end_stop),
+        Effect("thermal_friction_drift", "dyn", "current", None, warming),
+        Effect("drive_backlash", "kin", "markers", "proximal", drive_play),
+        Effect("series_elasticity", "kin", "markers", "proximal", series_give),
+        Effect("linkage_backlash", "kin", "markers", "distal", linkage_play),
+        Effect("linkage_compliance", "kin", "markers", "distal", linkage_give),
+        Effect("coupling_deadband", "kin", "markers", "distal", deadband),
+        Effect("distal_stop", "kin", "markers", "distal", distal_stop),
+        Effect("spring_decoupling", "kin", "markers", "proximal", decoupling),
+        Effect("external_contact", "dyn", "current", None, contact),
+        Effect("joint_wobble", "kin", "markers", "proximal", wobble),
+        Effect("moving_centre", "kin", "markers", "proximal", travelling_centre),
+        Effect("encoder_periodic_error", "rec", "position", "proximal", encoder_wave),
+        Effect("drive_sag", "dyn", "current", None, sagging),
+        Effect("command_delay", "dyn", "position", None, late_command),
+        Effect("current_saturation", "rec", "current", None, saturation),
+        Effect("current_channel_delay", "rec", "current", None, current_late),
+        Effect("command_as_measurement", "rec", "log", None, faked_channel, scalable=False),
+        Effect("clock_drift", "rec", "log", None, skew),
+        Effect("marker_slip", "marker", "markers", None, slip),
+        Effect("support_slip", "marker", "markers", None, support_turn),
+        Effect("palm_marker_slip", "marker", "markers", None, palm_slip),
+        Effect("marker_swap", "marker", "markers", None, swapped),
+    )
+}

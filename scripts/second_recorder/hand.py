@@ -1,4 +1,5 @@
 """A healthy hand drawn at random: motors, joints, markers, landmarks."""
+
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
@@ -107,9 +108,9 @@ def draw_finger(rng: np.random.Generator, side: str, name: str) -> Finger:
     axes, centres = TABLE[side][name]
     tilted = np.array([unit(np.array(axis) + rng.normal(0.0, 0.022, 3)) for axis in axes])
     moved = np.array(centres) + rng.normal(0.0, 0.001, (2, 3))
-    markers = np.array([
-        (np.array(SEGMENT_MARKERS[j]) + rng.normal(0.0, 0.0018, (3, 3))) @ finger_frame(tilted[j]) for j in (0, 1)
-    ])
+    markers = np.array(
+        [(np.array(SEGMENT_MARKERS[j]) + rng.normal(0.0, 0.0018, (3, 3))) @ finger_frame(tilted[j]) for j in (0, 1)]
+    )
     coef = (rng.normal(1.02, 0.04), rng.normal(0.0, 0.06), rng.normal(0.56, 0.04), rng.normal(0.45, 0.06))
     return Finger(name, tilted, moved, ANGLE_FULL[name], tuple(float(c) for c in coef), markers, draw_motor(rng))
 
@@ -137,8 +138,10 @@ def describe(hand: Hand, settings: dict[str, dict[str, dict[str, Any]]]) -> dict
     motors: dict[str, Any] = {}
     for finger in hand.fingers:
         kinematics[finger.name] = {
-            "axes": finger.axes.tolist(), "centres": finger.centres.tolist(),
-            "angle_full": list(finger.angle_full), "coef": list(finger.coef),
+            "axes": finger.axes.tolist(),
+            "centres": finger.centres.tolist(),
+            "angle_full": list(finger.angle_full),
+            "coef": list(finger.coef),
         }
         motor: dict[str, Any] = asdict(finger.motor)
         dyn = settings.get(finger.name, {}).get("dyn", {})

@@ -1,4 +1,5 @@
 """Joint angles and marker positions of one finger, with whatever is hidden in `kin` and `marker`."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -8,7 +9,7 @@ import numpy as np
 from .hand import Array, Finger, unit
 from .motor import Trace
 
-LOAD_UNIT = 100.0   # raw current at which a compliance is quoted
+LOAD_UNIT = 100.0  # raw current at which a compliance is quoted
 SUPPORT_FOOT = 0.7  # a support turns about its foot, nearer to the joint than its markers
 
 

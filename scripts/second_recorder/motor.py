@@ -1,4 +1,5 @@
 """Forward simulation of one drive: position controller, LuGre friction, spring, and whatever is hidden in `dyn`."""
+
 from __future__ import annotations
 
 import math
@@ -12,7 +13,7 @@ from .hand import Motor
 from .moves import STEP, Program
 
 Array = NDArray[np.float64]
-KP, KD = 22.0, 3.0            # raw per %, raw per %/s
+KP, KD = 22.0, 3.0  # raw per %, raw per %/s
 BRISTLE, BRISTLE_DAMPING = 60.0, 0.25
 
 
@@ -28,7 +29,8 @@ class Trace:
 
 
 def simulate(motor: Motor, dyn: dict[str, Any], program: Program, start: float, gravity: tuple[float, float]) -> Trace:
-    """Run a program; `start` is the session time [s] of the trial, `gravity` its (x, z) direction in the finger frame."""
+    """Run a program; `start` is the session time [s] of the trial, `gravity` its (x, z) direction in the finger
+    frame."""
     dt, exp, sin, cos = STEP, math.exp, math.sin, math.cos
     m, b, Fc, k, tau0 = motor.m, motor.b, motor.Fc, motor.k, motor.tau0
     get = dyn.get
@@ -59,8 +61,8 @@ def simulate(motor: Motor, dyn: dict[str, Any], program: Program, start: float, 
     s_on, s_off = (f * program.duration for f in get("shake_window", (2.0, 2.0)))
 
     lag = round(get("command_delay", 0.0) / dt)
-    reference = np.concatenate([np.zeros(lag), program.reference])[:len(program.reference)]
-    rate = np.concatenate([np.zeros(lag), program.rate])[:len(program.rate)]
+    reference = np.concatenate([np.zeros(lag), program.reference])[: len(program.reference)]
+    rate = np.concatenate([np.zeros(lag), program.rate])[: len(program.rate)]
     x = v = z = a = smooth_a = w = f_relax = rested = t = 0.0
     passes, above, window = 0, False, get("fade", 0.3)
     out_x: list[float] = []

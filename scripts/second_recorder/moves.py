@@ -1,4 +1,5 @@
 """Programs of moves and the reference that the drive follows."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -13,8 +14,20 @@ STEP = 0.001  # s of the simulation
 
 FLEXION_SPEEDS = (1.0, 0.45, 0.15, 0.7, 0.27, 1.0, 0.45, 0.15)
 FLEXION_B_SPEEDS = (1.0, 0.45, 0.15, 0.7, 0.27)
-EXCITATION = ((100, 1.0), (0, 1.0), (50, 1.0), (100, 1.0), (50, 1.0), (0, 1.0),
-              (100, 0.5), (0, 0.5), (50, 0.5), (100, 0.5), (50, 0.5), (0, 0.5))
+EXCITATION = (
+    (100, 1.0),
+    (0, 1.0),
+    (50, 1.0),
+    (100, 1.0),
+    (50, 1.0),
+    (0, 1.0),
+    (100, 0.5),
+    (0, 0.5),
+    (50, 0.5),
+    (100, 0.5),
+    (50, 0.5),
+    (0, 0.5),
+)
 
 Move = tuple[float, float]
 
@@ -54,11 +67,19 @@ def build(moves: list[Move], laboratory: Laboratory) -> Program:
         ramp = top / most
         end = distance / top + ramp
         left = np.clip(end - t, 0.0, None)
-        covered = np.where(t < ramp, 0.5 * most * t**2,
-                           np.where(t < end - ramp, top * (t - 0.5 * ramp), distance - 0.5 * most * left**2))
+        covered = np.where(
+            t < ramp,
+            0.5 * most * t**2,
+            np.where(t < end - ramp, top * (t - 0.5 * ramp), distance - 0.5 * most * left**2),
+        )
         sign = np.sign(target - position)
         reference.append(position + sign * covered)
         rate.append(sign * np.minimum(np.minimum(most * t, top), most * left))
         position = target
-    return Program(np.concatenate(reference), np.concatenate(rate), np.array(change),
-                   np.array([0.0] + [move[0] for move in moves]), np.array([1.0] + [move[1] for move in moves]))
+    return Program(
+        np.concatenate(reference),
+        np.concatenate(rate),
+        np.array(change),
+        np.array([0.0] + [move[0] for move in moves]),
+        np.array([1.0] + [move[1] for move in moves]),
+    )

@@ -1,4 +1,5 @@
 """Real things that the table has no name for."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -24,7 +25,13 @@ def friction_jump(rng: np.random.Generator, s: float, finger: Finger) -> Setting
 
 def broken_tooth(rng: np.random.Generator, s: float, finger: Finger) -> Settings:
     """A bump that opposes every third pass."""
-    return {"dyn": {"tooth_amp": rng.uniform(25.0, 40.0), "tooth_c": rng.uniform(30.0, 70.0), "tooth_w": rng.uniform(1.5, 3.0)}}
+    return {
+        "dyn": {
+            "tooth_amp": rng.uniform(25.0, 40.0),
+            "tooth_c": rng.uniform(30.0, 70.0),
+            "tooth_w": rng.uniform(1.5, 3.0),
+        }
+    }
 
 
 def lens_distortion(rng: np.random.Generator, s: float, finger: Finger) -> Settings:
@@ -39,20 +46,35 @@ def palm_bends(rng: np.random.Generator, s: float, finger: Finger) -> Settings:
 
 def supply_ripple(rng: np.random.Generator, s: float, finger: Finger) -> Settings:
     """A slow wave on the current reading."""
-    return {"rec": {"supply_amp": rng.uniform(9.0, 14.0), "supply_hz": rng.uniform(0.35, 1.3),
-                    "supply_phase": rng.uniform(0.0, 2 * np.pi)}}
+    return {
+        "rec": {
+            "supply_amp": rng.uniform(9.0, 14.0),
+            "supply_hz": rng.uniform(0.35, 1.3),
+            "supply_phase": rng.uniform(0.0, 2 * np.pi),
+        }
+    }
 
 
 def dwell_friction(rng: np.random.Generator, s: float, finger: Finger) -> Settings:
     """Breakaway that grows with the time at rest."""
-    return {"dyn": {"dwell_amp": rng.uniform(30.0, 45.0), "dwell_tau": rng.uniform(0.25, 0.6),
-                    "dwell_dist": rng.uniform(3.0, 7.0)}}
+    return {
+        "dyn": {
+            "dwell_amp": rng.uniform(30.0, 45.0),
+            "dwell_tau": rng.uniform(0.25, 0.6),
+            "dwell_dist": rng.uniform(3.0, 7.0),
+        }
+    }
 
 
 def fast_spring(rng: np.random.Generator, s: float, finger: Finger) -> Settings:
     """A second spring that engages only in fast motion."""
-    return {"dyn": {"fast_spring_k": rng.uniform(0.6, 1.0), "fast_spring_x": rng.uniform(40.0, 60.0),
-                    "fast_spring_v": rng.uniform(55.0, 70.0)}}
+    return {
+        "dyn": {
+            "fast_spring_k": rng.uniform(0.6, 1.0),
+            "fast_spring_x": rng.uniform(40.0, 60.0),
+            "fast_spring_v": rng.uniform(55.0, 70.0),
+        }
+    }
 
 
 def crosstalk(rng: np.random.Generator, s: float, finger: Finger) -> Settings:
@@ -62,15 +84,25 @@ def crosstalk(rng: np.random.Generator, s: float, finger: Finger) -> Settings:
 
 def tissue_swing(rng: np.random.Generator, s: float, finger: Finger) -> Settings:
     """Distal markers swing with their acceleration."""
-    return {"marker": {"swing_hz": rng.uniform(4.0, 7.0), "swing_damping": rng.uniform(0.08, 0.2),
-                       "swing_gain": rng.uniform(0.7, 1.2)}}
+    return {
+        "marker": {
+            "swing_hz": rng.uniform(4.0, 7.0),
+            "swing_damping": rng.uniform(0.08, 0.2),
+            "swing_gain": rng.uniform(0.7, 1.2),
+        }
+    }
 
 
 def vibration(rng: np.random.Generator, s: float, finger: Finger) -> Settings:
     """Somebody shakes the finger for a while."""
     start = rng.uniform(0.15, 0.45)
-    return {"dyn": {"shake_amp": rng.uniform(11.0, 18.0), "shake_hz": rng.uniform(2.5, 6.0),
-                    "shake_window": [start, start + rng.uniform(0.3, 0.5)]}}
+    return {
+        "dyn": {
+            "shake_amp": rng.uniform(11.0, 18.0),
+            "shake_hz": rng.uniform(2.5, 6.0),
+            "shake_window": [start, start + rng.uniform(0.3, 0.5)],
+        }
+    }
 
 
 def lost_counts(rng: np.random.Generator, s: float, finger: Finger) -> Settings:

@@ -1,4 +1,5 @@
 """Where the palm and the probe are in the world of the cameras."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -25,7 +26,9 @@ class Wander:
 
 def draw_wander(rng: np.random.Generator, size: float, low: float, high: float) -> Wander:
     """Three components of two sines each."""
-    return Wander(rng.uniform(0.3, 1.3, (3, 2)) * size, rng.uniform(low, high, (3, 2)), rng.uniform(0, 2 * np.pi, (3, 2)))
+    return Wander(
+        rng.uniform(0.3, 1.3, (3, 2)) * size, rng.uniform(low, high, (3, 2)), rng.uniform(0, 2 * np.pi, (3, 2))
+    )
 
 
 def turn_by(rotvec: Array) -> Array:

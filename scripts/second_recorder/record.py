@@ -1,4 +1,5 @@
 """What laboratory and drive write down of a trial: clocks, noise, gaps, rounding, and whatever is hidden in `rec`."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -15,10 +16,22 @@ from .moves import Program
 GAP_FRAMES = (4, 20)
 
 
-def log_rows(rng: np.random.Generator, finger: Finger, rec: dict[str, Any], program: Program, trace: Trace,
-             clock: float, session_time: float, noise: float, other: Array | None, laboratory: Laboratory) -> list[str]:
+def log_rows(
+    rng: np.random.Generator,
+    finger: Finger,
+    rec: dict[str, Any],
+    program: Program,
+    trace: Trace,
+    clock: float,
+    session_time: float,
+    noise: float,
+    other: Array | None,
+    laboratory: Laboratory,
+) -> list[str]:
     """Lines of an actuator log."""
-    steps = laboratory.log_step * rng.uniform(1 - laboratory.log_jitter, 1 + laboratory.log_jitter, int(program.duration / laboratory.log_step * 1.6))
+    steps = laboratory.log_step * rng.uniform(
+        1 - laboratory.log_jitter, 1 + laboratory.log_jitter, int(program.duration / laboratory.log_step * 1.6)
+    )
     times = np.cumsum(steps)
     times = times[times < program.duration]
     times = times[rng.random(len(times)) >= laboratory.log_loss]
@@ -26,7 +39,9 @@ def log_rows(rng: np.random.Generator, finger: Finger, rec: dict[str, Any], prog
     span = (full - empty) / 100.0
     position = empty + span * np.interp(times, trace.time, trace.position)
     if "encoder_amp" in rec:
-        position = position + rec["encoder_amp"] * np.sin(2 * np.pi * position / rec["encoder_period"] + rec["encoder_phase"])
+        position = position + rec["encoder_amp"] * np.sin(
+            2 * np.pi * position / rec["encoder_period"] + rec["encoder_phase"]
+        )
     for moment, counts in rec.get("lost_counts", []):
         position = position - counts * (times > moment * program.duration)
     current = np.interp(times - rec.get("current_delay", 0.0), trace.time, trace.current)
@@ -52,13 +67,23 @@ def log_rows(rng: np.random.Generator, finger: Finger, rec: dict[str, Any], prog
         current = np.full(len(times), float(rec["dead_value"]))
     stamps = clock + rec.get("skew", 1.0) * times
     rows = ["time,position,current,setpoint,speed,current_limit"]
-    rows += [f"{a:.5f},{b:.0f},{c:.0f},{d:.0f},{e:.0f},255"
-             for a, b, c, d, e in zip(stamps, position, current, setpoint, speed)]
+    rows += [
+        f"{a:.5f},{b:.0f},{c:.0f},{d:.0f},{e:.0f},255"
+        for a, b, c, d, e in zip(stamps, position, current, setpoint, speed)
+    ]
     return rows
 
 
-def corrupt_markers(rng: np.random.Generator, labels: list[str], points: Array, rec: dict[str, Any], marker: dict[str, Any],
-                    noise: float, gaps: bool, laboratory: Laboratory) -> Array:
+def corrupt_markers(
+    rng: np.random.Generator,
+    labels: list[str],
+    points: Array,
+    rec: dict[str, Any],
+    marker: dict[str, Any],
+    noise: float,
+    gaps: bool,
+    laboratory: Laboratory,
+) -> Array:
     """Noise, gaps, swapped labels, lens and lost frames on world positions (n, k, 3) [m]."""
     points = points.copy()
     count = len(points)
@@ -69,15 +94,15 @@ def corrupt_markers(rng: np.random.Generator, labels: list[str], points: Array, 
     for first, second, start, frames in marker.get("swaps", []):
         if first in labels and second in labels:
             i, j, k = labels.index(first), labels.index(second), int(start * count)
-            points[k:k + frames, [i, j]] = points[k:k + frames, [j, i]]
+            points[k : k + frames, [i, j]] = points[k : k + frames, [j, i]]
     if gaps:
         for i in range(len(labels)):
             for _ in range(rng.poisson(laboratory.gap_rate * count / laboratory.mocap_rate)):
                 k = int(rng.integers(0, count))
-                points[k:k + int(rng.integers(*GAP_FRAMES)), i] = np.nan
+                points[k : k + int(rng.integers(*GAP_FRAMES)), i] = np.nan
     keep = np.ones(count, dtype=bool)
     for moment, frames in rec.get("lost_frames", []):
-        keep[int(moment * count):int(moment * count) + frames] = False
+        keep[int(moment * count) : int(moment * count) + frames] = False
     return points[keep]
 
 
@@ -93,5 +118,7 @@ def write_c3d(path: Path, labels: list[str], points: Array, rate: float) -> None
     c3d["data"]["points"] = data
     c3d.add_parameter("POINT", "UNITS", ["mm"])
     c3d["data"]["meta_points"] = {
-        "residuals": np.where(lost, -1.0, 0.0)[None], "camera_masks": np.zeros((7, len(labels), len(points)), dtype=bool)}
+        "residuals": np.where(lost, -1.0, 0.0)[None],
+        "camera_masks": np.zeros((7, len(labels), len(points)), dtype=bool),
+    }
     c3d.write(str(path))

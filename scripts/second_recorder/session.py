@@ -1,4 +1,5 @@
 """One session folder: the trials of two fingers, recorded."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -34,8 +35,10 @@ class TrialPlan:
 def plans(short: bool) -> list[TrialPlan]:
     """The trials of one finger; fewer and shorter in a short session."""
     long, second = (FLEXION_SPEEDS[:5], FLEXION_B_SPEEDS[:3]) if short else (FLEXION_SPEEDS, FLEXION_B_SPEEDS)
-    out = [TrialPlan("flexion", "", 0.0, tuple(flexion(long)), True, False),
-           TrialPlan("flexion", "_b", 120.0, tuple(flexion(second)), True, True)]
+    out = [
+        TrialPlan("flexion", "", 0.0, tuple(flexion(long)), True, False),
+        TrialPlan("flexion", "_b", 120.0, tuple(flexion(second)), True, True),
+    ]
     repeats = 2 if short else 3
     for i in range(repeats):
         out.append(TrialPlan("excitation", f"_{i + 1}", 180.0 + 45.0 * i, tuple(EXCITATION), False, i + 1 == repeats))
@@ -45,16 +48,29 @@ def plans(short: bool) -> list[TrialPlan]:
 def manifest_head(hand: Hand) -> list[str]:
     """session.toml up to the trials."""
     probe = ", ".join(f"{label} = {list(place)}" for label, place in PROBE.items())
-    lines = ['format = "hand-session/1"', "", "[hand]", 'name = "bebionic"', f'side = "{hand.side}"', "", "[palm]",
-             'markers = { origin = "PO", medial = "PM", lateral = "PL" }', "", "[world]", "gravity = [0.0, 0.0, -9.81]", "",
-             "[probe]", f"markers = {{ {probe} }}"]
+    lines = [
+        'format = "hand-session/1"',
+        "",
+        "[hand]",
+        'name = "bebionic"',
+        f'side = "{hand.side}"',
+        "",
+        "[palm]",
+        'markers = { origin = "PO", medial = "PM", lateral = "PL" }',
+        "",
+        "[world]",
+        "gravity = [0.0, 0.0, -9.81]",
+        "",
+        "[probe]",
+        f"markers = {{ {probe} }}",
+    ]
     for finger in hand.fingers:
         lines += ["", "[[actuator]]", f'name = "{finger.name}"', "speed_full = 255", "current_full = 255"]
     for finger in hand.fingers:
         labels = finger.labels
         lines += ["", "[[finger]]", f'name = "{finger.name}"', f'actuator = "{finger.name}"', "segments = ["]
         for j, segment in enumerate(SEGMENTS):
-            names = ", ".join(f'"{label}"' for label in labels[3 * j:3 * j + 3])
+            names = ", ".join(f'"{label}"' for label in labels[3 * j : 3 * j + 3])
             lines.append(f'  {{ name = "{segment}", markers = [{names}] }},')
         lines.append("]")
     return lines
@@ -81,8 +97,16 @@ def palm_points(hand: Hand, marker: dict[str, Any], times: Array, trace: Trace |
 class Recorder:
     """Writes one session; `settings` maps finger names to what is hidden in them."""
 
-    def __init__(self, folder: Path, hand: Hand, settings: dict[str, Settings], rng: np.random.Generator,
-                 noise: float, short: bool, laboratory: Laboratory) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        hand: Hand,
+        settings: dict[str, Settings],
+        rng: np.random.Generator,
+        noise: float,
+        short: bool,
+        laboratory: Laboratory,
+    ) -> None:
         """Make the folders and place the hand; `noise` scales all noise, `short` leaves out moves and trials."""
         self.folder, self.hand, self.settings, self.rng = folder, hand, settings, rng
         self.noise, self.short, self.laboratory = noise, short, laboratory
@@ -105,7 +129,9 @@ class Recorder:
         points = np.concatenate([palm_points(self.hand, {}, times, None), probe_markers(self.rng, tip, times)], axis=1)
         world = to_world(turns, places, points)
         labels = PALM_LABELS + list(PROBE)
-        world = corrupt_markers(self.rng, labels, world, self._lens_only(), {}, self.noise, gaps=False, laboratory=self.laboratory)
+        world = corrupt_markers(
+            self.rng, labels, world, self._lens_only(), {}, self.noise, gaps=False, laboratory=self.laboratory
+        )
         write_c3d(self.folder / "mocap" / name, labels, world, self.laboratory.mocap_rate)
 
     def _lens_only(self) -> dict[str, Any]:
@@ -128,8 +154,9 @@ class Recorder:
                     tip = finger.centres[j] + along * finger.axes[j] + self.rng.normal(0.0, 0.0005, 3)
                     name = f"joint_{finger.name}_{joint}_{side}.c3d"
                     self._probe(name, tip, 120)
-                    self.lines += trial_lines(kind="joint_probe", finger=finger.name, joint=joint, side=side,
-                                              mocap=f"mocap/{name}")
+                    self.lines += trial_lines(
+                        kind="joint_probe", finger=finger.name, joint=joint, side=side, mocap=f"mocap/{name}"
+                    )
 
     def _moving_trials(self, finger: Finger) -> None:
         settings = self.settings.get(finger.name, {})
@@ -144,8 +171,18 @@ class Recorder:
             trace = simulate(finger.motor, dyn, program, plan.start, gravity_in_finger(base[0], frame))
             stem = f"{plan.kind}_{finger.name}{plan.suffix}"
             entries = {"kind": plan.kind, "finger": finger.name, "log": f"log/{stem}.csv"}
-            rows = log_rows(self.rng, finger, rec, program, trace, 1000.0 + plan.start + self.rng.uniform(-3.0, 3.0),
-                            plan.start, self.noise, self._neighbour(finger, rec, program, plan), self.laboratory)
+            rows = log_rows(
+                self.rng,
+                finger,
+                rec,
+                program,
+                trace,
+                1000.0 + plan.start + self.rng.uniform(-3.0, 3.0),
+                plan.start,
+                self.noise,
+                self._neighbour(finger, rec, program, plan),
+                self.laboratory,
+            )
             (self.folder / "log" / f"{stem}.csv").write_text("\n".join(rows) + "\n")
             if plan.mocap:
                 entries["mocap"] = f"mocap/{stem}.c3d"
@@ -162,12 +199,31 @@ class Recorder:
         speeds = tuple(float(speed) for speed in self.rng.choice([0.8, 0.6, 0.35, 0.2], 12))
         return simulate(other.motor, {}, build(flexion(speeds), self.laboratory), plan.start, (0.0, 0.0)).current
 
-    def _film(self, finger: Finger, kin: dict[str, Any], marker: dict[str, Any], rec: dict[str, Any],
-              base: tuple[Array, Array], program: Program, trace: Trace, name: str) -> None:
+    def _film(
+        self,
+        finger: Finger,
+        kin: dict[str, Any],
+        marker: dict[str, Any],
+        rec: dict[str, Any],
+        base: tuple[Array, Array],
+        program: Program,
+        trace: Trace,
+        name: str,
+    ) -> None:
         times = np.arange(round(program.duration * self.laboratory.mocap_rate)) / self.laboratory.mocap_rate
         turns, places = palm_motion(self.rng, base, times)
-        points = np.concatenate([palm_points(self.hand, marker, times, trace),
-                                 finger_markers(finger, kin, marker, trace, times)], axis=1)
+        points = np.concatenate(
+            [palm_points(self.hand, marker, times, trace), finger_markers(finger, kin, marker, trace, times)], axis=1
+        )
         labels = PALM_LABELS + finger.labels
-        world = corrupt_markers(self.rng, labels, to_world(turns, places, points), rec, marker, self.noise, gaps=True, laboratory=self.laboratory)
+        world = corrupt_markers(
+            self.rng,
+            labels,
+            to_world(turns, places, points),
+            rec,
+            marker,
+            self.noise,
+            gaps=True,
+            laboratory=self.laboratory,
+        )
         write_c3d(self.folder / "mocap" / name, labels, world, self.laboratory.mocap_rate)

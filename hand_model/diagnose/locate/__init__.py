@@ -1,1 +1,2 @@
-"""Locate: what the three stations show. Markers against rigid segments, counts against segment angles, current against motion."""
+"""Locate: what the three stations show. Markers against rigid segments, counts against segment angles, current against
+motion."""

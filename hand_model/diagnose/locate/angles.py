@@ -39,8 +39,8 @@ DEPARTURES_S = (0.1, 0.25, 0.6, 1.5)  # bandwidths of what a joint departs from 
 @dataclass(frozen=True)
 class FlexionAngles:
     """One flexion recording of one finger. angle_rad: (n, k), nan in frames that do not tell. swaps: labels put right.
-    data: markers as recorded, labels put right. pose: of every frame, by the identified chain. ghost: (n,) frames in which a label
-    sits on something else."""
+    data: markers as recorded, labels put right. pose: of every frame, by the identified chain. ghost: (n,) frames in
+    which a label sits on something else."""
 
     trial: Trial
     mocap: Mocap
@@ -53,7 +53,8 @@ class FlexionAngles:
 
 @dataclass(frozen=True)
 class FingerAngles:
-    """One finger: its chain (angles zero at rest), the marker noise [m], and all its flexion recordings in session order."""
+    """One finger: its chain (angles zero at rest), the marker noise [m], and all its flexion recordings in session
+    order."""
 
     finger: Finger
     chain: Chain
@@ -65,7 +66,8 @@ def finger_angles(session: Session, finger: Finger, shape: Array) -> FingerAngle
     """Chain of one finger from its training recordings as they are (nothing split or dropped: that is the diagnosis's
     part), and its angles in every flexion recording.
 
-    shape: (3, 3) [m] palm markers (`identify.palm_shape`). Raises IdentificationError where no recording tells the chain.
+    shape: (3, 3) [m] palm markers (`identify.palm_shape`). Raises IdentificationError where no recording tells the
+    chain.
     """
     trials = [t for t in session.select("flexion", finger.name) if t.mocap_path is not None]
     if not trials:
@@ -122,8 +124,8 @@ def _posed(finger: Finger, recordings: Sequence[_Recording], start: Chain) -> Fi
 
 
 def _poses(markers: ChainData, chain: Chain, noise_m: float) -> tuple[Pose, NDArray[np.bool_]]:
-    """Poses of all frames, and which are sound. Frames that are not are posed by all their markers, within FARTHEST_M: a
-    support that turned leaves the chain by more than noise, and is to be seen, not thrown away."""
+    """Poses of all frames, and which are sound. Frames that are not are posed by all their markers, within FARTHEST_M:
+    a support that turned leaves the chain by more than noise, and is to be seen, not thrown away."""
     pose, weight = fit_poses(markers, chain, noise_m)
     sound = sound_frames(markers, weight)
     odd = np.flatnonzero(~sound)
@@ -134,13 +136,18 @@ def _poses(markers: ChainData, chain: Chain, noise_m: float) -> tuple[Pose, NDAr
     return pose, sound
 
 
-def linkage_states(angles: FingerAngles, joint: int = 1, steps: Sequence[tuple[int, float]] = (),
-                   expected: Mapping[str, tuple[Array, Array]] | None = None, logged: bool = True) -> tuple[DriveState, ...]:
+def linkage_states(
+    angles: FingerAngles,
+    joint: int = 1,
+    steps: Sequence[tuple[int, float]] = (),
+    expected: Mapping[str, tuple[Array, Array]] | None = None,
+    logged: bool = True,
+) -> tuple[DriveState, ...]:
     """Balance of a follower: its angle [deg] against a quartic of its driver's angle [deg], one state per recording.
 
     The driver's angle is smoothed (see `_smoothed`): noise in a regressor would bend the map and hide small departures.
-    expected: trial -> times [s] and angles [deg] of the driver as its own station has it (`expected_angles`). logged: whether the
-    logs' clocks are believed; the markers tell alone otherwise.
+    expected: trial -> times [s] and angles [deg] of the driver as its own station has it (`expected_angles`). logged:
+    whether the logs' clocks are believed; the markers tell alone otherwise.
     """
     states = []
     name = angles.finger.segments[joint].name
@@ -151,14 +158,35 @@ def linkage_states(angles: FingerAngles, joint: int = 1, steps: Sequence[tuple[i
             continue
         t, q = record.mocap.time_s[good], np.rad2deg(record.angle_rad[good])
         log = _at_frames(record, t) if logged else None
-        driver, velocity, acceleration, sure = _smoothed(t, q[:, joint - 1], log, (expected or {}).get(record.trial.name))
+        driver, velocity, acceleration, sure = _smoothed(
+            t, q[:, joint - 1], log, (expected or {}).get(record.trial.name)
+        )
         stepped, more = _stepped(index, t, steps)
         declared = np.concatenate([np.stack([(driver / scale) ** k for k in range(5)], axis=-1), stepped], axis=1)
         follower = np.where(sure & _begun(driver) & ~_near(index, t, steps), q[:, joint], np.nan)
-        extra = {"trial_index": np.full(len(t), float(index)), "load": None if log is None else log.load,
-                 "scale": np.full(len(t), scale), "slope": _slope(driver, driver, q[:, joint], sure, 4)}
-        states.append(DriveState(record.trial.name, f"{angles.finger.name}/{name}", t, driver, velocity, acceleration, follower,
-                                 declared, "deg", "deg", _known(extra), (*_names(4), *more), record.trial.validate))
+        extra = {
+            "trial_index": np.full(len(t), float(index)),
+            "load": None if log is None else log.load,
+            "scale": np.full(len(t), scale),
+            "slope": _slope(driver, driver, q[:, joint], sure, 4),
+        }
+        states.append(
+            DriveState(
+                record.trial.name,
+                f"{angles.finger.name}/{name}",
+                t,
+                driver,
+                velocity,
+                acceleration,
+                follower,
+                declared,
+                "deg",
+                "deg",
+                _known(extra),
+                (*_names(4), *more),
+                record.trial.validate,
+            )
+        )
     return tuple(states)
 
 
@@ -184,16 +212,36 @@ def encoder_states(
         offsets[:, index] = slope * velocity
         stepped, more = _stepped(index, t, steps)
         declared = np.concatenate([np.stack([(x / 100) ** k for k in range(4)], axis=-1), offsets, stepped], axis=1)
-        extra = {"trial_index": np.full(len(t), float(index)), "load": log.load, "scale": np.full(len(t), 100.0), "slope": slope}
-        states.append(DriveState(record.trial.name, angles.finger.name, t, x, velocity, 100 * log.acceleration / (high - low),
-                                 np.where(log.inside & _begun(x) & ~_near(index, t, steps), q, np.nan), declared, "%", "deg", _known(extra),
-                                 (*_names(3), *(f"offset_{i}" for i in range(len(records))), *more), record.trial.validate))
+        extra = {
+            "trial_index": np.full(len(t), float(index)),
+            "load": log.load,
+            "scale": np.full(len(t), 100.0),
+            "slope": slope,
+        }
+        states.append(
+            DriveState(
+                record.trial.name,
+                angles.finger.name,
+                t,
+                x,
+                velocity,
+                100 * log.acceleration / (high - low),
+                np.where(log.inside & _begun(x) & ~_near(index, t, steps), q, np.nan),
+                declared,
+                "%",
+                "deg",
+                _known(extra),
+                (*_names(3), *(f"offset_{i}" for i in range(len(records))), *more),
+                record.trial.validate,
+            )
+        )
     return with_excursions(states)
 
 
 @dataclass(frozen=True)
 class _Log:
-    """A log at mocap frames: counts, speed, acceleration (where it is sure) [counts, s], load [raw] or None, inside: where it was running. (n,)."""
+    """A log at mocap frames: counts, speed, acceleration (where it is sure) [counts, s], load [raw] or None, inside:
+    where it was running. (n,)."""
 
     counts: Array
     speed: Array
@@ -203,7 +251,8 @@ class _Log:
 
 
 def _at_frames(record: FlexionAngles, time_s: Array, drifting: bool = True) -> _Log | None:
-    """The log of a recording at mocap times (n,) [s]; None without a log. drifting: with the clock's own rate, where it has one."""
+    """The log of a recording at mocap times (n,) [s]; None without a log. drifting: with the clock's own rate, where it
+    has one."""
     from ...identify.clock import align
 
     if record.trial.log_path is None:
@@ -227,7 +276,8 @@ def _at_frames(record: FlexionAngles, time_s: Array, drifting: bool = True) -> _
 
 
 def _transmitted(time_s: Array, current: Array, motion: Motion) -> Array:
-    """Load (n,) [raw] that a motor passes on: its smoothed current without what accelerates it (least squares while it moves)."""
+    """Load (n,) [raw] that a motor passes on: its smoothed current without what accelerates it (least squares while it
+    moves)."""
     v, use = motion.velocity, motion.moving
     columns = np.stack([motion.acceleration, v, np.sign(v), motion.position, np.ones_like(v)], axis=-1)
     inertia = max(float(np.linalg.lstsq(columns[use], current[use], rcond=1e-12)[0][0]), 0.0) if use.sum() > 50 else 0.0
@@ -243,13 +293,14 @@ def expected_angles(naming: Naming) -> dict[str, tuple[Array, Array]]:
     return out
 
 
-def _smoothed(time_s: Array, angle: Array, log: _Log | None,
-              expected: tuple[Array, Array] | None) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+def _smoothed(
+    time_s: Array, angle: Array, log: _Log | None, expected: tuple[Array, Array] | None
+) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
     """Angle, velocity, acceleration (n,) of a joint with little noise, and where they are sure.
 
-    With a log: what is expected of the encoder, which is far quieter than one frame's markers (else a cubic of it), plus what
-    the angle departs from that, smoothed. Without: the angle by local quadratics, sure only while it moves (at rest its noise
-    would be all there is).
+    With a log: what is expected of the encoder, which is far quieter than one frame's markers (else a cubic of it),
+    plus what the angle departs from that, smoothed. Without: the angle by local quadratics, sure only while it moves
+    (at rest its noise would be all there is).
     """
     if log is None:
         motion = estimate_motion(time_s, angle)
@@ -260,7 +311,8 @@ def _smoothed(time_s: Array, angle: Array, log: _Log | None,
     fitted = np.polynomial.Polynomial.fit(u[use], angle[use], 3)
     slope = fitted.deriv()(u) / half
     base = fitted(u)
-    if expected is not None:  # of what it does not cover, a recording's rest at first, the cubic tells how the angle goes on
+    # of what it does not cover, a recording's rest at first, the cubic tells how the angle goes on
+    if expected is not None:
         at, foreseen = expected
         base = base + np.interp(time_s, at, foreseen - np.interp(at, time_s, base))
     departure, rate = _least_error(time_s, angle - base)
@@ -268,7 +320,8 @@ def _smoothed(time_s: Array, angle: Array, log: _Log | None,
 
 
 def _least_error(time_s: Array, values: Array) -> tuple[Array, Array]:
-    """Values smoothed over time and their rate (n,), at the bandwidth with the least leave-one-out error (Stone 1974)."""
+    """Values smoothed over time and their rate (n,), at the bandwidth with the least leave-one-out error (Stone
+    1974)."""
     step = float(np.median(np.diff(time_s)))
     tried = []
     for bandwidth in DEPARTURES_S:
@@ -287,13 +340,16 @@ def _least_error(time_s: Array, values: Array) -> tuple[Array, Array]:
 
 def _stepped(record: int, time_s: Array, steps: Sequence[tuple[int, float]]) -> tuple[Array, tuple[str, ...]]:
     """Columns (n, s) that are one from a moment of a record on, in the records after it too, and their names."""
-    columns = [np.full(len(time_s), float(record > r)) if record != r else (time_s >= at).astype(float) for r, at in steps]
+    columns = [
+        np.full(len(time_s), float(record > r)) if record != r else (time_s >= at).astype(float) for r, at in steps
+    ]
     names = tuple(f"step_{i}" for i in range(len(steps)))
     return np.stack(columns, axis=-1) if columns else np.zeros((len(time_s), 0)), names
 
 
 def _begun(driver: Array) -> NDArray[np.bool_]:
-    """Samples (n,) from the first motion on: nobody knows on which side lost motion lay before, or whether it lay between."""
+    """Samples (n,) from the first motion on: nobody knows on which side lost motion lay before, or whether it lay
+    between."""
     moved = np.abs(driver - np.nanmedian(driver[:FIRST_SAMPLES])) > BEGUN * np.ptp(driver[np.isfinite(driver)])
     return np.maximum.accumulate(moved)
 

@@ -1,7 +1,9 @@
-"""Answers to commands: how late each drive's current and motion follow its setpoints, beside the session's other drives.
+"""Answers to commands: how late each drive's current and motion follow its setpoints, beside the session's other
+drives.
 
-A late drive answers late in both; a late current channel answers late beside a motion that does not. A healthy drive's motion
-begins when friction gives way, which differs from drive to drive by a sample or two; its current answers at once.
+A late drive answers late in both; a late current channel answers late beside a motion that does not. A healthy drive's
+motion begins when friction gives way, which differs from drive to drive by a sample or two; its current answers at
+once.
 """
 
 from __future__ import annotations
@@ -18,7 +20,9 @@ Array = NDArray[np.float64]
 
 LATE = 1.25  # sample intervals, from which an answer is late that one channel alone shows
 MOSTLY = 0.7  # share of such answers that must be late
-BOTH_LATE = 0.8  # sample intervals, from which a drive is late whose current and motion both are (446 pairs of healthy drives: 0.45 at most)
+# sample intervals, from which a drive is late whose current and motion both are (446 pairs of healthy drives: 0.45 at
+# most)
+BOTH_LATE = 0.8
 CERTAIN = 3.0  # standard errors by which the means of both are late beyond what healthy drives differ by
 UNCLEAR = 0.3  # share of the lateness that the motion has too, from which it is no longer clear what is late
 LEAST_ANSWERS = 5
@@ -38,8 +42,8 @@ class Answers:
 
 @dataclass(frozen=True)
 class Lateness:
-    """What a drive's answers say. drive_s: (k,) by how much the drive answers late, empty where it does not. channel_s: by how
-    much its current alone is late, and doubt_s, the standard deviation of that."""
+    """What a drive's answers say. drive_s: (k,) by how much the drive answers late, empty where it does not. channel_s:
+    by how much its current alone is late, and doubt_s, the standard deviation of that."""
 
     drive_s: Array
     channel_s: float
@@ -55,7 +59,8 @@ def answers_of(states: Sequence[DriveState], currents: Sequence[Array]) -> Answe
 
 
 def lateness(answers: Mapping[str, Answers]) -> dict[str, Lateness]:
-    """Of each drive that answers often enough, beside the least late one of the session, or a usual one where it is alone."""
+    """Of each drive that answers often enough, beside the least late one of the session, or a usual one where it is
+    alone."""
     told = {a: x for a, x in answers.items() if len(x.current_s) >= LEAST_ANSWERS}
     alone = len(told) == 1
     # who answers before it is told is early, and no measure for the others
@@ -66,9 +71,14 @@ def lateness(answers: Mapping[str, Answers]) -> dict[str, Lateness]:
         usual = min(first, x.step_s) if alone else first
         late = x.current_s - usual
         begins = USUAL_START * x.step_s if alone else min(moved.values(), default=np.nan)
-        behind = moved.get(actuator, np.nan) - begins  # nan where too few motions are seen to answer: late is the drive then
+        # nan where too few motions are seen to answer: late is the drive then
+        behind = moved.get(actuator, np.nan) - begins
         total = float(np.mean(x.current_s)) - usual
-        plain = not behind <= max(x.step_s, 0.5 * total) and np.mean(late) > LATE * x.step_s and np.mean(late > x.step_s) > MOSTLY
+        plain = (
+            not behind <= max(x.step_s, 0.5 * total)
+            and np.mean(late) > LATE * x.step_s
+            and np.mean(late > x.step_s) > MOSTLY
+        )
         drive = plain or (not alone and _both_late(x, total, behind))
         channel = max(total - np.nan_to_num(behind, nan=total), 0.0) if drive else total
         # Neither clearly the one nor the other: the motion's own scatter decides between the two.
@@ -83,7 +93,8 @@ def lateness(answers: Mapping[str, Answers]) -> dict[str, Lateness]:
 def _both_late(x: Answers, current_s: float, motion_s: float) -> bool:
     """Whether current and motion are late by as much [s] beside another drive, nan where that is not known.
 
-    Each is read to a sample and a motion begins when friction gives way, but not both to the same side: what they share is the delay.
+    Each is read to a sample and a motion begins when friction gives way, but not both to the same side: what they share
+    is the delay.
     """
     late_s = np.array([current_s, motion_s])
     if not np.isfinite(late_s).all():
@@ -97,7 +108,8 @@ def _both_late(x: Answers, current_s: float, motion_s: float) -> bool:
 def _latencies(state: DriveState, channel: Array, early_s: float = 0.0) -> list[float]:
     """Time from each setpoint change to the first two samples beyond three standard deviations, in its direction.
 
-    early_s: by how much a channel may answer before it is told; it does where that much before the change it stood, and no longer does at the change.
+    early_s: by how much a channel may answer before it is told; it does where that much before the change it stood, and
+    no longer does at the change.
     """
     if "setpoint" not in state.extra:
         return []
@@ -114,7 +126,8 @@ def _latencies(state: DriveState, channel: Array, early_s: float = 0.0) -> list[
 
 
 def _departure(t: Array, channel: Array, begin: int, end: int) -> tuple[int | None, NDArray[np.bool_]]:
-    """The first of two samples from `begin` on that lie above what the channel (n,) was before, and which do (end - begin,); None where none are."""
+    """The first of two samples from `begin` on that lie above what the channel (n,) was before, and which do (end -
+    begin,); None where none are."""
     before = channel[(t > t[begin] - 0.2) & (t < t[begin])]
     if len(before) < 5:
         return None, np.zeros(0, bool)

@@ -15,7 +15,8 @@ from .angles import FARTHEST_M, FingerAngles
 Array = NDArray[np.float64]
 
 BLOCK = 8  # frames averaged into one row block
-LOUD_BLOCKS, LOUD = 5, 0.6  # blocks over which the noise is read, and the share of the usual variance from which it is louder
+# blocks over which the noise is read, and the share of the usual variance from which it is louder
+LOUD_BLOCKS, LOUD = 5, 0.6
 LASTING_S = 2.0  # half of it is how long something must last that is no ghost
 
 
@@ -23,8 +24,9 @@ LASTING_S = 2.0  # half of it is how long something must last that is no ghost
 class Blocks:
     """Block means of all flexion recordings of one finger, in order of time.
 
-    residual: (b, m, 3) [m] observed minus chain, palm frame. weight: (b, m) frames behind a mean. pose_columns: (b, 3m, 6+k)
-    orthonormal basis of what poses explain. chain_columns: (b, 3m, s). rotation: (b, m, 3, 3) body to palm. position: (b, m, 3).
+    residual: (b, m, 3) [m] observed minus chain, palm frame. weight: (b, m) frames behind a mean. pose_columns: (b, 3m,
+    6+k) orthonormal basis of what poses explain. chain_columns: (b, 3m, s). rotation: (b, m, 3, 3) body to palm.
+    position: (b, m, 3).
     angle: (b, k). record, time_s: (b,). labels, body: of the markers.
     """
 
@@ -73,8 +75,8 @@ def blocks_of(angles: FingerAngles) -> Blocks:
 
 
 def _calm(scatter: Array) -> Array:
-    """Usual over present variance of the readings (b,) within blocks, at most one: what is seen while the cameras are disturbed
-    counts for less. scatter: (b, frames, m, 3) [m], nan where nothing is seen."""
+    """Usual over present variance of the readings (b,) within blocks, at most one: what is seen while the cameras are
+    disturbed counts for less. scatter: (b, frames, m, 3) [m], nan where nothing is seen."""
     variance = uniform_filter1d(np.nan_to_num(np.nanmean(scatter**2, axis=(1, 2, 3))), LOUD_BLOCKS, mode="nearest")
     share = np.median(variance) / np.maximum(variance, 1e-30)
     return np.where(share < LOUD, share, 1.0)
@@ -87,8 +89,16 @@ def passing(flag: NDArray[np.bool_], time_s: Array) -> NDArray[np.bool_]:
     return flag & (up < 0.45)
 
 
-def _assembled(chain: Chain, body: NDArray[np.int64], labels: tuple[str, ...], residual: Array, weight: Array, angle: Array,
-               record: Array, time_s: Array) -> Blocks:
+def _assembled(
+    chain: Chain,
+    body: NDArray[np.int64],
+    labels: tuple[str, ...],
+    residual: Array,
+    weight: Array,
+    angle: Array,
+    record: Array,
+    time_s: Array,
+) -> Blocks:
     x, by_frame, by_marker, by_joint = jacobians(chain, body, angle)
     _, _, joints = propagate(chain, body, angle)
     b, m = weight.shape
@@ -98,8 +108,21 @@ def _assembled(chain: Chain, body: NDArray[np.int64], labels: tuple[str, ...], r
     for j in range(m):
         shared[:, j, :, 3 * j : 3 * j + 3] = by_marker[:, j]
     columns = np.concatenate([shared.reshape(b, 3 * m, -1), by_joint.reshape(b, 3 * m, -1)], axis=-1)
-    return Blocks(residual, weight, basis, columns, by_marker, x, np.stack([a for a, _ in joints], 1),
-                  np.stack([c for _, c in joints], 1), angle, record.astype(int), time_s, labels, body)
+    return Blocks(
+        residual,
+        weight,
+        basis,
+        columns,
+        by_marker,
+        x,
+        np.stack([a for a, _ in joints], 1),
+        np.stack([c for _, c in joints], 1),
+        angle,
+        record.astype(int),
+        time_s,
+        labels,
+        body,
+    )
 
 
 def share_of_range(blocks: Blocks, joint: int) -> Array:

@@ -17,10 +17,12 @@ from .simulated import SimulatedDrive
 Array = NDArray[np.float64]
 
 RUN_IN_S, RUN_OUT_S = 0.3, 0.25  # a stroke's part at steady speed begins and ends this far from rest
-SAG_LEAST = 0.035  # of the speed, over the recorded loads: less is within what controllers do (the most of 560 healthy drives 0.029)
+# of the speed, over the recorded loads: less is within what controllers do (the most of 560 healthy drives 0.029)
+SAG_LEAST = 0.035
 SAG_T = 10.0
 FULL_SPEED = 0.9  # quantile of the velocity in the fastest strokes
-CEILING_SHARE = 0.6  # of the current beyond its limit that a drive takes from its speed: one, but for noise in the limit
+# of the current beyond its limit that a drive takes from its speed: one, but for noise in the limit
+CEILING_SHARE = 0.6
 CEILING_LEFT, CEILING_T = 0.1, 6.0
 REACTION_S = 0.15  # a person's quickest: a delay counts beside it
 UNLIKE = 0.1  # of a delay by which answers may miss it: controllers of other gains rise otherwise
@@ -28,10 +30,11 @@ UNLIKE = 0.1  # of a delay by which answers may miss it: controllers of other ga
 
 @dataclass(frozen=True)
 class CommandFacts:
-    """answers: to commands. sag, sag_se, load_range: loss of speed per load [1/raw], its standard error [1/raw] and the range of loads [raw];
-    nan where strokes do not tell. ceiling: current [raw] at which the drive is at its limit, or nan; cut: the weight of what it takes
-    away; share_cut: of the time at steady speed in which more would be needed. strokes: how many tell the sag. trials: names of the
-    recordings."""
+    """answers: to commands. sag, sag_se, load_range: loss of speed per load [1/raw], its standard error [1/raw] and the
+    range of loads [raw];
+    nan where strokes do not tell. ceiling: current [raw] at which the drive is at its limit, or nan; cut: the weight of
+    what it takes away; share_cut: of the time at steady speed in which more would be needed. strokes: how many tell the
+    sag. trials: names of the recordings."""
 
     answers: Answers
     sag: float
@@ -46,8 +49,8 @@ class CommandFacts:
 
 @dataclass(frozen=True)
 class Stroke:
-    """A stroke at one commanded speed, away from its start and stop. way: 1 flexing, -1 extending. position [%], velocity
-    [%/s], current [raw]: (n,)."""
+    """A stroke at one commanded speed, away from its start and stop. way: 1 flexing, -1 extending. position [%],
+    velocity [%/s], current [raw]: (n,)."""
 
     way: float
     commanded: float
@@ -59,8 +62,9 @@ class Stroke:
 def command_facts(states: tuple[DriveState, ...], currents: tuple[Array, ...]) -> CommandFacts:
     """Facts of one drive. currents: raw current (n,) of each state (its `effort` is masked at rest)."""
     strokes = _strokes(states, currents)
-    return CommandFacts(answers_of(states, currents), *_sag(strokes), *_ceiling(strokes), len(strokes),
-                        tuple(s.trial for s in states))
+    return CommandFacts(
+        answers_of(states, currents), *_sag(strokes), *_ceiling(strokes), len(strokes), tuple(s.trial for s in states)
+    )
 
 
 def _strokes(states: tuple[DriveState, ...], currents: tuple[Array, ...]) -> list[Stroke]:
@@ -75,13 +79,15 @@ def _strokes(states: tuple[DriveState, ...], currents: tuple[Array, ...]) -> lis
             keep = np.arange(a, b)[(t > t[0] + RUN_IN_S) & (t < t[-1] - RUN_OUT_S)]
             speeds = state.extra["speed"][keep]
             if way[a] and len(keep) >= 10 and np.ptp(speeds) == 0 and speeds[0] > 0:
-                out.append(Stroke(float(way[a]), float(speeds[0]), state.position[keep], state.velocity[keep], current[keep]))
+                out.append(
+                    Stroke(float(way[a]), float(speeds[0]), state.position[keep], state.velocity[keep], current[keep])
+                )
     return out
 
 
 def _load_rise(strokes: list[Stroke]) -> dict[float, np.poly1d]:
-    """Rise of the load over position [raw/%] flexing and extending, as polynomials of position: current = cubic in position +
-    viscous velocity, each of its own for the two ways."""
+    """Rise of the load over position [raw/%] flexing and extending, as polynomials of position: current = cubic in
+    position + viscous velocity, each of its own for the two ways."""
     scale = 100.0 ** -np.arange(4)
     out = {}
     for way in (1.0, -1.0):
@@ -93,13 +99,16 @@ def _load_rise(strokes: list[Stroke]) -> dict[float, np.poly1d]:
 
 def _sag(strokes: list[Stroke]) -> tuple[float, float, float]:
     """Loss of log speed per load, its standard error and the range of loads. Strokes of one commanded speed are
-    compared; a reference that a proportional controller follows falls behind by the rise of the load, which is no sag."""
+    compared; a reference that a proportional controller follows falls behind by the rise of the load, which is no
+    sag."""
     if len(strokes) < 12 or {s.way for s in strokes} != {1.0, -1.0}:
         return np.nan, np.nan, np.nan
     rise = _load_rise(strokes)
     y = np.log([max(s.way * float(np.mean(s.velocity)), 1e-9) for s in strokes])
     load = np.array([s.way * float(np.mean(s.current)) for s in strokes])
-    levels = np.array([[float(s.commanded == level) for level in sorted({s.commanded for s in strokes})] for s in strokes])
+    levels = np.array(
+        [[float(s.commanded == level) for level in sorted({s.commanded for s in strokes})] for s in strokes]
+    )
     rises = np.array([float(np.mean(rise[s.way](s.position))) for s in strokes])
     design = np.concatenate([levels, rises[:, None], load[:, None]], axis=1)
     beta = np.linalg.lstsq(design, y, rcond=None)[0]
@@ -109,9 +118,9 @@ def _sag(strokes: list[Stroke]) -> tuple[float, float, float]:
 
 
 def _ceiling(strokes: list[Stroke]) -> tuple[float, float, float]:
-    """Current [raw] at which the drive is at its limit, nan where it is at none, the weight of what that cuts and the share of time in which
-    it does: in the fastest flexing strokes speed falls by just what keeps the current from exceeding it. What current each place would need
-    at full speed is told by the slower strokes."""
+    """Current [raw] at which the drive is at its limit, nan where it is at none, the weight of what that cuts and the
+    share of time in which it does: in the fastest flexing strokes speed falls by just what keeps the current from
+    exceeding it. What current each place would need at full speed is told by the slower strokes."""
     none = np.nan, 0.0, 0.0
     fast = max((s.commanded for s in strokes), default=0.0)
     mine = [s for s in strokes if s.way > 0 and s.commanded == fast]
@@ -164,15 +173,25 @@ def command_findings(facts: dict[str, CommandFacts], fingers: dict[str, str | No
     return out
 
 
-def with_lateness(drives: Mapping[str, tuple[DriveState, ...]], facts: Mapping[str, CommandFacts],
-                  simulated: Mapping[str, SimulatedDrive]) -> dict[str, tuple[DriveState, ...]]:
-    """The states with what is known of their current channel: "late" (2,) [s], by how much and its doubt, by the simulated drive or
-    by answers to commands; a late current shows starts and stops late as well, whatever model it is held against."""
-    told = {a: (x.channel_s, float(np.hypot(x.doubt_s, UNLIKE * x.channel_s))) for a, x in lateness({a: f.answers for a, f in facts.items()}).items()}
+def with_lateness(
+    drives: Mapping[str, tuple[DriveState, ...]],
+    facts: Mapping[str, CommandFacts],
+    simulated: Mapping[str, SimulatedDrive],
+) -> dict[str, tuple[DriveState, ...]]:
+    """The states with what is known of their current channel: "late" (2,) [s], by how much and its doubt, by the
+    simulated drive or by answers to commands; a late current shows starts and stops late as well, whatever model it is
+    held against."""
+    told = {
+        a: (x.channel_s, float(np.hypot(x.doubt_s, UNLIKE * x.channel_s)))
+        for a, x in lateness({a: f.answers for a, f in facts.items()}).items()
+    }
     told |= {a: (d.delay_s, d.doubt_s) for a, d in simulated.items() if a in drives and np.isfinite(d.doubt_s)}
     out = dict(drives)
     for actuator, late in told.items():
-        out[actuator] = tuple(replace(s, extra={**s.extra, "late": np.array(late), "sigma": _lasting(s, late[0])}) for s in drives[actuator])
+        out[actuator] = tuple(
+            replace(s, extra={**s.extra, "late": np.array(late), "sigma": _lasting(s, late[0])})
+            for s in drives[actuator]
+        )
     return out
 
 
@@ -185,49 +204,123 @@ def _lasting(state: DriveState, late_s: float) -> Array:
 
 
 def _ceiling_finding(actuator: str, finger: str | None, fact: CommandFacts) -> tuple[float, Finding]:
-    fit = {"metric": "speed_loss", "unit": "1", "before": None, "after": None, "noise_floor": None, "ci95_reduction": None,
-           "held_out": [], "engine": "strokes"}
+    fit = {
+        "metric": "speed_loss",
+        "unit": "1",
+        "before": None,
+        "after": None,
+        "noise_floor": None,
+        "ci95_reduction": None,
+        "held_out": [],
+        "engine": "strokes",
+    }
     where = {**_where(actuator, finger), "signal": "current", "trials": list(fact.trials)}
-    text = (f"The {actuator} motor is at its limit of {fact.ceiling:.0f} raw in its fastest strokes: the current stays, and speed falls "
-            "as the load rises.")
-    return fact.cut, Finding("current_saturation", ("current_saturation",), 0.999, (), where, text,
-                        {"limit": {"value": fact.ceiling, "unit": "raw"}, "share_cut": {"value": fact.share_cut, "unit": "1"}}, fit, dict(UNWRITTEN))
+    text = (
+        f"The {actuator} motor is at its limit of {fact.ceiling:.0f} raw in its fastest strokes: the current stays, and speed falls "
+        "as the load rises."
+    )
+    return fact.cut, Finding(
+        "current_saturation",
+        ("current_saturation",),
+        0.999,
+        (),
+        where,
+        text,
+        {"limit": {"value": fact.ceiling, "unit": "raw"}, "share_cut": {"value": fact.share_cut, "unit": "1"}},
+        fit,
+        dict(UNWRITTEN),
+    )
 
 
-def refused(actuator: str, finger: str | None, trials: tuple[str, ...], signal: str = "current",
-            why: str = "it does not follow the motion") -> tuple[float, Finding]:
+def refused(
+    actuator: str,
+    finger: str | None,
+    trials: tuple[str, ...],
+    signal: str = "current",
+    why: str = "it does not follow the motion",
+) -> tuple[float, Finding]:
     """The finding of a current (or position) channel that is no measurement."""
-    fit = {"metric": f"{signal}_rmse", "unit": "raw", "before": None, "after": None, "noise_floor": None, "ci95_reduction": None,
-           "held_out": [], "engine": None}
+    fit = {
+        "metric": f"{signal}_rmse",
+        "unit": "raw",
+        "before": None,
+        "after": None,
+        "noise_floor": None,
+        "ci95_reduction": None,
+        "held_out": [],
+        "engine": None,
+    }
     where = {**_where(actuator, finger), "signal": signal, "trials": list(trials)}
     text = f"The {signal} of {actuator} is no measurement: {why}; nothing is fitted to it."
-    return 1e9, Finding("command_as_measurement", ("command_as_measurement",), 0.999, (), where, text, {}, fit, None,
-                        "the channel is refused")
+    return 1e9, Finding(
+        "command_as_measurement",
+        ("command_as_measurement",),
+        0.999,
+        (),
+        where,
+        text,
+        {},
+        fit,
+        None,
+        "the channel is refused",
+    )
 
 
 def _where(actuator: str, finger: str | None) -> dict[str, object]:
-    return {"finger": finger, "joint": None, "actuator": actuator, "signal": "command", "marker": None, "trials": [],
-            "region": None, "share_of_mismatch": 1.0}
+    return {
+        "finger": finger,
+        "joint": None,
+        "actuator": actuator,
+        "signal": "command",
+        "marker": None,
+        "trials": [],
+        "region": None,
+        "share_of_mismatch": 1.0,
+    }
 
 
 def _delay(actuator: str, finger: str | None, fact: CommandFacts, late_s: Array) -> tuple[float, Finding]:
     """Finding of a drive that answers `late_s` (k,) [s] later than a healthy one."""
     value, step_s = float(np.mean(late_s)), fact.answers.step_s
     error = 1.96 * float(np.std(late_s)) / np.sqrt(len(late_s))
-    fit = {"metric": "command_latency", "unit": "s", "before": value, "after": float(np.std(late_s)),
-           "noise_floor": step_s, "ci95_reduction": None, "held_out": [], "engine": "events"}
+    fit = {
+        "metric": "command_latency",
+        "unit": "s",
+        "before": value,
+        "after": float(np.std(late_s)),
+        "noise_floor": step_s,
+        "ci95_reduction": None,
+        "held_out": [],
+        "engine": "events",
+    }
     half = 0.5 * step_s  # the event itself is known to a sample only
     parameters = {"delay": {"value": value, "unit": "s", "ci95": [value - error - half, value + error + half]}}
     text = f"The {actuator} motor answers its commands {1e3 * value:.0f} ms late."
     where = {**_where(actuator, finger), "trials": list(fact.trials)}
-    return value / REACTION_S, Finding("command_delay", ("command_delay",), 0.999, (), where, text, parameters, fit, dict(UNWRITTEN))
+    return value / REACTION_S, Finding(
+        "command_delay", ("command_delay",), 0.999, (), where, text, parameters, fit, dict(UNWRITTEN)
+    )
 
 
 def _sag_finding(actuator: str, finger: str | None, fact: CommandFacts) -> tuple[float, Finding]:
     loss = fact.sag * fact.load_range
-    parameters = {"sag": {"value": fact.sag, "unit": "1/raw", "ci95": [fact.sag - 1.96 * fact.sag_se, fact.sag + 1.96 * fact.sag_se]}}
-    fit = {"metric": "speed_loss", "unit": "1", "before": loss, "after": 0.0, "noise_floor": fact.sag_se * fact.load_range,
-           "ci95_reduction": None, "held_out": [], "engine": "strokes"}
+    parameters = {
+        "sag": {
+            "value": fact.sag,
+            "unit": "1/raw",
+            "ci95": [fact.sag - 1.96 * fact.sag_se, fact.sag + 1.96 * fact.sag_se],
+        }
+    }
+    fit = {
+        "metric": "speed_loss",
+        "unit": "1",
+        "before": loss,
+        "after": 0.0,
+        "noise_floor": fact.sag_se * fact.load_range,
+        "ci95_reduction": None,
+        "held_out": [],
+        "engine": "strokes",
+    }
     text = f"The {actuator} motor loses {100 * loss:.1f} % of its speed over the recorded loads."
     per_stroke = fact.sag / fact.sag_se / np.sqrt(fact.strokes)
     where, weight = _where(actuator, finger), weighed(per_stroke, per_stroke / max(loss, 1e-9))

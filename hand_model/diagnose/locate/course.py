@@ -1,8 +1,9 @@
 """The course of a joint that is no plain hinge, fitted to the markers of the training recordings.
 
-Chain, palm poses, angles and the quartics of the extra joints are fitted together (Gauss-Newton on blocks of frames, each block's pose
-eliminated), so that a share of a course that another hinge explains goes to the hinge: a weak prior on the extra joints settles what
-no recording tells. The station's names decide which joint gets what; nothing is named here.
+Chain, palm poses, angles and the quartics of the extra joints are fitted together (Gauss-Newton on blocks of frames,
+each block's pose eliminated), so that a share of a course that another hinge explains goes to the hinge: a weak prior
+on the extra joints settles what no recording tells. The station's names decide which joint gets what; nothing is named
+here.
 """
 
 from __future__ import annotations
@@ -33,8 +34,9 @@ BOTH = ((1.0, 0.0), (0.0, 1.0))
 
 @dataclass(frozen=True)
 class Form:
-    """The extra joints of joint k. kinds: of each; across: its direction (2,) in `perpendicular_basis` of the hinge's axis. turning: as in
-    `Course`. scale [rad], mixing (POWERS, POWERS): its coordinate is [t, t^2, ...] @ mixing @ z, t = angle / scale, |z| its root mean square."""
+    """The extra joints of joint k. kinds: of each; across: its direction (2,) in `perpendicular_basis` of the hinge's
+    axis. turning: as in `Course`. scale [rad], mixing (POWERS, POWERS): its coordinate is [t, t^2, ...] @ mixing @ z, t
+    = angle / scale, |z| its root mean square."""
 
     k: int
     kinds: tuple[str, ...]
@@ -51,8 +53,10 @@ class Form:
     def course(self, axis: Array, z: Array) -> Course:
         """The course of unknowns z (size,) at a hinge of axis (3,)."""
         basis, scales = perpendicular_basis(axis), self.scale ** np.arange(1, POWERS + 1)
-        made = [ExtraJoint(kind, np.asarray(d) @ basis, np.r_[0.0, self.mixing @ own / scales])
-                for kind, d, own in zip(self.kinds, self.across, z.reshape(-1, POWERS), strict=True)]
+        made = [
+            ExtraJoint(kind, np.asarray(d) @ basis, np.r_[0.0, self.mixing @ own / scales])
+            for kind, d, own in zip(self.kinds, self.across, z.reshape(-1, POWERS), strict=True)
+        ]
         return Course(tuple(made), self.turning)
 
     def columns(self, chain: Chain, body: NDArray[np.int64], angle: Array) -> Array:
@@ -66,15 +70,19 @@ class Form:
         out = np.zeros((*x.shape, self.size))
         for i, (kind, d) in enumerate(zip(self.kinds, self.across, strict=True)):
             direction = (carrier @ (np.asarray(d) @ perpendicular_basis(chain.axis_palm[self.k])))[:, None]
-            way = np.broadcast_to(direction, x[:, moved].shape) if kind == "slide" else np.cross(direction, x[:, moved] - centre[:, None])
+            way = (
+                np.broadcast_to(direction, x[:, moved].shape)
+                if kind == "slide"
+                else np.cross(direction, x[:, moved] - centre[:, None])
+            )
             out[:, moved, :, POWERS * i : POWERS * (i + 1)] = way[..., None] * functions[:, None, None]
         return out
 
 
 @dataclass(frozen=True)
 class FingerCourses:
-    """A finger with joints that are no plain hinges. plain, coursed: chains fitted to the same training recordings. joints: which have a
-    course. data: markers of each recording (session order), slips taken out, seen in `angles`."""
+    """A finger with joints that are no plain hinges. plain, coursed: chains fitted to the same training recordings.
+    joints: which have a course. data: markers of each recording (session order), slips taken out, seen in `angles`."""
 
     angles: FingerAngles
     plain: Chain
@@ -95,8 +103,8 @@ class FingerCourses:
 
 @dataclass(frozen=True)
 class _Observed:
-    """Block means of training recordings: position (b, m, 3) [m] in the palm frame, nan where unseen; root (b, 3m, 1) of their
-    weights; start: their angles (b, k); sigma [m]: noise of one coordinate."""
+    """Block means of training recordings: position (b, m, 3) [m] in the palm frame, nan where unseen; root (b, 3m, 1)
+    of their weights; start: their angles (b, k); sigma [m]: noise of one coordinate."""
 
     position: Array
     root: Array
@@ -107,8 +115,8 @@ class _Observed:
 
 @dataclass(frozen=True)
 class _Solved:
-    """chain; cost: twice the negative log posterior. gram, right, square: normal equations there, the unknowns of the forms last and in
-    full, those of the chain as steps."""
+    """chain; cost: twice the negative log posterior. gram, right, square: normal equations there, the unknowns of the
+    forms last and in full, those of the chain as steps."""
 
     chain: Chain
     cost: float
@@ -117,9 +125,11 @@ class _Solved:
     square: float
 
 
-def finger_courses(angles: FingerAngles, naming: MarkerNaming, named: Collection[tuple[str, str]]) -> FingerCourses | None:
-    """Courses of the joints that the marker station names as no plain hinge; None where it names none. named: (effect, joint) of its
-    findings."""
+def finger_courses(
+    angles: FingerAngles, naming: MarkerNaming, named: Collection[tuple[str, str]]
+) -> FingerCourses | None:
+    """Courses of the joints that the marker station names as no plain hinge; None where it names none. named: (effect,
+    joint) of its findings."""
     segments = [s.name for s in angles.finger.segments]
     crooked = [e for e in naming.found if e.effect in HINGE and (e.effect, segments[e.body - 1]) in named]
     if not crooked:
@@ -151,7 +161,9 @@ def _observed(angles: FingerAngles, naming: MarkerNaming) -> _Observed:
     position = residual + propagate(angles.chain, blocks.body, blocks.angle)[0]
     weight = blocks.weight[mine]
     root = np.sqrt(np.repeat(weight / BLOCK, 3, axis=1))[..., None]
-    return _Observed(np.where(weight[..., None] > 0, position[mine], np.nan), root, blocks.angle[mine], blocks.body, naming.sigma_m)
+    return _Observed(
+        np.where(weight[..., None] > 0, position[mine], np.nan), root, blocks.angle[mine], blocks.body, naming.sigma_m
+    )
 
 
 def _slipped(naming: MarkerNaming) -> Array:
@@ -164,8 +176,8 @@ def _slipped(naming: MarkerNaming) -> Array:
 
 
 def _chosen(chain: Chain, observed: _Observed, others: Sequence[Form], k: int, tilts: bool, slides: bool) -> Form:
-    """The form of joint k that explains the markers best: with axes of the segment before it or of its own, and one second axis where two
-    bring no more than they cost (Schwarz 1978)."""
+    """The form of joint k that explains the markers best: with axes of the segment before it or of its own, and one
+    second axis where two bring no more than they cost (Schwarz 1978)."""
     kinds = ("slide",) * (2 * slides) + ("hinge",) * (2 * tilts)
     across = BOTH * (slides + tilts)
     angle = observed.start[:, k]
@@ -184,7 +196,8 @@ def _chosen(chain: Chain, observed: _Observed, others: Sequence[Form], k: int, t
 
 
 def _lone_direction(solved: _Solved, form: Form) -> tuple[float, float]:
-    """The one direction (2,) across the axis of a second hinge that explains most, the last two extra joints of the last form being hinges."""
+    """The one direction (2,) across the axis of a second hinge that explains most, the last two extra joints of the
+    last form being hinges."""
     from scipy.optimize import minimize_scalar
 
     kept = len(solved.gram) - 2 * POWERS
@@ -210,7 +223,9 @@ def _solve(start: Chain, observed: _Observed, forms: Sequence[Form]) -> _Solved:
     z = np.zeros(sum(f.size for f in forms))
     chain = _with_courses(start, forms, z)
     variance = observed.sigma**2
-    prior = np.concatenate([np.zeros(0), *(np.repeat([variance / PRIOR[kind] ** 2 for kind in f.kinds], POWERS) for f in forms)])
+    prior = np.concatenate(
+        [np.zeros(0), *(np.repeat([variance / PRIOR[kind] ** 2 for kind in f.kinds], POWERS) for f in forms)]
+    )
     cost, damping = np.inf, 1e-9
     for _ in range(STEPS):
         frame, shared, residual = _linearised(chain, observed, pose, forms)
@@ -246,7 +261,8 @@ def _solve(start: Chain, observed: _Observed, forms: Sequence[Form]) -> _Solved:
 
 
 def _linearised(chain: Chain, observed: _Observed, pose: Pose, forms: Sequence[Form]) -> tuple[Array, Array, Array]:
-    """Weighted columns of every block's pose (b, 3m, f) and of what all share (b, 3m, s), and the weighted residual (b, 3m, 1)."""
+    """Weighted columns of every block's pose (b, 3m, f) and of what all share (b, 3m, s), and the weighted residual (b,
+    3m, 1)."""
     b, m, _ = observed.position.shape
     _, by_frame, by_marker, by_joint = jacobians(chain, observed.body, pose.angle_rad)
     own = np.zeros((b, m, 3, 3 * m))
@@ -264,14 +280,18 @@ def _residual(chain: Chain, observed: _Observed, pose: Pose) -> Array:
     return np.nan_to_num(left).reshape(len(left), -1, 1)
 
 
-def _eliminated(chain: Chain, observed: _Observed, frame: Array, shared: Array, residual: Array) -> tuple[Array, Array, float, Array]:
-    """Normal equations beside the poses: Gram matrix and right side of the free steps, sum of squares, and the free steps (s, free)."""
+def _eliminated(
+    chain: Chain, observed: _Observed, frame: Array, shared: Array, residual: Array
+) -> tuple[Array, Array, float, Array]:
+    """Normal equations beside the poses: Gram matrix and right side of the free steps, sum of squares, and the free
+    steps (s, free)."""
     from scipy.linalg import block_diag
 
     basis = np.linalg.qr(frame)[0]
     shared, residual = (v - basis @ (np.swapaxes(basis, 1, 2) @ v) for v in (shared, residual))
     further = shared.shape[-1] - chain.size
-    free = free_directions(chain, observed.body)  # steps that leave the chain's gauge alone, and all of the forms' unknowns
+    # steps that leave the chain's gauge alone, and all of the forms' unknowns
+    free = free_directions(chain, observed.body)
     free = block_diag(free, np.eye(further)) if further else free
     flat = shared.reshape(-1, shared.shape[-1]) @ free
     return flat.T @ flat, flat.T @ residual.ravel(), float(np.sum(residual**2)), free

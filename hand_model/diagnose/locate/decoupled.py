@@ -19,15 +19,18 @@ BESIDE, MOST_S = 0.4, 1.0  # of an excursion's length, at most, on either side: 
 
 
 def while_driven(states: Sequence[DriveState], below: float) -> tuple[DriveState, ...]:
-    """A drive's states without the current where the finger does not follow it open, below that position [%]: the spring is not on it there."""
+    """A drive's states without the current where the finger does not follow it open, below that position [%]: the
+    spring is not on it there."""
     return tuple(replace(s, effort=np.where(s.position < below, np.nan, s.effort)) for s in states)
 
 
 def beside_excursions(states: Sequence[DriveState], ahead: Sequence[DriveState]) -> tuple[DriveState, ...]:
-    """A linkage's states without whiles in which the joint before ran `ahead` of its drive (states of the encoder's balance): something held
-    the finger then, and how the joint moved is told by no more than its markers."""
+    """A linkage's states without whiles in which the joint before ran `ahead` of its drive (states of the encoder's
+    balance): something held the finger then, and how the joint moved is told by no more than its markers."""
     found = {s.trial: spans(s) for s in ahead}
-    return tuple(replace(s, effort=np.where(_during(s.time_s, found.get(s.trial, [])), np.nan, s.effort)) for s in states)
+    return tuple(
+        replace(s, effort=np.where(_during(s.time_s, found.get(s.trial, [])), np.nan, s.effort)) for s in states
+    )
 
 
 def _during(time_s: Array, whiles: Sequence[Sequence[float]]) -> NDArray[np.bool_]:
@@ -36,7 +39,9 @@ def _during(time_s: Array, whiles: Sequence[Sequence[float]]) -> NDArray[np.bool
     return np.any(close, axis=0) if close else np.zeros(len(time_s), bool)
 
 
-def without_excursions(states: Sequence[DriveState], ahead: Sequence[DriveState], angles: FingerAngles) -> tuple[DriveState, ...]:
+def without_excursions(
+    states: Sequence[DriveState], ahead: Sequence[DriveState], angles: FingerAngles
+) -> tuple[DriveState, ...]:
     """A drive's states without the current of whiles in which the finger was ahead of it: it carried no spring then.
 
     ahead: states of the encoder's balance, with excursions. angles: of the finger; by them the clocks are aligned.

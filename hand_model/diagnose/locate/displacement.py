@@ -21,9 +21,9 @@ UNNAMED = (NO_HINGE, CREEP)  # what no table of effects names
 
 @dataclass(frozen=True)
 class Candidate:
-    """base: (b, 3m, d) [m per unit], shared by several candidates. pick: which of its columns are this one's, None for all. shifts: which of
-    them (c,) shift what a joint carries and do not turn it. step: it begins at some moment. lasting: a step that lasts for the session, or
-    until the end of the recording (it was put right after)."""
+    """base: (b, 3m, d) [m per unit], shared by several candidates. pick: which of its columns are this one's, None for
+    all. shifts: which of them (c,) shift what a joint carries and do not turn it. step: it begins at some moment.
+    lasting: a step that lasts for the session, or until the end of the recording (it was put right after)."""
 
     effect: str
     body: int
@@ -42,8 +42,9 @@ class Candidate:
 
 @dataclass(frozen=True)
 class MarkerEffect:
-    """A candidate that was chosen. everywhere: (b, 3m, c) unprojected, as if it acted always. begin, end: first block of a
-    step and the one after its last, None where it acts always. coefficients: (c,) of the columns, covariance: (c, c)."""
+    """A candidate that was chosen. everywhere: (b, 3m, c) unprojected, as if it acted always. begin, end: first block
+    of a step and the one after its last, None where it acts always. coefficients: (c,) of the columns, covariance: (c,
+    c)."""
 
     effect: str
     body: int
@@ -111,15 +112,17 @@ def creeping(blocks: Blocks, slip: Candidate) -> list[Candidate]:
 
 
 def _frames(blocks: Blocks, body: int, marker: int) -> list[Array]:
-    """Frames (b, 3, 3) in which a slip may be constant: its segment's, or the palm's (a marker held back by a cable)."""
+    """Frames (b, 3, 3) in which a slip may be constant: its segment's, or the palm's (a marker held back by a
+    cable)."""
     b = len(blocks.residual)
     fixed = np.broadcast_to(np.eye(3), (b, 3, 3))
     return [fixed] if body == 0 else [blocks.rotation[:, marker], fixed]
 
 
 def _no_hinge(blocks: Blocks, k: int) -> list[Candidate]:
-    """Wobble and moving centre of joint k - 1, each with a few forms over its angle. The other axis of a wobble meets the hinge
-    where the centre is taken to be, or passes anywhere: then what it carries is shifted in step with the tilt."""
+    """Wobble and moving centre of joint k - 1, each with a few forms over its angle. The other axis of a wobble meets
+    the hinge where the centre is taken to be, or passes anywhere: then what it carries is shifted in step with the
+    tilt."""
     b, m = blocks.weight.shape
     u = share_of_range(blocks, k - 1)[:, None]
     functions = [u, u**2, u**3, np.sin(2 * np.pi * u), np.cos(2 * np.pi * u)]
@@ -140,18 +143,23 @@ def _no_hinge(blocks: Blocks, k: int) -> list[Candidate]:
 
     def candidate(name: str, form: Sequence[int], which: Sequence[int]) -> Candidate:
         pick = tuple(len(ways) * f + way for f in form for way in which)
-        return Candidate(name, k, None, base, False, shifts=tuple(way in shifts for _ in form for way in which), pick=pick)
+        return Candidate(
+            name, k, None, base, False, shifts=tuple(way in shifts for _ in form for way in which), pick=pick
+        )
 
     out = []
     for form in forms:
-        out += [candidate("joint_wobble", form, tilts), candidate("joint_wobble", form, tilts + shifts),
-                candidate("moving_centre", form if form is wave else [even, *form], shifts)]
+        out += [
+            candidate("joint_wobble", form, tilts),
+            candidate("joint_wobble", form, tilts + shifts),
+            candidate("moving_centre", form if form is wave else [even, *form], shifts),
+        ]
     return out
 
 
 def _any_motion(blocks: Blocks, k: int) -> list[Candidate]:
-    """Whatever a smooth function of joint k - 1's angle could be: any motion of what it carries as a rigid body, or of each
-    marker of its segment (skin, a loose support)."""
+    """Whatever a smooth function of joint k - 1's angle could be: any motion of what it carries as a rigid body, or of
+    each marker of its segment (skin, a loose support)."""
     b, m = blocks.weight.shape
     u = share_of_range(blocks, k - 1)
     forms = [u, u**2, u**3, np.sin(2 * np.pi * u), np.cos(2 * np.pi * u)]

@@ -43,12 +43,13 @@ def drive_trials(session: Session) -> dict[str, list[Trial]]:
 
 
 def count_range(logs: list[Log]) -> tuple[float, float]:
-    """Counts at 0 % and 100 % of the range: the commanded extremes, else the recorded ones, where the commands are not those
-    that the motion follows (lost, constant, in another unit)."""
+    """Counts at 0 % and 100 % of the range: the commanded extremes, else the recorded ones, where the commands are not
+    those that the motion follows (lost, constant, in another unit)."""
     low, high = _extremes(logs, "position")
     if all("setpoint" in log.columns for log in logs):
         told_low, told_high = _extremes(logs, "setpoint")
-        reached = np.nanpercentile(np.concatenate([log.columns["position"] for log in logs]), [1, 99])  # a glitch reaches farther
+        # a glitch reaches farther
+        reached = np.nanpercentile(np.concatenate([log.columns["position"] for log in logs]), [1, 99])
         if max(abs(told_low - reached[0]), abs(told_high - reached[1])) < UNFOLLOWED * (reached[1] - reached[0]):
             low, high = told_low, told_high
     return low, max(high, low + 1e-9)
@@ -61,12 +62,18 @@ def _extremes(logs: list[Log], name: str) -> tuple[float, float]:
     return (float(values.min()), float(values.max())) if len(values) else (np.nan, np.nan)
 
 
-def drive_states(session: Session, corrections: Mapping[str, Callable[[Array], Array]] | None = None,
-                 unread: Collection[str] = (), simulated: Mapping[str, SimulatedDrive] | None = None) -> dict[str, tuple[DriveState, ...]]:
+def drive_states(
+    session: Session,
+    corrections: Mapping[str, Callable[[Array], Array]] | None = None,
+    unread: Collection[str] = (),
+    simulated: Mapping[str, SimulatedDrive] | None = None,
+) -> dict[str, tuple[DriveState, ...]]:
     """DriveStates of every actuator, [%] of its range and raw current; with the bristle length of its friction.
 
-    corrections: actuator -> function that takes its position [%] to what it should have read. unread: actuators to leave out. simulated:
-    drives whose simulated motion stands for the recorded one where that is not corrected and nothing is missing. A current that measures nothing says nothing of friction either: other drives are not compared with it.
+    corrections: actuator -> function that takes its position [%] to what it should have read. unread: actuators to
+    leave out. simulated:
+    drives whose simulated motion stands for the recorded one where that is not corrected and nothing is missing. A
+    current that measures nothing says nothing of friction either: other drives are not compared with it.
     """
     raw = {a: [(t, t.log()) for t in trials] for a, trials in drive_trials(session).items() if a not in unread}
     trusted = {a: d for a, d in (simulated or {}).items() if a not in (corrections or {})}
@@ -75,14 +82,23 @@ def drive_states(session: Session, corrections: Mapping[str, Callable[[Array], A
     return with_gives(prepared, [a for a, states in prepared.items() if is_measured(states)])
 
 
-def with_gives(drives: Mapping[str, tuple[DriveState, ...]], trusted: Collection[str]) -> dict[str, tuple[DriveState, ...]]:
-    """The states with each drive's bristle length, and what the `trusted` ones say that any drive of the session may have."""
+def with_gives(
+    drives: Mapping[str, tuple[DriveState, ...]], trusted: Collection[str]
+) -> dict[str, tuple[DriveState, ...]]:
+    """The states with each drive's bristle length, and what the `trusted` ones say that any drive of the session may
+    have."""
     give, granted = gives({a: states for a, states in drives.items() if a in trusted})
-    return {a: with_required(tuple(with_coulomb(s, give.get(a, granted), granted) for s in states)) for a, states in drives.items()}
+    return {
+        a: with_required(tuple(with_coulomb(s, give.get(a, granted), granted) for s in states))
+        for a, states in drives.items()
+    }
 
 
 def _prepare(
-    actuator: str, entries: list[tuple[Trial, Log]], correct: Callable[[Array], Array] | None = None, simulated: SimulatedDrive | None = None
+    actuator: str,
+    entries: list[tuple[Trial, Log]],
+    correct: Callable[[Array], Array] | None = None,
+    simulated: SimulatedDrive | None = None,
 ) -> list[DriveState]:
     low, high = count_range([log for _, log in entries])
     history: list[tuple[float, float]] = []  # of all bouts before a trial: time in motion, rest until the next one [s]
@@ -98,8 +114,11 @@ def _prepare(
         motion = estimate_motion(time_s, position if correct is None else correct(position))
         if simulated is not None and trial.name in simulated.motions:
             motion = with_simulated(motion, time_s, simulated.motions[trial.name]) or motion
-        extra = {name: _held(log.columns[name])[seen] for name in ("setpoint", "speed", "current_limit", "temperature")
-                 if name in log.columns and np.isfinite(log.columns[name]).any()}
+        extra = {
+            name: _held(log.columns[name])[seen]
+            for name in ("setpoint", "speed", "current_limit", "temperature")
+            if name in log.columns and np.isfinite(log.columns[name]).any()
+        }
         extra["elapsed"] = time_s - first
         if end is not None:
             history[-1] = (history[-1][0], history[-1][1] + max(float(time_s[0]) - end, 0.0))
@@ -114,11 +133,31 @@ def _prepare(
         extra["position_noise"] = np.full(len(time_s), motion.noise)
         extra["steady"] = steady(time_s, motion).astype(float)
         extra["smoothed"] = np.full(len(time_s), float(motion.smoothed))
-        declared = np.stack([sure_acceleration(motion, time_s), motion.velocity, np.sign(motion.velocity), motion.position,
-                             np.ones(len(time_s))], axis=-1)
-        states.append(DriveState(trial.name, actuator, time_s, motion.position, motion.velocity, motion.acceleration,
-                                 effort, declared, extra=extra, validate=trial.validate,
-                                 declared_names=("inertia", "viscous", "coulomb", "spring", "preload")))
+        declared = np.stack(
+            [
+                sure_acceleration(motion, time_s),
+                motion.velocity,
+                np.sign(motion.velocity),
+                motion.position,
+                np.ones(len(time_s)),
+            ],
+            axis=-1,
+        )
+        states.append(
+            DriveState(
+                trial.name,
+                actuator,
+                time_s,
+                motion.position,
+                motion.velocity,
+                motion.acceleration,
+                effort,
+                declared,
+                extra=extra,
+                validate=trial.validate,
+                declared_names=("inertia", "viscous", "coulomb", "spring", "preload"),
+            )
+        )
     total = max((float(s.elapsed_s[-1]) for s in states), default=0.0)
     return [replace(s, extra={**s.extra, "session_s": np.full(len(s.time_s), total)}) for s in states]
 
@@ -131,8 +170,11 @@ def _readable(log: Log) -> NDArray[np.bool_]:
 def too_short(session: Session) -> list[str]:
     """What is to be said of recordings that are left out, for they have too few rows to read a motion from."""
     rows = {t.name: int(_readable(t.log()).sum()) for trials in drive_trials(session).values() for t in trials}
-    return [f"{name}: {n} rows with a position; {LEAST_ROWS} are needed to read a motion, so its current was left out"
-            for name, n in rows.items() if n < LEAST_ROWS]
+    return [
+        f"{name}: {n} rows with a position; {LEAST_ROWS} are needed to read a motion, so its current was left out"
+        for name, n in rows.items()
+        if n < LEAST_ROWS
+    ]
 
 
 def _held(values: Array) -> Array:
@@ -142,17 +184,20 @@ def _held(values: Array) -> Array:
 
 
 def bouts(time_s: Array, moving: NDArray[np.bool_]) -> list[tuple[float, float]]:
-    """Time in motion and at rest after it [s] of each bout of a recording, in order; a rest before the first counts as a bout of
-    no motion. time_s, moving: (n,)."""
+    """Time in motion and at rest after it [s] of each bout of a recording, in order; a rest before the first counts as
+    a bout of no motion. time_s, moving: (n,)."""
     step = np.diff(time_s, prepend=time_s[0])
     begin = np.unique(np.r_[0, np.flatnonzero(np.diff(moving.astype(int)) > 0) + 1])
-    return [(float(step[a:b][moving[a:b]].sum()), float(step[a:b][~moving[a:b]].sum()))
-            for a, b in zip(begin, np.r_[begin[1:], len(time_s)], strict=True)]
+    return [
+        (float(step[a:b][moving[a:b]].sum()), float(step[a:b][~moving[a:b]].sum()))
+        for a, b in zip(begin, np.r_[begin[1:], len(time_s)], strict=True)
+    ]
 
 
 def is_measured(states: tuple[DriveState, ...]) -> bool:
-    """False where the current channel is dead, where the motion explains nothing of it (friction alone turns over with every
-    reversal), or where it is so free of noise beside a motion that it does not explain that it can only be a command."""
+    """False where the current channel is dead, where the motion explains nothing of it (friction alone turns over with
+    every reversal), or where it is so free of noise beside a motion that it does not explain that it can only be a
+    command."""
     current = np.concatenate([s.effort[np.isfinite(s.effort)] for s in states])
     if len(current) < 50:
         return True
@@ -166,8 +211,8 @@ def is_measured(states: tuple[DriveState, ...]) -> bool:
 
 
 def opposes(states: tuple[DriveState, ...]) -> bool:
-    """Whether friction would drive the motion: the current and the position of a drive have opposite signs. Of steady samples, by ten
-    standard errors."""
+    """Whether friction would drive the motion: the current and the position of a drive have opposite signs. Of steady
+    samples, by ten standard errors."""
     use = [s.extra["steady"] > 0 for s in states]
     effort = np.concatenate([s.effort[u] for s, u in zip(states, use, strict=True)])
     columns = np.concatenate([s.declared[u] for s, u in zip(states, use, strict=True)])[np.isfinite(effort)]
@@ -181,8 +226,8 @@ def opposes(states: tuple[DriveState, ...]) -> bool:
 
 
 def echoes_command(logs: Sequence[Log]) -> bool:
-    """Whether the position column repeats the setpoint: just after each change of the setpoint it is already there, which no
-    machine of finite speed is."""
+    """Whether the position column repeats the setpoint: just after each change of the setpoint it is already there,
+    which no machine of finite speed is."""
     near = []
     for log in logs:
         if "setpoint" not in log.columns:
@@ -197,8 +242,8 @@ def echoes_command(logs: Sequence[Log]) -> bool:
 
 
 def rests_on_command(logs: Sequence[Log]) -> bool:
-    """Whether the position column is at the setpoint to the count wherever the next one finds it: no drive with friction ends every
-    move there, nor does an encoder of so many counts read so."""
+    """Whether the position column is at the setpoint to the count wherever the next one finds it: no drive with
+    friction ends every move there, nor does an encoder of so many counts read so."""
     on, seen = [np.zeros(0)], [np.zeros(0)]
     for log in logs:
         if "setpoint" not in log.columns:
@@ -232,9 +277,10 @@ def with_coulomb(state: DriveState, give: float, granted: float) -> DriveState:
 
 
 def with_timing(state: DriveState) -> DriveState:
-    """Adds "slides", zero where the drive rests or has not left its place, and "sigma" [effort], zero in steady motion where that is
-    smoothed: what timing means for the declared prediction (half a sample interval around starts and stops; TOLD_S all along a simulated motion),
-    what is not known of friction while it turns over, and all that it may hold where the drive rests or has not left its place."""
+    """Adds "slides", zero where the drive rests or has not left its place, and "sigma" [effort], zero in steady motion
+    where that is smoothed: what timing means for the declared prediction (half a sample interval around starts and
+    stops; TOLD_S all along a simulated motion), what is not known of friction while it turns over, and all that it may
+    hold where the drive rests or has not left its place."""
     seen = np.isfinite(state.effort)
     if seen.sum() < 20:
         return state
@@ -260,13 +306,17 @@ def with_required(states: tuple[DriveState, ...]) -> tuple[DriveState, ...]:
 
 
 def gives(prepared: Mapping[str, Sequence[DriveState]]) -> tuple[dict[str, float], float]:
-    """Bristle length [%] of each drive's declared Coulomb friction, and the most that any drive of the session is granted.
+    """Bristle length [%] of each drive's declared Coulomb friction, and the most that any drive of the session is
+    granted.
 
     Coulomb friction turns over within a small distance in any drive; the drive that gives least shows how small. What a
     drive gives clearly beyond that is presliding, an effect.
     """
     lengths = np.geomspace(GIVE_LEAST, GIVE_MOST, 12)
-    best = {a: float(lengths[int(np.argmin([_misfit(states, length) for length in lengths]))]) for a, states in prepared.items()}
+    best = {
+        a: float(lengths[int(np.argmin([_misfit(states, length) for length in lengths]))])
+        for a, states in prepared.items()
+    }
     granted = max(1.6 * min(best.values(), default=GIVE_LEAST), GIVE_UNSEEN)
     return {a: min(length, granted) for a, length in best.items()}, granted
 

@@ -29,19 +29,24 @@ EDGE_S = 0.3  # by which it may begin before and end after the window that tells
 def with_excursions(states: Sequence[DriveState]) -> tuple[DriveState, ...]:
     """The states with "ahead" in `extra`: (n,) [effort unit] the course of every excursion, zero elsewhere.
 
-    The residual of the declared map and a drifting clock, minus its median over replicates (same place and direction in other strokes), is
-    searched for windows whose mean stands out by a likelihood ratio, and beyond what stands out below: nothing pushes a finger behind its
-    drive, so what does so there is chance (an angle that wanders goes both ways). Each must have ended before LONGEST_S.
+    The residual of the declared map and a drifting clock, minus its median over replicates (same place and direction in
+    other strokes), is searched for windows whose mean stands out by a likelihood ratio, and beyond what stands out
+    below: nothing pushes a finger behind its drive, so what does so there is chance (an angle that wanders goes both
+    ways). Each must have ended before LONGEST_S.
     """
     states = tuple(states)
     if not states:
         return states
     balance = Balance(states, everything=True)
-    drifting = balance.fit((Term(effect("clock_drift"), {}),))  # a clock at another rate lifts the finger where it is fast
+    # a clock at another rate lifts the finger where it is fast
+    drifting = balance.fit((Term(effect("clock_drift"), {}),))
     residual = _beside_replicates(balance, balance.effort - drifting.prediction)
     coloured = balance.sigma * np.sqrt(balance.inflation) if balance.inflation > 1 else 0.0
     parts = np.split(residual, np.cumsum([m.sum() for m in balance.masks])[:-1])
-    told = [_Told.of(s.time_s[m], r, coloured) if len(r) > FEWEST else None for s, m, r in zip(states, balance.masks, parts, strict=True)]
+    told = [
+        _Told.of(s.time_s[m], r, coloured) if len(r) > FEWEST else None
+        for s, m, r in zip(states, balance.masks, parts, strict=True)
+    ]
     behind = max((_best_window(-t.residual, t.sigma, t.lengths)[0] for t in told if t is not None), default=0.0)
     out = []
     for state, mask, one in zip(states, balance.masks, told, strict=True):
@@ -87,7 +92,8 @@ def _beside_replicates(balance: Balance, residual: Array) -> Array:
 
 
 def _course(told: _Told, least: float) -> Array:
-    """Smoothed residual (n,) within the excursions of one recording, zero elsewhere. least: log likelihood ratio of each."""
+    """Smoothed residual (n,) within the excursions of one recording, zero elsewhere. least: log likelihood ratio of
+    each."""
     left = told.residual.copy()
     inside = np.zeros(len(left), bool)
     for _ in range(len(left)):
@@ -111,8 +117,8 @@ def _to_zero(inside: NDArray[np.bool_], smooth: Array, most: int) -> NDArray[np.
 
 
 def _best_window(residual: Array, sigma: float, lengths: NDArray[np.int64]) -> tuple[float, int, int]:
-    """Largest log likelihood ratio of a raised mean over all windows, less the search, and the window. A window noisier than
-    the rest counts by its own noise."""
+    """Largest log likelihood ratio of a raised mean over all windows, less the search, and the window. A window noisier
+    than the rest counts by its own noise."""
     total = np.concatenate([[0.0], np.cumsum(residual)])
     rough = np.concatenate([[0.0], np.cumsum(np.diff(residual, prepend=residual[0]) ** 2 / 2)])
     best = (-np.inf, 0, 0)

@@ -1,7 +1,7 @@
 """Whiles in which a label sits on something else: a reflection takes a marker's name, and gives it back.
 
-A marker that slips stays where it slipped to; one that comes back was another. Told by the distances between the markers of one
-segment, which nothing that moves a segment changes.
+A marker that slips stays where it slipped to; one that comes back was another. Told by the distances between the
+markers of one segment, which nothing that moves a segment changes.
 """
 
 from __future__ import annotations
@@ -17,17 +17,21 @@ Array = NDArray[np.float64]
 FRAMES = 15  # over which a distance is averaged
 LIMIT, LEAST_M = 8.0, 5e-4  # standard deviations of such a mean from the usual distance, and at least
 LONGEST_S = 6.0  # of a while: what lasts longer is no ghost
-NEAR_S, FAR_S, USUAL = 0.5, 2.0, 0.5  # before and after a while, from half a second to two, it is within half of that limit
+# before and after a while, from half a second to two, it is within half of that limit
+NEAR_S, FAR_S, USUAL = 0.5, 2.0, 0.5
 ABRUPT = 0.4  # of the largest departure is there, and gone, from one mean to the next: a label jumps
 
 
 def ghosts(data: ChainData, time_s: Array) -> NDArray[np.bool_]:
-    """Frames (n,) of a recording in which a distance within one segment has left its usual value and comes back to it."""
+    """Frames (n,) of a recording in which a distance within one segment has left its usual value and comes back to
+    it."""
     out = np.zeros(len(time_s), bool)
     for first in range(len(data.body)):
         for second in range(first + 1, len(data.body)):
             if data.body[first] == data.body[second]:
-                out |= _excursions(np.linalg.norm(data.position_world[:, first] - data.position_world[:, second], axis=1), time_s)
+                out |= _excursions(
+                    np.linalg.norm(data.position_world[:, first] - data.position_world[:, second], axis=1), time_s
+                )
     return out
 
 
@@ -44,9 +48,14 @@ def _excursions(distance: Array, time_s: Array) -> NDArray[np.bool_]:
     out = np.zeros(len(distance), bool)
     for here in (np.flatnonzero(runs == run) for run in range(1, count + 1)):
         begin, end = time_s[here[0]], time_s[here[-1]]
-        aside = [away[slice(*np.searchsorted(time_s, span))] for span in ((begin - FAR_S, begin - NEAR_S), (end + NEAR_S, end + FAR_S))]
+        aside = [
+            away[slice(*np.searchsorted(time_s, span))]
+            for span in ((begin - FAR_S, begin - NEAR_S), (end + NEAR_S, end + FAR_S))
+        ]
         returns = all(len(a) and np.median(a) < USUAL for a in aside)
-        jumps = min(_jump(distance, here[0]), _jump(distance, here[-1] + 1)) > ABRUPT * float(np.max(np.abs(mean[here])))
+        jumps = min(_jump(distance, here[0]), _jump(distance, here[-1] + 1)) > ABRUPT * float(
+            np.max(np.abs(mean[here]))
+        )
         out[here] = returns and jumps and end - begin < LONGEST_S
     return binary_dilation(out, iterations=FRAMES // 2)
 

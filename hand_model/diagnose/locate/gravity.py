@@ -23,11 +23,14 @@ SMOOTH_S = 0.1  # the palm turns slowly
 TURNED = 0.12  # spread of gravity's direction below which a weight is as good as a function of position: seven degrees
 
 
-def with_gravity(session: Session, fingers: Mapping[str, FingerAngles], states: tuple[DriveState, ...]) -> tuple[DriveState, ...]:
-    """The states with `gravity_along` and `gravity_across` [m/s^2] in `extra`: gravity along the open finger and across it.
+def with_gravity(
+    session: Session, fingers: Mapping[str, FingerAngles], states: tuple[DriveState, ...]
+) -> tuple[DriveState, ...]:
+    """The states with `gravity_along` and `gravity_across` [m/s^2] in `extra`: gravity along the open finger and across
+    it.
 
-    fingers: by name. Recordings with markers have `pose_seen`; those without get `pose_unseen` instead. Unchanged where the session names no
-    gravity, where no recording shows the palm, or where it never turned.
+    fingers: by name. Recordings with markers have `pose_seen`; those without get `pose_unseen` instead. Unchanged where
+    the session names no gravity, where no recording shows the palm, or where it never turned.
     """
     if session.gravity_world is None:
         return states
@@ -49,7 +52,8 @@ def with_gravity(session: Session, fingers: Mapping[str, FingerAngles], states: 
 
 
 def _in_finger(session: Session, fingers: Mapping[str, FingerAngles], trial: Trial, state: DriveState) -> Array | None:
-    """Gravity (n, 2) in the finger's plane at the state's samples; None without markers or with clocks that do not align."""
+    """Gravity (n, 2) in the finger's plane at the state's samples; None without markers or with clocks that do not
+    align."""
     if trial.mocap_path is None or trial.finger not in fingers:
         return None
     angles = fingers[trial.finger]
@@ -60,7 +64,8 @@ def _in_finger(session: Session, fingers: Mapping[str, FingerAngles], trial: Tri
         time_s, flexed = record.mocap.time_s, record.angle_rad[:, 0]
     else:
         tip, base = (np.nanmean(data.position_world[:, data.body == k], axis=1) for k in (data.body.max(), 0))
-        time_s, flexed = mocap.time_s, -np.linalg.norm(tip - base, axis=1)  # a finger's reach shrinks as it flexes, a thumb's may grow
+        # a finger's reach shrinks as it flexes, a thumb's may grow
+        time_s, flexed = mocap.time_s, -np.linalg.norm(tip - base, axis=1)
     good = np.isfinite(flexed)
     clock = None
     for course in (flexed, -flexed) if record is None else (flexed,):
@@ -72,13 +77,16 @@ def _in_finger(session: Session, fingers: Mapping[str, FingerAngles], trial: Tri
     if clock is None:
         return None
     gravity_palm = np.einsum("nij,i->nj", palm_pose(chain, data).rotation, session.gravity_world)
-    smooth = np.stack([local_quadratic(mocap.time_s, g, SMOOTH_S)[0] for g in (gravity_palm @ plane(chain).T).T], axis=-1)
+    smooth = np.stack(
+        [local_quadratic(mocap.time_s, g, SMOOTH_S)[0] for g in (gravity_palm @ plane(chain).T).T], axis=-1
+    )
     at = clock.log_time(mocap.time_s)
     return np.stack([np.interp(state.time_s, at, g) for g in smooth.T], axis=-1)
 
 
 def plane(chain: Chain) -> Array:
-    """Unit vectors (2, 3) in the palm, in the plane of the first joint: along the open finger, and where flexion takes it."""
+    """Unit vectors (2, 3) in the palm, in the plane of the first joint: along the open finger, and where flexion takes
+    it."""
     axis = chain.axis_palm[0]
     arm = (chain.centre_palm[1] if len(chain.centre_palm) > 1 else chain.marker_palm[-1]) - chain.centre_palm[0]
     along = arm - axis * (axis @ arm)

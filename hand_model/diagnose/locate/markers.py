@@ -1,8 +1,9 @@
 """Marker station: markers against rigid segments on hinges; slips, supports that turn, hinges that are none.
 
-Linear in everything small about the identified chain: per frame the palm pose and joint angles, shared the chain, and the
-columns of a candidate. Frames are eliminated one by one (orthogonal projection), the chain by its Gram matrix, so that a
-candidate's gain is what neither a pose nor another chain can explain; a step's moment is scanned by cumulative sums.
+Linear in everything small about the identified chain: per frame the palm pose and joint angles, shared the chain, and
+the columns of a candidate. Frames are eliminated one by one (orthogonal projection), the chain by its Gram matrix, so
+that a candidate's gain is what neither a pose nor another chain can explain; a step's moment is scanned by cumulative
+sums.
 """
 
 from __future__ import annotations
@@ -48,7 +49,9 @@ class MarkerNaming:
     @property
     def believed(self) -> bool:
         """Whether the names stand: what they leave is noise, or they take most of the misfit away."""
-        return bool(self.found) and (self.p_after >= ALPHA or self.excess_after < (1 - EXPLAINED_LEAST) * self.excess_before)
+        return bool(self.found) and (
+            self.p_after >= ALPHA or self.excess_after < (1 - EXPLAINED_LEAST) * self.excess_before
+        )
 
 
 def name_markers(angles: FingerAngles) -> MarkerNaming:
@@ -107,8 +110,8 @@ def _within_noise(search: Stepwise, found: list[MarkerEffect]) -> bool:
 
 
 def _ahead(search: Stepwise, found: list[MarkerEffect]) -> list[MarkerEffect]:
-    """A larger set of effects that leaves nothing but noise, where `found` leaves more: several together may do what each of them alone, the
-    others still hidden in what it leaves, does not. `found` where there is no such set."""
+    """A larger set of effects that leaves nothing but noise, where `found` leaves more: several together may do what
+    each of them alone, the others still hidden in what it leaves, does not. `found` where there is no such set."""
     larger = found
     while len(larger) < MOST and (best := search.next(larger)).evidence > 0:
         larger = search.settled([*larger, best])
@@ -119,7 +122,10 @@ def _ahead(search: Stepwise, found: list[MarkerEffect]) -> list[MarkerEffect]:
 def _pruned(search: Stepwise, found: list[MarkerEffect]) -> list[MarkerEffect]:
     """What of the found effects brings enough beside all the others."""
     while found:
-        least, weakest = min(((_borne(search, found, gain, e), e) for gain, e in zip(search.without(found), found, strict=True)), key=lambda i: i[0])
+        least, weakest = min(
+            ((_borne(search, found, gain, e), e) for gain, e in zip(search.without(found), found, strict=True)),
+            key=lambda i: i[0],
+        )
         if least >= EVIDENCE_LEAST:
             break
         found = [e for e in found if e is not weakest]
@@ -129,16 +135,23 @@ def _pruned(search: Stepwise, found: list[MarkerEffect]) -> list[MarkerEffect]:
 def _borne(search: Stepwise, found: Sequence[MarkerEffect], gain: float, effect: MarkerEffect) -> float:
     """Log evidence of an effect that brings `gain`, as what `found` leaves correlated bears it out."""
     parameters = effect.everywhere.shape[-1] + (effect.begin is not None)
-    return 0.5 * gain / _inflation(search.residual(found), search.blocks) - 0.5 * parameters * float(np.log(search.readings))
+    return 0.5 * gain / _inflation(search.residual(found), search.blocks) - 0.5 * parameters * float(
+        np.log(search.readings)
+    )
 
 
 def _inflation(residual: Array, blocks: Blocks) -> float:
-    """Variance of means over SPELL blocks of the residual (b, 3m, 1) over what independent blocks would have, at least one."""
+    """Variance of means over SPELL blocks of the residual (b, 3m, 1) over what independent blocks would have, at least
+    one."""
     z = residual[..., 0]
     same = blocks.record[1:] == blocks.record[:-1]
     white = 0.5 * float(np.sum(np.mean(np.diff(z, axis=0)[same] ** 2, axis=0)))
-    spells = [z[i : i + SPELL].mean(0) for r in np.unique(blocks.record) for rows in [np.flatnonzero(blocks.record == r)]
-              for i in range(rows[0], rows[-1] + 2 - SPELL, SPELL)]
+    spells = [
+        z[i : i + SPELL].mean(0)
+        for r in np.unique(blocks.record)
+        for rows in [np.flatnonzero(blocks.record == r)]
+        for i in range(rows[0], rows[-1] + 2 - SPELL, SPELL)
+    ]
     if len(spells) < 4:
         return 1.0
     return max(SPELL * float(np.sum(np.mean(np.square(spells), axis=0))) / max(white, 1e-300), 1.0)
@@ -164,7 +177,9 @@ def _chain_part(shared: Array, y: Array) -> tuple[Array, Array]:
     flat = shared.reshape(-1, shared.shape[-1])
     gram = flat.T @ flat
     size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    return np.linalg.pinv(gram / np.outer(size, size), rcond=1e-9, hermitian=True) / np.outer(size, size), flat.T @ y.ravel()
+    return np.linalg.pinv(gram / np.outer(size, size), rcond=1e-9, hermitian=True) / np.outer(
+        size, size
+    ), flat.T @ y.ravel()
 
 
 def _lack(residual: Array, blocks: Blocks) -> tuple[float, float]:
@@ -207,8 +222,9 @@ def corrected_angles(angles: FingerAngles, naming: MarkerNaming) -> FingerAngles
 
 
 def _least_course(naming: MarkerNaming) -> Array:
-    """Displacement (b, 3m) [m] by all joints that are no hinges, without what another chain of hinges would explain as well: the least
-    that leaves hinges. Their tilts are nearly another axis, and what is linear in both would else go far both ways."""
+    """Displacement (b, 3m) [m] by all joints that are no hinges, without what another chain of hinges would explain as
+    well: the least that leaves hinges. Their tilts are nearly another axis, and what is linear in both would else go
+    far both ways."""
     blocks = naming.blocks
     course = np.zeros(blocks.residual.reshape(len(blocks.residual), -1).shape)
     for effect in (e for e in naming.found if e.effect in UNHINGED):
@@ -218,8 +234,8 @@ def _least_course(naming: MarkerNaming) -> Array:
 
 
 def shift_at_frames(naming: MarkerNaming, record: int, time_s: Array, course: Array | None = None) -> Array:
-    """Displacement (n, m, 3) [m], palm frame, of all named effects at the frames of one record. course: (b, 3m) [m] in the place of those
-    of joints that are no hinges."""
+    """Displacement (n, m, 3) [m], palm frame, of all named effects at the frames of one record. course: (b, 3m) [m] in
+    the place of those of joints that are no hinges."""
     blocks = naming.blocks
     mine = np.flatnonzero(blocks.record == record)
     out = np.zeros((len(time_s), *blocks.weight.shape[1:], 3))

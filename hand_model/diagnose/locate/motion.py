@@ -20,8 +20,10 @@ SURE = 3.0  # standard deviations
 
 @dataclass(frozen=True)
 class Motion:
-    """position, velocity, acceleration: (n,). noise: standard deviation of the raw position; bandwidth_s: of the kernel [s]. moving: (n,) bool;
-    since_start_s, until_stop_s: (n,) [s] to the nearest rest before and after (inf where none). smoothed: whether by the kernel; else simulated."""
+    """position, velocity, acceleration: (n,). noise: standard deviation of the raw position; bandwidth_s: of the kernel
+    [s]. moving: (n,) bool;
+    since_start_s, until_stop_s: (n,) [s] to the nearest rest before and after (inf where none). smoothed: whether by
+    the kernel; else simulated."""
 
     position: Array
     velocity: Array
@@ -73,8 +75,9 @@ def estimate_motion(time_s: Array, position: Array, bandwidth_s: float | None = 
 
 
 def position_at(motion: Motion, time_s: Array, then: Array) -> Array:
-    """Position (m,) at times (m,) of a motion estimated at (n,) [s]: what the kernel takes off a curve's corners is put back, as much as
-    it takes off once more ("twicing"; Stuetzle & Mittal 1979), and between samples the position goes with its velocity (Hermite)."""
+    """Position (m,) at times (m,) of a motion estimated at (n,) [s]: what the kernel takes off a curve's corners is put
+    back, as much as it takes off once more ("twicing"; Stuetzle & Mittal 1979), and between samples the position goes
+    with its velocity (Hermite)."""
     from scipy.interpolate import CubicHermiteSpline
 
     again = local_quadratic(time_s, motion.position, motion.bandwidth_s)
@@ -83,9 +86,10 @@ def position_at(motion: Motion, time_s: Array, then: Array) -> Array:
 
 
 def sure_acceleration(motion: Motion, time_s: Array) -> Array:
-    """Acceleration (n,) without what may be noise of the position: that would be found again, with the other sign, in whatever the
-    position is held against, and as an error of a regressor would take off its coefficient (Fuller 1987). The noise is that of the
-    kernel's second derivative, step / h^5 int ((u^2 - 1) phi)^2 du = 0.2116 step / h^5; what exceeds it stays as it is."""
+    """Acceleration (n,) without what may be noise of the position: that would be found again, with the other sign, in
+    whatever the position is held against, and as an error of a regressor would take off its coefficient (Fuller 1987).
+    The noise is that of the kernel's second derivative, step / h^5 int ((u^2 - 1) phi)^2 du = 0.2116 step / h^5; what
+    exceeds it stays as it is."""
     if not motion.smoothed:
         return motion.acceleration
     step = float(np.median(np.diff(time_s)))

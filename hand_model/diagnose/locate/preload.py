@@ -1,7 +1,8 @@
-"""Preload: a drive whose declared preload is unlike those of the hand's other drives has lopsided friction, or another preload.
+"""Preload: a drive whose declared preload is unlike those of the hand's other drives has lopsided friction, or another
+preload.
 
-From current alone the two are the same (the declared model takes up either), so the name is a class, and only what other drives
-of the same hand are like speaks for it.
+From current alone the two are the same (the declared model takes up either), so the name is a class, and only what
+other drives of the same hand are like speaks for it.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from ..findings import UNWRITTEN, Finding, weighed
 from ..magnitude import SLIGHT, channel_figures, magnitude
 from ..name.station import Station
 
-SPREAD, HANDS = 0.15, 3.0  # mean absolute deviation of the logarithm of a drive's preload within one hand, as sure as from so many comparisons
+# mean absolute deviation of the logarithm of a drive's preload within one hand, as sure as from so many comparisons
+SPREAD, HANDS = 0.15, 3.0
 LIKE = ("viscous", "coulomb", "spring")  # coefficients that say how alike the drives of a hand are
 ODD_P = 0.03  # of two drives that differ as much by chance; beyond, one of them is odd
 LOST = 0.2  # of the other's preload: less, or the wrong sign, and there is none
@@ -28,11 +30,16 @@ CLASS = ("asymmetric_friction", "spring_preload")
 def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]:
     """Drives whose preload the others' do not let expect, with their weight.
 
-    The other drives' median is the reference; one of which something is missing is none. What pulls a finger off its drive pulls at its
-    preload. A drive of which something else is missing must be unlike the others both with and without its name.
+    The other drives' median is the reference; one of which something is missing is none. What pulls a finger off its
+    drive pulls at its preload. A drive of which something else is missing must be unlike the others both with and
+    without its name.
     """
     pulled = {s.actuator for s in stations if _pulls(s)}
-    drives = [s for s in stations if s.signal == "current" and s.actuator not in pulled and "preload" in s.naming.fit.declared and _tells(s)]
+    drives = [
+        s
+        for s in stations
+        if s.signal == "current" and s.actuator not in pulled and "preload" in s.naming.fit.declared and _tells(s)
+    ]
     healthy = [s for s in drives if not s.missing]
     spread = _spread([s.naming.fit.declared for s in healthy])
     out = []
@@ -42,14 +49,18 @@ def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]
             continue
         others = [float(s.naming.fit.declared["preload"]) for s in rest]
         usual = float(np.median(others))
-        own = min((float(fit.declared["preload"]) for fit in (station.naming.fit, station.naming.declared)), key=lambda p: abs(p - usual))
+        own = min(
+            (float(fit.declared["preload"]) for fit in (station.naming.fit, station.naming.declared)),
+            key=lambda p: abs(p - usual),
+        )
         # Of two that differ the larger is odd, unless one has lost its preload altogether: springs do not push.
         if usual <= 0 or (len(others) == 1 and usual < LOST * own):
             continue
         error = _standard_error(station)
         p = max(_by_chance(own, error, other, spread) for other in others)  # unlike every other
         if p < ODD_P and (len(others) > 1 or own > usual or own < LOST * usual):
-            # Of two either may be odd: the odds are those of the sizes, where a usual preload may have any scale (Jeffreys 1946).
+            # Of two either may be odd: the odds are those of the sizes, where a usual preload may have any scale
+            # (Jeffreys 1946).
             larger = own / (own + usual) if len(others) == 1 and own > usual else 1.0
             out.append(_finding(station, own - usual, error, spread * usual, (1 - p) * larger))
     return out
@@ -57,7 +68,9 @@ def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]
 
 def _pulls(station: Station) -> bool:
     """Whether a finger is pulled off its drive by more than a trifle."""
-    named = next((f for f in station.kept if f.term.effect.name == "spring_decoupling"), None) if station.believed else None
+    named = (
+        next((f for f in station.kept if f.term.effect.name == "spring_decoupling"), None) if station.believed else None
+    )
     if named is None:
         return False
     values = {k: v["value"] for k, v in station.parameters[station.naming.fit.terms.index(named.term)].items()}
@@ -65,7 +78,8 @@ def _pulls(station: Station) -> bool:
 
 
 def _tells(station: Station) -> bool:
-    """Whether a drive's preload can be spoken of: of one that does not repeat itself, or of which something unknown is missing, it cannot."""
+    """Whether a drive's preload can be spoken of: of one that does not repeat itself, or of which something unknown is
+    missing, it cannot."""
     return station.wander <= RESTLESS and (station.believed or not station.missing)
 
 
@@ -76,8 +90,9 @@ def _settled(station: Station) -> bool:
 
 
 def _spread(drives: Sequence[Mapping[str, float]]) -> float:
-    """Mean absolute deviation of the logarithm of a preload among these drives: what is known of hands, and how alike the drives of this
-    one are in everything else (mean of an inverse gamma prior and the drives' coefficients; of two Laplace ones a pair differs by 1.5)."""
+    """Mean absolute deviation of the logarithm of a preload among these drives: what is known of hands, and how alike
+    the drives of this one are in everything else (mean of an inverse gamma prior and the drives' coefficients; of two
+    Laplace ones a pair differs by 1.5)."""
     known, weight = HANDS * SPREAD, HANDS
     for name in LIKE:
         values = np.array([d[name] for d in drives if d.get(name, 0.0) > 0])
@@ -89,7 +104,8 @@ def _spread(drives: Sequence[Mapping[str, float]]) -> float:
 
 
 def _by_chance(own: float, error: float, usual: float, spread: float) -> float:
-    """Probability of two healthy preloads so far apart (logarithms by Laplace), at the nearer end of the standard error."""
+    """Probability of two healthy preloads so far apart (logarithms by Laplace), at the nearer end of the standard
+    error."""
     if usual <= 0:
         return 0.0
     nearer = own + np.sign(usual - own) * min(2 * error, abs(usual - own))
@@ -105,14 +121,40 @@ def _standard_error(station: Station) -> float:
     return float(np.sqrt(np.linalg.pinv(matrix.T @ matrix)[at, at] * balance.inflation))
 
 
-def _finding(station: Station, half_difference: float, error: float, spread: float, probability: float) -> tuple[float, Finding]:
+def _finding(
+    station: Station, half_difference: float, error: float, spread: float, probability: float
+) -> tuple[float, Finding]:
     doubt = 2 * float(np.hypot(error, spread * np.sqrt(2)))
     unit = station.naming.balance.states[0].effort_unit
-    parameters = {"half_difference": {"value": half_difference, "unit": unit, "ci95": [half_difference - doubt, half_difference + doubt]}}
-    where: dict[str, Any] = {"finger": station.finger, "joint": None, "actuator": station.actuator, "signal": "current", "marker": None,
-                             "trials": [s.trial for s in station.naming.balance.states], "region": None, "share_of_mismatch": 1.0}
+    parameters = {
+        "half_difference": {
+            "value": half_difference,
+            "unit": unit,
+            "ci95": [half_difference - doubt, half_difference + doubt],
+        }
+    }
+    where: dict[str, Any] = {
+        "finger": station.finger,
+        "joint": None,
+        "actuator": station.actuator,
+        "signal": "current",
+        "marker": None,
+        "trials": [s.trial for s in station.naming.balance.states],
+        "region": None,
+        "share_of_mismatch": 1.0,
+    }
     text = effect(CLASS[0]).statement(where, {"half_difference": half_difference})
-    fit = {"metric": "current_rmse", "unit": unit, "before": None, "after": None, "noise_floor": station.naming.balance.sigma,
-           "ci95_reduction": None, "held_out": [], "engine": "comparison of the hand's motors"}
+    fit = {
+        "metric": "current_rmse",
+        "unit": unit,
+        "before": None,
+        "after": None,
+        "noise_floor": station.naming.balance.sigma,
+        "ci95_reduction": None,
+        "held_out": [],
+        "engine": "comparison of the hand's motors",
+    }
     sure = max(abs(half_difference) - doubt, SURE_LEAST * abs(half_difference))
-    return weighed(sure / station.naming.balance.sigma, station.contrast), Finding(CLASS[0], CLASS, probability, (), where, text, parameters, fit, dict(UNWRITTEN))
+    return weighed(sure / station.naming.balance.sigma, station.contrast), Finding(
+        CLASS[0], CLASS, probability, (), where, text, parameters, fit, dict(UNWRITTEN)
+    )

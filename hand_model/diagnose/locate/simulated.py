@@ -1,7 +1,8 @@
 """A drive as its commands explain it: how late its current is logged, and its motion without the noise of its encoder.
 
-Where a controller explains the recorded motion but for what changes slowly, the simulated motion and that slow rest are a better estimate of the
-state than any smoothing of the recorded motion: velocity and acceleration carry little noise, starts and stops are not smeared.
+Where a controller explains the recorded motion but for what changes slowly, the simulated motion and that slow rest are
+a better estimate of the state than any smoothing of the recorded motion: velocity and acceleration carry little noise,
+starts and stops are not smeared.
 """
 
 from __future__ import annotations
@@ -23,7 +24,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-TRUE_TO = 1.1  # times the noise of the encoder: a simulated motion that is farther from the recorded one, beside what is slow, lacks something
+# times the noise of the encoder: a simulated motion that is farther from the recorded one, beside what is slow, lacks
+# something
+TRUE_TO = 1.1
 SLOW_S, SLOW_SAMPLES = 0.1, 4.0  # width of the kernel, at least, by which the rest is smoothed
 FEWEST = 8  # samples in a row of which something slow can be told
 COVERED = 0.9  # of the samples in motion that the simulated moves must hold
@@ -34,9 +37,9 @@ DIFFERENCE_S = 2e-3  # half width of the differences that make velocity and acce
 
 @dataclass(frozen=True)
 class SimulatedDrive:
-    """delay_s: by how much the current of `actuator` is late, negative where its position is; doubt_s: standard deviation, infinite where
-    the current is not explained. motions: trial ->
-    time (n,) [s], position, velocity and acceleration (n,) [% and per second], nan between moves; none where the simulation lacks something."""
+    """delay_s: by how much the current of `actuator` is late, negative where its position is; doubt_s: standard
+    deviation, infinite where the current is not explained. motions: trial -> time (n,) [s], position, velocity and
+    acceleration (n,) [% and per second], nan between moves; none where the simulation lacks something."""
 
     actuator: str
     delay_s: float
@@ -61,11 +64,13 @@ def simulated_drive(session: Session, actuator: str) -> SimulatedDrive | None:
     except (HandModelError, np.linalg.LinAlgError):  # a drive that cannot be simulated is judged by its recorded motion
         return None
     told = {name: m for name, m in motions.items() if m is not None}
-    return SimulatedDrive(actuator, delay_s, doubt_s, told if len(told) == len(motions) else {})  # one kind of state in one balance
+    # one kind of state in one balance
+    return SimulatedDrive(actuator, delay_s, doubt_s, told if len(told) == len(motions) else {})
 
 
 def _motion(fit: MotorFit, name: str, log: Log) -> tuple[Array, Array, Array, Array] | None:
-    """Time, position, velocity and acceleration of a log's simulated moves; None where they are farther from the recorded ones than noise."""
+    """Time, position, velocity and acceleration of a log's simulated moves; None where they are farther from the
+    recorded ones than noise."""
     from ...identify.motor.fit import white_noise
     from ...identify.motor.output_error import simulate_states
     from ...identify.motor.predict import aligned_moves
@@ -82,12 +87,15 @@ def _motion(fit: MotorFit, name: str, log: Log) -> tuple[Array, Array, Array, Ar
     noise = max(white_noise(trial.position, trial.time_s), 0.3 / fit.scale.counts_per_percent)
     if np.sqrt(np.nanmean((trial.position - state[0] - slow[0]) ** 2)) > TRUE_TO * noise:
         return None
-    first = log.time_s[np.isfinite(log.time_s) & np.isfinite(log.columns["position"]) & np.isfinite(log.columns["current"])][0]
+    first = log.time_s[
+        np.isfinite(log.time_s) & np.isfinite(log.columns["position"]) & np.isfinite(log.columns["current"])
+    ][0]
     return (trial.time_s + first, *(state + slow))
 
 
 def _slow(time_s: Array, rest: Array) -> Array:
-    """What is slow of the recorded less the simulated motion (n,), nan between moves, and its two derivatives, (3, n)."""
+    """What is slow of the recorded less the simulated motion (n,), nan between moves, and its two derivatives, (3,
+    n)."""
     width_s = max(SLOW_S, SLOW_SAMPLES * float(np.median(np.diff(time_s))))
     out, known = np.full((3, len(rest)), np.nan), np.isfinite(rest)
     for begin, end in runs(known):
@@ -97,7 +105,8 @@ def _slow(time_s: Array, rest: Array) -> Array:
 
 
 def with_simulated(motion: Motion, time_s: Array, simulated: tuple[Array, Array, Array, Array]) -> Motion | None:
-    """The motion at times (n,) [s] with the simulated state, at rest between the moves; None where these hold too little of it."""
+    """The motion at times (n,) [s] with the simulated state, at rest between the moves; None where these hold too
+    little of it."""
     at = np.searchsorted(simulated[0], time_s - SAME_S).clip(0, len(simulated[0]) - 1)
     x, v, a = (np.where(np.abs(simulated[0][at] - time_s) < SAME_S, y[at], np.nan) for y in simulated[1:])
     known = np.isfinite(x)
@@ -109,7 +118,8 @@ def with_simulated(motion: Motion, time_s: Array, simulated: tuple[Array, Array,
 
 
 def delays_apart(drives: Mapping[str, SimulatedDrive]) -> dict[str, SimulatedDrive]:
-    """The drives with the delays of their currents beside the least one of the session: what all drives share is how the log is read."""
+    """The drives with the delays of their currents beside the least one of the session: what all drives share is how
+    the log is read."""
     told = [d.delay_s for d in drives.values() if np.isfinite(d.doubt_s)]
     common = min(told, key=abs) if len(told) > 1 else 0.0
     return {a: replace(d, delay_s=d.delay_s - common) for a, d in drives.items()}

@@ -65,14 +65,25 @@ def _contrast(angles: FingerAngles) -> float:
 
 def unexplained(angles: FingerAngles, naming: MarkerNaming) -> list[dict[str, Any]]:
     """What the markers show that no finding explains: a joint that is no plain hinge, or a misfit of no known form."""
+
     def entry(joint: str | None, share: float, shape: str) -> dict[str, Any]:
-        return {"where": {"finger": angles.finger.name, "joint": joint, "actuator": None, "signal": "markers"},
-                "share_of_mismatch": share, "shape": shape}
+        return {
+            "where": {"finger": angles.finger.name, "joint": joint, "actuator": None, "signal": "markers"},
+            "share_of_mismatch": share,
+            "shape": shape,
+        }
 
     if naming.believed:
         total = sum(e.gain for e in naming.found)
-        return [entry(angles.finger.segments[e.body - 1].name if e.body > 0 else None, e.gain / total, f"{NO_HINGE}: {IN_STEP}" if e.effect == NO_HINGE else
-                      f"{e.label or 'a support'} moves all the time") for e in naming.found if e.effect in UNNAMED]
+        return [
+            entry(
+                angles.finger.segments[e.body - 1].name if e.body > 0 else None,
+                e.gain / total,
+                f"{NO_HINGE}: {IN_STEP}" if e.effect == NO_HINGE else f"{e.label or 'a support'} moves all the time",
+            )
+            for e in naming.found
+            if e.effect in UNNAMED
+        ]
     if naming.p_before >= ALPHA:
         return []
     joints = [e.body - 1 for e in (*naming.found, naming.refused) if e is not None and e.effect in UNHINGED]
@@ -81,8 +92,9 @@ def unexplained(angles: FingerAngles, naming: MarkerNaming) -> list[dict[str, An
     return [entry(None, 1.0, NOT_RIGID)]
 
 
-def _finding(angles: FingerAngles, naming: MarkerNaming, name: str, body: int, label: str | None,
-             members: list[MarkerEffect]) -> Finding:
+def _finding(
+    angles: FingerAngles, naming: MarkerNaming, name: str, body: int, label: str | None, members: list[MarkerEffect]
+) -> Finding:
     blocks = naming.blocks
     joint = angles.finger.segments[body - 1].name if body > 0 else None
     main = max(members, key=lambda e: e.gain)
@@ -109,22 +121,40 @@ def _finding(angles: FingerAngles, naming: MarkerNaming, name: str, body: int, l
         parameters["travel"] = {"value": travel, "unit": "m", "ci95": interval}
         text = f"{angles.finger.name} {joint}: the centre of rotation travels by up to {1e3 * travel:.2f} mm as the angle grows."
     share = sum(e.gain for e in members) / max(sum(e.gain for e in naming.found), 1e-9)
-    where = {"finger": angles.finger.name, "joint": joint, "actuator": None, "signal": "markers", "marker": label,
-             "trials": trials, "region": None, "share_of_mismatch": share}
-    fit = {"metric": "marker_rmse", "unit": "m", **_proof(naming), "noise_floor": naming.sigma_m,
-           "held_out": [], "engine": "chain fitted to the markers, in-sample"}
+    where = {
+        "finger": angles.finger.name,
+        "joint": joint,
+        "actuator": None,
+        "signal": "markers",
+        "marker": label,
+        "trials": trials,
+        "region": None,
+        "share_of_mismatch": share,
+    }
+    fit = {
+        "metric": "marker_rmse",
+        "unit": "m",
+        **_proof(naming),
+        "noise_floor": naming.sigma_m,
+        "held_out": [],
+        "engine": "chain fitted to the markers, in-sample",
+    }
     correction = CORRECTION.get(name)
     model = None if correction else dict(UNWRITTEN)
-    return Finding(name, (name,), float(1 - np.exp(-min(main.evidence, 700))), (), where, text, parameters, fit, model, correction)
+    return Finding(
+        name, (name,), float(1 - np.exp(-min(main.evidence, 700))), (), where, text, parameters, fit, model, correction
+    )
 
 
 def displacement(members: Sequence[MarkerEffect], main: MarkerEffect) -> float:
-    """Median over the time in which `main` acts of how far [m] its effects together move the marker that they move most."""
+    """Median over the time in which `main` acts of how far [m] its effects together move the marker that they move
+    most."""
     return float(np.median(np.linalg.norm(_shift(members, main), axis=-1).max(1)))
 
 
 def turn(blocks: Blocks, members: Sequence[MarkerEffect], main: MarkerEffect) -> float:
-    """Median over the time in which `main` acts of the angle [rad] by which its effects together turn the segment's markers (Kabsch 1976)."""
+    """Median over the time in which `main` acts of the angle [rad] by which its effects together turn the segment's
+    markers (Kabsch 1976)."""
     return float(np.median(np.linalg.norm(_turned(blocks, members, main), axis=1)))
 
 
@@ -137,11 +167,15 @@ def _turned(blocks: Blocks, members: Sequence[MarkerEffect], main: MarkerEffect)
     return Rotation.from_matrix(kabsch(arm, arm + _shift(members, main)[:, mine])[0]).as_rotvec()
 
 
-def with_steps(found: Sequence[tuple[float, Finding]], angles: FingerAngles, naming: MarkerNaming,
-               stepped_deg: Mapping[str, Mapping[str, float]]) -> tuple[tuple[float, Finding], ...]:
-    """Findings with what supports turned about their joint's own axis, which markers alone cannot tell from motion, and what they share
-    with slips too small to report. stepped_deg: joint -> declared coefficients of the balance of its angle, in which "step_i" [deg]
-    belongs to the i-th of `steps`."""
+def with_steps(
+    found: Sequence[tuple[float, Finding]],
+    angles: FingerAngles,
+    naming: MarkerNaming,
+    stepped_deg: Mapping[str, Mapping[str, float]],
+) -> tuple[tuple[float, Finding], ...]:
+    """Findings with what supports turned about their joint's own axis, which markers alone cannot tell from motion, and
+    what they share with slips too small to report. stepped_deg: joint -> declared coefficients of the balance of its
+    angle, in which "step_i" [deg] belongs to the i-th of `steps`."""
     out = []
     for weight, finding in found:
         if "turn" in finding.parameters:
@@ -157,7 +191,11 @@ def with_steps(found: Sequence[tuple[float, Finding]], angles: FingerAngles, nam
 def _whole_turn(naming: MarkerNaming, body: int, stepped_deg: Mapping[str, float]) -> float:
     blocks, least = naming.blocks, _least(naming)
     main = max((e for e in naming.found if e.effect == "support_slip" and e.body == body), key=lambda e: e.gain)
-    acting = [e for e in naming.found if e.body == body and (e.effect == "support_slip" or e.effect == "marker_slip" and e.gain < least)]
+    acting = [
+        e
+        for e in naming.found
+        if e.body == body and (e.effect == "support_slip" or e.effect == "marker_slip" and e.gain < least)
+    ]
     step = sum(stepped_deg.get(f"step_{i}", 0.0) for i, e in enumerate(_stepping(naming))
                if e.body == body and blocks.record[e.begin] == blocks.record[main.begin])  # fmt: skip
     along = np.deg2rad(step) * blocks.axes[main.begin : main.end, body - 1]
@@ -171,8 +209,9 @@ def _shift(members: Sequence[MarkerEffect], main: MarkerEffect) -> Array:
 
 
 def _amount(naming: MarkerNaming, effect: MarkerEffect) -> tuple[float, list[float]]:
-    """Amplitude of a joint's second rotation [rad], or the largest travel of its centre [m], over the recorded angles, with its 95 %
-    interval: of what the fitted coefficients' covariance lets it be (parametric bootstrap, Efron & Tibshirani 1993, ch. 6)."""
+    """Amplitude of a joint's second rotation [rad], or the largest travel of its centre [m], over the recorded angles,
+    with its 95 % interval: of what the fitted coefficients' covariance lets it be (parametric bootstrap, Efron &
+    Tibshirani 1993, ch. 6)."""
     blocks, read = naming.blocks, wobble_amplitude if effect.effect == "joint_wobble" else centre_travel
 
     def amount(coefficients: Array) -> float:
@@ -187,12 +226,18 @@ def _amount(naming: MarkerNaming, effect: MarkerEffect) -> tuple[float, list[flo
 def _proof(naming: MarkerNaming) -> dict[str, Any]:
     """Error per coordinate of block means [m] before and after, from the excess of the cell means."""
     count = max(naming.blocks.weight.size * 3, 1)
-    before, after = (float(naming.sigma_m * np.sqrt(1 + e / count)) for e in (naming.excess_before, naming.excess_after))
+    before, after = (
+        float(naming.sigma_m * np.sqrt(1 + e / count)) for e in (naming.excess_before, naming.excess_after)
+    )
     return {"before": before, "after": after, "ci95_reduction": None}
 
 
 def _swaps(angles: FingerAngles) -> list[tuple[float, Finding]]:
-    whiles = {labels: found for labels in {frozenset(s.labels) for r in angles.records for s in r.swaps} if (found := _exchanged(angles, labels))}
+    whiles = {
+        labels: found
+        for labels in {frozenset(s.labels) for r in angles.records for s in r.swaps}
+        if (found := _exchanged(angles, labels))
+    }
     if not whiles:
         return []
     lasting = {labels: sum(end - begin for _, begin, end in found) for labels, found in whiles.items()}
@@ -201,22 +246,52 @@ def _swaps(angles: FingerAngles) -> list[tuple[float, Finding]]:
     joint = next((s.name for s in angles.finger.segments if labels & set(s.markers)), None)
     _, begin, end = max(whiles[labels], key=lambda w: w[2] - w[1])
     names, trials = sorted(labels), sorted({trial for trial, _, _ in whiles[labels]})
-    where = {"finger": angles.finger.name, "joint": joint, "actuator": None, "signal": "markers", "marker": names[0],
-             "markers": names, "trials": trials, "region": {"time": [begin, end], "unit": "s"}, "share_of_mismatch": 1.0}
-    parameters = {name: {"value": value, "unit": "s"} for name, value in (("begin", begin), ("end", end), ("lasting", sum(lasting.values())))}
-    fit = {"metric": "marker_rmse", "unit": "m", "before": None, "after": None, "noise_floor": angles.noise_m,
-           "ci95_reduction": None, "held_out": [], "engine": "chain fitted to the markers, in-sample"}
+    where = {
+        "finger": angles.finger.name,
+        "joint": joint,
+        "actuator": None,
+        "signal": "markers",
+        "marker": names[0],
+        "markers": names,
+        "trials": trials,
+        "region": {"time": [begin, end], "unit": "s"},
+        "share_of_mismatch": 1.0,
+    }
+    parameters = {
+        name: {"value": value, "unit": "s"}
+        for name, value in (("begin", begin), ("end", end), ("lasting", sum(lasting.values())))
+    }
+    fit = {
+        "metric": "marker_rmse",
+        "unit": "m",
+        "before": None,
+        "after": None,
+        "noise_floor": angles.noise_m,
+        "ci95_reduction": None,
+        "held_out": [],
+        "engine": "chain fitted to the markers, in-sample",
+    }
     text = "; ".join(f"{' and '.join(sorted(pair))} are exchanged {_spans(whiles[pair])}" for pair in order) + "."
     weight = _displaced(angles, names, sum(lasting.values()))
-    return [(weight, Finding("marker_swap", ("marker_swap",), 1.0, (), where, text, parameters, fit, None, CORRECTION["marker_swap"]))]
+    return [
+        (
+            weight,
+            Finding(
+                "marker_swap", ("marker_swap",), 1.0, (), where, text, parameters, fit, None, CORRECTION["marker_swap"]
+            ),
+        )
+    ]
 
 
 def _exchanged(angles: FingerAngles, labels: frozenset[str]) -> list[tuple[str, float, float]]:
-    """Recording, begin and end [s, of that recording] of each while in which `labels` are exchanged; pieces of one while, between which
-    they are hardly seen, are one. None where labels come and go all the time: that is a marker's noise that reaches its neighbour."""
+    """Recording, begin and end [s, of that recording] of each while in which `labels` are exchanged; pieces of one
+    while, between which they are hardly seen, are one. None where labels come and go all the time: that is a marker's
+    noise that reaches its neighbour."""
     out, flickers = [], 0
     for record in angles.records:
-        seen = np.isfinite(record.data.position_world[:, [record.data.labels.index(name) for name in sorted(labels)], 0]).all(1)
+        seen = np.isfinite(
+            record.data.position_world[:, [record.data.labels.index(name) for name in sorted(labels)], 0]
+        ).all(1)
         pieces = [s for s in record.swaps if frozenset(s.labels) == labels]
         lasting = [s for s in pieces if s.stop - s.start + 1 >= SWAP_FRAMES]
         flickers += len(pieces) - len(lasting)
@@ -234,8 +309,8 @@ def _spans(whiles: Sequence[tuple[str, float, float]], most: int = 3) -> str:
 
 
 def _displaced(angles: FingerAngles, labels: list[str], lasting_s: float) -> float:
-    """Weight of an exchange of labels, as a robust likelihood sees it: a wrong label is no more than an outlier, however far away the right one
-    is, and tells nothing."""
+    """Weight of an exchange of labels, as a robust likelihood sees it: a wrong label is no more than an outlier,
+    however far away the right one is, and tells nothing."""
     share = min(lasting_s / sum(float(np.ptp(r.mocap.time_s)) for r in angles.records), 1.0)
     lost = share * len(labels) / len(angles.records[0].data.labels)  # of all readings
     size = OUTLIER_LIMIT * np.sqrt(lost / 3)
@@ -243,10 +318,14 @@ def _displaced(angles: FingerAngles, labels: list[str], lasting_s: float) -> flo
 
 
 def steps(angles: FingerAngles, naming: MarkerNaming) -> list[tuple[int, float]]:
-    """(record, time [s]) of every slip: a support that turns about its joint's own axis steps the angle, which markers alone
-    cannot tell from motion; encoder and linkage balances let the angle step there."""
+    """(record, time [s]) of every slip: a support that turns about its joint's own axis steps the angle, which markers
+    alone cannot tell from motion; encoder and linkage balances let the angle step there."""
     return [(int(naming.blocks.record[e.begin]), float(naming.blocks.time_s[e.begin])) for e in _stepping(naming)]
 
 
 def _stepping(naming: MarkerNaming) -> list[MarkerEffect]:
-    return [e for e in naming.found if naming.believed and e.begin is not None and e.effect in ("support_slip", "palm_marker_slip")]
+    return [
+        e
+        for e in naming.found
+        if naming.believed and e.begin is not None and e.effect in ("support_slip", "palm_marker_slip")
+    ]

@@ -17,7 +17,8 @@ FEWEST = 100  # steps within cruises
 
 @dataclass(frozen=True)
 class Stamps:
-    """followed: share of the variation of the time steps that the motion follows (slope of travel over speed against time step;
+    """followed: share of the variation of the time steps that the motion follows (slope of travel over speed against
+    time step;
     1 where stamps are right), sd its standard deviation. wrong_s: standard deviation of a stamp's error [s]."""
 
     followed: float
@@ -33,8 +34,9 @@ class Stamps:
 def stamps(logs: Sequence[Log]) -> Stamps | None:
     """Judge the stamps of a drive's logs in its cruises; None where there are too few, or time steps do not vary.
 
-    At constant speed the travel between two rows is speed times the time between them. Where stamps are given in packets or by
-    another process, travel does not know of their steps: the slope of a regression falls (errors in variables, attenuation).
+    At constant speed the travel between two rows is speed times the time between them. Where stamps are given in
+    packets or by another process, travel does not know of their steps: the slope of a regression falls (errors in
+    variables, attenuation).
     """
     steps, travels = [], []
     for log in logs:
@@ -45,8 +47,13 @@ def stamps(logs: Sequence[Log]) -> Stamps | None:
             continue
         i = np.arange(REACH, len(t) - REACH - 1)
         speed = (x[i + REACH + 1] - x[i - REACH]) / (t[i + REACH + 1] - t[i - REACH])
-        before, after = (x[i] - x[i - REACH]) / (t[i] - t[i - REACH]), (x[i + REACH + 1] - x[i + 1]) / (t[i + REACH + 1] - t[i + 1])
-        cruise = (np.abs(speed) > CRUISE * np.quantile(np.abs(speed), 0.95)) & (np.abs(before - after) < CRUISE * np.abs(speed))
+        before, after = (
+            (x[i] - x[i - REACH]) / (t[i] - t[i - REACH]),
+            (x[i + REACH + 1] - x[i + 1]) / (t[i + REACH + 1] - t[i + 1]),
+        )
+        cruise = (np.abs(speed) > CRUISE * np.quantile(np.abs(speed), 0.95)) & (
+            np.abs(before - after) < CRUISE * np.abs(speed)
+        )
         usual = float(np.median(np.diff(t)))
         steps.append((t[i + 1] - t[i])[cruise] - usual)
         travels.append(((x[i + 1] - x[i])[cruise] / speed[cruise]) - usual)

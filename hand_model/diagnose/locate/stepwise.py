@@ -1,8 +1,9 @@
 """Stepwise selection among what may move markers (Efroymson 1960, "Multiple regression analysis").
 
-All is linear, so trials work on products of columns: those of candidates among themselves and with the readings once, those with what is
-shared or found as it comes. A step's moment is scanned by cumulative sums over cells of blocks, and settled block by block. One that was
-found early is tried anew beside what was found after it: beside a mistaken one the right ones may bring too little.
+All is linear, so trials work on products of columns: those of candidates among themselves and with the readings once,
+those with what is shared or found as it comes. A step's moment is scanned by cumulative sums over cells of blocks, and
+settled block by block. One that was found early is tried anew beside what was found after it: beside a mistaken one the
+right ones may bring too little.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ BETTER = 1.0  # log likelihood, penalised, by which another set is preferred
 
 @dataclass(frozen=True)
 class _Row:
-    """Products of projected columns (b, 3m, e), flat (3mb, e): with the readings (e,), with all steps by cell (n, e, S), with all else (e, W)."""
+    """Products of projected columns (b, 3m, e), flat (3mb, e): with the readings (e,), with all steps by cell (n, e,
+    S), with all else (e, W)."""
 
     flat: Array
     readings: Array
@@ -40,8 +42,9 @@ class _Row:
 
 @dataclass(frozen=True)
 class _Beside:
-    """What a candidate is tried beside: rows of the chain and what was found, one below the other. white: (s, s), by which products with
-    their columns become products with orthonormal ones; readings: (s,) such products with the readings. square: what they leave."""
+    """What a candidate is tried beside: rows of the chain and what was found, one below the other. white: (s, s), by
+    which products with their columns become products with orthonormal ones; readings: (s,) such products with the
+    readings. square: what they leave."""
 
     rows: tuple[_Row, ...]
     white: Array
@@ -67,13 +70,16 @@ class _Trial:
     def effect(self) -> MarkerEffect:
         """The candidate as chosen."""
         c = self.candidate
-        return MarkerEffect(c.effect, c.body, c.label, self.begin, self.end, c.columns, self.evidence, self.gain, shifts=c.shifts)
+        return MarkerEffect(
+            c.effect, c.body, c.label, self.begin, self.end, c.columns, self.evidence, self.gain, shifts=c.shifts
+        )
 
 
 class Stepwise:
     """Trials of candidates in the readings of one finger.
 
-    y: (b, 3m, 1) readings [m], poses projected out; shared: (b, 3m, s) columns of the chain, likewise; sigma: noise [m] of a reading.
+    y: (b, 3m, 1) readings [m], poses projected out; shared: (b, 3m, s) columns of the chain, likewise; sigma: noise [m]
+    of a reading.
     """
 
     def __init__(self, blocks: Blocks, candidates: Sequence[Candidate], y: Array, shared: Array, sigma: float) -> None:
@@ -114,18 +120,25 @@ class Stepwise:
         return self.y - explained.reshape(self.y.shape)
 
     def next(self, found: Sequence[MarkerEffect], known: bool = False) -> MarkerEffect:
-        """The likeliest further effect. Any motion in step with the angle is what no known form explains: where one takes most of it, it
-        is that one, seen to first order. known: only what has a form."""
+        """The likeliest further effect. Any motion in step with the angle is what no known form explains: where one
+        takes most of it, it is that one, seen to first order. known: only what has a form."""
         beside = self._beside(found)
         hinges = {e.body for e in found if e.effect in HINGE}
-        tried = self._tried(beside, [c for c in self.candidates if c.effect != NO_HINGE or not (known or c.body in hinges)])
+        tried = self._tried(
+            beside, [c for c in self.candidates if c.effect != NO_HINGE or not (known or c.body in hinges)]
+        )
         best = max(tried, key=lambda t: t.evidence)
         if best.candidate.effect == NO_HINGE:
-            named = max((t for t in tried if t.candidate.effect in HINGE and t.candidate.body == best.candidate.body), key=lambda t: t.evidence)
+            named = max(
+                (t for t in tried if t.candidate.effect in HINGE and t.candidate.body == best.candidate.body),
+                key=lambda t: t.evidence,
+            )
             best = named if named.gain > MOSTLY * best.gain else best
         if best.candidate.effect == "joint_wobble" and self._reach(best.candidate, beside) > REACH:
-            best = max((t for t in tried if t.candidate.effect == "moving_centre" and t.candidate.body == best.candidate.body),
-                       key=lambda t: t.evidence)
+            best = max(
+                (t for t in tried if t.candidate.effect == "moving_centre" and t.candidate.body == best.candidate.body),
+                key=lambda t: t.evidence,
+            )
         return best.effect()
 
     def alone(self, candidate: Candidate) -> MarkerEffect:
@@ -139,11 +152,13 @@ class Stepwise:
     def without(self, found: Sequence[MarkerEffect]) -> list[float]:
         """Gain (twice the log likelihood) that each effect brings beside all others."""
         square = self._beside(found).square
-        return [(self._beside([e for e in found if e is not effect]).square - square) / self.sigma**2 for effect in found]
+        return [
+            (self._beside([e for e in found if e is not effect]).square - square) / self.sigma**2 for effect in found
+        ]
 
     def settled(self, found: list[MarkerEffect]) -> list[MarkerEffect]:
-        """The same number of effects, each tried anew beside the others until none is better another known way; in the order of what they
-        bring."""
+        """The same number of effects, each tried anew beside the others until none is better another known way; in the
+        order of what they bring."""
         swapped = False
         for _ in range(PASSES):
             before = found
@@ -166,7 +181,9 @@ class Stepwise:
             gain = (self._beside(out).square - squares[at]) / self.sigma**2
             effect = left.pop(at)
             parameters = effect.everywhere.shape[-1] + (effect.begin is not None)
-            out.append(replace(effect, gain=gain, evidence=0.5 * gain - 0.5 * parameters * float(np.log(self.readings))))
+            out.append(
+                replace(effect, gain=gain, evidence=0.5 * gain - 0.5 * parameters * float(np.log(self.readings)))
+            )
         return out
 
     def _stacked(self, candidates: Sequence[Candidate]) -> Array:
@@ -185,7 +202,8 @@ class Stepwise:
     def _row(self, effect: MarkerEffect) -> _Row:
         key = (id(effect.everywhere), effect.begin, effect.end)
         if key not in self._rows:
-            self._rows[key] = (effect, self._row_of(project(self.blocks, effect.columns)))  # kept, so that its id stays its own
+            # kept, so that its id stays its own
+            self._rows[key] = (effect, self._row_of(project(self.blocks, effect.columns)))
         return self._rows[key][1]
 
     def _beside(self, found: Sequence[MarkerEffect]) -> _Beside:
@@ -218,16 +236,24 @@ class Stepwise:
             else:
                 pick = np.arange(c.base.shape[-1]) if c.pick is None else np.array(c.pick)
                 at = place.start + pick
-                gain = self._gain(self.own[id(c.base)][np.ix_(pick, pick)][None], crossed_whole[:, at][None], self.whole_readings[at][None], beside)
+                gain = self._gain(
+                    self.own[id(c.base)][np.ix_(pick, pick)][None],
+                    crossed_whole[:, at][None],
+                    self.whole_readings[at][None],
+                    beside,
+                )
                 out.append(self._trial(c, float(gain[0]), None, None))
         least = PROMISING * max(t.evidence for t in out)
         return [self._sharpened(t, beside) if t.begin is not None and t.evidence > least else t for t in out]
 
     def _stepped(self, c: Candidate, crossed: Array, beside: _Beside) -> _Trial:
-        """A step at the best of the cells' starts. crossed: (n, s, c) white products with what it is tried beside, from each start on."""
+        """A step at the best of the cells' starts. crossed: (n, s, c) white products with what it is tried beside, from
+        each start on."""
         sums = (lambda v: v[::-1].cumsum(0)[::-1]) if c.lasting else self._until
         place = self.place[id(c.base)]
-        gain = self._gain(sums(self.own[id(c.base)]), crossed, sums(self.step_readings[:, place]), beside, self.own[id(c.base)].sum(0))
+        gain = self._gain(
+            sums(self.own[id(c.base)]), crossed, sums(self.step_readings[:, place]), beside, self.own[id(c.base)].sum(0)
+        )
         gain[(self.starts < EDGE) | (self.starts > len(self.y) - 1 - EDGE)] = 0.0
         at = int(self.starts[int(np.argmax(gain))])
         return self._trial(c, float(gain.max()), at, len(self.y) if c.lasting else int(self.last[at]))
@@ -252,15 +278,17 @@ class Stepwise:
 
         tail = d[width:].reshape(-1, d.shape[-1])
         own = from_each(turned[:width] @ d[:width], tail.T @ tail)
-        crossed = beside.white @ from_each(np.swapaxes(rows[:width], 1, 2) @ d[:width], rows[width:].reshape(-1, rows.shape[-1]).T @ tail)
+        crossed = beside.white @ from_each(
+            np.swapaxes(rows[:width], 1, 2) @ d[:width], rows[width:].reshape(-1, rows.shape[-1]).T @ tail
+        )
         readings = from_each((turned[:width] @ self.y[first:stop])[..., 0], tail.T @ self.y[stop:end].ravel())
         gain = self._gain(own, crossed, readings, beside, self.own[id(c.base)].sum(0))
         best = int(np.argmax(gain))
         return self._trial(c, float(gain[best]), first + best, end) if gain[best] > trial.gain else trial
 
     def _gain(self, own: Array, crossed: Array, readings: Array, beside: _Beside, whole: Array | None = None) -> Array:
-        """Twice the log likelihood (n,) that columns bring. own: (n, c, c), crossed: (n, s, c), white, readings: (n, c); whole: (c, c) of the
-        columns everywhere, by which their own products are kept away from singular."""
+        """Twice the log likelihood (n,) that columns bring. own: (n, c, c), crossed: (n, s, c), white, readings: (n,
+        c); whole: (c, c) of the columns everywhere, by which their own products are kept away from singular."""
         scale = np.trace(own[0] if whole is None else whole) / own.shape[-1]
         turned = np.swapaxes(crossed, 1, 2)
         free = own - turned @ crossed + 1e-6 * scale * np.eye(own.shape[-1])
@@ -278,7 +306,8 @@ class Stepwise:
         return total[ends] - total[:-1]
 
     def _reach(self, wobble: Candidate, beside: _Beside) -> float:
-        """How far [m] from the joint the other axis of a wobble passes: what it shifts over what it turns (root mean squares)."""
+        """How far [m] from the joint the other axis of a wobble passes: what it shifts over what it turns (root mean
+        squares)."""
         shifts = np.array(wobble.shifts)
         if not shifts.any():
             return 0.0
@@ -287,10 +316,13 @@ class Stepwise:
         free = self.own[id(wobble.base)][np.ix_(wobble.pick, wobble.pick)] - crossed.T @ crossed
         own = np.linalg.lstsq(free, self.whole_readings[at] - crossed.T @ beside.readings, rcond=1e-9)[0]
         columns, carried = wobble.columns, np.flatnonzero(self.blocks.body == wobble.body)
-        moved, turned = ((columns[..., mine] @ own[mine]).reshape(len(self.y), -1, 3)[:, carried] for mine in (shifts, ~shifts))
+        moved, turned = (
+            (columns[..., mine] @ own[mine]).reshape(len(self.y), -1, 3)[:, carried] for mine in (shifts, ~shifts)
+        )
         spread = turned - turned.mean(1, keepdims=True)
         arm = self.blocks.position[:, carried] - self.blocks.position[:, carried].mean(1, keepdims=True)
-        tilt = np.sqrt(np.sum(spread**2) / max(float(np.sum(arm**2)) * 2 / 3, 1e-300))  # of arms in all directions, two thirds are across
+        # of arms in all directions, two thirds are across
+        tilt = np.sqrt(np.sum(spread**2) / max(float(np.sum(arm**2)) * 2 / 3, 1e-300))
         return float(np.sqrt(np.mean(np.sum(moved**2, axis=-1))) / max(tilt, 1e-12))
 
 

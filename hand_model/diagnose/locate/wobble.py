@@ -1,7 +1,9 @@
-"""How far a joint's second rotation swings and its centre travels, read from the displacements that were fitted to its markers.
+"""How far a joint's second rotation swings and its centre travels, read from the displacements that were fitted to its
+markers.
 
-Another axis of the hinge and other places of the markers on their segment explain part of any displacement: what they could explain is
-free, and a course over the range is read beside it: half or full waves of a tilt; of a centre an even or a growing travel, or an ellipse.
+Another axis of the hinge and other places of the markers on their segment explain part of any displacement: what they
+could explain is free, and a course over the range is read beside it: half or full waves of a tilt; of a centre an even
+or a growing travel, or an ellipse.
 """
 
 from __future__ import annotations
@@ -15,19 +17,22 @@ Array = NDArray[np.float64]
 
 
 def wobble_amplitude(blocks: Blocks, body: int, shift: Array) -> float:
-    """Amplitude [rad] of the wave over the joint's range, about one direction of the segment before it or of its own, that describes
-    the tilt best.
+    """Amplitude [rad] of the wave over the joint's range, about one direction of the segment before it or of its own,
+    that describes the tilt best.
 
     body: the segment that the joint carries; shift: (b, m, 3) displacements [m] of all markers, palm frame.
     """
     tilt, angle, u = _tilt(blocks, body, shift), blocks.angle[:, body - 1], share_of_range(blocks, body - 1)
     waves = ([np.sin(np.pi * u)], [np.sin(2 * np.pi * u), np.cos(2 * np.pi * u)])
-    _, along = min((_course(tilt, angle, forms, own) for forms in waves for own in (False, True)), key=lambda found: found[0])
+    _, along = min(
+        (_course(tilt, angle, forms, own) for forms in waves for own in (False, True)), key=lambda found: found[0]
+    )
     return float(np.linalg.svd(along)[1][0])
 
 
 def centre_travel(blocks: Blocks, body: int, shift: Array) -> float:
-    """Farthest distance [m] from where it began, over the joint's range, of the travelling centre that describes the displacement best:
+    """Farthest distance [m] from where it began, over the joint's range, of the travelling centre that describes the
+    displacement best:
     proportional to the angle, to its square, or along an ellipse. Arguments as in `wobble_amplitude`."""
     moved = _across(blocks, body, shift[:, blocks.body == body].mean(1))
     angle, u = blocks.angle[:, body - 1], share_of_range(blocks, body - 1)
@@ -39,7 +44,8 @@ def centre_travel(blocks: Blocks, body: int, shift: Array) -> float:
 
 
 def _tilt(blocks: Blocks, body: int, shift: Array) -> Array:
-    """Rotation (b, 2) [rad] of a segment across its joint's axis, about two directions that turn with the segment before it."""
+    """Rotation (b, 2) [rad] of a segment across its joint's axis, about two directions that turn with the segment
+    before it."""
     mine = blocks.body == body
     arm = blocks.position[:, mine] - blocks.position[:, mine].mean(1, keepdims=True)
     inertia = np.einsum("bmi,bmj->bij", arm, arm)
@@ -49,7 +55,8 @@ def _tilt(blocks: Blocks, body: int, shift: Array) -> Array:
 
 
 def _across(blocks: Blocks, body: int, vector: Array) -> Array:
-    """Components (b, 2) of vectors (b, 3) across a joint's axis, along two directions that turn with the segment before it."""
+    """Components (b, 2) of vectors (b, 3) across a joint's axis, along two directions that turn with the segment before
+    it."""
     axis = blocks.axes[:, body - 1]
     helper = np.eye(3)[np.argmin(np.abs(axis[0]))]
     if body > 1:
@@ -61,8 +68,8 @@ def _across(blocks: Blocks, body: int, vector: Array) -> Array:
 
 
 def _course(across: Array, angle: Array, forms: list[Array], own: bool) -> tuple[float, Array]:
-    """Sum of squares left of a course (b, 2), and the coefficients (2, forms) along two directions of `forms`, beside what is constant
-    before and behind the joint. own: the directions turn with the segment that the joint carries."""
+    """Sum of squares left of a course (b, 2), and the coefficients (2, forms) along two directions of `forms`, beside
+    what is constant before and behind the joint. own: the directions turn with the segment that the joint carries."""
     none, one = np.zeros(len(angle)), np.ones(len(angle))
     cosine, sine = np.cos(angle), np.sin(angle)
     columns = [np.r_[one, none], np.r_[none, one], np.r_[cosine, sine], np.r_[-sine, cosine]]

@@ -39,8 +39,8 @@ UNSETTLED = 1e-3  # weight left to a start or stop where steady motion alone is 
 @dataclass(frozen=True)
 class Fit:
     """declared: coefficients by name. amplitudes: one mapping per term. prediction: (n,) over all compared samples.
-    rss: weighted residual sum of squares over the training samples, what wider errors cost, and what answers to commands hold against
-    it. size: number of effect parameters."""
+    rss: weighted residual sum of squares over the training samples, what wider errors cost, and what answers to
+    commands hold against it. size: number of effect parameters."""
 
     terms: tuple[Term, ...]
     declared: Mapping[str, float]
@@ -52,25 +52,31 @@ class Fit:
     def added(self, which: int, state: DriveState) -> Array:
         """What the columns of one term add to the effort (n,) along a recording."""
         term = self.terms[which]
-        return term.effect.columns(replaced(state, bending(self.terms, term.effect)), term.shape) @ np.array(list(self.amplitudes[which].values()))
+        return term.effect.columns(replaced(state, bending(self.terms, term.effect)), term.shape) @ np.array(
+            list(self.amplitudes[which].values())
+        )
 
 
 class Balance:
     """The compared samples of several DriveStates, stacked.
 
-    effort, weight (1 / standard deviation), timing (the part of that deviation that starts and stops bring), train (bool): (n,). sigma:
-    noise of the effort; inflation: integrated autocorrelation of that noise (1 where it is white): a sum of squares counts divided by it. untouched: whether some recordings take no
-    part in learning. typical: declared coefficients of other balances of the same kind, by name.
+    effort, weight (1 / standard deviation), timing (the part of that deviation that starts and stops bring), train
+    (bool): (n,). sigma:
+    noise of the effort; inflation: integrated autocorrelation of that noise (1 where it is white): a sum of squares
+    counts divided by it. untouched: whether some recordings take no part in learning. typical: declared coefficients of
+    other balances of the same kind, by name.
     """
 
-    def __init__(self, states: tuple[DriveState, ...], everything: bool = False,
-                 typical: Mapping[str, float] | None = None) -> None:
+    def __init__(
+        self, states: tuple[DriveState, ...], everything: bool = False, typical: Mapping[str, float] | None = None
+    ) -> None:
         self.states, self.typical = states, typical or {}
         self.masks = [np.isfinite(s.effort) & np.isfinite(s.declared).all(1) for s in states]
         self._rows = [np.flatnonzero(m) for m in self.masks]
         self.effort = self.gather(lambda s: s.effort)
-        self.train = np.concatenate([np.full(m.sum(), everything or not s.validate)
-                                     for s, m in zip(states, self.masks, strict=True)])
+        self.train = np.concatenate(
+            [np.full(m.sum(), everything or not s.validate) for s, m in zip(states, self.masks, strict=True)]
+        )
         self.untouched = not self.train.all()
         self.names = states[0].declared_names or tuple(f"c{i}" for i in range(states[0].declared.shape[1]))
         self.stroke = self._strokes()
@@ -92,19 +98,23 @@ class Balance:
         return self._with(wander=wander if wander is not None and wander.real else None)
 
     def remapped(self, fit: Fit) -> Balance:
-        """The same balance with the slope of its map as it is in a fit, for what yields moves along that; of a balance without one, itself."""
+        """The same balance with the slope of its map as it is in a fit, for what yields moves along that; of a balance
+        without one, itself."""
         powers = [v for k, v in fit.declared.items() if k.startswith("power_")]
         if len(powers) < 2:
             return self
 
         def with_slope(state: DriveState) -> DriveState:
             scale = state.extra["scale"]
-            return replace(state, extra={**state.extra, "slope": Polynomial(powers).deriv()(state.position / scale) / scale})
+            return replace(
+                state, extra={**state.extra, "slope": Polynomial(powers).deriv()(state.position / scale) / scale}
+            )
 
         return self._with(states=tuple(with_slope(s) for s in self.states), _last=Memory())
 
     def required(self, fit: Fit) -> Balance:
         """The same balance with what is "required" of the drive as a fit has it, its effects included."""
+
         def asked(state: DriveState) -> DriveState:
             effort = state.declared @ np.array(list(fit.declared.values()))
             for which in range(len(fit.terms)):
@@ -118,10 +128,13 @@ class Balance:
         return self._with(weight=np.where(self.steady, self.weight, UNSETTLED * self.weight))
 
     def learning(self) -> Balance:
-        """The same balance without the samples of recordings that take no part in learning: what is only compared is found there sooner."""
+        """The same balance without the samples of recordings that take no part in learning: what is only compared is
+        found there sooner."""
         if self._learning is None:
             mine = self.train
-            kept = {name: getattr(self, name)[mine] for name in ("effort", "weight", "timing", "steady", "stroke", "train")}
+            kept = {
+                name: getattr(self, name)[mine] for name in ("effort", "weight", "timing", "steady", "stroke", "train")
+            }
             rows = [rows[:0] if state.validate else rows for state, rows in zip(self.states, self._rows, strict=True)]
             wander = None if self.wander is None else replace(self.wander, label=self.wander.label[mine])
             self._learning = self if mine.all() else self._with(**kept, _rows=rows, wander=wander, _last=Memory())
@@ -148,7 +161,13 @@ class Balance:
 
     def gather(self, value: Any) -> Array:
         """Stack `value(state)` (n, ...) over the compared samples."""
-        return np.concatenate([np.asarray(value(s)).take(rows, axis=0) for s, rows in zip(self.states, self._rows, strict=True) if len(rows)])
+        return np.concatenate(
+            [
+                np.asarray(value(s)).take(rows, axis=0)
+                for s, rows in zip(self.states, self._rows, strict=True)
+                if len(rows)
+            ]
+        )
 
     def _strokes(self) -> NDArray[np.int64]:
         out, count = [], 0
@@ -161,20 +180,25 @@ class Balance:
         return np.concatenate([label[m] for label, m in zip(out, self.masks, strict=True)])
 
     def columns(self, effect: Any, shape: Mapping[str, float], bends: tuple[Term, ...] = ()) -> Array:
-        """An effect's columns (n, j), as those of `bends` make them, unweighted. To be read only: the last ones are kept."""
+        """An effect's columns (n, j), as those of `bends` make them, unweighted. To be read only: the last ones are
+        kept."""
+
         def bent(state: DriveState) -> Array:
             return warped(state, effect.columns(self._rubbed(state, bends), shape), bends)
 
         return self._remembered((effect, key_of(shape), keys(bends)), bent)
 
     def _rubbed(self, state: DriveState, bends: tuple[Term, ...]) -> DriveState:
-        """The state with friction turned over by the bristles among `bends`, its columns kept: every candidate beside the same ones asks."""
+        """The state with friction turned over by the bristles among `bends`, its columns kept: every candidate beside
+        the same ones asks."""
         rubbing = tuple(t for t in bends if t.effect.replaces is not None)
         if not rubbing:
             return state
         key = ("rubbed", id(state), keys(rubbing))
         found = self._last.get(key)
-        return replace(state, declared=self._last.put(key, replaced(state, rubbing).declared) if found is None else found)
+        return replace(
+            state, declared=self._last.put(key, replaced(state, rubbing).declared) if found is None else found
+        )
 
     def _remembered(self, key: Any, value: Callable[[DriveState], Array]) -> Array:
         """What `gather` makes of `value`; while one term's shape is optimised the other terms' columns stay."""
@@ -188,9 +212,9 @@ class Balance:
         return self._grids[effect]
 
     def grid_columns(self, grid: Grid, weight: Array, terms: tuple[Term, ...] = ()) -> GridColumns:
-        """The columns beside `terms` of every shape of a grid, weighted by `weight` (n,) and whitened; kept under the balance's own weight,
-        for each step of a search asks again. What a term clips is left out of these, and delays and bristles are as nearly as need be: near
-        enough to choose a start by."""
+        """The columns beside `terms` of every shape of a grid, weighted by `weight` (n,) and whitened; kept under the
+        balance's own weight, for each step of a search asks again. What a term clips is left out of these, and delays
+        and bristles are as nearly as need be: near enough to choose a start by."""
         bends = tuple(t.coarse for t in bending(terms, grid.effect))
         own = self.weight * self.train
         inside = (weight != 0) | (own == 0)
@@ -206,21 +230,29 @@ class Balance:
         return out if inside.all() else out.within(inside)
 
     def _stacked(self, grid: Grid, weight: Array, bends: tuple[Term, ...]) -> GridColumns:
-        chunks = [grid.shapes[i:i + AT_ONCE] for i in range(0, len(grid.shapes), AT_ONCE)]
+        chunks = [grid.shapes[i : i + AT_ONCE] for i in range(0, len(grid.shapes), AT_ONCE)]
         return stacked(part for chunk in chunks for part in self._acting(grid.effect, chunk, weight, bends))
 
-    def _acting(self, effect: Any, shapes: Sequence[Mapping[str, float]], weight: Array, bends: tuple[Term, ...]) -> list[Array]:
-        """The columns (n, j) of each shape that are not zero, weighted and whitened; what shifts them shifts all of them at once. Not
-        remembered, for whole grids would push out what is asked for again."""
-        plain = {id(state): np.concatenate([effect.columns(self._rubbed(state, bends), shape) for shape in shapes], axis=1)
-                 for state, rows in zip(self.states, self._rows, strict=True) if len(rows)}
+    def _acting(
+        self, effect: Any, shapes: Sequence[Mapping[str, float]], weight: Array, bends: tuple[Term, ...]
+    ) -> list[Array]:
+        """The columns (n, j) of each shape that are not zero, weighted and whitened; what shifts them shifts all of
+        them at once. Not remembered, for whole grids would push out what is asked for again."""
+        plain = {
+            id(state): np.concatenate([effect.columns(self._rubbed(state, bends), shape) for shape in shapes], axis=1)
+            for state, rows in zip(self.states, self._rows, strict=True)
+            if len(rows)
+        }
         acting = np.any([columns.any(0) for columns in plain.values()], axis=0)
         together = self.gather(lambda state: warped(state, plain[id(state)][:, acting], bends)) * weight[:, None]
         return np.split(self.whiten(together, weight), np.cumsum(acting.reshape(len(shapes), -1).sum(1))[:-1], axis=1)
 
     def design(self, terms: tuple[Term, ...]) -> tuple[Array, Array, Array]:
         """Matrix (n, k + j) of declared and effect columns, lower and upper bounds (k + j,) of their coefficients."""
-        warps, changing = tuple(t for t in terms if t.effect.warps), tuple(t for t in terms if t.effect.replaces is not None)
+        warps, changing = (
+            tuple(t for t in terms if t.effect.warps),
+            tuple(t for t in terms if t.effect.replaces is not None),
+        )
 
         def declared(state: DriveState) -> Array:
             return warped(state, replaced(state, changing).declared, warps)
@@ -235,8 +267,8 @@ class Balance:
         return np.concatenate(parts, axis=1), np.array(low), np.array(high)
 
     def fit(self, terms: tuple[Term, ...] = (), held: bool = True) -> Fit:
-        """Amplitudes and declared coefficients by bounded weighted least squares on the training samples. held: also what belongs
-        to validation recordings alone, which training does not see."""
+        """Amplitudes and declared coefficients by bounded weighted least squares on the training samples. held: also
+        what belongs to validation recordings alone, which training does not see."""
         matrix, low, high = self.design(terms)
         weight = self.weights(terms)
         w = weight * self.train
@@ -263,12 +295,16 @@ class Balance:
             was, inside = inside, prediction == raw
             if np.array_equal(was, inside):
                 break
-        rss = float(np.sum(self.whiten((self.effort - prediction) * w, w) ** 2)) + self.vagueness(weight) + self.unanswered(terms)
+        rss = (
+            float(np.sum(self.whiten((self.effort - prediction) * w, w) ** 2))
+            + self.vagueness(weight)
+            + self.unanswered(terms)
+        )
         k = len(self.names)
         amplitudes, start = [], k
         for term in terms:
             names = [a[0] for a in term.effect.amplitudes()]
-            amplitudes.append(dict(zip(names, coefficients[start:start + len(names)].tolist(), strict=True)))
+            amplitudes.append(dict(zip(names, coefficients[start : start + len(names)].tolist(), strict=True)))
             start += len(names)
         size = sum(len([k for k in t.shape if k not in DISCRETE]) + len(t.effect.amplitudes()) for t in terms)
         declared = dict(zip(self.names, coefficients[:k].tolist(), strict=True))
@@ -286,8 +322,8 @@ class Balance:
         return prediction
 
     def apart(self, terms: tuple[Term, ...]) -> Projection:
-        """The design of `terms` taken out of the effort, samples that they clip left out. The last one is kept, for every candidate
-        beside the same terms asks for it."""
+        """The design of `terms` taken out of the effort, samples that they clip left out. The last one is kept, for
+        every candidate beside the same terms asks for it."""
         if self._apart is None or self._apart[0] != terms:
             self._apart = terms, self._taken_out(terms, self.unclipped(terms))
         return self._apart[1]
@@ -297,9 +333,13 @@ class Balance:
         matrix, low, high = self.design(terms)
         return Projection.of(self.whiten(matrix * w[:, None], w), self.whiten(self.effort * w, w), w, low, high)
 
-    def error_beside(self, terms: tuple[Term, ...], effect: Any, near: Fit | None = None) -> Callable[[Mapping[str, float]], float]:
-        """The sum of squares (as `Fit.rss`) of `terms` and one more effect, as a function of that effect's shape. near: beside terms that clip,
-        of the samples that this fit leaves unclipped; as long as these stay so, what the others add is the same."""
+    def error_beside(
+        self, terms: tuple[Term, ...], effect: Any, near: Fit | None = None
+    ) -> Callable[[Mapping[str, float]], float]:
+        """The sum of squares (as `Fit.rss`) of `terms` and one more effect, as a function of that effect's shape. near:
+        beside terms that clip, of the samples that this fit leaves unclipped; as long as these stay so, what the others
+        add is the same."""
+
         def fitted(shape: Mapping[str, float]) -> float:
             return self.fit((*terms, Term(effect, shape)), held=False).rss
 
@@ -321,8 +361,8 @@ class Balance:
         return projected
 
     def weights(self, terms: tuple[Term, ...]) -> Array:
-        """1 / standard deviation (n,) beside `terms`: what is not known of rest, starts and stops stays, and is delayed with all else
-        (where answers to commands tell how late the current is, that is in the weight)."""
+        """1 / standard deviation (n,) beside `terms`: what is not known of rest, starts and stops stays, and is delayed
+        with all else (where answers to commands tell how late the current is, that is in the weight)."""
         delays = [t for t in terms if t.effect.warps]
         if not delays or "late" in self.states[0].extra:
             return self.weight
@@ -337,12 +377,17 @@ class Balance:
         return 1 / np.hypot(own, self.gather(doubt))
 
     def vagueness(self, weight: Array) -> float:
-        """What wider errors cost, on the scale of a sum of squares: a density that says less is lower where it is right."""
-        return 0.0 if weight is self.weight else 2 * self.inflation * float(np.sum(np.log(self.weight / weight)[self.train]))
+        """What wider errors cost, on the scale of a sum of squares: a density that says less is lower where it is
+        right."""
+        return (
+            0.0
+            if weight is self.weight
+            else 2 * self.inflation * float(np.sum(np.log(self.weight / weight)[self.train]))
+        )
 
     def unanswered(self, terms: tuple[Term, ...]) -> float:
-        """What the answers to commands hold against `terms`, on the scale of a sum of squares: "late" in `extra`, by how much [s] the
-        current's answers come late and how far that may be wrong, is one more observation."""
+        """What the answers to commands hold against `terms`, on the scale of a sum of squares: "late" in `extra`, by
+        how much [s] the current's answers come late and how far that may be wrong, is one more observation."""
         late = self.states[0].extra.get("late")
         if late is None:
             return 0.0
@@ -356,17 +401,27 @@ class Balance:
 
     def unclipped(self, terms: tuple[Term, ...]) -> NDArray[np.bool_]:
         """Samples (n,) whose prediction no term clips: there the balance is linear."""
-        return self.unclipped_by(self.fit(terms)) if any(t.effect.clips for t in terms) else np.ones(len(self.effort), bool)
+        return (
+            self.unclipped_by(self.fit(terms))
+            if any(t.effect.clips for t in terms)
+            else np.ones(len(self.effort), bool)
+        )
 
     def unclipped_by(self, fit: Fit) -> NDArray[np.bool_]:
         """The same (n,) of a fit, some of whose terms clip."""
         free = fit.prediction
-        levels = [t.effect.clip(np.full(len(free), sign * np.inf), t.shape) for t in fit.terms if t.effect.clips for sign in (1, -1)]
+        levels = [
+            t.effect.clip(np.full(len(free), sign * np.inf), t.shape)
+            for t in fit.terms
+            if t.effect.clips
+            for sign in (1, -1)
+        ]
         return ~np.any([np.isclose(free, level) for level in levels], axis=0)
 
     def _own_nuisances(self, matrix: Array, coefficients: Array, w: Array, low: Array) -> Array:
-        """Coefficients of columns that act in validation recordings only (their own clock offset, a step in them, an obstacle
-        that is still there) from those recordings: they belong to the recording, not to the model, which stays as trained."""
+        """Coefficients of columns that act in validation recordings only (their own clock offset, a step in them, an
+        obstacle that is still there) from those recordings: they belong to the recording, not to the model, which stays
+        as trained."""
         columns = np.flatnonzero(coefficients == 0)  # least squares leaves a column alone that never acts
         columns = columns[np.any(matrix[:, columns] != 0, axis=0) & ~np.any(matrix[:, columns][w > 0] != 0, axis=0)]
         if not len(columns):

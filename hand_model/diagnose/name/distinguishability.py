@@ -1,8 +1,8 @@
 """Distinguishability: which effects these recordings can tell apart, from the recordings alone.
 
-Of each effect what it would add is taken at every starting shape, beside what the declared columns explain. What of it the
-likeliest shape of another effect cannot mimic is the part of a log likelihood ratio that an effect of a given size leaves (the
-expected discrimination of Box & Hill 1967, for rivals that are linear in their amplitudes).
+Of each effect what it would add is taken at every starting shape, beside what the declared columns explain. What of it
+the likeliest shape of another effect cannot mimic is the part of a log likelihood ratio that an effect of a given size
+leaves (the expected discrimination of Box & Hill 1967, for rivals that are linear in their amplitudes).
 """
 
 from __future__ import annotations
@@ -26,9 +26,11 @@ MOST_ROWS, MOST_SHAPES = 2500, 24  # of the balance, and of an effect's grid, th
 
 
 def distinguishability(balance: Balance, effects: Iterable[Any]) -> dict[tuple[str, str], float]:
-    """Pair of effects -> expected log likelihood ratio between them, the lower of the two ways round, where one of them adds SIZE.
+    """Pair of effects -> expected log likelihood ratio between them, the lower of the two ways round, where one of them
+    adds SIZE.
 
-    Effects that belong to one recording (events) and those that nothing here shows beside the declared columns are left out.
+    Effects that belong to one recording (events) and those that nothing here shows beside the declared columns are left
+    out.
     """
     declared = balance.apart(())
     basis, weight = declared.basis, declared.weight
@@ -47,13 +49,15 @@ def distinguishability(balance: Balance, effects: Iterable[Any]) -> dict[tuple[s
             spans[effect.name] = parts
     count = balance.train.sum() * SIZE**2 / (2 * balance.inflation)
     products = _products(spans)
-    return {(a, b): float(count * min(1 - _mimicked(products[a, b]), 1 - _mimicked(_turned(products[a, b]))))
-            for a, b in combinations(spans, 2)}
+    return {
+        (a, b): float(count * min(1 - _mimicked(products[a, b]), 1 - _mimicked(_turned(products[a, b]))))
+        for a, b in combinations(spans, 2)
+    }
 
 
 def protocol_pairs(balance: Balance, effects: Sequence[Any]) -> tuple[list[list[Any]], list[list[str]]]:
-    """Of the findings' protocol: each effect with the nearest of those that can be told from it (two names and the log likelihood
-    ratio), and the pairs that cannot be told apart."""
+    """Of the findings' protocol: each effect with the nearest of those that can be told from it (two names and the log
+    likelihood ratio), and the pairs that cannot be told apart."""
     pairs = distinguishability(balance, effects)
     told: dict[str, list[Any]] = {}
     for (a, b), value in sorted(pairs.items(), key=lambda item: item[1]):
@@ -65,7 +69,8 @@ def protocol_pairs(balance: Balance, effects: Sequence[Any]) -> tuple[list[list[
 
 
 def _span(balance: Balance, effect: Any, shape: dict[str, float], fit: Fit, basis: Array, weight: Array) -> Array:
-    """What an effect may add (n, j), weighted, whitened and beside the declared columns; no columns where that is nothing."""
+    """What an effect may add (n, j), weighted, whitened and beside the declared columns; no columns where that is
+    nothing."""
     added = _added(balance, Term(effect, shape), fit) * weight[:, None]
     added = balance.whiten(added, weight)
     length = np.linalg.norm(added, axis=0)
@@ -74,7 +79,8 @@ def _span(balance: Balance, effect: Any, shape: dict[str, float], fit: Fit, basi
 
 
 def _added(balance: Balance, term: Term, fit: Fit) -> Array:
-    """Columns (n, j) of an effect; of one that changes the declared columns, shifts or clips, the change of the declared prediction."""
+    """Columns (n, j) of an effect; of one that changes the declared columns, shifts or clips, the change of the
+    declared prediction."""
     effect, shape = term.effect, term.shape
     if effect.clips:
         return (effect.clip(fit.prediction, shape) - fit.prediction)[:, None]

@@ -1,8 +1,9 @@
 """Log evidence of one more term in a balance: what it gains, less what its freedom could gain by chance.
 
-Amplitudes, and shapes that are sizes, carry a prior as wide as the data find likely (empirical Bayes; George & Foster 2000);
-other shapes are uniform within the bounds that the effect declares (Laplace's method; Kass & Raftery 1995). Sums of squares
-count divided by the correlation time of the noise.
+Amplitudes, and shapes that are sizes, carry a prior as wide as the data find likely (empirical Bayes; George & Foster
+2000);
+other shapes are uniform within the bounds that the effect declares (Laplace's method; Kass & Raftery 1995). Sums of
+squares count divided by the correlation time of the noise.
 """
 
 from __future__ import annotations
@@ -37,13 +38,15 @@ def rough_evidence(balance: Balance, fit: Fit, reference: Fit, scale: float = 1.
 def evidence(balance: Balance, fit: Fit, reference: Fit, which: int = -1, scale: float = 1.0) -> float:
     """Log evidence of the term `which` of a polished fit over `reference`, the fit without it.
 
-    scale: residual variance over pure error of the best model known, at least 1. With `balance.typical` (what the hand's
-    other motors are like) a model pays for coefficients unlike theirs.
+    scale: residual variance over pure error of the best model known, at least 1. With `balance.typical` (what the
+    hand's other motors are like) a model pays for coefficients unlike theirs.
     """
     brought = gain(balance, fit, reference, scale)
     term = fit.terms[which]
     shapes = [shape for shape in term.effect.shapes(balance.states) if shape.name in term.shape]
-    count = int(np.any(balance.columns(term.effect, term.shape)[balance.train] != 0, axis=0).sum()) + sum(s.size for s in shapes)
+    count = int(np.any(balance.columns(term.effect, term.shape)[balance.train] != 0, axis=0).sum()) + sum(
+        s.size for s in shapes
+    )
     if count and brought > 0:
         brought -= 0.5 * count * (1 + np.log(max(2 * brought / count, 1.0)))
     volume = sum(_occam(balance, fit, which, shape, scale) for shape in shapes if not shape.size)
@@ -51,10 +54,12 @@ def evidence(balance: Balance, fit: Fit, reference: Fit, which: int = -1, scale:
 
 
 def oddity(balance: Balance, fit: Fit) -> float:
-    """Log density lost by declared coefficients unlike those of the hand's other motors (Laplace on their logarithms), and by
-    effects' parameters that machines rarely have."""
-    lost = -sum(t.effect.log_prior(t.effect.parameters(t.shape, a, fit.declared))
-                for t, a in zip(fit.terms, fit.amplitudes, strict=True))
+    """Log density lost by declared coefficients unlike those of the hand's other motors (Laplace on their logarithms),
+    and by effects' parameters that machines rarely have."""
+    lost = -sum(
+        t.effect.log_prior(t.effect.parameters(t.shape, a, fit.declared))
+        for t, a in zip(fit.terms, fit.amplitudes, strict=True)
+    )
     for name, typical in balance.typical.items():
         value = max(fit.declared.get(name, typical), 1e-2 * typical)
         lost += abs(float(np.log(value / typical))) / SPREAD

@@ -24,7 +24,8 @@ class Grid:
 
 @dataclass(frozen=True)
 class GridColumns:
-    """matrix: (n, c), dense or sparse, of the columns that act at all. shape: (c,) to which shape of the grid each belongs.
+    """matrix: (n, c), dense or sparse, of the columns that act at all. shape: (c,) to which shape of the grid each
+    belongs.
     length: (c,) Euclidean norms."""
 
     matrix: Any
@@ -48,7 +49,9 @@ class GridColumns:
         if isinstance(self.matrix, np.ndarray):
             matrix = self.matrix * inside[:, None]
             return GridColumns(matrix, self.shape, np.linalg.norm(matrix, axis=0))
-        matrix = csc_matrix((self.matrix.data * inside[self.matrix.indices], self.matrix.indices, self.matrix.indptr), self.matrix.shape)
+        matrix = csc_matrix(
+            (self.matrix.data * inside[self.matrix.indices], self.matrix.indices, self.matrix.indptr), self.matrix.shape
+        )
         return GridColumns(matrix, self.shape, norm(matrix, axis=0))
 
     def gram(self, which: NDArray[np.int64]) -> Array:

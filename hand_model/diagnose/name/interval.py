@@ -24,7 +24,8 @@ MISFIT_LIMIT = 1.5  # residual variance over pure error above which no interval 
 
 @dataclass(frozen=True)
 class Reading:
-    """The balance from which sizes are read, and its fits without and with the named effects (terms as in the naming)."""
+    """The balance from which sizes are read, and its fits without and with the named effects (terms as in the
+    naming)."""
 
     balance: Balance
     declared: Fit
@@ -34,8 +35,8 @@ class Reading:
 def parameter_intervals(reading: Reading, which: int) -> dict[str, dict[str, Any]]:
     """Parameters of the fit's term `which` with 95 % intervals (Gauss-Newton, delta method), by name.
 
-    What another form would say of them counts by how likely it is (Hoeting et al. 1999, "Bayesian model averaging", eq. 4). Where the model
-    does not fit (residual variance more than 1.5 times the pure error) the interval is left out.
+    What another form would say of them counts by how likely it is (Hoeting et al. 1999, "Bayesian model averaging", eq.
+    4). Where the model does not fit (residual variance more than 1.5 times the pure error) the interval is left out.
     """
     balance, fit = reading.balance, reading.fit
     scale = max(fit.rss / max(balance.train.sum(), 1), 1.0)
@@ -44,8 +45,12 @@ def parameter_intervals(reading: Reading, which: int) -> dict[str, dict[str, Any
     if scale >= MISFIT_LIMIT:
         return out
     variance = _variances(balance, fit, which, scale)
-    said = [(p, *_figures(balance, f, which), _variances(balance, f, which, scale)) for p, f in _forms(balance, fit, which, scale)]
-    for name in (k for k in out if k not in DISCRETE and np.sqrt(variance[k]) > EXACT * abs(values[k])):  # what is chosen has none
+    said = [
+        (p, *_figures(balance, f, which), _variances(balance, f, which, scale))
+        for p, f in _forms(balance, fit, which, scale)
+    ]
+    # what is chosen has none
+    for name in (k for k in out if k not in DISCRETE and np.sqrt(variance[k]) > EXACT * abs(values[k])):
         parts = [(p, v[name], s2[name]) for p, v, unit, s2 in said if name in v and unit.get(name) == units.get(name)]
         # a form that hardly tells the parameter at all says nothing of it
         parts = [(p, v, s2) for p, v, s2 in parts if np.isfinite(v + s2) and s2 <= max(v**2, variance[name])]
@@ -73,7 +78,8 @@ def _figures(balance: Balance, fit: Fit, which: int) -> tuple[dict[str, float], 
 
 
 def _variances(balance: Balance, fit: Fit, which: int, scale: float) -> dict[str, float]:
-    """Variance of each parameter of a term: the covariance of all that is fitted, through the gradient of the parameter."""
+    """Variance of each parameter of a term: the covariance of all that is fitted, through the gradient of the
+    parameter."""
     theta, build = _vector(fit)
     covariance = _covariance(balance, fit, theta, build) * scale * balance.inflation
     term = fit.terms[which]
@@ -82,8 +88,10 @@ def _variances(balance: Balance, fit: Fit, which: int, scale: float) -> dict[str
         step = 1e-4 * (abs(theta[i]) + 1e-6)
         up, down = theta.copy(), theta.copy()
         up[i], down[i] = theta[i] + step, theta[i] - step
-        above, below = (_all(balance, term, shape[which], amplitude[which], declared)
-                        for shape, amplitude, declared in (build(up), build(down)))
+        above, below = (
+            _all(balance, term, shape[which], amplitude[which], declared)
+            for shape, amplitude, declared in (build(up), build(down))
+        )
         columns.append({k: (above[k] - below[k]) / (2 * step) for k in above})
     gradients = {k: np.array([c[k] for c in columns]) for k in columns[0]}
     return {k: max(float(g @ covariance @ g), 0.0) for k, g in gradients.items()}
@@ -96,16 +104,16 @@ def _forms(balance: Balance, fit: Fit, which: int, scale: float) -> list[tuple[f
     out = []
     for form in (f for f in forms if f != term.shape.get("form")):
         other = Term(term.effect, {**term.shape, "form": form})
-        out.append(polish(balance, balance.fit((*fit.terms[:which], other, *fit.terms[which + 1:])), which))
+        out.append(polish(balance, balance.fit((*fit.terms[:which], other, *fit.terms[which + 1 :])), which))
     ahead = np.array([gain(balance, f, fit, scale) + oddity(balance, fit) - oddity(balance, f) for f in out])
     chance = np.exp(np.minimum(ahead, 0.0))
     return list(zip((chance / (1 + chance.sum())).tolist(), out, strict=True))
 
 
 def undisturbed(naming: Naming) -> Reading:
-    """Where sizes are read: from steady samples alone, for starts and stops are smeared and bend what happens at low speed; as
-    named where an effect acts at starts, and where too few samples are steady; of lost motion without levels by chance. Among the forms of each effect, the one that
-    steady motion likes best."""
+    """Where sizes are read: from steady samples alone, for starts and stops are smeared and bend what happens at low
+    speed; as named where an effect acts at starts, and where too few samples are steady; of lost motion without levels
+    by chance. Among the forms of each effect, the one that steady motion likes best."""
     balance, fit = naming.balance, naming.fit
     count = (balance.train & balance.steady).sum()
     lively = any(t.effect.warps or t.effect.replaces for t in fit.terms)
@@ -123,17 +131,24 @@ def undisturbed(naming: Naming) -> Reading:
         for form in forms:
             if form != term.shape["form"]:
                 other = Term(term.effect, {**best.terms[which].shape, "form": form})
-                fits.append(refit(calm, calm.fit((*best.terms[:which], other, *best.terms[which + 1:]))))
+                fits.append(refit(calm, calm.fit((*best.terms[:which], other, *best.terms[which + 1 :]))))
         best = likeliest(calm, fits, which, lambda found: 0.5 * found.rss / calm.inflation + oddity(calm, found))
     held = balance.steady & ~balance.train
-    errors = [float(np.mean((balance.effort - f.prediction)[held] ** 2)) for f in (fit, best)] if held.any() else [1.0, 1.0]
+    errors = (
+        [float(np.mean((balance.effort - f.prediction)[held] ** 2)) for f in (fit, best)] if held.any() else [1.0, 1.0]
+    )
     if errors[1] > REFUTED * errors[0]:  # slow moves that the training recordings did not have
         return Reading(balance, naming.declared, fit)
     return Reading(calm, calm.fit(), best)
 
 
-def _all(balance: Balance, term: Term, shape: Mapping[str, float], amplitude: Mapping[str, float],
-         declared: Mapping[str, float]) -> dict[str, float]:
+def _all(
+    balance: Balance,
+    term: Term,
+    shape: Mapping[str, float],
+    amplitude: Mapping[str, float],
+    declared: Mapping[str, float],
+) -> dict[str, float]:
     values = term.effect.parameters(shape, amplitude, declared)
     return {k: float(v) for k, v in {**values, **term.effect.derived(balance.states, values)}.items()}
 
@@ -142,7 +157,9 @@ def _units(term: Term, balance: Balance) -> dict[str, str]:
     state = balance.states[0]
     derived = {name: unit for name, unit, _, _ in term.effect.amplitudes()} | dict(term.effect.units(term.shape))
     return {s.name: s.unit for s in term.effect.shapes(balance.states)} | {
-        name: unit.replace("effort", state.effort_unit).replace("position", state.position_unit) for name, unit in derived.items()}
+        name: unit.replace("effort", state.effort_unit).replace("position", state.position_unit)
+        for name, unit in derived.items()
+    }
 
 
 def _vector(fit: Fit) -> tuple[Array, Any]:
@@ -195,11 +212,12 @@ def _covariance(balance: Balance, fit: Fit, theta: Array, build: Any) -> Array:
 
 
 def held_out(reading: Reading, which: int, seed: int = 0) -> dict[str, Any]:
-    """Root-mean-square error on recordings that took no part, without and with the term `which` and others of the same effect (one finding
-    may have several), the noise floor, and a bootstrap interval over strokes of the reduction.
+    """Root-mean-square error on recordings that took no part, without and with the term `which` and others of the same
+    effect (one finding may have several), the noise floor, and a bootstrap interval over strokes of the reduction.
 
-    Steady samples; all sliding ones for a delay or a give, which act at starts and stops, where the floor is what timing grants. `held_out` is empty where there
-    are no validation recordings, where the naming had to look at them, and for an event: figures are then in-sample.
+    Steady samples; all sliding ones for a delay or a give, which act at starts and stops, where the floor is what
+    timing grants. `held_out` is empty where there are no validation recordings, where the naming had to look at them,
+    and for an event: figures are then in-sample.
     """
     balance, fit = reading.balance, reading.fit
     effect = fit.terms[which].effect
@@ -227,9 +245,9 @@ def held_out(reading: Reading, which: int, seed: int = 0) -> dict[str, Any]:
 
 
 def brought_held_out(naming: Naming, which: int) -> float | None:
-    """Log likelihood that the term `which`, as fitted to the training recordings, brings to those that took no part, not more than it
-    would without claiming to know less: what they add to its log evidence. None where nothing can be asked: no untouched recording, or
-    an event that belongs to one recording only."""
+    """Log likelihood that the term `which`, as fitted to the training recordings, brings to those that took no part,
+    not more than it would without claiming to know less: what they add to its log evidence. None where nothing can be
+    asked: no untouched recording, or an event that belongs to one recording only."""
     balance, fit = naming.balance, naming.fit
     held = ~balance.train & balance.telling(fit.terms[which].effect)
     if "trial" in fit.terms[which].shape or not held.any():
@@ -237,16 +255,19 @@ def brought_held_out(naming: Naming, which: int) -> float | None:
     without = balance.fit(tuple(t for i, t in enumerate(fit.terms) if i != which))
     brought = []
     for weights in ([balance.weights(f.terms) for f in (without, fit)], [balance.weight] * 2):
-        before, after = (balance.inflation * float(np.sum(np.log(w[held])))
-                         - 0.5 * float(np.sum(balance.whiten((balance.effort - f.prediction) * w * held, w * held) ** 2))
-                         for f, w in zip((without, fit), weights, strict=True))
+        before, after = (
+            balance.inflation * float(np.sum(np.log(w[held])))
+            - 0.5 * float(np.sum(balance.whiten((balance.effort - f.prediction) * w * held, w * held) ** 2))
+            for f, w in zip((without, fit), weights, strict=True)
+        )
         brought.append((after - before) / balance.inflation)
     return min(brought)
 
 
 def sized(reading: Reading, which: int) -> bool:
-    """Whether the size of the term `which` is told from zero where sizes are read: a likelihood ratio of all its amplitudes
-    together (Wilks 1938), for some go together; True of a term without any, and where the model does not fit."""
+    """Whether the size of the term `which` is told from zero where sizes are read: a likelihood ratio of all its
+    amplitudes together (Wilks 1938), for some go together; True of a term without any, and where the model does not
+    fit."""
     balance, fit = reading.balance, reading.fit
     count = len(fit.amplitudes[which])
     scale = max(fit.rss / max(balance.train.sum(), 1), 1.0)

@@ -17,9 +17,9 @@ Array = NDArray[np.float64]
 class LackOfFit:
     """p: probability of a residual as structured as this if nothing is missing (Bonferroni over the groupings).
     ratio: variance of cell means over what pure error explains, of the most telling grouping. telling: its name.
-    limit: the ratio that pure error stays below with probability 1 - alpha. excess: weighted sum of squares of cell means
-    beyond what pure error explains, of the grouping that holds most: the explainable mismatch. unrest: variance from one stroke
-    to its replicate, over the noise's."""
+    limit: the ratio that pure error stays below with probability 1 - alpha. excess: weighted sum of squares of cell
+    means beyond what pure error explains, of the grouping that holds most: the explainable mismatch. unrest: variance
+    from one stroke to its replicate, over the noise's."""
 
     p: float
     ratio: float
@@ -59,7 +59,8 @@ def _bins(values: Array, count: int) -> NDArray[np.int64]:
 
 
 def stroke_variance(balance: Balance, z: Array) -> float:
-    """Variance from one stroke to its next replicate (same direction and speed) beyond the samples' noise, in its units:
+    """Variance from one stroke to its next replicate (same direction and speed) beyond the samples' noise, in its
+    units:
     machines do not repeat themselves exactly. Successive differences, so that a slow drift does not count."""
     use = balance.steady
     velocity = balance.gather(lambda s: s.velocity)[use]
@@ -75,13 +76,17 @@ def stroke_variance(balance: Balance, z: Array) -> float:
     return max(float(np.mean(squares)), 0.0) if len(squares) >= 8 else 0.0
 
 
-def lack_of_fit(balance: Balance, prediction: Array, parameters: int, alpha: float, calmest: float = np.inf) -> LackOfFit:
-    """Tests of cell means of the residual (steady samples) against how they vary from stroke to stroke, several groupings.
+def lack_of_fit(
+    balance: Balance, prediction: Array, parameters: int, alpha: float, calmest: float = np.inf
+) -> LackOfFit:
+    """Tests of cell means of the residual (steady samples) against how they vary from stroke to stroke, several
+    groupings.
 
     parameters: number of fitted coefficients, taken off the degrees of freedom of the grouping by strokes. alpha:
-    false-alarm probability that `limit` stands for. calmest: the least unrest known of other models of these recordings, by which the
-    excess is measured: what they explain is no pure error. The null is that of a wild bootstrap with strokes as blocks
-    (Liu 1988), in closed form: it holds for noise that is coloured, differs over pose or speed, or comes in bursts.
+    false-alarm probability that `limit` stands for. calmest: the least unrest known of other models of these
+    recordings, by which the excess is measured: what they explain is no pure error. The null is that of a wild
+    bootstrap with strokes as blocks (Liu 1988), in closed form: it holds for noise that is coloured, differs over pose
+    or speed, or comes in bursts.
     """
     from scipy.stats import f
 
@@ -120,8 +125,8 @@ def _sums(cell: NDArray[np.int64], stroke: NDArray[np.int64], z: Array) -> tuple
 def _against_strokes(sums: Array, count: Array, variance: Array) -> tuple[float, float, float]:
     """Sum of squared cell means over its expectation if only the strokes differ, and its two degrees of freedom.
 
-    sums, count: (cells, strokes); variance: (cells,) scales of the cells. With strokes multiplied by random signs the sum is
-    a quadratic form, whose first two moments give the scale and the degrees of freedom (Satterthwaite 1946).
+    sums, count: (cells, strokes); variance: (cells,) scales of the cells. With strokes multiplied by random signs the
+    sum is a quadratic form, whose first two moments give the scale and the degrees of freedom (Satterthwaite 1946).
     """
     replicates = (count > 0).sum(1)
     keep = replicates >= 3
@@ -136,4 +141,8 @@ def _against_strokes(sums: Array, count: Array, variance: Array) -> tuple[float,
     form = root @ root.T
     expected = float(np.trace(form))
     freedom = expected**2 / max(float(np.sum(form**2)), 1e-300)
-    return float(np.sum(sums.sum(1) ** 2 / variance)) / max(expected, 1e-300), freedom, max(float((count > 0).any(0).sum()) - 1, 1.0)
+    return (
+        float(np.sum(sums.sum(1) ** 2 / variance)) / max(expected, 1e-300),
+        freedom,
+        max(float((count > 0).any(0).sum()) - 1, 1.0),
+    )

@@ -1,4 +1,5 @@
-"""What a balance says: the effects that were named there, each with its rivals, beside the declared model and the final one."""
+"""What a balance says: the effects that were named there, each with its rivals, beside the declared model and the final
+one."""
 
 from __future__ import annotations
 
@@ -27,8 +28,8 @@ class Rival:
 @dataclass(frozen=True)
 class Named:
     """One finding of a balance. rivals: every candidate that was tried in its place (best first), the winner included.
-    share: of the explainable residual variance. size: of what it adds beyond what declared coefficients could, over the noise of
-    one reading (root mean squares). probability: against all rivals and none."""
+    share: of the explainable residual variance. size: of what it adds beyond what declared coefficients could, over the
+    noise of one reading (root mean squares). probability: against all rivals and none."""
 
     term: Term
     amplitudes: dict[str, float]
@@ -51,8 +52,8 @@ class Named:
 
 @dataclass(frozen=True)
 class Naming:
-    """What a balance says. wander: what does not repeat beside the fit. before, after: lack of fit of the declared model and of the final one. rejected: tried and
-    not kept, with the log evidence that it brought."""
+    """What a balance says. wander: what does not repeat beside the fit. before, after: lack of fit of the declared
+    model and of the final one. rejected: tried and not kept, with the log evidence that it brought."""
 
     balance: Balance
     declared: Fit
@@ -75,5 +76,6 @@ class Naming:
 
 
 def overwhelmed(count: int, before: LackOfFit, after: LackOfFit) -> bool:
-    """Whether as many effects as may be named leave a plain mismatch unexplained: whatever else is tried, nothing known is missing."""
+    """Whether as many effects as may be named leave a plain mismatch unexplained: whatever else is tried, nothing known
+    is missing."""
     return count >= MOST_TERMS and after.p < ALPHA and after.excess > (1 - EXPLAINED_LEAST) * before.excess

@@ -21,8 +21,8 @@ LONGEST = 15  # samples over which noise may be correlated; what lasts longer is
 def noise(balance: Balance) -> tuple[float, float]:
     """Standard deviation of the effort's noise and its integrated autocorrelation time in samples.
 
-    Pure error of replicates: the declared fit's residual minus its mean over all strokes with the same direction, speed and
-    place. White noise: differences of neighbouring samples (von Neumann 1941) are sharper and are taken instead.
+    Pure error of replicates: the declared fit's residual minus its mean over all strokes with the same direction, speed
+    and place. White noise: differences of neighbouring samples (von Neumann 1941) are sharper and are taken instead.
     """
     steady = balance.gather(lambda s: s.extra.get("steady", np.ones(len(s.time_s)))) > 0
     r = balance.effort - _plain_fit(balance, steady)
@@ -35,7 +35,11 @@ def noise(balance: Balance) -> tuple[float, float]:
         return max(neighbours, 1e-9), 1.0
     lags = []
     for k in range(LONGEST + 1):
-        pair = (balance.stroke[k:] == balance.stroke[: len(r) - k]) & np.isfinite(deviation[k:]) & np.isfinite(deviation[: len(r) - k])
+        pair = (
+            (balance.stroke[k:] == balance.stroke[: len(r) - k])
+            & np.isfinite(deviation[k:])
+            & np.isfinite(deviation[: len(r) - k])
+        )
         lags.append(float(np.mean((deviation[k:] * deviation[: len(r) - k])[pair])) if pair.sum() > 20 else 0.0)
     # What still correlates after LONGEST samples is a misfit that does not repeat (an event), no noise.
     covariance = np.array(lags) - max(float(np.mean(lags[-5:])), 0.0)

@@ -1,6 +1,7 @@
 """A design taken out of a balance, once for many candidates: what is left of theirs tells all of a joint fit.
 
-Regression on two sets of columns is regression of the residual of the one on the residual of the other (Frisch & Waugh 1933, Lovell 1963).
+Regression on two sets of columns is regression of the residual of the one on the residual of the other (Frisch & Waugh
+1933, Lovell 1963).
 """
 
 from __future__ import annotations
@@ -21,8 +22,9 @@ DEPENDENT = 1e-7  # of a column's length: less left beside the others, and no co
 class Projection:
     """Weighted, whitened and divided into what the design explains and the rest.
 
-    basis: (n, k) orthonormal columns that span the design. left: (n,) of the effort beside it. weight: (n,) of the samples. triangle: (k, k),
-    explained: (k,) such that the coefficients of the design's k acting columns alone solve triangle @ x = explained. low, high: (k,) their bounds.
+    basis: (n, k) orthonormal columns that span the design. left: (n,) of the effort beside it. weight: (n,) of the
+    samples. triangle: (k, k), explained: (k,) such that the coefficients of the design's k acting columns alone solve
+    triangle @ x = explained. low, high: (k,) their bounds.
     """
 
     basis: Array
@@ -48,8 +50,8 @@ class Projection:
         return bool(np.all(np.abs(np.diag(self.triangle)) > DEPENDENT * np.linalg.norm(self.triangle, axis=0)))
 
     def rss(self, columns: Array, low: Array, high: Array) -> float | None:
-        """Residual sum of squares of the joint fit of the design and of `columns` (n, j), weighted and whitened, whose coefficients are
-        bounded; None where the design's own coefficients would leave their bounds."""
+        """Residual sum of squares of the joint fit of the design and of `columns` (n, j), weighted and whitened, whose
+        coefficients are bounded; None where the design's own coefficients would leave their bounds."""
         inside = self.basis.T @ columns
         beside = columns - self.basis @ inside
         amplitudes = bounded_least_squares(beside, self.left, low, high)

@@ -1,7 +1,7 @@
 """Findings as they are written: each station read once more with its findings and nothing else of the machine.
 
-What is left out of the list of findings (the form of another, a trifle, what no table names) is not in the model either: sizes beside it
-would not be those of the model. What belongs to the recording stays in.
+What is left out of the list of findings (the form of another, a trifle, what no table names) is not in the model
+either: sizes beside it would not be those of the model. What belongs to the recording stays in.
 """
 
 from __future__ import annotations
@@ -28,10 +28,12 @@ SETTLED = 0.003  # of the noise: a round that moves the prediction less is the l
 
 
 def reread(findings: Sequence[Finding], stations: Sequence[Station]) -> tuple[tuple[Finding, ...], list[Station]]:
-    """Findings with the sizes that they have among themselves, and the stations so read. `declared` of those is beside what belongs to
-    the recording."""
+    """Findings with the sizes that they have among themselves, and the stations so read. `declared` of those is beside
+    what belongs to the recording."""
     written = [_written(s, {f.effect for f in findings if s.names(f)}) for s in stations]
-    changed = [(old, new) for old, new in zip(stations, written, strict=True) if new.reading.fit.terms != old.reading.fit.terms]
+    changed = [
+        (old, new) for old, new in zip(stations, written, strict=True) if new.reading.fit.terms != old.reading.fit.terms
+    ]
     out = []
     for finding in findings:
         new = next((new for old, new in changed if old.names(finding)), None)
@@ -39,7 +41,9 @@ def reread(findings: Sequence[Finding], stations: Sequence[Station]) -> tuple[tu
         if new is not None and named is not None:
             _, again = finding_of(new, named, 0.0, 0.0)
             where = {**finding.where, "region": again.where["region"]}
-            finding = replace(finding, where=where, statement=again.statement, parameters=again.parameters, fit=again.fit)
+            finding = replace(
+                finding, where=where, statement=again.statement, parameters=again.parameters, fit=again.fit
+            )
         out.append(finding)
     return tuple(out), written
 
@@ -52,8 +56,11 @@ def _written(station: Station, names: set[str]) -> Station:
     if names and (asking or len(kept) < len(naming.fit.terms)):
         balance, fit = _settled(naming.balance, tuple(naming.fit.terms[i] for i in kept), ROUNDS if asking else 1)
         place = {i: k for k, i in enumerate(kept)}
-        again = {id(f): replace(f, term=fit.terms[k], amplitudes=dict(fit.amplitudes[k]))
-                 for f in naming.found if (k := place.get(naming.fit.terms.index(f.term))) is not None}
+        again = {
+            id(f): replace(f, term=fit.terms[k], amplitudes=dict(fit.amplitudes[k]))
+            for f in naming.found
+            if (k := place.get(naming.fit.terms.index(f.term))) is not None
+        }
         out.naming = replace(naming, balance=balance, fit=fit, found=tuple(again.values()))
         out.proven = tuple(again[id(f)] for f in station.proven if id(f) in again)
         out.reading = undisturbed(out.naming)
@@ -83,8 +90,8 @@ def _recorded(balance: Balance, fit: Fit) -> Fit:
 
 
 def of_recording(fit: Fit, state: DriveState) -> Array:
-    """Effort (n,) along a recording that belongs to the recording itself: effects that are none of the machine, and, of an angle, its
-    clock's offset and steps of slipped markers."""
+    """Effort (n,) along a recording that belongs to the recording itself: effects that are none of the machine, and, of
+    an angle, its clock's offset and steps of slipped markers."""
     out = np.zeros(len(state.time_s))
     if any(name.startswith("power_") for name in state.declared_names):
         own = [i for i, name in enumerate(state.declared_names) if not name.startswith("power_")]

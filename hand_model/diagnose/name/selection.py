@@ -31,19 +31,26 @@ FAINT = 3.0  # the same of the only one, to be heard: recordings that took no pa
 MOST_SEARCHES = 3  # each with noise that knows what did not repeat beside the effects of the one before
 REFUTED = 3.0  # standard deviations by which a delay may miss what answers to commands say
 SMALL = 0.07  # share of the explained mismatch: less beside a larger effect may be no more than its form being another
-LOST_MOTION, BENT = "lost motion", 0.01  # a family, and the change of its map's slope from which another search is worth its time
-REFIT, DEARER = 30.0, 4.0  # times as long a refit takes as projecting a column, and a shape that needs refits as one that does not
+# a family, and the change of its map's slope from which another search is worth its time
+LOST_MOTION, BENT = "lost motion", 0.01
+# times as long a refit takes as projecting a column, and a shape that needs refits as one that does not
+REFIT, DEARER = 30.0, 4.0
 ABSORBED = 0.5  # of a column squared, at most, is left of what is mostly a level per while
 GROWN = 1.3  # change of that noise, from which another search is worth its time
 
 
-def name_effects(states: tuple[Any, ...], effects: Iterable[Any], progress: Callable[[str], None] | None = None,
-                 typical: Mapping[str, float] | None = None, whole: bool = False) -> Naming:
+def name_effects(
+    states: tuple[Any, ...],
+    effects: Iterable[Any],
+    progress: Callable[[str], None] | None = None,
+    typical: Mapping[str, float] | None = None,
+    whole: bool = False,
+) -> Naming:
     """Name what is missing from the balance of `states` among `effects`; raises nothing for healthy recordings.
 
     states: DriveStates of one balance, validation recordings marked by `validate`. The lack-of-fit test alone decides
-    whether anything is missing; without it no effect is named, however well it fits. typical: declared coefficients of the
-    hand's other motors, by name. whole: learn from the validation recordings, too.
+    whether anything is missing; without it no effect is named, however well it fits. typical: declared coefficients of
+    the hand's other motors, by name. whole: learn from the validation recordings, too.
     """
     balance = Balance(tuple(states), whole, typical)
     naming = _name(balance, tuple(effects), progress)
@@ -62,7 +69,12 @@ def _name(balance: Balance, effects: tuple[Any, ...], progress: Callable[[str], 
         return _named(balance, lambda b: pairs.enter_context(Pair(b)), effects, progress)
 
 
-def _named(balance: Balance, paired: Callable[[Balance], Pair], effects: tuple[Any, ...], progress: Callable[[str], None] | None) -> Naming:
+def _named(
+    balance: Balance,
+    paired: Callable[[Balance], Pair],
+    effects: tuple[Any, ...],
+    progress: Callable[[str], None] | None,
+) -> Naming:
     wander, mapped = estimate_wander(balance, balance.fit().prediction), balance
     for _ in range(MOST_SEARCHES):
         balance = mapped.wandering(wander)
@@ -92,7 +104,8 @@ def _named(balance: Balance, paired: Callable[[Balance], Pair], effects: tuple[A
 
 
 def _remapped(balance: Balance, fit: Fit) -> Balance:
-    """The balance with the map that it has beside its lost motion, where that is another: the first map took the mean of the give up."""
+    """The balance with the map that it has beside its lost motion, where that is another: the first map took the mean
+    of the give up."""
     if not any(t.effect.family == LOST_MOTION for t in fit.terms):
         return balance
     other = balance.remapped(fit)
@@ -115,8 +128,9 @@ def _overwhelmed(balance: Balance, fit: Fit) -> bool:
 
 
 def _calmed(balance: Balance, fit: Fit, ranked: Iterable[Rival]) -> Rival | None:
-    """The refused candidate that would be taken if what does not repeat were estimated beside it: a slow change of the machine looks
-    like chance as long as nobody holds its law against it. The likeliest one; None where there is none."""
+    """The refused candidate that would be taken if what does not repeat were estimated beside it: a slow change of the
+    machine looks like chance as long as nobody holds its law against it. The likeliest one; None where there is
+    none."""
     if balance.wander is None:
         return None
     chance = _likelihood(balance, fit, balance.wander)
@@ -130,13 +144,13 @@ def _calmed(balance: Balance, fit: Fit, ranked: Iterable[Rival]) -> Rival | None
 
 
 def _shaped_calmly(balance: Balance, fit: Fit, ranked: Iterable[Rival]) -> list[Rival]:
-    """Candidates, and terms in their own place, of which chance levels take the better part, with the shapes that are best without such
-    levels: beside them nothing but the stroke in which it happens tells the moment of a jump."""
+    """Candidates, and terms in their own place, of which chance levels take the better part, with the shapes that are
+    best without such levels: beside them nothing but the stroke in which it happens tells the moment of a jump."""
     if balance.wander is None or not balance.wander.real:
         return []
     calm, out = balance.wandering(None), []
     places = [(fit.terms, r.fit.terms[-1]) for r in ranked]
-    places += [(fit.terms[:i] + fit.terms[i + 1:], term) for i, term in enumerate(fit.terms)]
+    places += [(fit.terms[:i] + fit.terms[i + 1 :], term) for i, term in enumerate(fit.terms)]
     for others, term in places:
         start = scan(calm, term.effect, others) if term.shape and _absorbed(balance, term) else None
         if start is not None:
@@ -154,9 +168,11 @@ def _absorbed(balance: Balance, term: Term) -> bool:
     return bool(np.sum(balance.whiten(column, weight) ** 2) < ABSORBED * np.sum(column**2))
 
 
-def _search(pair: Pair, effects: tuple[Any, ...], progress: Callable[[str], None] | None,
-            start: tuple[Term, ...] = ()) -> tuple[Fit, dict[str, float], list[Rival]]:
-    """The fit to which no effect adds evidence, what every candidate brought at its best moment, and the last ones refused. start:
+def _search(
+    pair: Pair, effects: tuple[Any, ...], progress: Callable[[str], None] | None, start: tuple[Term, ...] = ()
+) -> tuple[Fit, dict[str, float], list[Rival]]:
+    """The fit to which no effect adds evidence, what every candidate brought at its best moment, and the last ones
+    refused. start:
     terms to begin with."""
     balance = pair.state
     fit, brought, ranked = settle(pair, effects, start)[1] if start else balance.fit(), {}, list[Rival]()
@@ -165,7 +181,9 @@ def _search(pair: Pair, effects: tuple[Any, ...], progress: Callable[[str], None
         ranked = rank(pair, effects, fit.terms, fit)
         for rival in ranked:
             brought[rival.name] = max(brought.get(rival.name, -np.inf), rival.evidence)
-        best = next((r for r in ranked if r.evidence >= _least(balance, len(fit.terms)) and r.name not in refused), None)
+        best = next(
+            (r for r in ranked if r.evidence >= _least(balance, len(fit.terms)) and r.name not in refused), None
+        )
         if best is None:
             break
         _, settled = settle(pair, effects, best.fit.terms)
@@ -190,8 +208,8 @@ def _names(fit: Fit) -> tuple[str, ...]:
 
 
 def _unrepeated(balance: Balance, fit: Fit) -> Wander | None:
-    """What does not repeat beside `fit`. An event of one recording is never repeated: it must be likelier than a model without
-    it in which the same residual is chance."""
+    """What does not repeat beside `fit`. An event of one recording is never repeated: it must be likelier than a model
+    without it in which the same residual is chance."""
     wander = estimate_wander(balance, fit.prediction)
     for which, term in enumerate(fit.terms):
         if "trial" not in term.shape:
@@ -227,16 +245,23 @@ def _resolved(balance: Balance, term: Term) -> bool:
     return abs(term.shape["delay"]) > least_delay(balance.states) and not refuted
 
 
-def rank(pair: Pair, effects: Iterable[Any], terms: tuple[Term, ...], fit: Fit, refine: int = 6, least: float = 0.0) -> list[Rival]:
-    """Every candidate added to `terms`, its shape optimised from several starts; best evidence first. least: log evidence below which
-    none is of interest."""
+def rank(
+    pair: Pair, effects: Iterable[Any], terms: tuple[Term, ...], fit: Fit, refine: int = 6, least: float = 0.0
+) -> list[Rival]:
+    """Every candidate added to `terms`, its shape optimised from several starts; best evidence first. least: log
+    evidence below which none is of interest."""
     balance, taken = pair.state, {t.effect.name for t in terms}
     places = [e if e.name not in taken or e.repeats else None for e in effects]
     costs = [len(balance.grid(e).shapes) * (1.0 if additive(e) else REFIT) for e in effects]
     rough = [r for r in pair.map(_rough, places, terms, fit, least, costs=costs) if r is not None]
     rough.sort(key=lambda item: -item[0])
     starts = [start for _, start in rough]
-    polished = pair.map(polish, starts[:refine], len(terms), costs=[1.0 if additive(s.terms[-1].effect) else DEARER for s in starts[:refine]])
+    polished = pair.map(
+        polish,
+        starts[:refine],
+        len(terms),
+        costs=[1.0 if additive(s.terms[-1].effect) else DEARER for s in starts[:refine]],
+    )
     out = [(f, i < refine) for i, f in enumerate([*polished, *starts[refine:]]) if _possible(balance, f)]
     scale = min((scale_of(balance, f) for f, _ in out), default=1.0)
     weights = pair.map(_weight, out, fit, scale)
@@ -299,11 +324,13 @@ def _swap(pair: Pair, effects: tuple[Any, ...], fit: Fit) -> Fit | None:
 
 
 def _findings(pair: Pair, effects: tuple[Any, ...], fit: Fit) -> tuple[Named, ...]:
-    """Each term with its rivals (every candidate in its place, small terms aside that may stand for one of them), its share and
-    its probability; largest share first."""
+    """Each term with its rivals (every candidate in its place, small terms aside that may stand for one of them), its
+    share and its probability; largest share first."""
     balance, found, terms = pair.state, [], fit.terms
-    losses = [max(balance.fit(tuple(t for i, t in enumerate(terms) if i != which)).rss - fit.rss, 0.0)
-              for which in range(len(terms))]
+    losses = [
+        max(balance.fit(tuple(t for i, t in enumerate(terms) if i != which)).rss - fit.rss, 0.0)
+        for which in range(len(terms))
+    ]
     large = [loss >= SMALL * sum(losses) for loss in losses]
     for which, term in enumerate(terms):
         others = [i for i in range(len(terms)) if i != which and (large[i] or not large[which])]
@@ -313,18 +340,29 @@ def _findings(pair: Pair, effects: tuple[Any, ...], fit: Fit) -> tuple[Named, ..
         ranked = rank(pair, effects, rest, without, refine=3)
         own = evidence(balance, beside, without, place, scale_of(balance, beside))
         rivals = [r for r in ranked if r.name != term.effect.name]
-        rivals.append(Rival(term.effect.name, max([own, *[r.evidence for r in ranked if r.name == term.effect.name]]), fit))
+        rivals.append(
+            Rival(term.effect.name, max([own, *[r.evidence for r in ranked if r.name == term.effect.name]]), fit)
+        )
         rivals.sort(key=lambda r: -r.evidence)
         weights = np.exp(np.array([r.evidence for r in rivals] + [0.0]) - max(rivals[0].evidence, 0.0))
         mine = [r.name for r in rivals].index(term.effect.name)
         share = losses[which] / max(sum(losses), 1e-12)
-        found.append(Named(term, dict(fit.amplitudes[which]), tuple(rivals), float(share), _size(balance, fit, which),
-                           float(weights[mine] / weights.sum())))
+        found.append(
+            Named(
+                term,
+                dict(fit.amplitudes[which]),
+                tuple(rivals),
+                float(share),
+                _size(balance, fit, which),
+                float(weights[mine] / weights.sum()),
+            )
+        )
     return tuple(sorted(found, key=lambda f: -f.share))
 
 
 def _size(balance: Balance, fit: Fit, which: int) -> float:
-    """Root mean square over the noise of what a term adds beyond what the declared columns could, all coefficients as they are."""
+    """Root mean square over the noise of what a term adds beyond what the declared columns could, all coefficients as
+    they are."""
     declared = balance.apart(())
     added = balance.whiten((fit.prediction - balance.removed(fit, which)) * declared.weight, declared.weight)
     added = added - declared.basis @ (declared.basis.T @ added)

@@ -1,4 +1,5 @@
-"""The shape of a term beside others: the best of a grid of starts, then optimised, everything linear refitted at each step."""
+"""The shape of a term beside others: the best of a grid of starts, then optimised, everything linear refitted at each
+step."""
 
 from __future__ import annotations
 
@@ -17,13 +18,14 @@ from .term import DISCRETE, Term, additive
 Array = NDArray[np.float64]
 
 ALONG = 1e-6  # of a column's length: less left beside the design, and it says nothing of its own
-CLIPPED_ANEW = 0.005  # of the samples: where more are clipped that were not, or no longer, a shape is sought with whole fits
+# of the samples: where more are clipped that were not, or no longer, a shape is sought with whole fits
+CLIPPED_ANEW = 0.005
 GRAIN = 1.5  # times what the best shape of a grid brings: more no shape between is expected to
 
 
 def scan(balance: Balance, effect: Any, terms: tuple[Term, ...], least: float = 0.0) -> Fit | None:
-    """Best starting shape of `effect` beside `terms`; columns are projected, anything else is refitted. None where no shape could bring
-    a log likelihood near `least`."""
+    """Best starting shape of `effect` beside `terms`; columns are projected, anything else is refitted. None where no
+    shape could bring a log likelihood near `least`."""
     grid = balance.grid(effect)
     if not grid.shapes:
         return None
@@ -38,7 +40,8 @@ def scan(balance: Balance, effect: Any, terms: tuple[Term, ...], least: float = 
 
 
 def _project(balance: Balance, grid: Grid, terms: tuple[Term, ...], least: float) -> list[dict[str, float]]:
-    """The two best shapes of a grid by the fall of the RSS, more than `least`, that its columns, orthogonal to the design, bring."""
+    """The two best shapes of a grid by the fall of the RSS, more than `least`, that its columns, orthogonal to the
+    design, bring."""
     rest = balance.apart(terms)
     columns = balance.grid_columns(grid, rest.weight, terms)
     inside = columns.products(rest.basis)
@@ -74,7 +77,10 @@ def polish(balance: Balance, fit: Fit, which: int) -> Fit:
     others = tuple(t for i, t in enumerate(fit.terms) if i != which)
 
     def shaped(u: Array) -> dict[str, float]:
-        return {**term.shape, **{s.name: float(np.clip(v, s.low, s.high)) for s, v in zip(shapes, start + u * span, strict=True)}}
+        return {
+            **term.shape,
+            **{s.name: float(np.clip(v, s.low, s.high)) for s, v in zip(shapes, start + u * span, strict=True)},
+        }
 
     step = [np.zeros(len(shapes))]
     for i, s in enumerate(shapes):
@@ -84,12 +90,19 @@ def polish(balance: Balance, fit: Fit, which: int) -> Fit:
         step.append(corner)
 
     def optimum(error: Callable[[Mapping[str, float]], float]) -> Fit:
-        result = minimize(lambda u: error(shaped(u)), np.zeros(len(shapes)), method="Nelder-Mead",
-                          options={"initial_simplex": np.array(step), "maxfev": 30 + 25 * len(shapes), "fatol": 0.02, "xatol": 1e-4})
-        return balance.fit((*fit.terms[:which], Term(term.effect, shaped(result.x)), *fit.terms[which + 1:]))
+        result = minimize(
+            lambda u: error(shaped(u)),
+            np.zeros(len(shapes)),
+            method="Nelder-Mead",
+            options={"initial_simplex": np.array(step), "maxfev": 30 + 25 * len(shapes), "fatol": 0.02, "xatol": 1e-4},
+        )
+        return balance.fit((*fit.terms[:which], Term(term.effect, shaped(result.x)), *fit.terms[which + 1 :]))
 
     best = optimum(balance.error_beside(others, term.effect, fit))
-    if any(t.effect.clips for t in others) and np.mean(balance.unclipped_by(best) != balance.unclipped_by(fit)) > CLIPPED_ANEW:
+    if (
+        any(t.effect.clips for t in others)
+        and np.mean(balance.unclipped_by(best) != balance.unclipped_by(fit)) > CLIPPED_ANEW
+    ):
         best = optimum(balance.error_beside(others, term.effect))
     return best if best.rss < fit.rss else fit
 
@@ -120,8 +133,11 @@ def reform(balance: Balance, fit: Fit, which: int) -> Fit:
 
 def likeliest(balance: Balance, fits: Iterable[Fit], which: int, cost: Callable[[Fit], float] = lambda f: f.rss) -> Fit:
     """The fit of the smallest cost, of those whose term `which` a machine may have where there are any."""
+
     def key(fit: Fit) -> tuple[bool, float]:
         term, amplitudes = fit.terms[which], fit.amplitudes[which]
-        return not term.effect.possible(balance.states, term.effect.parameters(term.shape, amplitudes, fit.declared)), cost(fit)
+        return not term.effect.possible(
+            balance.states, term.effect.parameters(term.shape, amplitudes, fit.declared)
+        ), cost(fit)
 
     return min(fits, key=key)

@@ -15,42 +15,57 @@ from .naming import ALPHA, EXPLAINED_LEAST, MOST_TERMS, Named, Naming
 from .selection import EVIDENCE_LEAST, SMALL, name_effects
 
 # How before and after were computed, said in the findings: no compiled file is involved until one is replayed.
-ENGINE = {"current": "inverse dynamics of the motor's balance, motion as recorded", "encoder": "encoder map, motion as recorded",
-          "markers": "linkage polynomial, motion as recorded"}
-SECOND_HEARINGS, DISPLACING = 2, 0.1  # and the share of what was explained from which a fallen name has displaced others
+ENGINE = {
+    "current": "inverse dynamics of the motor's balance, motion as recorded",
+    "encoder": "encoder map, motion as recorded",
+    "markers": "linkage polynomial, motion as recorded",
+}
+# and the share of what was explained from which a fallen name has displaced others
+SECOND_HEARINGS, DISPLACING = 2, 0.1
 CHANCES = 20 * 25  # channels of a session, times names: what no test of a channel sees must stand against as many
 ALIKE = 1 / 3  # of the size of a larger effect of the same family: below, no finding of its own
 UNREST = 0.3  # of the noise: wander that every machine is granted; more is no explanation
 WORSE = 1.5  # times the mean square of training recordings
-KEPT_OUT, EXPLAINED_MOST = 1.05, 2 / 3  # times the noise of recordings kept out, and the share of what is above it that true names take
+# times the noise of recordings kept out, and the share of what is above it that true names take
+KEPT_OUT, EXPLAINED_MOST = 1.05, 2 / 3
 MAIN = 0.5  # of what names explain together: what one of them must hold where they do not do
 PLAINLY = 1 / 3  # of the mean square of recordings kept out before, at most, is noise
-EXPLAINED_SOME = 1 / 3  # of a mismatch that the lack-of-fit test sees: below, they are not what is missing, whatever is left to see
+# of a mismatch that the lack-of-fit test sees: below, they are not what is missing, whatever is left to see
+EXPLAINED_SOME = 1 / 3
 
 
 class Station:
     """One balance of one finger and what was named there."""
 
-    def __init__(self, signal: str, finger: str | None, actuator: str | None, joint: str | None, naming: Naming) -> None:
+    def __init__(
+        self, signal: str, finger: str | None, actuator: str | None, joint: str | None, naming: Naming
+    ) -> None:
         self.signal, self.finger, self.actuator, self.joint, self.naming = signal, finger, actuator, joint, naming
         places = {id(f): naming.fit.terms.index(f.term) for f in naming.found}
         self.reading = undisturbed(naming)
         least = EVIDENCE_LEAST + (np.log(CHANCES) if naming.before.p >= ALPHA else 0.0)
-        stand = [places[id(f)] for f in naming.found if _stands(naming, f, places[id(f)], least) and
-                 (sized(self.reading, places[id(f)]) or _plain_at_ends(naming, f, least))]
+        stand = [
+            places[id(f)]
+            for f in naming.found
+            if _stands(naming, f, places[id(f)], least)
+            and (sized(self.reading, places[id(f)]) or _plain_at_ends(naming, f, least))
+        ]
         self.parameters = {which: parameter_intervals(self.reading, which) for which in stand}
         self.proven = tuple(f for f in naming.found if places[id(f)] in stand)
 
     def names(self, finding: Finding) -> bool:
         """Whether a finding was named here."""
         named = {f.term.effect.name for f in self.naming.found}
-        return finding.effect in named and finding.where.get("finger") == self.finger and (
-            self.signal != "markers" or finding.where.get("joint") == self.joint)
+        return (
+            finding.effect in named
+            and finding.where.get("finger") == self.finger
+            and (self.signal != "markers" or finding.where.get("joint") == self.joint)
+        )
 
     @property
     def missing(self) -> bool:
-        """Whether the lack-of-fit test says that something is missing, or an effect that it overlooked holds out: along the
-        known effects mismatch shows earlier than in any grouping of cells."""
+        """Whether the lack-of-fit test says that something is missing, or an effect that it overlooked holds out: along
+        the known effects mismatch shows earlier than in any grouping of cells."""
         return self.naming.before.p < ALPHA or bool(self.proven)
 
     @property
@@ -72,45 +87,60 @@ class Station:
 
     @property
     def believed(self) -> bool:
-        """Whether the names stand: the final model passes the test, or takes most of the mismatch away, or all that recordings kept out
-        show. Names that take little of a plain mismatch away do not, however little is left to see, nor names of nothing where more than
-        the noise does not repeat, nor as many as may be, none of them the main one, beside which the test fails."""
+        """Whether the names stand: the final model passes the test, or takes most of the mismatch away, or all that
+        recordings kept out show. Names that take little of a plain mismatch away do not, however little is left to see,
+        nor names of nothing where more than the noise does not repeat, nor as many as may be, none of them the main
+        one, beside which the test fails."""
         idle = self.explained < (EXPLAINED_SOME if self.naming.before.p < ALPHA else SMALL if self.wander > 1 else 0.0)
         most = self.naming.after.p >= ALPHA or self.explained >= EXPLAINED_LEAST or self._predicted
         return bool(self.proven) and not idle and not self._short and not self._scattered and most
 
     @property
     def _scattered(self) -> bool:
-        """Whether as many names as may be leave something that the test sees, and none of them holds the better part of what they explain: each
-        describes a piece of what is something else."""
-        return self.naming.after.p < ALPHA and len(self.naming.found) >= MOST_TERMS and max(f.share for f in self.naming.found) < MAIN
+        """Whether as many names as may be leave something that the test sees, and none of them holds the better part of
+        what they explain: each describes a piece of what is something else."""
+        return (
+            self.naming.after.p < ALPHA
+            and len(self.naming.found) >= MOST_TERMS
+            and max(f.share for f in self.naming.found) < MAIN
+        )
 
     @property
     def _predicted(self) -> bool:
-        """Whether recordings kept out, plainly above their noise before, are within it beside the names: the test asks what repeats at the same
-        place, speed and direction, and not what changes over a recording."""
+        """Whether recordings kept out, plainly above their noise before, are within it beside the names: the test asks
+        what repeats at the same place, speed and direction, and not what changes over a recording."""
         before, after = (variance_ratio(self.naming, fit) for fit in (self.naming.declared, self.naming.fit))
         return self.naming.balance.untouched and after <= KEPT_OUT**2 < PLAINLY * before
 
     @property
     def _short(self) -> bool:
-        """Whether the names leave recordings kept out plainly above their noise, and more than a third of what was, or make them worse: something
-        else is missing. Of steady motion: what acts at starts and stops is not asked."""
-        if self.naming.before.p >= ALPHA or any(f.term.effect.warps or f.term.effect.replaces for f in self.naming.found):
+        """Whether the names leave recordings kept out plainly above their noise, and more than a third of what was, or
+        make them worse: something else is missing. Of steady motion: what acts at starts and stops is not asked."""
+        if self.naming.before.p >= ALPHA or any(
+            f.term.effect.warps or f.term.effect.replaces for f in self.naming.found
+        ):
             return False
         before, after = (variance_ratio(self.naming, fit) for fit in (self.naming.declared, self.naming.fit))
         least, floor = KEPT_OUT**2, 1 + self.wander**2
-        return after > max(before, least) or after > least * floor and before - after < EXPLAINED_MOST * (before - floor)
+        return (
+            after > max(before, least) or after > least * floor and before - after < EXPLAINED_MOST * (before - floor)
+        )
 
     @property
     def kept(self) -> tuple[Named, ...]:
-        """The effects that stand beside each other: one of a small share may be no more than the form of the large one being
-        another, and is left to the unexplained part; so is what is smaller than something that no table names."""
+        """The effects that stand beside each other: one of a small share may be no more than the form of the large one
+        being another, and is left to the unexplained part; so is what is smaller than something that no table names."""
         strange = max((f.size for f in self.outsiders), default=0.0)
         covered = {name for f in self.outsiders for name in f.term.effect.covers}
         restless = self.wander if self.wander > UNREST else 0.0
-        return tuple(f for f in self._beside if f.term.effect.listed and f.size >= strange and f.term.effect.name not in covered
-                     and (f.size >= restless or not f.term.effect.drifting))
+        return tuple(
+            f
+            for f in self._beside
+            if f.term.effect.listed
+            and f.size >= strange
+            and f.term.effect.name not in covered
+            and (f.size >= restless or not f.term.effect.drifting)
+        )
 
     @property
     def outsiders(self) -> tuple[Named, ...]:
@@ -124,8 +154,14 @@ class Station:
     @property
     def forms(self) -> tuple[Named, ...]:
         """What adds little beside another of its family: a play with a mass that floats in it gives a little, too."""
-        return tuple(f for f in self.proven for g in self.proven
-                     if f.term.effect.family is not None and f.term.effect.family == g.term.effect.family and f.size < ALIKE * g.size)
+        return tuple(
+            f
+            for f in self.proven
+            for g in self.proven
+            if f.term.effect.family is not None
+            and f.term.effect.family == g.term.effect.family
+            and f.size < ALIKE * g.size
+        )
 
     @property
     def contrast(self) -> float:
@@ -148,19 +184,21 @@ class Station:
 
 
 def _stands(naming: Naming, named: Named, which: int, least: float) -> bool:
-    """Whether recordings that took no part are predicted better with the effect, and all of them together bear it out."""
+    """Whether recordings that took no part are predicted better with the effect, and all of them together bear it
+    out."""
     brought = brought_held_out(naming, which)
     return named.evidence >= least if brought is None else brought > 0 and named.evidence + brought >= least
 
 
 def _plain_at_ends(naming: Naming, named: Named, least: float) -> bool:
-    """Whether the only effect is that plain that it needs no steady motion to be told from zero: some act where motion starts and
-    stops, as a stop of the open hand."""
+    """Whether the only effect is that plain that it needs no steady motion to be told from zero: some act where motion
+    starts and stops, as a stop of the open hand."""
     return len(naming.found) == 1 and _stands(naming, named, 0, least + EVIDENCE_LEAST)
 
 
 def _elsewhere(naming: Naming) -> bool:
-    """Whether what the training recordings taught fails in those kept out: something happens there that they do not have."""
+    """Whether what the training recordings taught fails in those kept out: something happens there that they do not
+    have."""
     balance = naming.balance
     square = ((balance.effort - naming.fit.prediction) * balance.weight) ** 2
     inside, outside = balance.steady & balance.train, balance.steady & ~balance.train
@@ -168,8 +206,9 @@ def _elsewhere(naming: Naming) -> bool:
 
 
 def _altered(naming: Naming) -> bool:
-    """Whether a recording kept out is plainly that of a machine with other declared coefficients, as in another pose of the hand: what their own
-    fit gains there in log likelihood, less the penalty of Schwarz (1978). A change of level alone is spread too thin for tests of cells."""
+    """Whether a recording kept out is plainly that of a machine with other declared coefficients, as in another pose of
+    the hand: what their own fit gains there in log likelihood, less the penalty of Schwarz (1978). A change of level
+    alone is spread too thin for tests of cells."""
     balance = naming.balance
     residual, matrix = balance.effort - naming.fit.prediction, balance.gather(lambda s: s.declared)
     recording = balance.gather(lambda s: np.full(len(s.time_s), s.trial))
@@ -184,16 +223,25 @@ def _altered(naming: Naming) -> bool:
     return False
 
 
-def judged(signal: str, finger: str | None, actuator: str | None, joint: str | None, states: tuple[Any, ...], effects: Iterable[Any],
-           typical: Mapping[str, float] | None = None) -> Station:
-    """The station of the balance of `states`, named among `effects`. Where a name does not stand, or is another's form, the others are
-    heard without it."""
+def judged(
+    signal: str,
+    finger: str | None,
+    actuator: str | None,
+    joint: str | None,
+    states: tuple[Any, ...],
+    effects: Iterable[Any],
+    typical: Mapping[str, float] | None = None,
+) -> Station:
+    """The station of the balance of `states`, named among `effects`. Where a name does not stand, or is another's form,
+    the others are heard without it."""
     left = every = tuple(effects)
     station = Station(signal, finger, actuator, joint, name_effects(states, left, typical=typical))
     elsewhere = _elsewhere(station.naming)
     for _ in range(SECOND_HEARINGS):
         fallen = {f.term.effect.name for f in station.naming.found} - {f.term.effect.name for f in station.proven}
-        lost = sum(f.share for f in station.naming.found if f.term.effect.name in fallen and f.evidence >= EVIDENCE_LEAST)
+        lost = sum(
+            f.share for f in station.naming.found if f.term.effect.name in fallen and f.evidence >= EVIDENCE_LEAST
+        )
         if lost < DISPLACING or station.naming.overwhelmed:
             break
         left = tuple(e for e in left if e.name not in fallen)
@@ -203,12 +251,21 @@ def judged(signal: str, finger: str | None, actuator: str | None, joint: str | N
         station = other
     untold = not station.believed or elsewhere and station.naming.after.p < ALPHA
     hopeless = station.naming.overwhelmed and not elsewhere  # in the training recordings already
-    if (station.missing and untold and not hopeless or not station.proven and _altered(station.naming)) and any(s.validate for s in states):
+    if (station.missing and untold and not hopeless or not station.proven and _altered(station.naming)) and any(
+        s.validate for s in states
+    ):
         # what the training recordings cannot tell, a pose that one of the others alone has may tell
         lasting = tuple(e for e in every if e.of_the_hand)  # what one recording had explains no other
         learned = name_effects(states, lasting, typical=typical, whole=True)
-        other = Station(signal, finger, actuator, joint, replace(learned, before=max(station.naming.before, learned.before, key=attrgetter("excess"))))
-        seen = other.naming.after.p >= ALPHA or _altered(station.naming)  # another pose is plain to see, whatever small is left
+        other = Station(
+            signal,
+            finger,
+            actuator,
+            joint,
+            replace(learned, before=max(station.naming.before, learned.before, key=attrgetter("excess"))),
+        )
+        # another pose is plain to see, whatever small is left
+        seen = other.naming.after.p >= ALPHA or _altered(station.naming)
         station = other if seen and other.believed and other.wander <= max(station.wander, UNREST) else station
     if station.forms:
         left = tuple(e for e in left if e.name not in {f.term.effect.name for f in station.forms})
@@ -232,21 +289,40 @@ def finding_of(station: Station, named: Named, share: float, size: float) -> tup
         "signal": getattr(effect, "signal", station.signal),
         "marker": None,
         "trials": [s.trial for s in naming.balance.states],
-        "region": effect.region(naming.balance.states, station.reading.fit.terms[which].shape),  # of the figures that the statement tells
+        # of the figures that the statement tells
+        "region": effect.region(naming.balance.states, station.reading.fit.terms[which].shape),
         "share_of_mismatch": share * station.claimed,
     }
     top = named.rivals[0].evidence
     weights = np.exp(np.array([r.evidence for r in named.rivals] + [0.0]) - max(top, 0.0))
     weights = weights / weights.sum()
-    alternatives = tuple((r.name, float(p)) for r, p in zip(named.rivals, weights[:-1], strict=True)
-                         if r.name != effect.name and p > 1e-3 and r.fit.terms[-1].effect.listed)[:4]
+    alternatives = tuple(
+        (r.name, float(p))
+        for r, p in zip(named.rivals, weights[:-1], strict=True)
+        if r.name != effect.name and p > 1e-3 and r.fit.terms[-1].effect.listed
+    )[:4]
     unit = naming.balance.states[0].effort_unit
-    fit = {"metric": f"{station.signal}_rmse", "unit": unit, **held_out(station.reading, which), "engine": ENGINE[station.signal]}
+    fit = {
+        "metric": f"{station.signal}_rmse",
+        "unit": unit,
+        **held_out(station.reading, which),
+        "engine": ENGINE[station.signal],
+    }
     members = named.members if effect.name in named.members else (effect.name, *named.members)
     recording = getattr(effect, "correction", None)
     model = None if recording else dict(UNWRITTEN)
-    return weighed(size, station.contrast), Finding(effect.name, members, named.probability, alternatives, where,
-                           effect.statement(where, values), parameters, fit, model, recording)
+    return weighed(size, station.contrast), Finding(
+        effect.name,
+        members,
+        named.probability,
+        alternatives,
+        where,
+        effect.statement(where, values),
+        parameters,
+        fit,
+        model,
+        recording,
+    )
 
 
 def outsider_of(station: Station, named: Named) -> dict[str, Any]:
@@ -259,7 +335,12 @@ def outsider_of(station: Station, named: Named) -> dict[str, Any]:
 
 def unexplained_of(station: Station, share: float) -> dict[str, Any]:
     return {
-        "where": {"finger": station.finger, "joint": station.joint, "actuator": station.actuator, "signal": station.signal},
+        "where": {
+            "finger": station.finger,
+            "joint": station.joint,
+            "actuator": station.actuator,
+            "signal": station.signal,
+        },
         "share_of_mismatch": share,
         "shape": f"varies with {station.naming.after.telling}",
     }
@@ -275,9 +356,17 @@ def unrepeated_of(station: Station) -> dict[str, Any]:
 
 
 def channel_of(station: Station) -> dict[str, Any]:
-    """The channel's row of the findings. effects: those that stand in it; p_before, p_after: of the lack-of-fit test; noise: in the unit of
-    its effort."""
+    """The channel's row of the findings. effects: those that stand in it; p_before, p_after: of the lack-of-fit test;
+    noise: in the unit of its effort."""
     n, stands = station.naming, station.kept if station.believed else ()
-    return {"finger": station.finger, "joint": station.joint, "signal": station.signal, "p_before": n.before.p,
-            "p_after": n.after.p, "varies_with": n.before.telling, "noise": n.balance.sigma,
-            "effects": [f.term.effect.name for f in stands], "explained": station.explained}
+    return {
+        "finger": station.finger,
+        "joint": station.joint,
+        "signal": station.signal,
+        "p_before": n.before.p,
+        "p_after": n.after.p,
+        "varies_with": n.before.telling,
+        "noise": n.balance.sigma,
+        "effects": [f.term.effect.name for f in stands],
+        "explained": station.explained,
+    }

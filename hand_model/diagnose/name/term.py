@@ -14,7 +14,8 @@ from ...effects.base import FRICTION, DriveState
 
 Array = NDArray[np.float64]
 
-DISCRETE = ("side", "trial", "form", "end")  # shapes that choose among few cases: no continuous parameter is spent on them
+# shapes that choose among few cases: no continuous parameter is spent on them
+DISCRETE = ("side", "trial", "form", "end")
 COARSE = 0.15  # of a delay or a bristle's length: nearer is near enough to choose a start by
 
 
@@ -64,8 +65,8 @@ def warped(state: DriveState, columns: Array, terms: tuple[Term, ...]) -> Array:
 
 
 def replaced(state: DriveState, terms: tuple[Term, ...]) -> DriveState:
-    """The state with its declared columns as `terms` leave them, and so friction's direction: steady friction, whatever it depends on, is that of
-    the bristles (Canudas de Wit 1995, eq. 3)."""
+    """The state with its declared columns as `terms` leave them, and so friction's direction: steady friction, whatever
+    it depends on, is that of the bristles (Canudas de Wit 1995, eq. 3)."""
     for term in terms:
         if term.effect.replaces is not None:
             state = replace(state, declared=term.effect.declared(state, term.shape))

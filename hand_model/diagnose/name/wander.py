@@ -1,8 +1,9 @@
 """Wander: what differs from one while to the next although place, speed and direction are the same.
 
-Machines and channels do not repeat themselves exactly: a zero drifts, friction is another in every stroke, something shakes
-the bench. Such a load has no law to be named, but whoever counts it as white noise names whatever effect resembles the
-accident. It is a random level per while (a random intercept; Laird & Ware 1982), as large as the replicates say.
+Machines and channels do not repeat themselves exactly: a zero drifts, friction is another in every stroke, something
+shakes the bench. Such a load has no law to be named, but whoever counts it as white noise names whatever effect
+resembles the accident. It is a random level per while (a random intercept; Laird & Ware 1982), as large as the
+replicates say.
 """
 
 from __future__ import annotations
@@ -48,7 +49,8 @@ class Wander:
         return np.diff(np.r_[self._starts, len(self.label)])
 
     def whiten(self, values: Array, weight: Array, inflation: float) -> Array:
-        """Weighted values (n,) or (n, k) with the level of each while shrunk to the size that noise has: uncorrelated again.
+        """Weighted values (n,) or (n, k) with the level of each while shrunk to the size that noise has: uncorrelated
+        again.
 
         weight: (n,) that `values` carry, zero for samples that take no part. Exact inverse root of
         I + d^2/inflation * w w' within each while (Woodbury).
@@ -68,7 +70,8 @@ class Wander:
         return out
 
     def common(self, weighted: Array, weight: Array, inflation: float) -> Array:
-        """What the levels take off the products (k, k) of weighted columns (n, k): X'X less this is that of the whitened ones (Woodbury)."""
+        """What the levels take off the products (k, k) of weighted columns (n, k): X'X less this is that of the
+        whitened ones (Woodbury)."""
         size = np.add.reduceat(weight**2, self._starts)
         sums = np.stack([np.add.reduceat(column * weight, self._starts) for column in weighted.T], axis=1)
         share = self.deviation**2 / (inflation + self.deviation**2 * size)
@@ -82,8 +85,8 @@ class Wander:
 
 
 def estimate_wander(balance: Balance, prediction: Array) -> Wander | None:
-    """The random level that the residual of a prediction (n,) shows in training recordings, beside what repeats: the likeliest
-    size and length of a while (Laird & Ware 1982). None where there are too few replicates to tell."""
+    """The random level that the residual of a prediction (n,) shows in training recordings, beside what repeats: the
+    likeliest size and length of a while (Laird & Ware 1982). None where there are too few replicates to tell."""
     use = balance.train & balance.steady
     apart, _ = replicate_deviation(balance, balance.effort - prediction, use)
     if not len(apart):

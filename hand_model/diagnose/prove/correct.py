@@ -1,4 +1,5 @@
-"""Corrected copies of recordings: what a diagnosis put right, in a session of its own; the original is never touched."""
+"""Corrected copies of recordings: what a diagnosis put right, in a session of its own; the original is never
+touched."""
 
 from __future__ import annotations
 
@@ -24,31 +25,49 @@ FOLDER = "corrected"
 
 
 def refuse_output(output: Path) -> None:
-    """Raise HandModelError where `output` is a file, or holds a corrected copy that no diagnosis wrote: recordings are never thrown away."""
+    """Raise HandModelError where `output` is a file, or holds a corrected copy that no diagnosis wrote: recordings are
+    never thrown away."""
     refuse_file(output)
     if (output / FOLDER).exists() and not (output / FILES[0]).is_file():
         raise HandModelError(f'{output}: holds "{FOLDER}", which no diagnosis wrote; name another folder')
 
 
-def write_corrected(session: Session, findings: Sequence[Finding], encoders: Mapping[str, Callable[[Array], Array]],
-                    output: Path) -> Path | None:
-    """Write the session with every correction of `findings` applied into `output`/corrected; None where there is none to apply.
+def write_corrected(
+    session: Session, findings: Sequence[Finding], encoders: Mapping[str, Callable[[Array], Array]], output: Path
+) -> Path | None:
+    """Write the session with every correction of `findings` applied into `output`/corrected; None where there is none
+    to apply.
 
-    encoders: actuator -> correction of its encoder counts. Marker files become QTM TSV, logs CSV, where they are changed; the
-    manifest names them, everything else is copied as it is, but for `output` itself. Replaces an earlier copy, whole or not at all.
+    encoders: actuator -> correction of its encoder counts. Marker files become QTM TSV, logs CSV, where they are
+    changed; the manifest names them, everything else is copied as it is, but for `output` itself. Replaces an earlier
+    copy, whole or not at all.
     """
-    markers = {finger.name: {f.effect for f in findings if f.effect == "palm_marker_slip" or f.where["finger"] == finger.name}
-               & {*SLIPS, "marker_swap"} for finger in session.fingers}
-    drifts = {name: f.parameters["rate_minus_one"]["value"] for f in findings if f.effect == "clock_drift" for name in _logs_of(session, f)}
+    markers = {
+        finger.name: {f.effect for f in findings if f.effect == "palm_marker_slip" or f.where["finger"] == finger.name}
+        & {*SLIPS, "marker_swap"}
+        for finger in session.fingers
+    }
+    drifts = {
+        name: f.parameters["rate_minus_one"]["value"]
+        for f in findings
+        if f.effect == "clock_drift"
+        for name in _logs_of(session, f)
+    }
     turned = {str(f.where["actuator"]) for f in findings if f.effect == "encoder_periodic_error"} & set(encoders)
     if not any(markers.values()) and not drifts and not turned:
         return None
     target = output / FOLDER
-    earlier = [entry.name for entry in target.iterdir()] if target.is_dir() else []  # `refuse_output` knows that a diagnosis wrote it
+    # `refuse_output` knows that a diagnosis wrote it
+    earlier = [entry.name for entry in target.iterdir()] if target.is_dir() else []
     with new_folder(target, earlier) as staging:
-        ours = {output.resolve(), *(output.resolve() / name for name in (*FILES, *FOLDERS, staging.name))}  # the output may lie in the session
-        shutil.copytree(session.path, staging, dirs_exist_ok=True,
-                        ignore=lambda folder, names: [n for n in names if (Path(folder) / n).resolve() in ours])
+        # the output may lie in the session
+        ours = {output.resolve(), *(output.resolve() / name for name in (*FILES, *FOLDERS, staging.name))}
+        shutil.copytree(
+            session.path,
+            staging,
+            dirs_exist_ok=True,
+            ignore=lambda folder, names: [n for n in names if (Path(folder) / n).resolve() in ours],
+        )
         renamed: dict[str, str] = {}
         for path, mocap in _corrected_files(session, markers).items():
             renamed |= _replace(session, path, staging, ".tsv", lambda file, m=mocap: write_tsv(file, m))
@@ -68,7 +87,8 @@ def _logs_of(session: Session, finding: Finding) -> set[str]:
 
 
 def _corrected_files(session: Session, markers: Mapping[str, set[str]]) -> dict[Path, Mocap]:
-    """Marker file -> what it should have held; one file may hold several fingers. markers: finger -> effects to put right."""
+    """Marker file -> what it should have held; one file may hold several fingers. markers: finger -> effects to put
+    right."""
     from ...identify.identification import palm_shape
 
     out: dict[Path, Mocap] = {}
@@ -82,7 +102,8 @@ def _corrected_files(session: Session, markers: Mapping[str, set[str]]) -> dict[
 
 
 def corrected_markers(angles: FingerAngles, naming: MarkerNaming, index: int, applied: set[str], into: Mocap) -> Mocap:
-    """One recording with exchanged labels put right and the named slips' displacement taken out. applied: effects that were found.
+    """One recording with exchanged labels put right and the named slips' displacement taken out. applied: effects that
+    were found.
     into: the recording as it is, or as another finger's correction left it."""
     from dataclasses import replace
 
@@ -100,12 +121,15 @@ def corrected_markers(angles: FingerAngles, naming: MarkerNaming, index: int, ap
             right -= np.einsum("nij,nmj->nmi", record.pose.rotation, shift_palm)
     for j, label in enumerate(record.data.labels):
         if not np.array_equal(right[:, j], recorded[:, j], equal_nan=True):
-            plain = label if label in into.labels else label.rpartition(":")[2]  # the manifest may carry a subject's prefix
+            # the manifest may carry a subject's prefix
+            plain = label if label in into.labels else label.rpartition(":")[2]
             position[:, into.labels.index(plain)] = right[:, j]
     return replace(into, position_world=position)
 
 
-def _write_log(session: Session, trial: Trial, drift: float, correct: Callable[[Array], Array] | None, target: Path) -> dict[str, str]:
+def _write_log(
+    session: Session, trial: Trial, drift: float, correct: Callable[[Array], Array] | None, target: Path
+) -> dict[str, str]:
     log = trial.log()
     columns = dict(log.columns)
     if correct is not None:
@@ -114,7 +138,9 @@ def _write_log(session: Session, trial: Trial, drift: float, correct: Callable[[
     return _replace(session, trial.log_path, target, ".csv", lambda path: write_csv(path, time_s, columns))
 
 
-def _replace(session: Session, old: Path | None, target: Path, ending: str, write: Callable[[Path], None]) -> dict[str, str]:
+def _replace(
+    session: Session, old: Path | None, target: Path, ending: str, write: Callable[[Path], None]
+) -> dict[str, str]:
     """Write a file beside the copy of `old`, which is removed; the old path in the manifest and the new one."""
     name = Path(str(old)).relative_to(session.path)
     new = name.with_name(f"{name.stem}_corrected{ending}")
@@ -127,8 +153,14 @@ def _replace(session: Session, old: Path | None, target: Path, ending: str, writ
 def write_tsv(path: Path, mocap: Mocap) -> None:
     """Marker trajectories as a QTM TSV export in millimetres with frame and time; a gap is an empty cell."""
     names = [f"{label} {axis}" for label in mocap.labels for axis in "XYZ"]
-    head = [("NO_OF_FRAMES", len(mocap.time_s)), ("NO_OF_MARKERS", len(mocap.labels)), ("FREQUENCY", repr(mocap.rate_hz)),
-            ("DATA_INCLUDED", "3D"), ("MARKER_NAMES", *mocap.labels), ("Frame", "Time", *names)]
+    head = [
+        ("NO_OF_FRAMES", len(mocap.time_s)),
+        ("NO_OF_MARKERS", len(mocap.labels)),
+        ("FREQUENCY", repr(mocap.rate_hz)),
+        ("DATA_INCLUDED", "3D"),
+        ("MARKER_NAMES", *mocap.labels),
+        ("Frame", "Time", *names),
+    ]
     rows = ["\t".join(map(str, line)) for line in head]
     flat = 1e3 * mocap.position_world.reshape(len(mocap.time_s), -1)
     for i, (t, row) in enumerate(zip(mocap.time_s.tolist(), flat.tolist(), strict=True), start=1):
@@ -145,7 +177,9 @@ def write_csv(path: Path, time_s: Array, columns: Mapping[str, Array]) -> None:
 
 
 def _rename(manifest: Path, renamed: Mapping[str, str]) -> None:
-    """Put new paths in the place of old ones, in quotes and however they are spelt, and leave the rest of the manifest as it is."""
+    """Put new paths in the place of old ones, in quotes and however they are spelt, and leave the rest of the manifest
+    as it is."""
+
     def new(quoted: re.Match[str]) -> str:
         path = renamed.get(posixpath.normpath(quoted[2]))
         return quoted[0] if path is None else f"{quoted[1]}{path}{quoted[1]}"

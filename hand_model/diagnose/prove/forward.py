@@ -1,8 +1,9 @@
-"""Forward replay of a compiled hand: one joint on its recorded path, everything behind it moved by the file's own elements.
+"""Forward replay of a compiled hand: one joint on its recorded path, everything behind it moved by the file's own
+elements.
 
-Contact and gravity are off (the pose of the palm is not the question), limits, tendons and equalities on; effects that the file
-cannot hold act through the passive-force callback, the motor's load being the recorded one. The motion is slowed down: maps,
-plays and stops do not mind, and nothing of the file that was not measured is tested.
+Contact and gravity are off (the pose of the palm is not the question), limits, tendons and equalities on; effects that
+the file cannot hold act through the passive-force callback, the motor's load being the recorded one. The motion is
+slowed down: maps, plays and stops do not mind, and nothing of the file that was not measured is tested.
 """
 
 from __future__ import annotations
@@ -26,14 +27,16 @@ Array = NDArray[np.float64]
 
 STEP_S = 0.002
 COASTING_S = 0.002  # in which a part that nothing drives stands: whatever rubs in its play, nobody has measured
-SLOWER = 3.0  # the replay's time over the recording's: the spring that holds a finger on its lever is nominal, not what is tested
+# the replay's time over the recording's: the spring that holds a finger on its lever is nominal, not what is tested
+SLOWER = 3.0
 
 
 def follower_along(folder: Path, state: DriveState, where: Mapping[str, Any], station: str) -> Array | None:
-    """Angle (n,) [rad] of a joint of a compiled folder while its driver moves as in `state`; None where no file has both.
+    """Angle (n,) [rad] of a joint of a compiled folder while its driver moves as in `state`; None where no file has
+    both.
 
-    where: "finger", "joint" and "actuator" of a finding. station "encoder": the driver is the motor, in percent, and the joint stands
-    behind its lever. "linkage": the driver is the joint's own, in degrees.
+    where: "finger", "joint" and "actuator" of a finding. station "encoder": the driver is the motor, in percent, and
+    the joint stands behind its lever. "linkage": the driver is the joint's own, in degrees.
     """
     import mujoco
 
@@ -44,7 +47,8 @@ def follower_along(folder: Path, state: DriveState, where: Mapping[str, Any], st
         if driver is not None:
             path = state.position if station == "encoder" else np.deg2rad(state.position)
             hand = load_hand(folder / "hand.json")
-            own = replace(hand, effects=tuple(e for e in hand.effects if effect(e.effect).station == station))  # no other one moves it
+            # no other one moves it
+            own = replace(hand, effects=tuple(e for e in hand.effects if effect(e.effect).station == station))
             return _roll(model, own, state, str(where["actuator"]), driver, path, follower)
     return None
 
@@ -74,8 +78,11 @@ def _behind_inputs(model: Any, joint: int) -> int:
 def _inputs(model: Any, joint: int) -> Iterator[tuple[int, int]]:
     """Inputs from a joint on, towards the driver, each with the tendon by which it follows the next."""
     while SUFFIX in model.joint(joint).name:
-        tendon = next(t for t in range(model.ntendon) if model.wrap_objid[model.tendon_adr[t] + 1] == joint
-                      and model.tendon_num[t] == 2)
+        tendon = next(
+            t
+            for t in range(model.ntendon)
+            if model.wrap_objid[model.tendon_adr[t] + 1] == joint and model.tendon_num[t] == 2
+        )
         yield joint, tendon
         joint = int(model.wrap_objid[model.tendon_adr[tendon]])
 
@@ -88,7 +95,12 @@ def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, pat
     model.opt.gravity[:] = 0
     model.opt.tolerance = 1e-16  # of forces on inertias a millionth of the held one
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
-    _rub(model, driver, float(model.dof_M0[model.jnt_dofadr[follower]]), float(np.abs(np.gradient(path, state.time_s)).max()) / SLOWER)
+    _rub(
+        model,
+        driver,
+        float(model.dof_M0[model.jnt_dofadr[follower]]),
+        float(np.abs(np.gradient(path, state.time_s)).max()) / SLOWER,
+    )
     held = {driver}
     for actuator in range(len(model.actuator_trnid)):
         joint = int(model.actuator_trnid[actuator, 0])
@@ -101,7 +113,8 @@ def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, pat
     model.dof_armature[dof] = HOLD
     model.jnt_limited[list(held)] = 0  # a path a little beyond its range would be braked, and throw what it carries
     mujoco.mj_setConst(model, mujoco.MjData(model))
-    absolute = model.eq_solref[:, 0] < 0  # ties of slides, stiff for the inertias as they were and for the file's own step
+    # ties of slides, stiff for the inertias as they were and for the file's own step
+    absolute = model.eq_solref[:, 0] < 0
     model.eq_solref[absolute] = 2 * STEP_S, 1.0
     at, rate = model.jnt_qposadr[driver], model.jnt_dofadr[driver]
     time_s = SLOWER * state.time_s
@@ -124,14 +137,17 @@ def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, pat
 
 
 def _rub(model: Any, driver: int, inertia: float, fastest: float) -> None:
-    """Let inputs that lie loose in a play behind a driver stand within `COASTING_S`, as friction, which the gap's ends push without lag
-    and no spring has to bear. inertia: of the joint that is moved [kg m^2]; fastest: of the driver, its unit per second."""
+    """Let inputs that lie loose in a play behind a driver stand within `COASTING_S`, as friction, which the gap's ends
+    push without lag and no spring has to bear. inertia: of the joint that is moved [kg m^2]; fastest: of the driver,
+    its unit per second."""
     import mujoco
 
     for row in np.flatnonzero(model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)):
         last = int(model.eq_obj2id[row])
         if _behind_inputs(model, last) == driver:
-            loose = [model.jnt_dofadr[joint] for joint, tendon in _inputs(model, last) if not model.tendon_stiffness[tendon]]
+            loose = [
+                model.jnt_dofadr[joint] for joint, tendon in _inputs(model, last) if not model.tendon_stiffness[tendon]
+            ]
             model.dof_frictionloss[loose] = inertia * model.eq_data[row, 1] ** 2 * fastest / COASTING_S
 
 
@@ -144,7 +160,8 @@ def _unit(model: Any, motor: str) -> float:
 
 
 def _started(model: Any, qpos: Array, driver: int) -> Array:
-    """qpos (nq,) with inputs at the end of their tendons' ranges that a first stroke finds closed, followers on their maps."""
+    """qpos (nq,) with inputs at the end of their tendons' ranges that a first stroke finds closed, followers on their
+    maps."""
     out = on_linkages(model, qpos)
     for joint in range(model.njnt):
         if SUFFIX in model.joint(joint).name and _behind_inputs(model, joint) == driver:

@@ -22,9 +22,15 @@ from .markers import COMPILED, marker_fit, of_folder
 from .replays import Replay, errors_along, proved, untouched
 from .write_course import with_chains, written_courses
 
-MOTOR = {"inertia": ("inertia", "raw s^2/%"), "viscous": ("viscous", "raw s/%"), "coulomb": ("coulomb", "raw"),
-         "spring": ("stiffness", "raw/%"), "preload": ("preload", "raw")}
-LEAST = {"stiffness": 1e-6, "inertia": 2e-3}  # [raw, %]: a preload needs a spring; bristles without inertia cannot be simulated
+MOTOR = {
+    "inertia": ("inertia", "raw s^2/%"),
+    "viscous": ("viscous", "raw s/%"),
+    "coulomb": ("coulomb", "raw"),
+    "spring": ("stiffness", "raw/%"),
+    "preload": ("preload", "raw"),
+}
+# [raw, %]: a preload needs a spring; bristles without inertia cannot be simulated
+LEAST = {"stiffness": 1e-6, "inertia": 2e-3}
 OTHER_MARKERS = "the model's palm markers are not this session's, or elsewhere: nothing tells where its joints are"
 REACHED = 200  # places over a driver's range
 DRIVE_KEPT = ("gain", "damping")  # of an identified motor, beside what the balance fits
@@ -41,18 +47,23 @@ def read_model(model: Any) -> Hand:
 def refuse_other(hand: Hand, session: Session) -> None:
     """Raise HandFileError where a hand is not the session's: of the other side, or without any of its fingers."""
     if hand.side != session.side:
-        raise HandFileError(f"the model is a {hand.side} hand, and the session's is a {session.side} one; a model of this hand is needed")
+        raise HandFileError(
+            f"the model is a {hand.side} hand, and the session's is a {session.side} one; a model of this hand is needed"
+        )
     fingers = [f.name for f in session.fingers]
     if not {f.name for f in hand.fingers} & set(fingers):
-        raise HandFileError(f"the model has none of the session's fingers ({', '.join(fingers)}); a model of this hand is needed")
+        raise HandFileError(
+            f"the model has none of the session's fingers ({', '.join(fingers)}); a model of this hand is needed"
+        )
 
 
-def as_fitted(hand: Hand, stations: Sequence[Any], counts: Mapping[str, tuple[float, float]],
-              fit: Callable[[Any], Any]) -> Hand:
+def as_fitted(
+    hand: Hand, stations: Sequence[Any], counts: Mapping[str, tuple[float, float]], fit: Callable[[Any], Any]
+) -> Hand:
     """The hand with the coefficients of a fit of each station: motors, encoder maps, couplings.
 
-    stations: those to take over. counts: actuator -> counts at 0 and 100 %. fit: of the naming or the reading of a station, the declared one or the
-    one with effects.
+    stations: those to take over. counts: actuator -> counts at 0 and 100 %. fit: of the naming or the reading of a
+    station, the declared one or the one with effects.
     """
     motors = {m.actuator: m for m in hand.motors}
     fingers = {f.name: f for f in hand.fingers}
@@ -60,7 +71,9 @@ def as_fitted(hand: Hand, stations: Sequence[Any], counts: Mapping[str, tuple[fl
         declared = dict(fit(station.reading).declared)
         if station.signal == "current":
             declared["inertia"] = fit(station.naming).declared["inertia"]  # told by starts and stops alone
-            motors[station.actuator] = _motor(station, declared, fit(station.reading).terms, counts[station.actuator], motors.get(station.actuator))
+            motors[station.actuator] = _motor(
+                station, declared, fit(station.reading).terms, counts[station.actuator], motors.get(station.actuator)
+            )
         elif station.signal == "encoder":
             fingers[station.finger] = _with_map(fingers[station.finger], station, declared, counts[station.actuator])
         elif station.joint is not None:
@@ -68,27 +81,41 @@ def as_fitted(hand: Hand, stations: Sequence[Any], counts: Mapping[str, tuple[fl
     return replace(hand, motors=tuple(motors.values()), fingers=tuple(fingers.values()))
 
 
-def _motor(station: Any, declared: Mapping[str, float], terms: Sequence[Any], counts: tuple[float, float], was: Motor | None) -> Motor:
+def _motor(
+    station: Any, declared: Mapping[str, float], terms: Sequence[Any], counts: tuple[float, float], was: Motor | None
+) -> Motor:
     states = station.naming.balance.states
-    values = {MOTOR[k][0]: Estimate(float(v), None, MOTOR[k][1], "diagnosis") for k, v in declared.items() if k in MOTOR}
-    values |= {k: replace(values[k], value=least, origin="least that can be simulated") for k, least in LEAST.items() if values[k].value < least}
+    values = {
+        MOTOR[k][0]: Estimate(float(v), None, MOTOR[k][1], "diagnosis") for k, v in declared.items() if k in MOTOR
+    }
+    values |= {
+        k: replace(values[k], value=least, origin="least that can be simulated")
+        for k, least in LEAST.items()
+        if values[k].value < least
+    }
     if values["coulomb"].value > 0:
-        named = [t.shape["bristle_length"] for t in terms if t.effect.name == "presliding_friction"]  # all friction acts through these bristles
+        # all friction acts through these bristles
+        named = [t.shape["bristle_length"] for t in terms if t.effect.name == "presliding_friction"]
         give = named[0] if named else float(np.max(states[0].extra.get("give", np.zeros(1))))
-        values["presliding"] = Estimate(give, None, "%", "diagnosis" if named else "diagnosis, common to the session's drives")
+        values["presliding"] = Estimate(
+            give, None, "%", "diagnosis" if named else "diagnosis, common to the session's drives"
+        )
     if was is not None:
         values |= {k: was.parameters[k] for k in DRIVE_KEPT if k in was.parameters}
     return Motor(station.actuator, *counts, values, station.naming.balance.sigma, tuple(s.trial for s in states))
 
 
 def _with_map(finger: Finger, station: Any, declared: Mapping[str, float], counts: tuple[float, float]) -> Finger:
-    """The encoder map of the proximal joint: proximal angle [deg] over the share of the range becomes radians. Its range holds what the map
-    gives over the positions of the recordings, and so do those of the joints that follow."""
+    """The encoder map of the proximal joint: proximal angle [deg] over the share of the range becomes radians. Its
+    range holds what the map gives over the positions of the recordings, and so do those of the joints that follow."""
     coefficients = np.deg2rad([v for k, v in declared.items() if k.startswith("power_")])
     positions = np.concatenate([s.position[np.isfinite(s.position)] for s in station.naming.balance.states]) / 100
     angles = Polynomial(coefficients)(np.linspace(positions.min(), positions.max(), REACHED))
-    finger = replace(finger, encoder_maps=(EncoderMap(*counts, coefficients, {}, {}), *finger.encoder_maps[1:]),
-                     joints=(_ranging(finger.joints[0], angles), *finger.joints[1:]))
+    finger = replace(
+        finger,
+        encoder_maps=(EncoderMap(*counts, coefficients, {}, {}), *finger.encoder_maps[1:]),
+        joints=(_ranging(finger.joints[0], angles), *finger.joints[1:]),
+    )
     return _following(finger)
 
 
@@ -112,13 +139,16 @@ def _with_coupling(finger: Finger, station: Any, declared: Mapping[str, float]) 
     scale = float(station.naming.balance.states[0].extra["scale"][0])
     powers = [v for k, v in declared.items() if k.startswith("power_")]
     coefficients = Polynomial(np.deg2rad(powers))(Polynomial([0.0, np.rad2deg(1.0) / scale])).coef
-    couplings = [c if c.follower != station.joint else Coupling(c.driver, c.follower, coefficients, {}, {})
-                 for c in finger.couplings]
+    couplings = [
+        c if c.follower != station.joint else Coupling(c.driver, c.follower, coefficients, {}, {})
+        for c in finger.couplings
+    ]
     return _following(replace(finger, couplings=tuple(couplings)))
 
 
 def without_effects(hand: Hand, findings: Sequence[Finding]) -> Hand:
-    """The hand without the effects that the findings name anew: its declared coefficients are fitted as if it had none."""
+    """The hand without the effects that the findings name anew: its declared coefficients are fitted as if it had
+    none."""
     named = {_seat(f.effect, f.where) for f in findings}
     return replace(hand, effects=tuple(e for e in hand.effects if _seat(e.effect, e.where) not in named))
 
@@ -130,19 +160,25 @@ def _seat(effect_name: str, where: Mapping[str, Any]) -> tuple[Any, ...]:
 def with_effects(hand: Hand, findings: Sequence[Finding]) -> Hand:
     """The hand with the findings that are physics of its fingers."""
     physics = [f for f in findings if f.correction is None and f.where.get("finger") in {x.name for x in hand.fingers}]
-    effects = tuple(Effect(f.effect, dict(f.where), {k: _estimate(v) for k, v in f.parameters.items() if np.isfinite(v["value"])})
-                    for f in physics if effect(f.effect).of_the_hand)
+    effects = tuple(
+        Effect(f.effect, dict(f.where), {k: _estimate(v) for k, v in f.parameters.items() if np.isfinite(v["value"])})
+        for f in physics
+        if effect(f.effect).of_the_hand
+    )
     return replace(hand, effects=(*hand.effects, *effects))
 
 
 def _estimate(entry: Mapping[str, Any]) -> Estimate:
     ci = entry.get("ci95")
-    return Estimate(float(entry["value"]), None if ci is None else (float(ci[0]), float(ci[1])), str(entry["unit"]), "diagnosis")
+    return Estimate(
+        float(entry["value"]), None if ci is None else (float(ci[0]), float(ci[1])), str(entry["unit"]), "diagnosis"
+    )
 
 
 def written(before: Path, after: Path, finding: Finding, fingers: Collection[str]) -> dict[str, Any]:
-    """`model` of a finding, {"native", "mjcf", "urdf", "callback"}: where the files of the folder `before`, which hold no effect, get it, or
-    where those of `after` have what comes from hand.json (a course). fingers: of the model, which may lack the finding's."""
+    """`model` of a finding, {"native", "mjcf", "urdf", "callback"}: where the files of the folder `before`, which hold
+    no effect, get it, or where those of `after` have what comes from hand.json (a course). fingers: of the model, which
+    may lack the finding's."""
     from lxml import etree
 
     if finding.where.get("finger") not in fingers:
@@ -160,19 +196,30 @@ def written(before: Path, after: Path, finding: Finding, fingers: Collection[str
         place = kind.write_mjcf(etree.parse(str(file)).getroot(), finding.where, values)
         if place is not None:
             return {"native": True, "mjcf": place, "urdf": urdf, "callback": None}
-    return {"native": False, "mjcf": None, "urdf": urdf, "callback": None,
-            "note": kind.unwritten or "no element of MJCF holds it: kept in hand.json"}
+    return {
+        "native": False,
+        "mjcf": None,
+        "urdf": urdf,
+        "callback": None,
+        "note": kind.unwritten or "no element of MJCF holds it: kept in hand.json",
+    }
 
 
 def _absent(finding: Finding) -> str:
     return f"the model has no {finding.where.get('finger') or 'finger of it'}"
 
 
-def write_improved(hand: Hand, findings: Sequence[Finding], stations: Sequence[Any], counts: Mapping[str, tuple[float, float]],
-                   output: Path,
-                   courses: Mapping[str, FingerCourses] | None = None) -> tuple[tuple[Finding, ...], tuple[Replay, ...]]:
-    """Compile the hand as declared into `output`/model_before and with its effects into `output`/model; the findings, saying
-    where each is written and what replaying the two says, and the replays. courses: finger -> those of its joints.
+def write_improved(
+    hand: Hand,
+    findings: Sequence[Finding],
+    stations: Sequence[Any],
+    counts: Mapping[str, tuple[float, float]],
+    output: Path,
+    courses: Mapping[str, FingerCourses] | None = None,
+) -> tuple[tuple[Finding, ...], tuple[Replay, ...]]:
+    """Compile the hand as declared into `output`/model_before and with its effects into `output`/model; the findings,
+    saying where each is written and what replaying the two says, and the replays. courses: finger -> those of its
+    joints.
 
     Raises HandModelError where the hand cannot be compiled. Nothing is written where no finding is physics of the hand.
     """
@@ -195,7 +242,9 @@ def write_improved(hand: Hand, findings: Sequence[Finding], stations: Sequence[A
     named = [(f, next((s for s in stations if s.names(f)), None)) for f in findings]
     files = output / "model_before", output / "model"
     errors = errors_along([(s, untouched(f, s)) for f, s in named if f.correction is None], *files)
-    fits = {name: marker_fit(c, *(of_folder(f, name, c.labels) for f in files), COMPILED) for name, c in crooked.items()}
+    fits = {
+        name: marker_fit(c, *(of_folder(f, name, c.labels) for f in files), COMPILED) for name, c in crooked.items()
+    }
     out, replays = [], []
     for finding, station in named:
         if finding.correction is None:

@@ -1,7 +1,7 @@
 """Inverse dynamics of a compiled motor: what current its file needs for a recorded motion, by MuJoCo, step by step.
 
-The MJCF is reduced to the motor joint with what acts on it (friction, spring, tendons, passive motors, sensors); effects that
-the file cannot hold act through the passive-force callback, as a user would turn them on.
+The MJCF is reduced to the motor joint with what acts on it (friction, spring, tendons, passive motors, sensors);
+effects that the file cannot hold act through the passive-force callback, as a user would turn them on.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ KEPT = ("compiler", "option", "custom", "worldbody", "tendon", "actuator", "sens
 
 @dataclass(frozen=True)
 class CompiledMotor:
-    """One motor of a compiled folder. root: its reduced MJCF (lxml). unit: effort per raw unit. joint: name of its joint."""
+    """One motor of a compiled folder. root: its reduced MJCF (lxml). unit: effort per raw unit. joint: name of its
+    joint."""
 
     root: Any
     actuator: str
@@ -46,7 +47,9 @@ def read_motor(folder: Path, actuator: str) -> CompiledMotor | None:
         found = motor_joint(root, {"actuator": actuator})
         if found is not None:
             joint, unit = found[0].get("name"), found[1]
-            return CompiledMotor(reduced(root, actuator, found[0]), actuator, joint, unit, load_hand(folder / "hand.json"))
+            return CompiledMotor(
+                reduced(root, actuator, found[0]), actuator, joint, unit, load_hand(folder / "hand.json")
+            )
     return None
 
 
@@ -76,7 +79,8 @@ def reduced(root: Any, actuator: str, joint: Any) -> Any:
 def current_along(motor: CompiledMotor, state: DriveState) -> Array:
     """Current (n,) [raw] that a compiled motor needs for the motion of `state`, as its sensor would read it.
 
-    mj_inverse at every step of 2 ms; the states of friction, tendons and effects come from stepping along the same motion.
+    mj_inverse at every step of 2 ms; the states of friction, tendons and effects come from stepping along the same
+    motion.
     """
     import mujoco
     from lxml import etree
@@ -88,14 +92,18 @@ def current_along(motor: CompiledMotor, state: DriveState) -> Array:
     model.actuator_gainprm[drive] = model.actuator_biasprm[drive] = 0.0  # the drive itself is what is asked for
     grid = np.arange(state.time_s[0], state.time_s[-1] + STEP_S, STEP_S)
     path = [np.interp(grid, state.time_s, x) for x in (state.position, state.velocity, state.acceleration)]
-    inertia, model.dof_armature[0] = model.dof_armature[0] - HOLD, HOLD  # what is on a given path need not be stable by itself
+    # what is on a given path need not be stable by itself
+    inertia, model.dof_armature[0] = model.dof_armature[0] - HOLD, HOLD
     mujoco.mj_setConst(model, mujoco.MjData(model))
     data, out = mujoco.MjData(model), np.empty(len(grid))
-    own = np.delete(np.arange(len(data.actuator_force)), drive)  # passive motors have no control: nu does not count them
+    # passive motors have no control: nu does not count them
+    own = np.delete(np.arange(len(data.actuator_force)), drive)
     data.time, data.qpos[0] = state.elapsed_s[0], path[0][0]
     data.plastic[:] = path[0][0]  # springs that yield start relaxed
     if "gravity_along" in state.extra:  # a motor without its finger has the plane of the finger in x and y
-        gravity = np.stack([np.interp(grid, state.time_s, state.extra[f"gravity_{k}"]) for k in ("along", "across")], axis=-1)
+        gravity = np.stack(
+            [np.interp(grid, state.time_s, state.extra[f"gravity_{k}"]) for k in ("along", "across")], axis=-1
+        )
     else:
         gravity = np.broadcast_to(model.opt.gravity[:2], (len(grid), 2))
     with effects_on(model, started(motor.hand, state)), divergence():
@@ -111,20 +119,33 @@ def current_along(motor: CompiledMotor, state: DriveState) -> Array:
 
 def started(hand: Hand, state: DriveState) -> Hand:
     """The hand with its effects as they stand when a recording begins (a drive that is warm by then)."""
-    effects = tuple(replace(e, parameters={**e.parameters, **{
-        k: Estimate(v, None, "1", "recording") for k, v in effect(e.effect).started(state, {k: x.value for k, x in e.parameters.items()}).items()}})
-        for e in hand.effects)
+    effects = tuple(
+        replace(
+            e,
+            parameters={
+                **e.parameters,
+                **{
+                    k: Estimate(v, None, "1", "recording")
+                    for k, v in effect(e.effect).started(state, {k: x.value for k, x in e.parameters.items()}).items()
+                },
+            },
+        )
+        for e in hand.effects
+    )
     return replace(hand, effects=effects)
 
 
 def _read(motor: CompiledMotor, effort: Array, time_s: Array) -> Array:
-    """The effort (n,) through the sensor of the motor's current: its delay against the encoder's, what its channel does, its cutoff."""
+    """The effort (n,) through the sensor of the motor's current: its delay against the encoder's, what its channel
+    does, its cutoff."""
     sensors = {s.get("name"): s for s in motor.root.iterfind("sensor/*")}
     current, encoder = (sensors.get(f"{motor.actuator}_{kind}") for kind in ("current", "encoder"))
     late = sum(sign * float(s.get("delay", 0.0)) for sign, s in ((1, current), (-1, encoder)) if s is not None)
     effort = np.interp(time_s - late, time_s, effort) if late else effort
     for e in motor.hand.effects:
         if e.where.get("actuator") == motor.actuator:
-            effort = motor.unit * effect(e.effect).reading(effort / motor.unit, time_s, {k: v.value for k, v in e.parameters.items()})
+            effort = motor.unit * effect(e.effect).reading(
+                effort / motor.unit, time_s, {k: v.value for k, v in e.parameters.items()}
+            )
     cutoff = np.inf if current is None else float(current.get("cutoff", 0.0)) or np.inf
     return np.clip(effort, -cutoff, cutoff)

@@ -1,7 +1,8 @@
-"""Proof of a joint that is no plain hinge: recorded markers against the compiled files' kinematics, on recordings that took no part.
+"""Proof of a joint that is no plain hinge: recorded markers against the compiled files' kinematics, on recordings that
+took no part.
 
-Palm pose and angles of every frame are fitted with the file's own chain (nothing else could say where the palm was); what the markers then
-leave, averaged over a few frames, is compared. Both files are compared on the same readings.
+Palm pose and angles of every frame are fitted with the file's own chain (nothing else could say where the palm was);
+what the markers then leave, averaged over a few frames, is compared. Both files are compared on the same readings.
 """
 
 from __future__ import annotations
@@ -43,7 +44,8 @@ def of_chain(chain: Chain, body: NDArray[np.int64]) -> Replayed:
 
 
 def of_folder(folder: Path, finger: str, labels: Sequence[str]) -> Replayed:
-    """A compiled finger by MuJoCo's kinematics of its file; raises DescriptionError where it lacks one of the markers."""
+    """A compiled finger by MuJoCo's kinematics of its file; raises DescriptionError where it lacks one of the
+    markers."""
     from ...description import read_description
     from ...engines import mujoco, ours
     from ...replay import chain_of
@@ -63,8 +65,8 @@ def of_folder(folder: Path, finger: str, labels: Sequence[str]) -> Replayed:
 
 
 def marker_fit(courses: FingerCourses, before: Replayed, after: Replayed, engine: str) -> dict[str, Any]:
-    """`fit` of a finding: root mean square of what means over BLOCK frames leave per coordinate [m], and their noise by differences of
-    neighbours, on the recordings kept out (on all, where none is)."""
+    """`fit` of a finding: root mean square of what means over BLOCK frames leave per coordinate [m], and their noise by
+    differences of neighbours, on the recordings kept out (on all, where none is)."""
     records = courses.angles.records
     chosen = [i for i, r in enumerate(records) if r.trial.validate] or list(range(len(records)))
     left, right, noise, blocks = [], [], [], []
@@ -76,12 +78,21 @@ def marker_fit(courses: FingerCourses, before: Replayed, after: Replayed, engine
         blocks.append(block)
     fit = reduction(left, right, blocks)
     floor = float(np.sqrt(0.5 * np.mean(np.concatenate(noise) ** 2)))
-    return {"metric": "marker_rmse", "unit": "m", **fit, "noise_floor": floor, "engine": engine,
-            "held_out": [records[i].trial.name for i in chosen if records[i].trial.validate]}
+    return {
+        "metric": "marker_rmse",
+        "unit": "m",
+        **fit,
+        "noise_floor": floor,
+        "engine": engine,
+        "held_out": [records[i].trial.name for i in chosen if records[i].trial.validate],
+    }
 
 
-def _left(courses: FingerCourses, index: int, before: Replayed, after: Replayed) -> tuple[tuple[Array, Array], Array, NDArray[np.int64]]:
-    """Of one recording: what block means leave before and after (q,) [m], differences of neighbours after, and a number (q,) of their spell."""
+def _left(
+    courses: FingerCourses, index: int, before: Replayed, after: Replayed
+) -> tuple[tuple[Array, Array], Array, NDArray[np.int64]]:
+    """Of one recording: what block means leave before and after (q,) [m], differences of neighbours after, and a number
+    (q,) of their spell."""
     record, data, noise = courses.angles.records[index], courses.data[index], courses.angles.noise_m
     far = np.linalg.norm(_errors(data, after, noise), axis=-1) > OUTLIER_LIMIT * noise
     seen = np.isfinite(data.position_world[..., 0]) & ~passing(far, record.mocap.time_s) & ~record.ghost[:, None]

@@ -29,8 +29,8 @@ RESAMPLES = 1000
 
 @dataclass(frozen=True)
 class Replay:
-    """Residuals of two compiled files along the recordings kept out: position, velocity, before, after (n,), units, noise of a
-    sample, names of the recordings."""
+    """Residuals of two compiled files along the recordings kept out: position, velocity, before, after (n,), units,
+    noise of a sample, names of the recordings."""
 
     finding: Finding
     position: Array
@@ -44,7 +44,8 @@ class Replay:
 
 
 def untouched(finding: Finding, station: Any) -> tuple[DriveState, ...]:
-    """The recordings on which a finding is proved by replay; none where it cannot be replayed. station: where it was named, or None."""
+    """The recordings on which a finding is proved by replay; none where it cannot be replayed. station: where it was
+    named, or None."""
     kind = effect(finding.effect)
     if station is None or not kind.of_the_hand or kind.unwritten:
         return ()
@@ -52,20 +53,24 @@ def untouched(finding: Finding, station: Any) -> tuple[DriveState, ...]:
 
 
 def errors_along(wanted: Sequence[tuple[Any, Sequence[DriveState]]], before: Path, after: Path) -> Errors:
-    """Recorded minus replayed (n,) by station and recording, of the folders `before` and `after`; two replays at a time.
+    """Recorded minus replayed (n,) by station and recording, of the folders `before` and `after`; two replays at a
+    time.
 
     wanted: stations and recordings, each of which is replayed once, however many effects are named there.
     """
     once = {(_place(station), s.trial): (station, s) for station, states in wanted for s in states}
-    calls = [(_place(station), folder, of_recording(fit, state), state) for station, state in once.values()
-             for folder, fit in ((before, station.reading.declared), (after, station.reading.fit))]
+    calls = [
+        (_place(station), folder, of_recording(fit, state), state)
+        for station, state in once.values()
+        for folder, fit in ((before, station.reading.declared), (after, station.reading.fit))
+    ]
     errors = list(Background(_error, calls).results())
     return {key: (errors[2 * i], errors[2 * i + 1]) for i, key in enumerate(once)}
 
 
 def proved(finding: Finding, station: Any, errors: Errors) -> tuple[dict[str, Any], Replay | None]:
-    """`fit` of a finding from the errors of the compiled files along its recordings, and their replay; as it was, saying why, where they
-    cannot be replayed.
+    """`fit` of a finding from the errors of the compiled files along its recordings, and their replay; as it was,
+    saying why, where they cannot be replayed.
 
     station: where it was named, None for what was read from events.
     """
@@ -79,13 +84,31 @@ def proved(finding: Finding, station: Any, errors: Errors) -> tuple[dict[str, An
     used = [_used(s, every, station.naming.balance.sigma) for s in states]
     r0, r1 = ([pair[k][u] for pair, u in zip(pairs, used, strict=True)] for k in (0, 1))
     blocks = [_blocks(s)[u] for s, u in zip(states, used, strict=True)]
-    granted = np.concatenate([s.extra.get("sigma", np.zeros(len(s.time_s)))[u] for s, u in zip(states, used, strict=True)])
+    granted = np.concatenate(
+        [s.extra.get("sigma", np.zeros(len(s.time_s)))[u] for s, u in zip(states, used, strict=True)]
+    )
     floor = float(np.hypot(station.naming.balance.sigma, np.sqrt(np.mean(granted**2))))
-    fit = {**finding.fit, **reduction(r0, r1, blocks), "noise_floor": floor, "engine": INVERSE if station.signal == "current" else FORWARD,
-           "held_out": [s.trial for s in states if s.validate]}
-    x, v = (np.concatenate([getattr(s, k)[u] for s, u in zip(states, used, strict=True)]) for k in ("position", "velocity"))
-    return fit, Replay(finding, x, v, np.concatenate(r0), np.concatenate(r1), states[0].position_unit, states[0].effort_unit,
-                       station.naming.balance.sigma, tuple(s.trial for s in states))
+    fit = {
+        **finding.fit,
+        **reduction(r0, r1, blocks),
+        "noise_floor": floor,
+        "engine": INVERSE if station.signal == "current" else FORWARD,
+        "held_out": [s.trial for s in states if s.validate],
+    }
+    x, v = (
+        np.concatenate([getattr(s, k)[u] for s, u in zip(states, used, strict=True)]) for k in ("position", "velocity")
+    )
+    return fit, Replay(
+        finding,
+        x,
+        v,
+        np.concatenate(r0),
+        np.concatenate(r1),
+        states[0].position_unit,
+        states[0].effort_unit,
+        station.naming.balance.sigma,
+        tuple(s.trial for s in states),
+    )
 
 
 def _place(station: Any) -> Place:
@@ -93,8 +116,8 @@ def _place(station: Any) -> Place:
 
 
 def _error(place: Place, folder: Path, own: Array, state: DriveState) -> Array | None:
-    """Recorded minus replayed (n,): current [raw] of the compiled motor, or angle [deg] of the compiled joint; less what belongs to the
-    recording itself, `own` (n,). None where no file has the motor or the joint."""
+    """Recorded minus replayed (n,): current [raw] of the compiled motor, or angle [deg] of the compiled joint; less
+    what belongs to the recording itself, `own` (n,). None where no file has the motor or the joint."""
     signal, finger, joint, actuator = place
     if signal == "current":
         from .inverse import current_along, read_motor
@@ -116,7 +139,8 @@ def kept_out(states: Sequence[DriveState]) -> tuple[DriveState, ...]:
 
 
 def _used(state: DriveState, every: bool, noise: float) -> NDArray[np.bool_]:
-    """Samples (n,) that are compared: steady ones, as a balance of that noise has them, or every sliding one for what acts at starts and stops."""
+    """Samples (n,) that are compared: steady ones, as a balance of that noise has them, or every sliding one for what
+    acts at starts and stops."""
     if every:
         return np.isfinite(state.effort) & (state.extra.get("slides", np.ones(len(state.time_s))) > 0)
     seen = np.isfinite(state.effort) & (state.extra.get("steady", np.ones(len(state.time_s))) > 0)
@@ -131,7 +155,9 @@ def _blocks(state: DriveState) -> NDArray[np.int64]:
     return out
 
 
-def reduction(before: Sequence[Array], after: Sequence[Array], blocks: Sequence[NDArray[np.int64]], seed: int = 0) -> dict[str, Any]:
+def reduction(
+    before: Sequence[Array], after: Sequence[Array], blocks: Sequence[NDArray[np.int64]], seed: int = 0
+) -> dict[str, Any]:
     """Root mean square error before and after, and the 95 % interval of its reduction by a bootstrap over blocks.
 
     before, after: errors (n,) of each recording; blocks: (n,) numbers of its blocks.
@@ -144,5 +170,8 @@ def reduction(before: Sequence[Array], after: Sequence[Array], blocks: Sequence[
     pick = np.random.default_rng(seed).integers(0, len(n), (RESAMPLES, len(n)))
     size = n[pick].sum(1)
     gain = np.sqrt(s0[pick].sum(1) / size) - np.sqrt(s1[pick].sum(1) / size)
-    return {"before": float(np.sqrt(r0.mean())), "after": float(np.sqrt(r1.mean())),
-            "ci95_reduction": np.percentile(gain, [2.5, 97.5]).tolist()}
+    return {
+        "before": float(np.sqrt(r0.mean())),
+        "after": float(np.sqrt(r1.mean())),
+        "ci95_reduction": np.percentile(gain, [2.5, 97.5]).tolist(),
+    }

@@ -20,8 +20,11 @@ Array = NDArray[np.float64]
 ELSEWHERE_M = 1e-3  # palm markers further from where the model has them were put on anew
 
 
-def written_courses(hand: Hand, findings: Sequence[Finding], courses: Mapping[str, FingerCourses]) -> dict[str, FingerCourses]:
-    """Those of `courses` (finger -> its own) that a finding names and that the hand can take: it has the session's markers where they are."""
+def written_courses(
+    hand: Hand, findings: Sequence[Finding], courses: Mapping[str, FingerCourses]
+) -> dict[str, FingerCourses]:
+    """Those of `courses` (finger -> its own) that a finding names and that the hand can take: it has the session's
+    markers where they are."""
     named = {f.where.get("finger") for f in findings if f.effect in HINGE}
     known = {f.name for f in hand.fingers}
     return {name: c for name, c in courses.items() if name in named & known and _placed(hand, c) is not None}
@@ -29,12 +32,15 @@ def written_courses(hand: Hand, findings: Sequence[Finding], courses: Mapping[st
 
 def with_chains(hand: Hand, courses: Mapping[str, FingerCourses], which: Callable[[FingerCourses], Chain]) -> Hand:
     """The hand with the axes, centres, markers and courses of one of the chains of each finger of `courses`."""
-    fingers = [_with_chain(hand, f, courses[f.name], which(courses[f.name])) if f.name in courses else f for f in hand.fingers]
+    fingers = [
+        _with_chain(hand, f, courses[f.name], which(courses[f.name])) if f.name in courses else f for f in hand.fingers
+    ]
     return replace(hand, fingers=tuple(fingers))
 
 
 def _placed(hand: Hand, courses: FingerCourses) -> tuple[Array, Array] | None:
-    """Rotation (3, 3) and translation (3,) [m] from the chain's palm frame to the hand's; None where the markers are others."""
+    """Rotation (3, 3) and translation (3,) [m] from the chain's palm frame to the hand's; None where the markers are
+    others."""
     palm = np.flatnonzero(courses.body == 0)
     own = dict(hand.palm_markers_palm)
     if not {courses.labels[j] for j in palm} <= set(own):
@@ -51,9 +57,19 @@ def _with_chain(hand: Hand, finger: Finger, courses: FingerCourses, chain: Chain
     rotation, translation = kabsch(chain.marker_palm[palm], there)
     joints = []
     for k, joint in enumerate(finger.joints):
-        markers = {courses.labels[j]: rotation @ chain.marker_palm[j] + translation for j in np.flatnonzero(courses.body == k + 1)}
-        joints.append(replace(joint, axis_palm=rotation @ chain.axis_palm[k], centre_palm=rotation @ chain.centre_palm[k] + translation,
-                              markers_palm={**joint.markers_palm, **markers}, course=_turned(chain.course(k), rotation)))
+        markers = {
+            courses.labels[j]: rotation @ chain.marker_palm[j] + translation
+            for j in np.flatnonzero(courses.body == k + 1)
+        }
+        joints.append(
+            replace(
+                joint,
+                axis_palm=rotation @ chain.axis_palm[k],
+                centre_palm=rotation @ chain.centre_palm[k] + translation,
+                markers_palm={**joint.markers_palm, **markers},
+                course=_turned(chain.course(k), rotation),
+            )
+        )
     return replace(finger, joints=tuple(joints))
 
 

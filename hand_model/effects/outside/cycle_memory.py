@@ -11,12 +11,14 @@ from ..base import Amplitude, Array, DriveState, Shape, figure, position_range
 from ..path import strokes
 from .outsider import Outsider
 
-# Rhythms: period in passes, the first pass of each period, how many passes in a row. Every second one is a direction, no rhythm.
+# Rhythms: period in passes, the first pass of each period, how many passes in a row. Every second one is a direction,
+# no rhythm.
 RHYTHMS = (*((3, k, 1) for k in range(3)), *((4, k, 2) for k in range(4)), *((6, k, 2) for k in (0, 2, 4)))
 
 
 class CycleMemory(Outsider):
-    """F = A sign(v) in the passes of a rhythm, everywhere or times exp(-((x - centre) / width)^2 / 2); counted from each recording's start."""
+    """F = A sign(v) in the passes of a rhythm, everywhere or times exp(-((x - centre) / width)^2 / 2); counted from
+    each recording's start."""
 
     name = "cycle_memory"
     rubs = True
@@ -25,9 +27,11 @@ class CycleMemory(Outsider):
         """The rhythm, and where in the range: a width beyond it means everywhere."""
         low, high = position_range(states)
         span = high - low
-        return (Shape("form", "1", 0.0, float(len(RHYTHMS) - 1), tuple(float(i) for i in range(len(RHYTHMS)))),
-                Shape("centre", states[0].position_unit, low, high, tuple(np.linspace(low, high, 11)[1:-1].tolist())),
-                Shape("width", states[0].position_unit, 0.01 * span, 2 * span, (0.05 * span, 2 * span)))
+        return (
+            Shape("form", "1", 0.0, float(len(RHYTHMS) - 1), tuple(float(i) for i in range(len(RHYTHMS)))),
+            Shape("centre", states[0].position_unit, low, high, tuple(np.linspace(low, high, 11)[1:-1].tolist())),
+            Shape("width", states[0].position_unit, 0.01 * span, 2 * span, (0.05 * span, 2 * span)),
+        )
 
     def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
         """What is everywhere has no centre."""

@@ -14,8 +14,8 @@ from .outsider import Outsider
 
 
 class DwellFriction(Outsider):
-    """F = A sign(v) r exp(-s / distance), s travelled since the last rest, r how far that rest restored what had been worn off: at rest
-    it approaches 1 with the time constant of healing (Dieterich 1979)."""
+    """F = A sign(v) r exp(-s / distance), s travelled since the last rest, r how far that rest restored what had been
+    worn off: at rest it approaches 1 with the time constant of healing (Dieterich 1979)."""
 
     name = "dwell_friction"
     rubs = True
@@ -24,8 +24,12 @@ class DwellFriction(Outsider):
         """The way on which it is worn off, and the time in which it heals."""
         low, high = position_range(states)
         span = high - low
-        return (Shape("distance", states[0].position_unit, 0.01 * span, 0.4 * span, tuple(np.geomspace(0.015, 0.25, 6) * span)),
-                Shape("healing_time", "s", 0.02, 10.0, (0.05, 0.5, 2.0)))
+        return (
+            Shape(
+                "distance", states[0].position_unit, 0.01 * span, 0.4 * span, tuple(np.geomspace(0.015, 0.25, 6) * span)
+            ),
+            Shape("healing_time", "s", 0.02, 10.0, (0.05, 0.5, 2.0)),
+        )
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Friction beyond the usual, just after a rest."""
@@ -42,7 +46,9 @@ class DwellFriction(Outsider):
                 healed[a:b] = left * worn[a:b]
                 left = healed[b - 1]
             else:
-                left = 1 - (1 - left) * np.exp(-(state.time_s[min(b, len(moving) - 1)] - state.time_s[a]) / shape["healing_time"])
+                left = 1 - (1 - left) * np.exp(
+                    -(state.time_s[min(b, len(moving) - 1)] - state.time_s[a]) / shape["healing_time"]
+                )
         return (state.direction * healed)[:, None]
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:

@@ -24,7 +24,8 @@ class Outsider(Effect):
 
 
 def of_its_record(state: DriveState, columns: Array, records: int) -> Array:
-    """Columns (n, k) of one recording among those of the first `records` of a session, (n, records k); zero of any other."""
+    """Columns (n, k) of one recording among those of the first `records` of a session, (n, records k); zero of any
+    other."""
     out = np.zeros((len(columns), records, columns.shape[1]))
     record = int(state.extra["trial_index"][0]) if "trial_index" in state.extra else records
     if record < records:
@@ -36,4 +37,6 @@ def moments(states: tuple[DriveState, ...]) -> Shape:
     """A moment of the session [s] while something is recorded, with starts all along."""
     recorded = np.concatenate([s.elapsed_s[np.isfinite(s.effort)] for s in states])
     starts = np.quantile(recorded, np.linspace(0.04, 0.96, 24))
-    return Shape("moment", "s", float(starts[0]), float(max(starts[-1], starts[0] + 1e-9)), tuple(np.unique(starts).tolist()))
+    return Shape(
+        "moment", "s", float(starts[0]), float(max(starts[-1], starts[0] + 1e-9)), tuple(np.unique(starts).tolist())
+    )

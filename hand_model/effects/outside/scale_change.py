@@ -12,7 +12,8 @@ from .outsider import Outsider
 
 
 class ScaleChange(Outsider):
-    """angle = map(encoder (1 + A h)), h one from a moment on, in the recordings after it too: a magnet or a gear has slipped."""
+    """angle = map(encoder (1 + A h)), h one from a moment on, in the recordings after it too: a magnet or a gear has
+    slipped."""
 
     name = "scale_change"
     station = "encoder"
@@ -21,7 +22,9 @@ class ScaleChange(Outsider):
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """The moment, in recordings since the first began."""
         last = 1.0 + max((_place(s)[0] for s in states), default=0.0)
-        return (Shape("since", "recordings", 0.05, float(last) - 0.05, tuple(np.arange(0.1, last - 0.05, 0.1).tolist())),)
+        return (
+            Shape("since", "recordings", 0.05, float(last) - 0.05, tuple(np.arange(0.1, last - 0.05, 0.1).tolist())),
+        )
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Relative change, either sign."""

@@ -12,7 +12,8 @@ from .outsider import Outsider
 
 
 class SegmentSwing(Outsider):
-    """angle = map(driver) - A slope a: it stays behind by what it takes to speed it up, A = 1 / (resonance [rad/s])^2."""
+    """angle = map(driver) - A slope a: it stays behind by what it takes to speed it up, A = 1 / (resonance
+    [rad/s])^2."""
 
     name = "segment_swing"
     station = "linkage"

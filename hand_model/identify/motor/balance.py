@@ -1,4 +1,5 @@
-"""The current that a recorded motion takes, both sides filtered alike; friction by its state along the path (Dahl 1968)."""
+"""The current that a recorded motion takes, both sides filtered alike; friction by its state along the path (Dahl
+1968)."""
 
 from __future__ import annotations
 
@@ -15,7 +16,8 @@ PRESLIDING = 1.2  # [%], a travel after which the friction has turned round in a
 
 
 def friction_state(position: Array, presliding: float) -> Array:
-    """Dahl's friction state z (n,) in -1..1 along positions (n,) [%]: z' = (1 - z sign(v)) v / presliding, from z = 0."""
+    """Dahl's friction state z (n,) in -1..1 along positions (n,) [%]: z' = (1 - z sign(v)) v / presliding, from z =
+    0."""
     move = np.diff(position)
     keep = np.exp(-np.abs(move) / presliding)
     sign = np.sign(move)
@@ -28,9 +30,11 @@ def friction_state(position: Array, presliding: float) -> Array:
 
 
 def balance(t: MotorTrial, values: Array, cutoff_hz: float = 2 * CUTOFF_HZ, flexing: bool = False) -> Array:
-    """Current (n,) [raw] that the recorded motion of a trial takes, by `values` (5,) of NAMES; motion filtered at cutoff_hz [Hz].
+    """Current (n,) [raw] that the recorded motion of a trial takes, by `values` (5,) of NAMES; motion filtered at
+    cutoff_hz [Hz].
 
-    flexing: friction as in flexion throughout, which is all that it can be while the drive flexes or is held up in flexion.
+    flexing: friction as in flexion throughout, which is all that it can be while the drive flexes or is held up in
+    flexion.
     """
     rate = 1 / float(np.median(np.diff(t.time_s)))
     time = np.arange(t.time_s[0], t.time_s[-1], 1 / rate)

@@ -1,4 +1,5 @@
-"""The controller of cascades: a position loop round a speed loop, simulated for many drives at once (equations in `drive`)."""
+"""The controller of cascades: a position loop round a speed loop, simulated for many drives at once (equations in
+`drive`)."""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ Array = NDArray[np.float64]
 
 
 class Cascade:
-    """What a position loop round a speed loop adds to the current. ahead (n, B) [%]: the reference less the position, which within the deadband stays;
+    """What a position loop round a speed loop adds to the current. ahead (n, B) [%]: the reference less the position,
+    which within the deadband stays;
     wanted (n, B) [%/s]: its velocity. The current that the preload takes is left out of `ahead`."""
 
     def __init__(self, moves: Moves, q: Mapping[str, Array], times: Grid) -> None:
@@ -24,7 +26,12 @@ class Cascade:
         self.starting = (times.at.min(axis=1) * times.step_s < moves.start_s.max()).tolist()
         self.gain, self.damping, self.preload = q["gain"], q["damping"], q["preload"] / q["gain"]
         self.stiffness = 0.0
-        self.start_s, self.target, self.origin, self.loop = moves.start_s, moves.target, moves.origin, Loop(q, moves.speed)
+        self.start_s, self.target, self.origin, self.loop = (
+            moves.start_s,
+            moves.target,
+            moves.origin,
+            Loop(q, moves.speed),
+        )
         self.ahead, self.wanted = np.zeros((2, len(times.at) + 1, len(self.gain)))
 
     def begin(self, p: Array, v: Array) -> Array:
@@ -37,7 +44,8 @@ class Cascade:
         k = len(step_s)
         self.loop.pace(step_s)
         self.step_s, self.half, self.own_gain = step_s, 0.5 * step_s, self.gain[:k]
-        self.per_way = 0.5 * self.own_gain + self.damping[:k] / step_s  # current by the way that the reference goes in a step
+        # current by the way that the reference goes in a step
+        self.per_way = 0.5 * self.own_gain + self.damping[:k] / step_s
         self.own_target, (self.error, self.way, self.work, self.given) = self.target[:k], np.empty((4, k))
         self.w, self.d = self.wanted[first, :k], self.ahead[first, :k]
         self.coming = zip(self.wanted[first + 1 : last + 1, :k], self.ahead[first + 1 : last + 1, :k], strict=True)
@@ -60,9 +68,17 @@ class Cascade:
         return given
 
     def _begun(self, i: int, p: Array, v: Array, wanted: Array, share: Array, change: Array) -> tuple[Array, Array]:
-        """The share of step i that lies behind the command counts, so that the command's instant counts within a step too."""
+        """The share of step i that lies behind the command counts, so that the command's instant counts within a step
+        too."""
         k = len(p)
-        since = np.minimum(np.maximum((self.times.each(self.times.at[i])[:k] * self.times.step_s + self.step_s - self.start_s[:k]) / self.step_s, 0.0), 1.0)
+        since = np.minimum(
+            np.maximum(
+                (self.times.each(self.times.at[i])[:k] * self.times.step_s + self.step_s - self.start_s[:k])
+                / self.step_s,
+                0.0,
+            ),
+            1.0,
+        )
         old_share, old_change = self.loop.step(self.origin[:k] - p, v, wanted)
         return since * share + (1 - since) * old_share, since * change + (1 - since) * old_change
 
@@ -87,7 +103,11 @@ class Loop:
     """The position loop of cascades: the wanted speed, within a slew rate, of a position error."""
 
     def __init__(self, q: Mapping[str, Array], speed: Array) -> None:
-        self.slope, self.top, self.delay = q["speed_full"] / np.maximum(q["rise"], 1e-4), q["speed_full"] * speed, q["delay"]
+        self.slope, self.top, self.delay = (
+            q["speed_full"] / np.maximum(q["rise"], 1e-4),
+            q["speed_full"] * speed,
+            q["delay"],
+        )
         self.deadband, self.edge, self.gain = q["deadband"], q["edge"], q["position_gain"]
 
     def pace(self, step_s: Array) -> None:
@@ -103,7 +123,8 @@ class Loop:
         self.views = *self.sizes, *self.bounded, *self.changes, *np.empty((2, k))
 
     def step(self, error: Array, v: Array, wanted: Array) -> tuple[Array, Array]:
-        """Share (k,) (0..1) in which position errors (k,) [%] at velocities v (k,) [%/s] are outside the deadband, and the change of the wanted speed [%/s], in one step;
+        """Share (k,) (0..1) in which position errors (k,) [%] at velocities v (k,) [%/s] are outside the deadband, and
+        the change of the wanted speed [%/s], in one step;
         both until the next call."""
         (deadband, edge, gain, half), (low, high), (down, up) = self.own, self.bounds, self.slew
         step_s, middle, end = self.ahead_s
@@ -135,11 +156,15 @@ class Loop:
 def cascade_step(
     q: Mapping[str, float], error: float, speed: float, reference: float, wanted: float, velocity: float, step_s: float
 ) -> tuple[float, float]:
-    """Reference [%] and wanted speed [%/s] of the cascade after one step of step_s [s], for a controller in another simulator's loop.
+    """Reference [%] and wanted speed [%/s] of the cascade after one step of step_s [s], for a controller in another
+    simulator's loop.
 
     error [%]: setpoint less position; speed: share of full; velocity [%/s] of the drive.
     """
-    one = {k: np.atleast_1d(np.asarray(q[k], float)) for k in ("deadband", "edge", "position_gain", "speed_full", "rise", "delay")}
+    one = {
+        k: np.atleast_1d(np.asarray(q[k], float))
+        for k in ("deadband", "edge", "position_gain", "speed_full", "rise", "delay")
+    }
     loop = Loop(one, np.atleast_1d(speed))
     loop.pace(np.atleast_1d(step_s))
     share, change = (float(x[0]) for x in loop.step(*map(np.atleast_1d, (error, velocity, wanted))))

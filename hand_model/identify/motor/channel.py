@@ -1,7 +1,8 @@
-"""By how much a drive's current is logged later than its position: the profile likelihood of that lateness in the simulated drive.
+"""By how much a drive's current is logged later than its position: the profile likelihood of that lateness in the
+simulated drive.
 
-A balance of forces hardly tells a late current from another inertia, and smears what would tell them apart; the drive simulated from its commands
-bends where its reference does, in position and current at once.
+A balance of forces hardly tells a late current from another inertia, and smears what would tell them apart; the drive
+simulated from its commands bends where its reference does, in position and current at once.
 """
 
 from __future__ import annotations
@@ -21,22 +22,28 @@ ROUNDS = 2  # of refinement, once the best lateness lies between two others
 
 
 def channel_delay(found: OutputErrorFit, bounds: Mapping[str, tuple[float, float]]) -> tuple[float, float]:
-    """Lateness of the current [s], negative where the position is late, and its standard deviation; a tick of the controller is not told.
+    """Lateness of the current [s], negative where the position is late, and its standard deviation; a tick of the
+    controller is not told.
 
-    found: a fit that explains the motion, in which the lateness was held near zero. bounds: parameter -> (low, high), as it was fitted with.
+    found: a fit that explains the motion, in which the lateness was held near zero. bounds: parameter -> (low, high),
+    as it was fitted with.
     """
     start = -found.values.get("lead", 0.0)
     glance = {x: _misfit(found, start + x) for x in (-GLANCE_S, 0.0, GLANCE_S)}
     toward, sd = _vertex(glance)
     if not np.isfinite(sd) or abs(toward) < SURE * sd:
-        return start + float(np.clip(toward, -GLANCE_S, GLANCE_S)) if np.isfinite(sd) else start, float(np.hypot(sd, TICK_S))
+        return start + float(np.clip(toward, -GLANCE_S, GLANCE_S)) if np.isfinite(sd) else start, float(
+            np.hypot(sd, TICK_S)
+        )
     names = tuple(n for n in found.names if n != "lead")
     fits = {0.0: found}
 
     def misfit(delay_s: float) -> float:
         near = fits[min(fits, key=lambda x: abs(x - delay_s))]
         values = {**near.values, "lead": -delay_s}
-        fits[delay_s] = output_error.fit(found.moves, values, names, found.sigma, bounds, found.controller, (FINE,), near.own, found.memory)
+        fits[delay_s] = output_error.fit(
+            found.moves, values, names, found.sigma, bounds, found.controller, (FINE,), near.own, found.memory
+        )
         return fits[delay_s].cost - output_error.held(fits[delay_s].values, "lead")
 
     best, sd = _minimum(misfit, start, float(np.sign(toward)) * FIRST_S)
@@ -45,7 +52,9 @@ def channel_delay(found: OutputErrorFit, bounds: Mapping[str, tuple[float, float
 
 def _misfit(found: OutputErrorFit, delay_s: float) -> float:
     """Sum of squares of the current's residuals over its noise with a lateness, all else as it is."""
-    simulated = output_error.simulate_moves(found.moves, {**found.values, "lead": -delay_s}, found.own, found.controller)
+    simulated = output_error.simulate_moves(
+        found.moves, {**found.values, "lead": -delay_s}, found.own, found.controller
+    )
     left = np.concatenate([m.current - y[:, 1] for m, y in zip(found.moves, simulated, strict=True)])
     return float(np.sum((left / found.sigma[1]) ** 2))
 
@@ -62,7 +71,11 @@ def _minimum(misfit: Callable[[float], float], start: float, step: float) -> tup
     for _ in range(ROUNDS):
         around = _around(seen)
         if len(around) < 3:  # the best one lies at the end of what was sought
-            further = 2 * min(seen) - sorted(seen)[1] if min(seen, key=seen.__getitem__) == min(seen) else 2 * max(seen) - sorted(seen)[-2]
+            further = (
+                2 * min(seen) - sorted(seen)[1]
+                if min(seen, key=seen.__getitem__) == min(seen)
+                else 2 * max(seen) - sorted(seen)[-2]
+            )
             seen[further] = misfit(further)
             continue
         best, sd = _vertex(around)
@@ -81,7 +94,8 @@ def _around(seen: Mapping[float, float]) -> dict[float, float]:
 
 
 def _vertex(three: Mapping[float, float]) -> tuple[float, float]:
-    """Lowest place of the parabola through three points of a sum of squares, and the standard deviation that its curvature stands for;
+    """Lowest place of the parabola through three points of a sum of squares, and the standard deviation that its
+    curvature stands for;
     infinite where it is not curved upwards."""
     x, y = np.array(sorted(three)), np.array([three[k] for k in sorted(three)])
     curve, slope, _ = np.polyfit(x - x[1], y - y[1], 2)

@@ -1,7 +1,9 @@
-"""The kind of controller behind a drive, and a start for the fit of everything: searched with the plant held at the regression's values.
+"""The kind of controller behind a drive, and a start for the fit of everything: searched with the plant held at the
+regression's values.
 
-A few moves of every speed and direction, simulated at a coarse step, are enough to tell one controller from another; the plant, which a regression
-that knows no controller has found already, is not let go before the controller is near, or the two run off together.
+A few moves of every speed and direction, simulated at a coarse step, are enough to tell one controller from another;
+the plant, which a regression that knows no controller has found already, is not let go before the controller is near,
+or the two run off together.
 """
 
 from __future__ import annotations
@@ -39,8 +41,8 @@ def find_controller(
     """Fit of plant and controller, the kind of controller chosen by how well it explains the moves.
 
     plant: values of inertia, friction and spring to search with.
-    sigma: noise of position [%] and current [raw]. bounds: parameter -> (low, high). enough: systematic misfit [noise variances]
-    below which no other kind is tried.
+    sigma: noise of position [%] and current [raw]. bounds: parameter -> (low, high). enough: systematic misfit [noise
+    variances] below which no other kind is tried.
     """
     start, some = start_values(moves, plant), _spread(moves)
     moves = [shortened(m, MOVE_S) for m in moves]
@@ -69,7 +71,9 @@ def find_controller(
             near = jump if jump.cost < near.cost + EVIDENCE else near
         # bristles at rest let go under every tremor: what they hold there is not known
         whole = moves if near.values["presliding"] == 0 else [without_rest(m) for m in moves]
-        found = output_error.fit(whole, near.values, _names(near.controller, near.values), sigma, bounds, near.controller, ROUGH)
+        found = output_error.fit(
+            whole, near.values, _names(near.controller, near.values), sigma, bounds, near.controller, ROUGH
+        )
         if best is None or found.cost < best.cost:
             best = found
         if lack_of_fit(best) < enough:
@@ -77,28 +81,46 @@ def find_controller(
     return best
 
 
-def _first_misfit(some: Sequence[MoveData], kind: str, values: Mapping[str, float], sigma: tuple[float, float]) -> float:
-    """Sum of squares of the whitened residuals of a start: the kind that is nearest before anything is fitted mostly stays it."""
+def _first_misfit(
+    some: Sequence[MoveData], kind: str, values: Mapping[str, float], sigma: tuple[float, float]
+) -> float:
+    """Sum of squares of the whitened residuals of a start: the kind that is nearest before anything is fitted mostly
+    stays it."""
     found = np.concatenate(output_error.whitened(some, values, np.array([m.own for m in some]), sigma, kind, COARSE_S))
     return float(np.nan_to_num(np.sum(found**2), nan=np.inf))
 
 
 def _names(kind: str, values: Mapping[str, float]) -> tuple[str, ...]:
-    """Parameters of a drive with this controller; one that sticks hard has no bristles, a reference whose speed jumps no ramps of speed."""
+    """Parameters of a drive with this controller; one that sticks hard has no bristles, a reference whose speed jumps
+    no ramps of speed."""
     fixed = (*(STICK if values["presliding"] == 0 else ()), *(JUMP if values["rise"] == 0 else ()))
     return tuple(n for n in CONTROLLERS[kind] if n not in fixed)
 
 
 def _near(
-    some: Sequence[MoveData], g: OutputErrorFit, changed: Mapping[str, float], sigma: tuple[float, float], bounds: Mapping[str, tuple[float, float]]
+    some: Sequence[MoveData],
+    g: OutputErrorFit,
+    changed: Mapping[str, float],
+    sigma: tuple[float, float],
+    bounds: Mapping[str, tuple[float, float]],
 ) -> OutputErrorFit:
     """The search from a glance, with these values."""
     values = {**g.values, **changed}
-    return output_error.fit(some, values, [n for n in _names(g.controller, values) if n not in NAMES], sigma, bounds, g.controller, SEARCH, g.own)
+    return output_error.fit(
+        some,
+        values,
+        [n for n in _names(g.controller, values) if n not in NAMES],
+        sigma,
+        bounds,
+        g.controller,
+        SEARCH,
+        g.own,
+    )
 
 
 def start_values(moves: Sequence[MoveData], plant: Mapping[str, float]) -> dict[str, float]:
-    """Starting values: the plant as it is, the controller from how fast moves go and what holds the drive off its setpoint."""
+    """Starting values: the plant as it is, the controller from how fast moves go and what holds the drive off its
+    setpoint."""
     ratio, error, hold = [], [], []
     for m in moves:
         n = len(m.time_s)

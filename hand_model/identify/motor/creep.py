@@ -1,7 +1,7 @@
 """The state in which a move leaves the drive to the next one: within its deadband a cascade creeps on.
 
-Where the integral of a position loop holds, a drive goes on at what its last push allows, for seconds: too slowly for its encoder to tell from rest, fast
-enough that the next move begins some milliseconds earlier or later.
+Where the integral of a position loop holds, a drive goes on at what its last push allows, for seconds: too slowly for
+its encoder to tell from rest, fast enough that the next move begins some milliseconds earlier or later.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ ODD = 4.0  # standard deviations of the velocity seen, beyond which it is believ
 
 
 def end_state(time_s: Array, simulated: Array) -> tuple[float, float, float]:
-    """Position [%], current [raw] and velocity [%/s] at the end of a simulated move, at times (n,) [s]: position and current (n, 2)."""
+    """Position [%], current [raw] and velocity [%/s] at the end of a simulated move, at times (n,) [s]: position and
+    current (n, 2)."""
     creep = float((simulated[-1, 0] - simulated[-4, 0]) / (time_s[-1] - time_s[-4]))
     return float(simulated[-1, 0]), float(simulated[-1, 1]), creep if abs(creep) > LEAST else 0.0
 
@@ -33,9 +34,11 @@ def follows(m: MoveData, before: MoveData) -> bool:
     return m.trial == before.trial and m.index == before.index + 1 + len(before.time_s)
 
 
-def begins(data: Sequence[MoveData], values: Mapping[str, float], own: Array, controller: str) -> list[tuple[float, float, float] | None]:
-    """Position [%], current [raw] and velocity [%/s] with which whole moves of a cascade begin; None for a first move, for one that is seen to move
-    otherwise, and for a controller that lets nothing creep."""
+def begins(
+    data: Sequence[MoveData], values: Mapping[str, float], own: Array, controller: str
+) -> list[tuple[float, float, float] | None]:
+    """Position [%], current [raw] and velocity [%/s] with which whole moves of a cascade begin; None for a first move,
+    for one that is seen to move otherwise, and for a controller that lets nothing creep."""
     found: list[tuple[float, float, float] | None] = [None] * len(data)
     if controller != "cascade":
         return found
@@ -53,7 +56,8 @@ def creeping(data: Sequence[MoveData], states: Sequence[tuple[float, float, floa
 
 
 def continued(data: Sequence[MoveData], states: Sequence[tuple[float, float, float] | None]) -> tuple[MoveData, ...]:
-    """The moves with these states at their begin, known as well as the simulation: when a command took effect is to be told from there."""
+    """The moves with these states at their begin, known as well as the simulation: when a command took effect is to be
+    told from there."""
     out = []
     for m, s in zip(data, states, strict=True):
         if s is not None:

@@ -1,15 +1,20 @@
 """The drive simulated in raw units: profile generator, controller, mass, spring and friction; many moves at once.
 
 Plant: inertia a = u - viscous v - F - stiffness p - preload, with the friction of LuGre (Canudas de Wit et al. 1995),
-    F = f + bristle f',  f' = coulomb / distance (1 - f sign(v) / level(v)) v,  level(v) = coulomb (1 + (ratio - 1) exp(-|v / stribeck|^exponent)),
-which sticks (any f within its bounds at v = 0). Without a presliding distance friction is Coulomb's, set-valued at rest: bristles however
-stiff let a drive off before they hold it, for a time that falls with the square root of their distance only.
+    F = f + bristle f',  f' = coulomb / distance (1 - f sign(v) / level(v)) v,  level(v) = coulomb (1 + (ratio - 1)
+    exp(-|v / stribeck|^exponent)),
+which sticks (any f within its bounds at v = 0). Without a presliding distance friction is Coulomb's, set-valued at
+rest: bristles however stiff let a drive off before they hold it, for a time that falls with the square root of their
+distance only.
 Controller: u = gain (r - p) + damping (r' - v), within the current limit. Two kinds make the reference r:
-    "profile": a trapezoidal velocity profile from the old to the new setpoint (a ramp where rise and fall take no time);
-    "cascade": r' follows position_gain (setpoint - p) within the speed limit and a slew rate, and holds within a deadband, which sets in over a width `edge`; as r is
-    the integral of the wanted speed, this is a position loop round a speed loop with proportional and integral action.
+    "profile": a trapezoidal velocity profile from the old to the new setpoint (a ramp where rise and fall take no
+    time);
+    "cascade": r' follows position_gain (setpoint - p) within the speed limit and a slew rate, and holds within a
+    deadband, which sets in over a width `edge`; as r is the integral of the wanted speed, this is a position loop round
+    a speed loop with proportional and integral action.
 The recorded current acts `lead` seconds later: a loop that samples holds its value until the next step.
-A loop that samples acts late: p and v reach the controller `delay` seconds old, to first order (p - delay v, v - delay a).
+A loop that samples acts late: p and v reach the controller `delay` seconds old, to first order (p - delay v, v - delay
+a).
 A generator that sums up its reference step by step has the velocity r' `lag` seconds behind r.
 Integrated by the implicit midpoint rule, linear within a step.
 """
@@ -35,7 +40,21 @@ STEP_S = 2e-3
 BEYOND_S = 2e-3  # simulated beyond a move's end, where what is known of a sample needs it
 TICK_S = 1e-3  # of the controller
 EARLY_S = 0.01  # simulated before a move's own zero, for a command that took effect before it
-SHARED = ("inertia", "viscous", "coulomb", "stiffness", "preload", "presliding", "bristle", "speed_full", "rise", "gain", "damping", "delay", "lead")
+SHARED = (
+    "inertia",
+    "viscous",
+    "coulomb",
+    "stiffness",
+    "preload",
+    "presliding",
+    "bristle",
+    "speed_full",
+    "rise",
+    "gain",
+    "damping",
+    "delay",
+    "lead",
+)
 CONTROLLERS = {"profile": (*SHARED, "fall", "lag"), "cascade": (*SHARED, "position_gain", "deadband")}
 STRIBECK = ("static_ratio", "stribeck_speed", "stribeck_exponent")
 
@@ -43,8 +62,9 @@ STRIBECK = ("static_ratio", "stribeck_speed", "stribeck_exponent")
 @dataclass(frozen=True)
 class Moves:
     """Moves from rest, one per entry (B,): start_s of the command after the move's own zero [s], origin and target [%],
-    speed [share of full], limit [raw], position [%] and current hold [raw] at rest, duration_s [s], velocity [%/s] of a drive that
-    creeps within its deadband; when it may be simulated in long steps [s]: from when on it cruises, until when, and from when on it rests."""
+    speed [share of full], limit [raw], position [%] and current hold [raw] at rest, duration_s [s], velocity [%/s] of a
+    drive that creeps within its deadband; when it may be simulated in long steps [s]: from when on it cruises, until
+    when, and from when on it rests."""
 
     start_s: Array
     origin: Array
@@ -66,7 +86,8 @@ class Moves:
 
 
 def profile(time_s: Array, moves: Moves, q: Mapping[str, Array]) -> tuple[Array, Array]:
-    """Reference [%] and its velocity [%/s], (n, B), of trapezoidal moves at times (n,) [s]; the velocity `lag` [s] behind."""
+    """Reference [%] and its velocity [%/s], (n, B), of trapezoidal moves at times (n,) [s]; the velocity `lag` [s]
+    behind."""
     t = time_s[:, None] - moves.start_s
     sign, shape = np.sign(moves.target - moves.origin), _Trapezoid(moves, q)
     return moves.origin + sign * shape.way(t), sign * shape.speed(t - q["lag"])
@@ -77,8 +98,13 @@ class _Trapezoid:
 
     def __init__(self, moves: Moves, q: Mapping[str, Array]) -> None:
         distance = np.abs(moves.target - moves.origin)
-        self.up, self.down = q["speed_full"] / np.maximum(q["rise"], 1e-4), q["speed_full"] / np.maximum(q["fall"], 1e-4)
-        top = np.minimum(q["speed_full"] * moves.speed, np.sqrt(2 * distance * self.up * self.down / (self.up + self.down)))
+        self.up, self.down = (
+            q["speed_full"] / np.maximum(q["rise"], 1e-4),
+            q["speed_full"] / np.maximum(q["fall"], 1e-4),
+        )
+        top = np.minimum(
+            q["speed_full"] * moves.speed, np.sqrt(2 * distance * self.up * self.down / (self.up + self.down))
+        )
         self.top = np.maximum(top, 1e-9)
         self.rise, self.fall = self.top / self.up, self.top / self.down
         self.flat = np.maximum(distance / self.top - 0.5 * (self.rise + self.fall), 0.0)
@@ -109,8 +135,9 @@ def _within(t: Array, duration: Array) -> Array:
 
 @dataclass(frozen=True)
 class Run:
-    """Simulated moves. grid: times of the steps, from EARLY_S before the moves' zero; position (n, B) [%]; feedback (n, B) [raw]: the current without what a reference
-    that is known beforehand adds, and unlimited; moves and q (each (B,)), column (B,): where each move stands among these columns. Rows after a move's duration are not filled."""
+    """Simulated moves. grid: times of the steps, from EARLY_S before the moves' zero; position (n, B) [%]; feedback (n,
+    B) [raw]: the current without what a reference that is known beforehand adds, and unlimited; moves and q (each
+    (B,)), column (B,): where each move stands among these columns. Rows after a move's duration are not filled."""
 
     grid: Grid
     position: Array
@@ -121,8 +148,9 @@ class Run:
     column: NDArray[np.int64]
 
     def sample(self, at_s: Sequence[Array], width: int = 1) -> tuple[Array, Array]:
-        """Position [%] and, `lead` later, current [raw], (N, width), at times at_s (each (k,)) [s] of every `width` neighbouring moves, one after the other; where the
-        reference's speed jumps, the mean over a controller's tick, as nobody knows where in a tick a sample falls."""
+        """Position [%] and, `lead` later, current [raw], (N, width), at times at_s (each (k,)) [s] of every `width`
+        neighbouring moves, one after the other; where the reference's speed jumps, the mean over a controller's tick,
+        as nobody knows where in a tick a sample falls."""
         column = np.repeat(self.column.reshape(-1, width), [len(t) for t in at_s], axis=0)
         t = np.concatenate(at_s)[:, None] + EARLY_S
         position = self._interpolated(self.position, t, column)
@@ -130,10 +158,17 @@ class Run:
         current = self._interpolated(self.feedback, t, column)
         moves = self.moves
         if self.controller == "profile":
-            t, shape, sign = t - moves.start_s[column], _Trapezoid(moves, self.q).some(column), np.sign(moves.target - moves.origin)[column]
+            t, shape, sign = (
+                t - moves.start_s[column],
+                _Trapezoid(moves, self.q).some(column),
+                np.sign(moves.target - moves.origin)[column],
+            )
             behind = t - self.q["lag"][column]
             jumped = (shape.way(behind + 0.5 * TICK_S) - shape.way(behind - 0.5 * TICK_S)) / TICK_S
-            current += self.q["gain"][column] * (moves.origin[column] + sign * shape.way(t)) + self.q["damping"][column] * sign * jumped
+            current += (
+                self.q["gain"][column] * (moves.origin[column] + sign * shape.way(t))
+                + self.q["damping"][column] * sign * jumped
+            )
         limit = moves.limit[column]
         return position, np.minimum(np.maximum(current, -limit), limit)
 
@@ -146,34 +181,55 @@ class Run:
         return y[flat] * (1 - share) + y[flat + below] * share
 
 
-def run(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, controller: str = "profile", width: int = 1) -> Run:
+def run(
+    moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, controller: str = "profile", width: int = 1
+) -> Run:
     """Simulate B moves under B parameter sets (each (B,)); every `width` neighbours are one move, in the same steps.
 
-    Every move starts at rest in balance, so its friction there is what the controller pushes less the spring; where it creeps,
-    friction is that of sliding. Friction without presliding in any set sticks hard.
+    Every move starts at rest in balance, so its friction there is what the controller pushes less the spring; where it
+    creeps, friction is that of sliding. Friction without presliding in any set sticks hard.
     """
     beyond = BEYOND_S + max(0.0, float(np.max(q.get("lead", 0.0))))
     # an object stops a drive anywhere
-    calm = np.full((3, len(moves.target)), NEVER) if "contact_stiffness" in q else np.stack([x + EARLY_S + np.zeros(len(moves.target)) for x in (moves.cruise_s, moves.stop_s, moves.rest_s)])
+    calm = (
+        np.full((3, len(moves.target)), NEVER)
+        if "contact_stiffness" in q
+        else np.stack([x + EARLY_S + np.zeros(len(moves.target)) for x in (moves.cruise_s, moves.stop_s, moves.rest_s)])
+    )
     ends_s, steps = rows(calm, moves.duration_s + EARLY_S + beyond, step_s)
     order = np.argsort(-steps, kind="stable")
     column = np.empty(len(order), int)
     column[order] = np.arange(len(order))
     moves, q, steps = moves.some(order), {n: x[order] for n, x in q.items()}, steps[order]
-    moves = dataclasses.replace(moves, start_s=moves.start_s + EARLY_S, position=moves.position - EARLY_S * moves.velocity)
+    moves = dataclasses.replace(
+        moves, start_s=moves.start_s + EARLY_S, position=moves.position - EARLY_S * moves.velocity
+    )
     times = grid(ends_s[:, order], int(steps[0]) + 1, step_s, width)
     kind = Cascade if controller == "cascade" else _Profile
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # values that a search tries may let a drive run away
+    # values that a search tries may let a drive run away
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         steer = kind(moves, q, times)
         position, feedback = _run(moves, q, steer, times, steps, np.inf)
         simulated = np.arange(len(position))[:, None] < steps
-        if np.any(np.isfinite(moves.limit)) and np.any(simulated & (np.abs(steer.asked(position) + feedback) > moves.limit)):
+        if np.any(np.isfinite(moves.limit)) and np.any(
+            simulated & (np.abs(steer.asked(position) + feedback) > moves.limit)
+        ):
             steer = kind(moves, q, times)
             position, feedback = _run(moves, q, steer, times, steps, moves.limit)
-        return Run(times, position, steer.asked(position) + feedback if controller == "cascade" else feedback, moves, q, controller, column)
+        return Run(
+            times,
+            position,
+            steer.asked(position) + feedback if controller == "cascade" else feedback,
+            moves,
+            q,
+            controller,
+            column,
+        )
 
 
-def simulate(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, controller: str = "profile") -> tuple[Array, Array, Array]:
+def simulate(
+    moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, controller: str = "profile"
+) -> tuple[Array, Array, Array]:
     """Time (n,) [s], position (n, B) [%] and current (n, B) [raw] of `run`, at its short steps."""
     found = run(moves, {**q, "lead": np.zeros(len(moves.target))}, step_s, controller)
     time_s = np.arange(int(np.ceil(np.max(moves.duration_s) / step_s)) + 2) * step_s
@@ -182,9 +238,15 @@ def simulate(moves: Moves, q: Mapping[str, Array], step_s: float = STEP_S, contr
 
 
 def _run(
-    moves: Moves, q: Mapping[str, Array], steer: _Profile | Cascade, times: Grid, rows_of: NDArray[np.int64], limit: Array | float
+    moves: Moves,
+    q: Mapping[str, Array],
+    steer: _Profile | Cascade,
+    times: Grid,
+    rows_of: NDArray[np.int64],
+    limit: Array | float,
 ) -> tuple[Array, Array]:
-    """Position [%] and what it adds to the current that is asked for [raw], (n, B), of drives that follow what `steer` says, with no more current than the limit [raw].
+    """Position [%] and what it adds to the current that is asked for [raw], (n, B), of drives that follow what `steer`
+    says, with no more current than the limit [raw].
 
     rows_of (B,): the rows that each takes, falling.
     """
@@ -192,7 +254,10 @@ def _run(
     position, velocity = np.zeros((2, len(times.at) + 1, width))
     position[0], velocity[0] = moves.position, moves.velocity
     friction = (Stick if not np.any(q["presliding"]) else Bristles)(q)
-    friction.begin(np.clip(steer.begin(position[0], velocity[0]), -limit, limit) - q["stiffness"] * position[0] - q["preload"], velocity[0])
+    friction.begin(
+        np.clip(steer.begin(position[0], velocity[0]), -limit, limit) - q["stiffness"] * position[0] - q["preload"],
+        velocity[0],
+    )
     late = np.minimum(q["delay"], 0.8 * q["inertia"] / np.maximum(q["damping"], 1e-9))
     late_push, sprung = q["damping"] * late, q["stiffness"] + steer.stiffness
     contact = _Contact(q) if "contact_stiffness" in q else None
@@ -208,7 +273,9 @@ def _run(
         for part in (friction, steer, *(x for x in (contact, ceiling) if x is not None)):
             part.pace(first, last, h)
         p, v = position[first, :k], velocity[first, :k]
-        for i, to, fresh in zip(range(first, last), position[first + 1 : last + 1, :k], velocity[first + 1 : last + 1, :k], strict=True):
+        for i, to, fresh in zip(
+            range(first, last), position[first + 1 : last + 1, :k], velocity[first + 1 : last + 1, :k], strict=True
+        ):
             np.multiply(moving, v, out=total)
             np.multiply(own_sprung, p, out=work)
             np.subtract(total, work, out=total)
@@ -236,7 +303,8 @@ def _run(
 
 
 def _stretches(steps: Array, rows_of: NDArray[np.int64]) -> Iterator[tuple[int, int, int]]:
-    """First row, the row after the last, and how many drives are simulated, of stretches in which no drive changes its step or ends.
+    """First row, the row after the last, and how many drives are simulated, of stretches in which no drive changes its
+    step or ends.
 
     steps (n, ...) [s] that begin in each row; rows_of (B,): the rows that each takes, falling.
     """
@@ -258,7 +326,9 @@ class _Profile:
         way = shape.way(t)
         # the mean over a step is exact where the velocity jumps within it
         self.at = q["gain"] * r
-        self.at[:-1] = 0.5 * (self.at[1:] + self.at[:-1]) + q["damping"] * sign * np.diff(way, axis=0) / times.each(times.steps()[:-1])
+        self.at[:-1] = 0.5 * (self.at[1:] + self.at[:-1]) + q["damping"] * sign * np.diff(way, axis=0) / times.each(
+            times.steps()[:-1]
+        )
         self.given, self.hold, self.stiffness = self.at - q["preload"], q["gain"] * r[0], q["gain"]
 
     def begin(self, p: Array, v: Array) -> Array:
@@ -289,12 +359,26 @@ class _Ceiling:
     def pace(self, first: int, last: int, step_s: Array) -> None:
         """The first k drives from here on, in steps (k,) [s]."""
         k = len(step_s)
-        half, q, late = 0.5 * step_s, {n: self.q[n][:k] for n in ("inertia", "gain", "damping", "stiffness", "preload")}, self.late[:k]
+        half, q, late = (
+            0.5 * step_s,
+            {n: self.q[n][:k] for n in ("inertia", "gain", "damping", "stiffness", "preload")},
+            self.late[:k],
+        )
         self.now = q["inertia"] / half, q["stiffness"], q["preload"], self.limit[:k]
         self.closed = 0.5 * (q["gain"] * (half - late) + q["damping"] * (1.0 - late / half))
 
-    def kept(self, both: Array, total: Array, resisting: Array, p: Array, v: Array, pressed: Array | float, friction: Stick | Bristles) -> Array:
-        """Sum of the velocities (k,) [%/s] at both ends of a step where the current that gives `both` is more than the limit."""
+    def kept(
+        self,
+        both: Array,
+        total: Array,
+        resisting: Array,
+        p: Array,
+        v: Array,
+        pressed: Array | float,
+        friction: Stick | Bristles,
+    ) -> Array:
+        """Sum of the velocities (k,) [%/s] at both ends of a step where the current that gives `both` is more than the
+        limit."""
         mass, stiffness, preload, limit = self.now
         own = mass * v - stiffness * p - preload - pressed  # what is left without the controller
         current = total - own - self.closed * both

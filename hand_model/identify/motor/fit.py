@@ -71,7 +71,8 @@ BOUNDS = {
     "stribeck_exponent": (1.0, 3.0),  # below 1 the rise would be infinitely steep at rest
 }
 LACK_OF_FIT = 0.5  # systematic misfit [noise variances] above which output error does not describe the recording
-CLAIM = 6.0  # standard errors, by a jackknife over some forty strokes, above which the regression claims a Stribeck rise
+# standard errors, by a jackknife over some forty strokes, above which the regression claims a Stribeck rise
+CLAIM = 6.0
 ROOM = 3.0  # the same, above which output error tries one
 REGRESSION_MISFIT = 4.0  # the same for the regression; noise with a memory of a sample or two reaches 3
 EVIDENCE = 16.0  # fall of the misfit (in variances, of three parameters): once in about a thousand by chance
@@ -81,11 +82,14 @@ EVIDENCE = 16.0  # fall of the misfit (in variances, of three parameters): once 
 class MotorFit:
     """An identified drive.
 
-    motor: what goes into the hand. scale: encoder range. values: every parameter of plant, friction and controller (see UNITS);
-    covariance (k, k) of `names`. method: "output error" or "regression" (no setpoints, or none that explain the motion).
-    sigma_position [%], sigma_current [raw]: noise of one sample. regression: the regression in weak form; published, alike: the
-    four models with the current as it is, and with both sides filtered alike; smear: share of the reciprocal term's gain that is
-    smear. output_error: its fit, or None. stribeck: whether the recordings show a Stribeck rise; evidence: fall of the misfit by it.
+    motor: what goes into the hand. scale: encoder range. values: every parameter of plant, friction and controller (see
+    UNITS);
+    covariance (k, k) of `names`. method: "output error" or "regression" (no setpoints, or none that explain the
+    motion).
+    sigma_position [%], sigma_current [raw]: noise of one sample. regression: the regression in weak form; published,
+    alike: the four models with the current as it is, and with both sides filtered alike; smear: share of the reciprocal
+    term's gain that is smear. output_error: its fit, or None. stribeck: whether the recordings show a Stribeck rise;
+    evidence: fall of the misfit by it.
     """
 
     motor: Motor
@@ -111,12 +115,14 @@ class MotorFit:
 
     @property
     def simulated(self) -> Mapping[str, float] | None:
-        """Values that the simulated drive takes: those of `values`, or of a controller that explains the motion less well; None without."""
+        """Values that the simulated drive takes: those of `values`, or of a controller that explains the motion less
+        well; None without."""
         return None if self.output_error is None else self.output_error.values
 
 
 def white_noise(values: Array, time_s: Array) -> float:
-    """Standard deviation of white noise on a smooth signal (n,): from each sample's distance to the line of its neighbours.
+    """Standard deviation of white noise on a smooth signal (n,): from each sample's distance to the line of its
+    neighbours.
 
     Rice's difference estimator for irregular times, by the median, so that jumps do not count.
     """
@@ -143,7 +149,8 @@ def rest_noise(trials: Sequence[MotorTrial], sigma: tuple[float, float], speed_f
 def identify_motor(session: Session, actuator: str) -> MotorFit:
     """Identify one motor from the session's excitation and flexion logs (validation trials take no part).
 
-    Raises IdentificationError where they hold no excitation, one direction only, or a current that is constant, clipped or a command.
+    Raises IdentificationError where they hold no excitation, one direction only, or a current that is constant, clipped
+    or a command.
     """
     trials, scale = motor_trials(session, actuator)
     return fit_motor(trials, scale, actuator)
@@ -168,7 +175,8 @@ def identify_motors(session: Session) -> tuple[tuple[Motor, ...], tuple[str, ...
 
 
 def fit_motor(trials: Sequence[MotorTrial], scale: Scale, actuator: str = "motor") -> MotorFit:
-    """Identify a motor from checked trials: regression first, then output error from the commands where these explain the motion."""
+    """Identify a motor from checked trials: regression first, then output error from the commands where these explain
+    the motion."""
     sigma_p = max(float(np.median([white_noise(t.position, t.time_s) for t in trials])), 0.3 / scale.counts_per_percent)
     sigma_u = max(float(np.median([white_noise(t.current, t.time_s) for t in trials])), 0.3)
     sigma_u = max(sigma_u, rest_noise(trials, (sigma_p, sigma_u), scale.speed_full))
@@ -193,7 +201,9 @@ def fit_motor(trials: Sequence[MotorTrial], scale: Scale, actuator: str = "motor
                 "parameters are given without intervals"
             )
         if best is None:
-            notes.append("no moves from rest with logged setpoints: controller not identified, setpoints do not predict the motion")
+            notes.append(
+                "no moves from rest with logged setpoints: controller not identified, setpoints do not predict the motion"
+            )
         else:
             values = {**best.values, **values}
             notes.append(
@@ -215,11 +225,15 @@ def fit_motor(trials: Sequence[MotorTrial], scale: Scale, actuator: str = "motor
 def _fit_output_error(
     moves: Sequence[MoveData], plain: Regression, curved: Regression, sigma: tuple[float, float]
 ) -> tuple[OutputErrorFit, float]:
-    """Fit of plant and controller, with a Stribeck rise where it is worth its parameters, and the fall of the misfit by it."""
+    """Fit of plant and controller, with a Stribeck rise where it is worth its parameters, and the fall of the misfit by
+    it."""
     best, evidence = find_controller(moves, _plant(plain), sigma, BOUNDS, LACK_OF_FIT), 0.0
     # a rise is tried where the regression, which knows no controller, leaves room for one
     if curved.excess_z > (ROOM if max(best.chi2) < 4.0 else CLAIM):
-        best, evidence = _with_rise(output_error.fit(best.moves, best.values, best.names, sigma, BOUNDS, best.controller, (FINE,), best.own), curved)
+        best, evidence = _with_rise(
+            output_error.fit(best.moves, best.values, best.names, sigma, BOUNDS, best.controller, (FINE,), best.own),
+            curved,
+        )
     if lack_of_fit(best) < LACK_OF_FIT:
         states = begins(moves, best.values, best.own, best.controller)
         best = output_error.refined(dataclasses.replace(best, moves=creeping(best.moves, states)), BOUNDS)
@@ -233,17 +247,31 @@ def _with_rise(base: OutputErrorFit, curved: Regression) -> tuple[OutputErrorFit
     The shape of the rise is one of its unknowns: held at a wrong one, Coulomb and viscous friction make up for it.
     """
     level = max(float(curved.values[2]), 0.2 * base.values["coulomb"])
-    rise = {"static_ratio": float(np.clip(1 + curved.static_excess / level, 1.2, 5.0)), "stribeck_speed": curved.stribeck_speed}
-    start = {**base.values, "viscous": float(curved.values[1]), "coulomb": level, **rise, "stribeck_exponent": curved.stribeck_exponent}
-    best = output_error.fit(base.moves, start, (*base.names, *STRIBECK), base.sigma, BOUNDS, base.controller, (FINE,), base.own)
+    rise = {
+        "static_ratio": float(np.clip(1 + curved.static_excess / level, 1.2, 5.0)),
+        "stribeck_speed": curved.stribeck_speed,
+    }
+    start = {
+        **base.values,
+        "viscous": float(curved.values[1]),
+        "coulomb": level,
+        **rise,
+        "stribeck_exponent": curved.stribeck_exponent,
+    }
+    best = output_error.fit(
+        base.moves, start, (*base.names, *STRIBECK), base.sigma, BOUNDS, base.controller, (FINE,), base.own
+    )
     if base.cost - best.cost > EVIDENCE:  # far from where it began: once more
-        best = _hardened(best) or output_error.fit(base.moves, best.values, best.names, base.sigma, BOUNDS, base.controller, (FINE,), best.own)
+        best = _hardened(best) or output_error.fit(
+            base.moves, best.values, best.names, base.sigma, BOUNDS, base.controller, (FINE,), best.own
+        )
     evidence = (base.cost - best.cost) / max(1.0, *best.chi2)
     return (base, 0.0) if evidence < EVIDENCE else (best, evidence)
 
 
 def _hardened(f: OutputErrorFit) -> OutputErrorFit | None:
-    """The fit with friction that sticks hard and a reference whose speed jumps, where bristles and ramps were no more than what a rise does at low speed;
+    """The fit with friction that sticks hard and a reference whose speed jumps, where bristles and ramps were no more
+    than what a rise does at low speed;
     None where the encoder sees both, or without them the moves are not explained as well."""
     bends = 0 < f.values["presliding"] < f.sigma[0]
     ramps = f.controller == "profile" and 0 < min(f.values["rise"], f.values["fall"]) < SUDDEN_S
@@ -256,32 +284,57 @@ def _hardened(f: OutputErrorFit) -> OutputErrorFit | None:
 
 
 def _with_other_shape(best: OutputErrorFit) -> OutputErrorFit:
-    """The fit, its covariance as wide as the misfit tells between its own shape of the rise and the other usual one (exponential; Gaussian).
+    """The fit, its covariance as wide as the misfit tells between its own shape of the rise and the other usual one
+    (exponential; Gaussian).
 
     Along this way the misfit is no parabola: the secant over it says how far the recording allows to go.
     """
     exponent = 2.0 if best.values["stribeck_exponent"] < 1.5 else 1.0
     names = tuple(n for n in best.names if n != "stribeck_exponent")
     other = output_error.fit(
-        best.moves, {**best.values, "stribeck_exponent": exponent}, names, best.sigma, BOUNDS, best.controller, (FINE,), best.own, best.memory
+        best.moves,
+        {**best.values, "stribeck_exponent": exponent},
+        names,
+        best.sigma,
+        BOUNDS,
+        best.controller,
+        (FINE,),
+        best.own,
+        best.memory,
     )
     return _widened(best, other)
 
 
 def _with_other_speed(best: OutputErrorFit) -> OutputErrorFit:
-    """The better of the fit and of one begun at half the speed of the rise, its covariance as wide as the misfit tells between the two.
+    """The better of the fit and of one begun at half the speed of the rise, its covariance as wide as the misfit tells
+    between the two.
 
-    Coulomb and viscous friction make up for a broad rise: a long, flat valley, in which a search among kinks may end anywhere.
+    Coulomb and viscous friction make up for a broad rise: a long, flat valley, in which a search among kinks may end
+    anywhere.
     """
     v0, exponent = best.values["stribeck_speed"], best.values["stribeck_exponent"]
     v = np.linspace(0.01, 1.0, 100) * best.values["speed_full"]
     columns = [np.column_stack([np.ones_like(v), np.exp(-((v / speed) ** exponent)), v]) for speed in (v0, 0.5 * v0)]
     level = best.values["coulomb"]
     friction = columns[0] @ [level, level * (best.values["static_ratio"] - 1), best.values["viscous"]]
-    level, rise, viscous = map(float, np.linalg.lstsq(columns[1], friction, rcond=None)[0])  # what comes nearest to the same friction
-    start = {"coulomb": level, "static_ratio": max(1 + rise / level, 1.05), "viscous": viscous, "stribeck_speed": 0.5 * v0}
+    # what comes nearest to the same friction
+    level, rise, viscous = map(float, np.linalg.lstsq(columns[1], friction, rcond=None)[0])
+    start = {
+        "coulomb": level,
+        "static_ratio": max(1 + rise / level, 1.05),
+        "viscous": viscous,
+        "stribeck_speed": 0.5 * v0,
+    }
     other = output_error.fit(
-        best.moves, {**best.values, **start}, best.names, best.sigma, BOUNDS, best.controller, (FINE,), best.own, best.memory
+        best.moves,
+        {**best.values, **start},
+        best.names,
+        best.sigma,
+        BOUNDS,
+        best.controller,
+        (FINE,),
+        best.own,
+        best.memory,
     )
     return _widened(*sorted((best, other), key=lambda f: f.cost))
 
@@ -300,10 +353,15 @@ def _claims(curved: Regression) -> bool:
 
 
 def _plant(r: Regression) -> dict[str, float]:
-    """Plant and friction as a regression found them, within what a drive can be; bristles only where friction was seen to give."""
+    """Plant and friction as a regression found them, within what a drive can be; bristles only where friction was seen
+    to give."""
     plant = dict(zip(NAMES, map(float, r.values), strict=True))
     plant["inertia"], plant["coulomb"] = max(plant["inertia"], 1e-3), max(plant["coulomb"], 1.0)
-    return plant | {"static_ratio": 1.0, "stribeck_speed": 20.0, "stribeck_exponent": 1.0} | ({"presliding": r.give} if r.give > GIVE[0] else {})
+    return (
+        plant
+        | {"static_ratio": 1.0, "stribeck_speed": 20.0, "stribeck_exponent": 1.0}
+        | ({"presliding": r.give} if r.give > GIVE[0] else {})
+    )
 
 
 def _from_regression(plain: Regression, curved: Regression) -> tuple[dict[str, float], tuple[str, ...], Array, bool]:
@@ -311,11 +369,17 @@ def _from_regression(plain: Regression, curved: Regression) -> tuple[dict[str, f
     used = curved if stribeck else plain
     values = dict(zip(NAMES, map(float, used.values), strict=True))
     if stribeck:
-        values |= {"static_ratio": 1 + used.static_excess / used.values[2], "stribeck_speed": used.stribeck_speed, "stribeck_exponent": used.stribeck_exponent}
+        values |= {
+            "static_ratio": 1 + used.static_excess / used.values[2],
+            "stribeck_speed": used.stribeck_speed,
+            "stribeck_exponent": used.stribeck_exponent,
+        }
     return values, NAMES, used.covariance, stribeck
 
 
-def _estimates(values: Mapping[str, float], names: Sequence[str], covariance: Array, accepted: bool) -> dict[str, Estimate]:
+def _estimates(
+    values: Mapping[str, float], names: Sequence[str], covariance: Array, accepted: bool
+) -> dict[str, Estimate]:
     origin = "output error of the simulated drive" if accepted else "regression in weak form"
     sd = dict(zip(names, np.sqrt(np.maximum(np.diag(covariance), 0)), strict=True))
     kept = values if accepted else {n: v for n, v in values.items() if n in NAMES or n in STRIBECK}
@@ -323,6 +387,11 @@ def _estimates(values: Mapping[str, float], names: Sequence[str], covariance: Ar
         kept = {n: v for n, v in kept.items() if n not in STRIBECK}
     ordered = [*NAMES, *(n for n in kept if n not in NAMES)]
     return {
-        n: Estimate(float(kept[n]), (float(kept[n] - 1.96 * sd[n]), float(kept[n] + 1.96 * sd[n])) if n in sd else None, UNITS[n], origin)
+        n: Estimate(
+            float(kept[n]),
+            (float(kept[n] - 1.96 * sd[n]), float(kept[n] + 1.96 * sd[n])) if n in sd else None,
+            UNITS[n],
+            origin,
+        )
         for n in ordered
     }

@@ -1,4 +1,5 @@
-"""Friction of a simulated drive, many at once: Coulomb's that truly sticks, or bristles that give (LuGre; Canudas de Wit et al. 1995)."""
+"""Friction of a simulated drive, many at once: Coulomb's that truly sticks, or bristles that give (LuGre; Canudas de
+Wit et al. 1995)."""
 
 from __future__ import annotations
 
@@ -11,7 +12,8 @@ Array = NDArray[np.float64]
 
 
 class Stick:
-    """Coulomb friction that truly sticks; set-valued at rest, solved implicitly (Moreau's sweeping process; Acary & Brogliato 2008)."""
+    """Coulomb friction that truly sticks; set-valued at rest, solved implicitly (Moreau's sweeping process; Acary &
+    Brogliato 2008)."""
 
     def __init__(self, q: Mapping[str, Array]) -> None:
         self.rise = Rise(q)
@@ -26,7 +28,8 @@ class Stick:
         """Nothing: what holds a drive at rest follows from its balance."""
 
     def velocities(self, total: Array, resisting: Array, v: Array) -> Array:
-        """Sum of the velocities (k,) [%/s] at both ends of a step, until the next call, of all other efforts [raw] in its middle and what resists it [raw s/%]."""
+        """Sum of the velocities (k,) [%/s] at both ends of a step, until the next call, of all other efforts [raw] in
+        its middle and what resists it [raw s/%]."""
         low, high = self.rise.levels(v)
         np.maximum(total, low, out=self.both)
         np.minimum(self.both, high, out=self.both)
@@ -35,7 +38,8 @@ class Stick:
         return self.both
 
     def advance(self, v: Array, both: Array, fresh: Array) -> None:
-        """Velocity (k,) [%/s] at the end of the step, into `fresh`; a drive that would turn round has stopped within the step, which its mean then tells."""
+        """Velocity (k,) [%/s] at the end of the step, into `fresh`; a drive that would turn round has stopped within
+        the step, which its mean then tells."""
         np.subtract(both, v, out=fresh)
         np.multiply(fresh, v, out=self.turned)
         if self.turned[self.turned.argmin()] < 0.0:
@@ -66,12 +70,15 @@ class Bristles:
         self.f = np.where(v == 0.0, np.clip(load, -top, top), np.sign(v) * top)
 
     def velocities(self, total: Array, resisting: Array, v: Array) -> Array:
-        """Sum of the velocities (k,) [%/s] at both ends of a step, until the next call, of all other efforts [raw] in its middle and what resists it [raw s/%]."""
+        """Sum of the velocities (k,) [%/s] at both ends of a step, until the next call, of all other efforts [raw] in
+        its middle and what resists it [raw s/%]."""
         push, share, work = self.push, self.share, self.work
         np.subtract(total, self.f, out=push)
         _, self.level = self.rise.levels(v)
-        self.softer = None if self.rise.flat else self.rise.coulomb / self.level  # bristles as stiff as ever bend further under more friction
-        # (exp(x) - 1) / x, x the travel of a step over the distance: of so small a travel at least that rounding does not count
+        # bristles as stiff as ever bend further under more friction
+        self.softer = None if self.rise.flat else self.rise.coulomb / self.level
+        # (exp(x) - 1) / x, x the travel of a step over the distance: of so small a travel at least that rounding does
+        # not count
         np.absolute(v, out=work)
         np.multiply(work, self.per, out=work)
         if self.softer is not None:
@@ -109,13 +116,23 @@ class Rise:
     """The level of friction [raw] over speed: Coulomb, with a Stribeck rise where any drive has one."""
 
     def __init__(self, q: Mapping[str, Array]) -> None:
-        self.coulomb, self.ratio, self.per_speed, self.exponent = q["coulomb"], q["static_ratio"] - 1.0, 1.0 / q["stribeck_speed"], q["stribeck_exponent"]
+        self.coulomb, self.ratio, self.per_speed, self.exponent = (
+            q["coulomb"],
+            q["static_ratio"] - 1.0,
+            1.0 / q["stribeck_speed"],
+            q["stribeck_exponent"],
+        )
         self.flat = not np.any(self.ratio != 0.0)
         self.top = self.coulomb * (1.0 + self.ratio)
 
     def narrow(self, k: int) -> None:
         """Keep the first k drives."""
-        self.coulomb, self.ratio, self.per_speed, self.exponent = self.coulomb[:k], self.ratio[:k], self.per_speed[:k], self.exponent[:k]
+        self.coulomb, self.ratio, self.per_speed, self.exponent = (
+            self.coulomb[:k],
+            self.ratio[:k],
+            self.per_speed[:k],
+            self.exponent[:k],
+        )
         self.bounds = -self.coulomb, self.coulomb
 
     def levels(self, v: Array) -> tuple[Array, Array]:

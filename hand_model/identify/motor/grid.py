@@ -1,4 +1,5 @@
-"""The time steps of simulated moves: short where a drive was seen to start and to stop, long where it cruised or rested, where all is smooth."""
+"""The time steps of simulated moves: short where a drive was seen to start and to stop, long where it cruised or
+rested, where all is smooth."""
 
 from __future__ import annotations
 
@@ -16,8 +17,9 @@ NEVER = 1e9  # [s]: the end of a stretch that has none
 
 @dataclass(frozen=True)
 class Grid:
-    """Steps of B simulated drives, every `width` neighbours of which share theirs. step_s [s]: a short one. ends_s (3, B) [s]: of the stretch in short steps at the start,
-    of the long steps after it, of the short ones at the stop; long ones follow. at (n, B / width): times of all steps, in short ones."""
+    """Steps of B simulated drives, every `width` neighbours of which share theirs. step_s [s]: a short one. ends_s (3,
+    B) [s]: of the stretch in short steps at the start, of the long steps after it, of the short ones at the stop; long
+    ones follow. at (n, B / width): times of all steps, in short ones."""
 
     step_s: float
     ends_s: Array
@@ -72,7 +74,8 @@ def rows(calm_s: Array, duration_s: Array, step_s: float) -> tuple[Array, NDArra
 
 
 def grid(ends_s: Array, n: int, step_s: float, width: int = 1) -> Grid:
-    """The grid of n rows with these ends (3, B) [s] of its stretches, as `rows` found them; the same of every `width` neighbours."""
+    """The grid of n rows with these ends (3, B) [s] of its stretches, as `rows` found them; the same of every `width`
+    neighbours."""
     i = np.arange(n)[:, None]
     distinct = ends_s[:, ::width]
     if ends_s[0].min() >= NEVER:

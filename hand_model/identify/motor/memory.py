@@ -1,6 +1,8 @@
-"""Noise with a memory: residuals freed of what those before them foretell, by autoregression (Cochrane & Orcutt 1949; Box & Jenkins 1976, ch. 7).
+"""Noise with a memory: residuals freed of what those before them foretell, by autoregression (Cochrane & Orcutt 1949;
+Box & Jenkins 1976, ch. 7).
 
-A load that wanders while the drive moves, or a current that is filtered before it is logged, leaves residuals that are alike from sample to sample:
+A load that wanders while the drive moves, or a current that is filtered before it is logged, leaves residuals that are
+alike from sample to sample:
 taken for independent they count for more than they are worth, in the estimate and in its interval.
 """
 
@@ -14,18 +16,21 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 ORDER = 4  # samples that the prediction looks back
-Predictors = tuple[tuple[Array, float], ...]  # by order from 0: coefficients of the samples before, latest first, and share of the deviation left
+# by order from 0: coefficients of the samples before, latest first, and share of the deviation left
+Predictors = tuple[tuple[Array, float], ...]
 
 
 def autocorrelation(residual: Sequence[Array]) -> Array:
-    """Autocorrelation (channels, ORDER + 1) of residuals (n, channels) of several stretches, from lag 0; windowed, which keeps it positive definite."""
+    """Autocorrelation (channels, ORDER + 1) of residuals (n, channels) of several stretches, from lag 0; windowed,
+    which keeps it positive definite."""
     lags = [np.sum([np.sum(e[k:] * e[: len(e) - k], axis=0) for e in residual], axis=0) for k in range(ORDER + 1)]
     found = np.array(lags).T
     return found / found[:, :1] * (1 - np.arange(ORDER + 1) / (10 * (ORDER + 1)))
 
 
 def predictors(correlation: Array) -> Predictors:
-    """Best linear predictions of a sample from 0 to ORDER samples before it (Yule & Walker), of one channel's autocorrelation (ORDER + 1,)."""
+    """Best linear predictions of a sample from 0 to ORDER samples before it (Yule & Walker), of one channel's
+    autocorrelation (ORDER + 1,)."""
     from scipy.linalg import solve_toeplitz
 
     found = [(np.empty(0), 1.0)]
@@ -36,7 +41,8 @@ def predictors(correlation: Array) -> Predictors:
 
 
 def freed(e: Array, channels: Sequence[Predictors]) -> Array:
-    """Rows (channels * n, ...), one channel after the other, less what the rows before foretell, of the same variance."""
+    """Rows (channels * n, ...), one channel after the other, less what the rows before foretell, of the same
+    variance."""
     if not channels:
         return e
     n = len(e) // len(channels)

@@ -1,4 +1,5 @@
-"""Modulating functions: cubic B-splines that vanish at both ends of a stretch (Shinbrot 1957; Preisig & Rippin 1993), as the banded matrices that they are."""
+"""Modulating functions: cubic B-splines that vanish at both ends of a stretch (Shinbrot 1957; Preisig & Rippin 1993),
+as the banded matrices that they are."""
 
 from __future__ import annotations
 
@@ -13,10 +14,11 @@ DEGREE = 3
 
 
 class Modulating:
-    """Splines over begin_s to end_s [s], knots `spacing_s` apart, on a uniform grid of steps no longer than step_s. grid (n,) [s]; k splines.
+    """Splines over begin_s to end_s [s], knots `spacing_s` apart, on a uniform grid of steps no longer than step_s.
+    grid (n,) [s]; k splines.
 
-    Products are integrals over the stretch (trapezoidal rule). Whitened: in combinations of the splines that are orthonormal on the grid, by the
-    Cholesky factor of their products, which has three diagonals below its own.
+    Products are integrals over the stretch (trapezoidal rule). Whitened: in combinations of the splines that are
+    orthonormal on the grid, by the Cholesky factor of their products, which has three diagonals below its own.
     """
 
     def __init__(self, begin_s: float, end_s: float, spacing_s: float, step_s: float) -> None:
@@ -28,11 +30,13 @@ class Modulating:
         self.weight = np.full(len(self.grid), self.grid[1] - self.grid[0])
         self.weight[[0, -1]] *= 0.5
         self._onto = [_design(self.grid, knots[i : len(knots) - i], DEGREE - i).T for i in range(3)]
-        # derivatives of a spline are splines of less degree: by how much its coefficients differ over the width of their knots (de Boor 1978, ch. X)
+        # derivatives of a spline are splines of less degree: by how much its coefficients differ over the width of
+        # their knots (de Boor 1978, ch. X)
         self._slopes = [_slopes(knots[i : len(knots) - i], DEGREE - i) for i in range(2)]
         onto = self._onto[0]
         products = onto.multiply(self.weight) @ onto.T
-        below = [np.r_[products.diagonal(-i)[1:-1], np.zeros(i)] for i in range(DEGREE + 1)]  # of all but the first and the last
+        # of all but the first and the last
+        below = [np.r_[products.diagonal(-i)[1:-1], np.zeros(i)] for i in range(DEGREE + 1)]
         self._factor = cholesky_banded(np.array(below), lower=True)
 
     def products(self, y: Array, derivative: int = 0) -> Array:

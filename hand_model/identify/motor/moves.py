@@ -19,7 +19,8 @@ SETTLED = 0.6  # [%]: movement allowed over the samples before a move that start
 SURE = 0.05  # share of what one logged speed is known to, below which no level of speeds is known
 AFTER_S = 0.05  # after which a move that is settled counts as over
 AWAY = 0.02  # share of a move by which a drive has left a place, well beyond the noise of an encoder
-STARTS_S, STOPS_S, RESTS_S = 0.15, 0.3, 0.2  # after a drive has left its place, before it is back at rest, and after that: where it may be sudden
+# after a drive has left its place, before it is back at rest, and after that: where it may be sudden
+STARTS_S, STOPS_S, RESTS_S = 0.15, 0.3, 0.2
 BEFORE = 12  # samples at rest that a move looks back to
 
 
@@ -27,9 +28,11 @@ BEFORE = 12  # samples at rest that a move looks back to
 class MoveData:
     """One move from rest: its samples, and what the command says.
 
-    Known only so well, and estimated with the fit: own = when the command took effect (within one sample of the log) [s], where
-    the drive rested [%], the speed [share of full] (logged in whole raw units), and the current that held it at rest [raw].
-    own_sd: (4,) standard deviations. velocity [%/s]: of a drive that creeps before the command; 0 at rest. logged: the speed as it is logged.
+    Known only so well, and estimated with the fit: own = when the command took effect (within one sample of the log)
+    [s], where the drive rested [%], the speed [share of full] (logged in whole raw units), and the current that held it
+    at rest [raw].
+    own_sd: (4,) standard deviations. velocity [%/s]: of a drive that creeps before the command; 0 at rest. logged: the
+    speed as it is logged.
     seen: velocity before the command as the encoder tells it, and its deviation [%/s].
     """
 
@@ -49,28 +52,38 @@ class MoveData:
 
     @cached_property
     def calm_s(self) -> tuple[float, float, float]:
-        """When the drive was seen to cruise, from and until, and from when on to rest [s]: where nothing sudden happens."""
+        """When the drive was seen to cruise, from and until, and from when on to rest [s]: where nothing sudden
+        happens."""
         return _calm(self)
 
 
 def moves_from_rest(trial: MotorTrial, sigma: tuple[float, float], speed_full: float) -> tuple[MoveData, ...]:
     """The commanded moves of a log that start with the drive at rest; empty where no setpoint is logged.
 
-    The current of the last sample before a command may be of the command already, as channels are read one after the other: it belongs to no move.
+    The current of the last sample before a command may be of the command already, as channels are read one after the
+    other: it belongs to no move.
 
     sigma: noise of position [%] and current [raw]. speed_full: raw full scale of the speed column.
     """
     if trial.setpoint is None:
         return ()
     t, p, sigma_position = trial.time_s, trial.position, sigma[0]
-    whole = trial.speed is not None and speed_full > 1 and np.allclose(trial.speed * speed_full, np.round(trial.speed * speed_full))
+    whole = (
+        trial.speed is not None
+        and speed_full > 1
+        and np.allclose(trial.speed * speed_full, np.round(trial.speed * speed_full))
+    )
     speed_sd = 1 / (np.sqrt(12) * speed_full) if whole else 1e-4
     change = np.flatnonzero(np.diff(trial.setpoint) != 0)
     ends = np.append(change[1:] - 1, len(t) - 1)
     found = []
     for i, j in zip(change, ends, strict=True):
         look = slice(max(0, i - BEFORE + 1), i + 1)
-        if j - i < 8 or trial.setpoint[i + 1] == trial.setpoint[i] or (rest := _rest(t[look], p[look], sigma_position)) is None:
+        if (
+            j - i < 8
+            or trial.setpoint[i + 1] == trial.setpoint[i]
+            or (rest := _rest(t[look], p[look], sigma_position)) is None
+        ):
             continue
         held = trial.current[look][:-1]
         speed = 1.0 if trial.speed is None else float(trial.speed[i + 1])
@@ -88,9 +101,11 @@ def moves_from_rest(trial: MotorTrial, sigma: tuple[float, float], speed_full: f
 
 
 def speed_levels(moves: Sequence[MoveData], own: Array) -> dict[float, tuple[float, float]]:
-    """What each logged speed stands for [share of full], and its standard deviation, from what a fit found for every move, own (moves, 4).
+    """What each logged speed stands for [share of full], and its standard deviation, from what a fit found for every
+    move, own (moves, 4).
 
-    A log in whole units rounds a speed alike each time, so that moves tell it together; long ones tell more, as the square of a duration times its samples.
+    A log in whole units rounds a speed alike each time, so that moves tell it together; long ones tell more, as the
+    square of a duration times its samples.
     """
     found = {}
     for logged in {m.logged for m in moves}:
@@ -104,11 +119,16 @@ def speed_levels(moves: Sequence[MoveData], own: Array) -> dict[float, tuple[flo
 
 
 def levelled(moves: Sequence[MoveData], levels: Mapping[float, tuple[float, float]]) -> tuple[MoveData, ...]:
-    """The moves with what is known of their speeds: logged speed -> share of full and its deviation; as logged where it is not among them."""
+    """The moves with what is known of their speeds: logged speed -> share of full and its deviation; as logged where it
+    is not among them."""
     out = []
     for m in moves:
         mean, sd = levels.get(m.logged, (m.own[2], m.own_sd[2]))
-        out.append(dataclasses.replace(m, own=np.array([*m.own[:2], mean, m.own[3]]), own_sd=np.array([*m.own_sd[:2], sd, m.own_sd[3]])))
+        out.append(
+            dataclasses.replace(
+                m, own=np.array([*m.own[:2], mean, m.own[3]]), own_sd=np.array([*m.own_sd[:2], sd, m.own_sd[3]])
+            )
+        )
     return tuple(out)
 
 
@@ -133,11 +153,16 @@ def _calm(m: MoveData) -> tuple[float, float, float]:
         return NEVER, NEVER, NEVER
     stopped = float(t[far[-1]])
     rests = len(p) > far[-1] + 4
-    return float(max(t[gone[0]], m.own[0])) + STARTS_S, (stopped - STOPS_S if rests else NEVER), (stopped + RESTS_S if rests else NEVER)
+    return (
+        float(max(t[gone[0]], m.own[0])) + STARTS_S,
+        (stopped - STOPS_S if rests else NEVER),
+        (stopped + RESTS_S if rests else NEVER),
+    )
 
 
 def _rest(t: Array, p: Array, sigma: float) -> tuple[float, float, float, tuple[float, float]] | None:
-    """Position [%] at the last of samples before a command, its deviation [%], the velocity [%/s] of a steady creep, and the slope with its deviation.
+    """Position [%] at the last of samples before a command, its deviation [%], the velocity [%/s] of a steady creep,
+    and the slope with its deviation.
 
     0 where none is told from rest; None where the drive is not settled.
     """

@@ -27,8 +27,9 @@ ONSET_S = 0.15
 
 @dataclass(frozen=True)
 class Prediction:
-    """Open-loop prediction at the log's usable samples: time_s (n,) [s], position (n,) [%], current (n,) [raw], what was recorded,
-    phase (n,) index into PHASES, predicted (n,) whether the sample lies in a move that starts from rest or the rest before one."""
+    """Open-loop prediction at the log's usable samples: time_s (n,) [s], position (n,) [%], current (n,) [raw], what
+    was recorded, phase (n,) index into PHASES, predicted (n,) whether the sample lies in a move that starts from rest
+    or the rest before one."""
 
     time_s: Array
     position: Array
@@ -52,9 +53,11 @@ class Prediction:
 def predict(fit: MotorFit, log: Log, name: str = "log", align: bool = True) -> Prediction:
     """Simulate a log's moves from its commands alone.
 
-    align: the instant at which each command took effect and the speed, which a log holds only to one sample and one raw unit, are
-    found within these limits from the recorded position; nothing else is. Every move starts where the last one was predicted to end.
-    Where no controller was identified or the log holds no setpoint, the motion is taken as recorded and the current predicted from it.
+    align: the instant at which each command took effect and the speed, which a log holds only to one sample and one raw
+    unit, are found within these limits from the recorded position; nothing else is. Every move starts where the last
+    one was predicted to end.
+    Where no controller was identified or the log holds no setpoint, the motion is taken as recorded and the current
+    predicted from it.
     Raises IdentificationError where a log with setpoints holds no move that starts from rest.
     """
     trial = motor_trial(name, log, fit.scale)
@@ -75,7 +78,8 @@ def predict(fit: MotorFit, log: Log, name: str = "log", align: bool = True) -> P
             x[1], x[3] = last[0], last[1]
             m = dataclasses.replace(m, velocity=last[3])
         else:  # the drive's state before its first move is no prediction: it is where the recording starts
-            k = slice(0 if last is None else m.index, m.index)  # the last sample before a command may be of the command already
+            # the last sample before a command may be of the command already
+            k = slice(0 if last is None else m.index, m.index)
             position[k], current[k] = x[1], (values["gain"] * (m.origin - x[1]) if controller == "profile" else x[3])
             predicted[k] = True
         y = output_error.simulate_moves([m], values, x[None], controller, 1e-3)[0]
@@ -83,7 +87,8 @@ def predict(fit: MotorFit, log: Log, name: str = "log", align: bool = True) -> P
         position[k], current[k], predicted[k] = y[:, 0], y[:, 1], True
         phase[k] = _phases(m, x, y[:, 0])
         position_end, current_end, creep = end_state(m.time_s, y)
-        # a reference that ends lets nothing creep: what is left of a motion then is the end of its settling, held by bristles that are not all bent
+        # a reference that ends lets nothing creep: what is left of a motion then is the end of its settling, held by
+        # bristles that are not all bent
         last = (position_end, current_end, k.stop, creep if controller == "cascade" else 0.0)
     return Prediction(trial.time_s, position, current, trial.position, trial.current, phase, predicted)
 
@@ -101,7 +106,9 @@ def _align(fit: MotorFit, data: tuple[MoveData, ...]) -> Array:
     found = output_error.fit(data, fit.simulated, (), blind, {}, controller, output_error.ALIGN)
     states = begins(data, fit.simulated, found.own, controller)
     if any(states):
-        found = output_error.fit(continued(data, states), fit.simulated, (), blind, {}, controller, output_error.ALIGN[1:], found.own)
+        found = output_error.fit(
+            continued(data, states), fit.simulated, (), blind, {}, controller, output_error.ALIGN[1:], found.own
+        )
     return found.own
 
 
@@ -110,11 +117,14 @@ def _from_motion(fit: MotorFit, trial: MotorTrial) -> Prediction:
     current = balance(trial, np.array([fit.values[n] for n in NAMES]))
     moving = np.abs(np.gradient(trial.position, trial.time_s)) > 5.0
     phase = np.where(moving, PHASES.index("cruise"), PHASES.index("rest"))
-    return Prediction(trial.time_s, trial.position, current, trial.position, trial.current, phase, np.ones(len(current), bool))
+    return Prediction(
+        trial.time_s, trial.position, current, trial.position, trial.current, phase, np.ones(len(current), bool)
+    )
 
 
 def _phases(m: MoveData, own: Array, position: Array) -> NDArray[np.int64]:
-    """Onset until ONSET_S after the command; stop from 10 % before the end until the motion ends; rest after; cruise between."""
+    """Onset until ONSET_S after the command; stop from 10 % before the end until the motion ends; rest after; cruise
+    between."""
     away = np.abs(position - position[-1])
     late = m.time_s - own[0]
     out = np.full(len(position), PHASES.index("cruise"))
@@ -125,18 +135,22 @@ def _phases(m: MoveData, own: Array, position: Array) -> NDArray[np.int64]:
 
 
 def aligned_moves(fit: MotorFit, trial: MotorTrial) -> tuple[tuple[MoveData, ...], Array]:
-    """The moves of a trial that start from rest, and for each when its command took effect, where the drive rested, its speed and hold."""
+    """The moves of a trial that start from rest, and for each when its command took effect, where the drive rested, its
+    speed and hold."""
     data = known_moves(fit, trial)
     return data, (_align(fit, data) if data else np.empty((0, 4)))
 
 
 def reference(fit: MotorFit, trial: MotorTrial, time_s: Array) -> Array:
-    """Control of the compiled actuator, (n,) [%], at times (n,) [s] of the trial: r + (damping / gain) r' of the profile generator.
+    """Control of the compiled actuator, (n,) [%], at times (n,) [s] of the trial: r + (damping / gain) r' of the
+    profile generator.
 
     Raises IdentificationError for a cascade controller, whose reference depends on the simulated position.
     """
     if not fit.predictive or fit.output_error.controller != "profile":
-        raise IdentificationError(f'motor "{fit.motor.actuator}": its controller has no reference that is known before the motion')
+        raise IdentificationError(
+            f'motor "{fit.motor.actuator}": its controller has no reference that is known before the motion'
+        )
     data, own = aligned_moves(fit, trial)
     out = np.full(len(time_s), data[0].origin if data else 0.0)
     lead = fit.values["damping"] / fit.values["gain"]
@@ -144,7 +158,9 @@ def reference(fit: MotorFit, trial: MotorTrial, time_s: Array) -> Array:
         begin = trial.time_s[m.index]
         k = time_s >= begin
         one = np.ones(1)
-        moves = Moves(x[:1], m.origin * one, m.target * one, x[2:3], one * m.limit, one * m.own[1], one * 0.0, one * 1.0)
+        moves = Moves(
+            x[:1], m.origin * one, m.target * one, x[2:3], one * m.limit, one * m.own[1], one * 0.0, one * 1.0
+        )
         r, w = profile(time_s[k] - begin, moves, {n: v * one for n, v in fit.values.items()})
         out[k] = r[:, 0] + lead * w[:, 0]
     return out

@@ -1,4 +1,5 @@
-"""The identification as published: position filtered, current not, four models by least squares on samples above a speed.
+"""The identification as published: position filtered, current not, four models by least squares on samples above a
+speed.
 
 Modelling of Robotic Hands: Kinematic and Dynamic Parameter Identification, section 4.3; tables 4.12, 4.13,
 whose figures are `hand_model.published.current_rmse_raw`.
@@ -45,7 +46,8 @@ def zero_phase(x: Array, rate_hz: float, cutoff_hz: float = CUTOFF_HZ) -> Array:
 
 
 def derivatives(x: Array, rate_hz: float) -> tuple[Array, Array]:
-    """First and second derivative of uniform samples (n,) by a quintic spline: central differences lose 15 % of a at 6 Hz and 55 Hz."""
+    """First and second derivative of uniform samples (n,) by a quintic spline: central differences lose 15 % of a at 6
+    Hz and 55 Hz."""
     from scipy.interpolate import make_interp_spline
 
     t = np.arange(len(x)) / rate_hz
@@ -56,7 +58,8 @@ def derivatives(x: Array, rate_hz: float) -> tuple[Array, Array]:
 def columns(trial: MotorTrial, both_sides: bool = False) -> tuple[dict[str, Array], Array, Array]:
     """Regressors by term (n,), current (n,) and the mask of samples above the speed threshold of one trial.
 
-    Velocity and acceleration by differences of the filtered position; `both_sides` filters current and friction terms alike.
+    Velocity and acceleration by differences of the filtered position; `both_sides` filters current and friction terms
+    alike.
     """
     rate_hz = 1 / float(np.median(np.diff(trial.time_s)))
     t = np.arange(trial.time_s[0], trial.time_s[-1], 1 / rate_hz)
@@ -69,7 +72,8 @@ def columns(trial: MotorTrial, both_sides: bool = False) -> tuple[dict[str, Arra
     terms = {"inertia": a, "viscous": v, "stiffness": p, "coulomb": np.sign(v), "reciprocal": 1 / safe}
     if both_sides:
         terms["viscous"], terms["inertia"] = derivatives(p, rate_hz)
-        # the friction changes sign with the drive, not with its filtered copy: lightly filtered velocity, then the same filter
+        # the friction changes sign with the drive, not with its filtered copy: lightly filtered velocity, then the same
+        # filter
         light = np.gradient(zero_phase(position, rate_hz, 3 * CUTOFF_HZ), t)
         strong = np.abs(light) > SPEED_THRESHOLD
         sign = _held_sign(light, strong)
@@ -82,14 +86,16 @@ def columns(trial: MotorTrial, both_sides: bool = False) -> tuple[dict[str, Arra
 
 
 def _held_sign(v: Array, strong: Array) -> Array:
-    """Sign of the velocity, held through rest: the friction keeps its direction until the drive is pushed the other way."""
+    """Sign of the velocity, held through rest: the friction keeps its direction until the drive is pushed the other
+    way."""
     index = np.maximum.accumulate(np.where(strong, np.arange(len(v)), -1))
     sign = np.where(index >= 0, np.sign(v[np.maximum(index, 0)]), 0.0)
     return sign
 
 
 def fit_published(trials: Sequence[MotorTrial], both_sides: bool = False) -> tuple[PublishedFit, ...]:
-    """The four models of tables 4.12 and 4.13 on all trials together; `both_sides` for the comparison with a like filter."""
+    """The four models of tables 4.12 and 4.13 on all trials together; `both_sides` for the comparison with a like
+    filter."""
     parts = [columns(t, both_sides) for t in trials]
     current = np.concatenate([u[m] for _, u, m in parts])
     found = []

@@ -37,8 +37,8 @@ class Scale:
 
 @dataclass(frozen=True)
 class MotorTrial:
-    """One log: time_s (n,) [s] from its first sample, position (n,) [%], current (n,) [raw] and, where the hand logs them,
-    setpoint (n,) [%], speed (n,) [share of full], limit (n,) [raw]; None where it does not."""
+    """One log: time_s (n,) [s] from its first sample, position (n,) [%], current (n,) [raw] and, where the hand logs
+    them, setpoint (n,) [%], speed (n,) [share of full], limit (n,) [raw]; None where it does not."""
 
     name: str
     time_s: Array
@@ -49,7 +49,9 @@ class MotorTrial:
     limit: Array | None
 
 
-def actuator_trials(session: Session, actuator: str, kinds: Sequence[str] = KINDS, validate: bool | None = False) -> tuple[Trial, ...]:
+def actuator_trials(
+    session: Session, actuator: str, kinds: Sequence[str] = KINDS, validate: bool | None = False
+) -> tuple[Trial, ...]:
     """Trials with a log of all fingers that the actuator drives; raises IdentificationError for an unknown actuator."""
     names = [a.name for a in session.actuators]
     if actuator not in names:
@@ -60,7 +62,8 @@ def actuator_trials(session: Session, actuator: str, kinds: Sequence[str] = KIND
 
 
 def trial_scale(logs: Sequence[tuple[str, Log]], speed_full: float | None = None) -> Scale:
-    """Range of an actuator [counts]: the extreme setpoints, or the extremes of the recorded positions where none is logged.
+    """Range of an actuator [counts]: the extreme setpoints, or the extremes of the recorded positions where none is
+    logged.
 
     logs: (trial name, log). Raises IdentificationError where position never moves or a column is missing.
     """
@@ -76,10 +79,14 @@ def trial_scale(logs: Sequence[tuple[str, Log]], speed_full: float | None = None
             high.append(signal.max())
         if "speed" in log.columns:
             full.append(np.nanmax(log.columns["speed"]))
-    moved = [np.ptp(q[np.isfinite(q)]) if np.isfinite(q).any() else 0.0 for q in (log.columns["position"] for _, log in logs)]
+    moved = [
+        np.ptp(q[np.isfinite(q)]) if np.isfinite(q).any() else 0.0 for q in (log.columns["position"] for _, log in logs)
+    ]
     if not low or max(high) - min(low) < 1e-9 or max(moved) < 0.1 * (max(high) - min(low)):
         names = ", ".join(name for name, _ in logs)
-        raise IdentificationError(f"{names}: the actuator does not move; excitation over most of its range, both ways, is needed")
+        raise IdentificationError(
+            f"{names}: the actuator does not move; excitation over most of its range, both ways, is needed"
+        )
     scale = speed_full or (max(full) if full else 1.0)
     return Scale(float(min(low)), float(max(high)), float(scale) or 1.0)
 
@@ -90,7 +97,9 @@ def motor_trial(name: str, log: Log, scale: Scale) -> MotorTrial:
     good = np.isfinite(log.time_s) & np.isfinite(c["position"]) & np.isfinite(c["current"])
     good[1:] &= np.diff(np.maximum.accumulate(np.where(np.isfinite(log.time_s), log.time_s, -np.inf))) > 0
     if good.sum() < 50:
-        raise IdentificationError(f"{name}: {int(good.sum())} samples hold position and current; at least 50 are needed")
+        raise IdentificationError(
+            f"{name}: {int(good.sum())} samples hold position and current; at least 50 are needed"
+        )
 
     def held(column: str) -> Array | None:
         if column not in c or not np.isfinite(c[column]).any():
@@ -113,7 +122,8 @@ def motor_trial(name: str, log: Log, scale: Scale) -> MotorTrial:
 
 
 def check_trials(trials: Sequence[MotorTrial]) -> None:
-    """Raise IdentificationError where the current is constant, saturated, a command or no drive's, or the motion goes one way only."""
+    """Raise IdentificationError where the current is constant, saturated, a command or no drive's, or the motion goes
+    one way only."""
     v = [_coarse_velocity(t) for t in trials]
     fastest = max(float(np.quantile(np.abs(x), 0.98)) for x in v)
     share = [sum(float(np.mean(sign * x > 0.25 * fastest)) for x in v) for sign in (1, -1)]
@@ -124,7 +134,10 @@ def check_trials(trials: Sequence[MotorTrial]) -> None:
         )
     for t in trials:
         _check_current(t)
-    flexing, extending = (np.concatenate([t.current[sign * x > 0.25 * fastest] for t, x in zip(trials, v, strict=True)]) for sign in (1, -1))
+    flexing, extending = (
+        np.concatenate([t.current[sign * x > 0.25 * fastest] for t, x in zip(trials, v, strict=True)])
+        for sign in (1, -1)
+    )
     friction = flexing.mean() - extending.mean()
     if friction < 5 * np.sqrt(flexing.var() / len(flexing) + extending.var() / len(extending)):
         raise IdentificationError(
@@ -144,10 +157,14 @@ def _coarse_velocity(t: MotorTrial) -> Array:
 def _check_current(t: MotorTrial) -> None:
     u = t.current
     if np.ptp(u) == 0:
-        raise IdentificationError(f'{t.name}: column "current" is constant ({u[0]:g}); a measured current varies with the load')
+        raise IdentificationError(
+            f'{t.name}: column "current" is constant ({u[0]:g}); a measured current varies with the load'
+        )
     moving = np.abs(_coarse_velocity(t)) > 5.0
     if moving.sum() > 20 and np.mean(np.diff(u)[moving[1:]] == 0) > 0.9:
-        raise IdentificationError(f'{t.name}: column "current" holds its value while the finger moves; it is a command, not a measurement')
+        raise IdentificationError(
+            f'{t.name}: column "current" holds its value while the finger moves; it is a command, not a measurement'
+        )
     for side in (u.max(), u.min()):
         at = u == side
         run = at[1:] & at[:-1]
@@ -161,7 +178,9 @@ def _check_current(t: MotorTrial) -> None:
             )
     command = _follows_command(t)
     if command:
-        raise IdentificationError(f'{t.name}: column "current" {command}; it is a command, not a measurement, and is not fitted')
+        raise IdentificationError(
+            f'{t.name}: column "current" {command}; it is a command, not a measurement, and is not fitted'
+        )
     for side in (1, -1):
         share, ceiling = _quiet_ceiling(side * u[moving])
         if share > 0.05:
@@ -172,9 +191,11 @@ def _check_current(t: MotorTrial) -> None:
 
 
 def _quiet_ceiling(u: Array) -> tuple[float, float]:
-    """Share of samples (n,) that lie at the top of their range with hardly any of the others' noise, and that top; 0 where none do.
+    """Share of samples (n,) that lie at the top of their range with hardly any of the others' noise, and that top; 0
+    where none do.
 
-    A reading that clips loses its noise at the ceiling, whatever is added after it; noise within a band as wide as its own deviation keeps about half of it.
+    A reading that clips loses its noise at the ceiling, whatever is added after it; noise within a band as wide as its
+    own deviation keeps about half of it.
     """
     if len(u) < 50:
         return 0.0, 0.0
@@ -189,7 +210,8 @@ def _quiet_ceiling(u: Array) -> tuple[float, float]:
 
 
 def _follows_command(t: MotorTrial) -> str | None:
-    """What the current is an exact function of, or None: within 0.5 % of its variance, of setpoint, speed, limit and position."""
+    """What the current is an exact function of, or None: within 0.5 % of its variance, of setpoint, speed, limit and
+    position."""
     named = {"setpoint": t.setpoint, "speed": t.speed, "current_limit": t.limit, "position": t.position}
     for name, column in named.items():
         if column is None or np.ptp(column) == 0:
@@ -203,14 +225,17 @@ def _follows_command(t: MotorTrial) -> str | None:
             x = np.c_[column, _coarse_velocity(t), np.ones(len(column))]
             fitted = x @ np.linalg.lstsq(x, t.current, rcond=None)[0]
         if np.var(t.current - fitted) < 0.005 * np.var(t.current):
-            return f'equals a function of column "{name}" to {100 * np.std(t.current - fitted) / np.std(t.current):.1f} %'
+            return (
+                f'equals a function of column "{name}" to {100 * np.std(t.current - fitted) / np.std(t.current):.1f} %'
+            )
     return None
 
 
 def motor_trials(session: Session, actuator: str) -> tuple[list[MotorTrial], Scale]:
     """The trials from which a motor is identified, checked, and their scale (validation trials take no part).
 
-    Raises IdentificationError where there are none, or where they hold no excitation, one direction only, or a current that is constant, clipped or a command.
+    Raises IdentificationError where there are none, or where they hold no excitation, one direction only, or a current
+    that is constant, clipped or a command.
     """
     found = actuator_trials(session, actuator)
     if not found:

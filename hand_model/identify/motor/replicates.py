@@ -15,10 +15,12 @@ BIN_S = 0.04  # over which residuals are averaged before replicates are compared
 
 
 def lack_of_fit(f: OutputErrorFit) -> float:
-    """Systematic misfit: the variance, in units of the noise's, that repeated moves leave unexplained alike; of the worse channel.
+    """Systematic misfit: the variance, in units of the noise's, that repeated moves leave unexplained alike; of the
+    worse channel.
 
-    Moves of one kind (origin, target, speed) are replicates: what differs between them is pure error, of whatever colour; what they share is
-    the model's (analysis of variance on residuals averaged over BIN_S). The lower end of its 95 % interval, from the scatter between kinds;
+    Moves of one kind (origin, target, speed) are replicates: what differs between them is pure error, of whatever
+    colour; what they share is the model's (analysis of variance on residuals averaged over BIN_S). The lower end of its
+    95 % interval, from the scatter between kinds;
     never more than the mean square less one, which is all that counts where nothing was repeated.
     """
     kinds: dict[tuple, list[int]] = {}
@@ -35,7 +37,8 @@ def lack_of_fit(f: OutputErrorFit) -> float:
 
 
 def _shared(f: OutputErrorFit, members: Sequence[int]) -> tuple[Array, float]:
-    """Sum of squares (2,) that replicates share, whitened, of position and current, and the samples that it stands for."""
+    """Sum of squares (2,) that replicates share, whitened, of position and current, and the samples that it stands
+    for."""
     last = min(f.moves[i].time_s[-1] - f.own[i, 0] for i in members)
     bins = max(int(last / BIN_S), 1)
     counts, means = np.empty((len(members), bins)), np.empty((len(members), 2, bins))
@@ -44,7 +47,9 @@ def _shared(f: OutputErrorFit, members: Sequence[int]) -> tuple[Array, float]:
         k = (at >= 0) & (at < bins)
         counts[row] = np.bincount(at[k], minlength=bins)
         for channel in (0, 1):
-            means[row, channel] = np.bincount(at[k], f.residual[i][k, channel] / f.sigma[channel], minlength=bins) / np.maximum(counts[row], 1)
+            means[row, channel] = np.bincount(
+                at[k], f.residual[i][k, channel] / f.sigma[channel], minlength=bins
+            ) / np.maximum(counts[row], 1)
     full = (counts > 0).all(axis=0)
     samples = 1 / (1 / counts[:, full]).mean(axis=0)
     mean, scatter = means[:, :, full].mean(axis=0), means[:, :, full].var(axis=0, ddof=1)

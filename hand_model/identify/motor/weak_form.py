@@ -1,11 +1,12 @@
 """The regression done right: the balance in weak form on every stroke, so that nothing recorded is ever differentiated.
 
-current = inertia a + viscous v + coulomb z + stiffness p + preload (+ rise z exp(-|v / speed|^exponent)) is multiplied by B-splines that vanish at
-both ends of a stroke and integrated by parts (modulating functions, Shinbrot 1957; Preisig & Rippin 1993): position and current pass through the
-same splines. At an end the drive stands still and friction turns round, at an instant known to about a sample; as the splines
-vanish there, an error of it counts only in second order. A rest is not used: friction there is known only within its bounds. Friction builds up from what it
-held at rest over a distance (Dahl 1968). The encoder's noise in the regressors is simulated at the recorded instants and taken off
-(errors in variables; Fuller 1987, ch. 2); the covariance is the jackknife over strokes. Needs no setpoint and no controller.
+current = inertia a + viscous v + coulomb z + stiffness p + preload (+ rise z exp(-|v / speed|^exponent)) is multiplied
+by B-splines that vanish at both ends of a stroke and integrated by parts (modulating functions, Shinbrot 1957; Preisig
+& Rippin 1993): position and current pass through the same splines. At an end the drive stands still and friction turns
+round, at an instant known to about a sample; as the splines vanish there, an error of it counts only in second order. A
+rest is not used: friction there is known only within its bounds. Friction builds up from what it held at rest over a
+distance (Dahl 1968). The encoder's noise in the regressors is simulated at the recorded instants and taken off (errors
+in variables; Fuller 1987, ch. 2); the covariance is the jackknife over strokes. Needs no setpoint and no controller.
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ from .recording import MotorTrial
 Array = NDArray[np.float64]
 
 GIVE = (0.02, 0.3, 0.6, 1.0)  # [%], distances tried first; the least of them is Coulomb's friction to any encoder here
-STRIBECK = tuple(itertools.product((6.0, 10.0, 15.0, 22.0, 32.0, 45.0), (1.0, 2.0)))  # speed [%/s] and exponent, profiled
+# speed [%/s] and exponent, profiled
+STRIBECK = tuple(itertools.product((6.0, 10.0, 15.0, 22.0, 32.0, 45.0), (1.0, 2.0)))
 RATIO = 2.0  # most that the rise is of Coulomb friction
 INERTIA = 0.0125  # [raw s^2/%] of a typical finger drive, only to choose how dense the splines are
 WINDOW = 5  # samples that tell motion from rest
@@ -33,8 +35,9 @@ EVIDENCE = 16.0  # fall of the misfit for which a give of the friction is believ
 
 @dataclass(frozen=True)
 class Regression:
-    """values (5,) of balance.NAMES; covariance (5, 5), a jackknife over strokes; misfit: residual variance over that of the
-    current's noise; give [%]: distance over which friction turns round; static_excess [raw], stribeck_speed [%/s] and its exponent; excess_z: the excess over its standard error."""
+    """values (5,) of balance.NAMES; covariance (5, 5), a jackknife over strokes; misfit: residual variance over that of
+    the current's noise; give [%]: distance over which friction turns round; static_excess [raw], stribeck_speed [%/s]
+    and its exponent; excess_z: the excess over its standard error."""
 
     values: Array
     covariance: Array
@@ -48,8 +51,9 @@ class Regression:
 
 @dataclass(frozen=True)
 class Stroke:
-    """A stretch of motion in one direction (sign), from begin_s to end_s [s], positions there [%], the current that held the drive
-    before it [raw] (None where it did not come from rest), its samples' slice, and where friction began to turn round, rest [%]."""
+    """A stretch of motion in one direction (sign), from begin_s to end_s [s], positions there [%], the current that
+    held the drive before it [raw] (None where it did not come from rest), its samples' slice, and where friction began
+    to turn round, rest [%]."""
 
     sign: float
     begin_s: float
@@ -64,8 +68,8 @@ class Stroke:
 @dataclass(frozen=True)
 class _Projected:
     """A stroke on its splines (k of them, n grid points); fixed (k, 2) acceleration and velocity, whitened;
-    position, current (interpolated between samples; held_current: from those inside only) and speed (n,) on the grid; noise (3, 3) expected in the
-    products of acceleration, velocity and position."""
+    position, current (interpolated between samples; held_current: from those inside only) and speed (n,) on the grid;
+    noise (3, 3) expected in the products of acceleration, velocity and position."""
 
     stroke: Stroke
     splines: Modulating
@@ -77,19 +81,29 @@ class _Projected:
     noise: Array
 
 
-def fit_regressions(trials: Sequence[MotorTrial], sigma_position: float, sigma_current: float) -> tuple[Regression, Regression]:
-    """Least squares on all strokes, without a Stribeck rise and with one, whose speed and exponent are profiled over a grid.
+def fit_regressions(
+    trials: Sequence[MotorTrial], sigma_position: float, sigma_current: float
+) -> tuple[Regression, Regression]:
+    """Least squares on all strokes, without a Stribeck rise and with one, whose speed and exponent are profiled over a
+    grid.
 
-    sigma_position [%], sigma_current [raw]: noise of one sample. Raises IdentificationError with fewer than six strokes.
+    sigma_position [%], sigma_current [raw]: noise of one sample. Raises IdentificationError with fewer than six
+    strokes.
     """
     moved = [strokes(t, sigma_position) for t in trials]
     parts = _projected(trials, moved, sigma_position, sigma_current)
     if len(parts) < 6:
         names = ", ".join(t.name for t in trials)
-        raise IdentificationError(f"{names}: {len(parts)} strokes are long enough to be told from noise; at least six, both ways, are needed")
+        raise IdentificationError(
+            f"{names}: {len(parts)} strokes are long enough to be told from noise; at least six, both ways, are needed"
+        )
     parts = _without_outliers(parts)
-    if (give := _give(parts)) > GIVE[0]:  # how friction builds up is a model of its own, and takes the place of inertia: only what slides
-        sliding = [[_settled(t, s, 2.5 * give + 2 * sigma_position) for s in found] for t, found in zip(trials, moved, strict=True)]
+    # how friction builds up is a model of its own, and takes the place of inertia: only what slides
+    if (give := _give(parts)) > GIVE[0]:
+        sliding = [
+            [_settled(t, s, 2.5 * give + 2 * sigma_position) for s in found]
+            for t, found in zip(trials, moved, strict=True)
+        ]
         parts = _without_outliers(_projected(trials, sliding, sigma_position, sigma_current), give)
     noise = sigma_current**2 * float(np.median(np.concatenate([np.diff(t.time_s) for t in trials])))
     system = _system(parts, give)
@@ -105,18 +119,33 @@ def fit_regressions(trials: Sequence[MotorTrial], sigma_position: float, sigma_c
     best = min(rises, key=lambda i: _misfit(systems[i], found[i]))
     shape, (values, covariance, square) = STRIBECK[best], _solve(systems[best])
     excess = float(values[5])
-    curved = Regression(values[:5], covariance[:5, :5] + unrecorded, square / noise, give, excess, *shape, excess / float(np.sqrt(covariance[5, 5])))
+    curved = Regression(
+        values[:5],
+        covariance[:5, :5] + unrecorded,
+        square / noise,
+        give,
+        excess,
+        *shape,
+        excess / float(np.sqrt(covariance[5, 5])),
+    )
     return plain, curved
 
 
 def strokes(t: MotorTrial, sigma: float) -> list[Stroke]:
-    """Strokes of a trial: where a line through the samples before and one through those after both move the same way."""
+    """Strokes of a trial: where a line through the samples before and one through those after both move the same
+    way."""
     time, p = t.time_s, t.position
     back, back_sd = _slope(time, p, sigma, -1)
     ahead, ahead_sd = _slope(time, p, sigma, 1)
-    sign = np.where((back > 3 * back_sd) & (ahead > 3 * ahead_sd), 1, np.where((back < -3 * back_sd) & (ahead < -3 * ahead_sd), -1, 0))
+    sign = np.where(
+        (back > 3 * back_sd) & (ahead > 3 * ahead_sd),
+        1,
+        np.where((back < -3 * back_sd) & (ahead < -3 * ahead_sd), -1, 0),
+    )
     cuts = np.r_[0, np.flatnonzero(np.diff(sign) != 0) + 1, len(sign)]
-    runs = [(a, b) for a, b in itertools.pairwise(cuts) if sign[a] != 0 and b - a >= 4 and abs(p[b - 1] - p[a]) > 6 * sigma]
+    runs = [
+        (a, b) for a, b in itertools.pairwise(cuts) if sign[a] != 0 and b - a >= 4 and abs(p[b - 1] - p[a]) > 6 * sigma
+    ]
     found = []
     for i, (a, b) in enumerate(runs):
         before = runs[i - 1][1] if i else 0
@@ -139,8 +168,8 @@ def _slope(time: Array, p: Array, sigma: float, way: int) -> tuple[Array, Array]
 def _end(t: MotorTrial, sigma: float, outwards: range) -> tuple[float, float, float | None]:
     """Instant [s] and position [%] at which a stroke begins or ends, and the current [raw] in the rest beyond it.
 
-    outwards: samples from the stroke's last sure one to the neighbouring stroke. From rest the square root of the way travelled is linear in time,
-    which leads back to the instant; without one the stroke ends at its last sure sample.
+    outwards: samples from the stroke's last sure one to the neighbouring stroke. From rest the square root of the way
+    travelled is linear in time, which leads back to the instant; without one the stroke ends at its last sure sample.
     """
     time, p, k = t.time_s, t.position, np.array(outwards, int)
     if len(k) < 6 or np.ptp(p[k[3:11]]) > 6 * sigma + 0.3:
@@ -167,7 +196,9 @@ def _settled(t: MotorTrial, s: Stroke, travel: float) -> Stroke:
     return replace(s, begin_s=float(t.time_s[k[0]]), begin=float(t.position[k[0]]))
 
 
-def _projected(trials: Sequence[MotorTrial], moved: Sequence[Sequence[Stroke]], sigma: float, sigma_current: float) -> list[_Projected]:
+def _projected(
+    trials: Sequence[MotorTrial], moved: Sequence[Sequence[Stroke]], sigma: float, sigma_current: float
+) -> list[_Projected]:
     """Every stroke that is long enough on its splines; knots as dense as the noise lets accelerations be seen."""
     parts, rng = [], np.random.default_rng(0)
     for t, found in zip(trials, moved, strict=True):
@@ -177,7 +208,9 @@ def _projected(trials: Sequence[MotorTrial], moved: Sequence[Sequence[Stroke]], 
     return parts
 
 
-def _project(t: MotorTrial, s: Stroke, sigma: float, spacing: float, step: float, rng: np.random.Generator) -> _Projected:
+def _project(
+    t: MotorTrial, s: Stroke, sigma: float, spacing: float, step: float, rng: np.random.Generator
+) -> _Projected:
     from scipy.interpolate import make_interp_spline
 
     k = np.arange(max(s.samples.start - 3, 0), min(s.samples.stop + 3, len(t.time_s)))
@@ -193,7 +226,10 @@ def _project(t: MotorTrial, s: Stroke, sigma: float, spacing: float, step: float
     bent = smooth - smooth[0] - (smooth[-1] - smooth[0]) * share[:, None]
     position, chord = smooth[:, 0], (smooth[-1, 0] - smooth[0, 0]) / (s.end_s - s.begin_s)
     accelerated = splines.products(bent, 2)
-    moved, placed = -splines.products(np.c_[bent[:, 0], smooth[:, 1:]], 1), splines.products(np.c_[bent[:, 0], np.ones(len(grid)), smooth[:, 1:]])
+    moved, placed = (
+        -splines.products(np.c_[bent[:, 0], smooth[:, 1:]], 1),
+        splines.products(np.c_[bent[:, 0], np.ones(len(grid)), smooth[:, 1:]]),
+    )
     velocity = moved[:, 0] + chord * placed[:, 1]
     speed = np.abs(chord + splines.slope(placed[:, 0]))
     seen = np.stack([accelerated[:, 1:], moved[:, 1:], placed[:, 2:]])
@@ -203,19 +239,22 @@ def _project(t: MotorTrial, s: Stroke, sigma: float, spacing: float, step: float
 
 
 def _rows(q: _Projected, give: float, shapes: Sequence[tuple[float, float]] = ()) -> tuple[Array, Array]:
-    """Regressors (k, 5), with what each shape of a Stribeck rise adds (k, 5 + shapes), and current (k,): from rest friction is exp(-travel / give) of
-    what it held, and slides for the rest."""
+    """Regressors (k, 5), with what each shape of a Stribeck rise adds (k, 5 + shapes), and current (k,): from rest
+    friction is exp(-travel / give) of what it held, and slides for the rest."""
     left = np.exp(-np.abs(q.position - q.stroke.rest) / give)
     if q.stroke.hold is None:
         friction, held, hold = q.stroke.sign * (1 - 2 * left), np.zeros_like(left), 0.0
     else:
         friction, held, hold = q.stroke.sign * (1 - left), left, q.stroke.hold
     rises = [friction * np.exp(-((q.speed / speed) ** exponent)) for speed, exponent in shapes]
-    x = q.splines.products(np.column_stack([friction, q.position - held * q.stroke.rest, 1 - held, *rises, q.current - held * hold]))
+    x = q.splines.products(
+        np.column_stack([friction, q.position - held * q.stroke.rest, 1 - held, *rises, q.current - held * hold])
+    )
     return np.c_[q.fixed, x[:, :-1]], x[:, -1]
 
 
-_System = tuple[Array, Array, float, int]  # by stroke: normal matrices (strokes, k, k), right sides (strokes, k); square of the current, and its rows
+# by stroke: normal matrices (strokes, k, k), right sides (strokes, k); square of the current, and its rows
+_System = tuple[Array, Array, float, int]
 
 
 def _system(parts: Sequence[_Projected], give: float) -> _System:
@@ -280,7 +319,8 @@ def _solve(system: _System) -> tuple[Array, Array, float]:
 
 
 def _without_outliers(parts: list[_Projected], give: float = GIVE[0]) -> list[_Projected]:
-    """The strokes without those that the others do not explain: something held the drive, or their ends were misjudged."""
+    """The strokes without those that the others do not explain: something held the drive, or their ends were
+    misjudged."""
     for _ in range(3):
         values = _values(_system(parts, give))
         misfit = np.array([np.mean((y - x @ values) ** 2) for x, y in (_rows(q, give) for q in parts)])

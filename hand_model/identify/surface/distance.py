@@ -33,12 +33,15 @@ def distance_to_mesh(points: ArrayLike, vertices: Array, faces: Faces) -> Array:
 def _in_chunks(points: Array, triangles: Array, count: int) -> Array:
     """Distance (n,) of points (n, 3) from the nearest of their own triangles (n, count, 3, 3)."""
     step = max(1, CHUNK // max(count, 1))
-    parts = [_to_triangles(points[i : i + step, None], triangles[i : i + step]).min(1) for i in range(0, len(points), step)]
+    parts = [
+        _to_triangles(points[i : i + step, None], triangles[i : i + step]).min(1) for i in range(0, len(points), step)
+    ]
     return np.concatenate(parts) if parts else np.zeros(0)
 
 
 def _to_triangles(p: Array, triangle: Array) -> Array:
-    """Distances of points (..., 3) from triangles (..., 3, 3): of the foot within the triangle, else of the nearest edge."""
+    """Distances of points (..., 3) from triangles (..., 3, 3): of the foot within the triangle, else of the nearest
+    edge."""
     a, b, c = (triangle[..., i, :] for i in range(3))
     ab, ac, ap = b - a, c - a, p - a
     normal = np.cross(ab, ac)
@@ -60,4 +63,9 @@ def _to_edges(p: Array, a: Array, b: Array) -> Array:
 def summary_mm(distance_m: ArrayLike) -> dict[str, Any]:
     """Median, 95 % quantile and maximum [mm] of distances (n,) [m], and their number."""
     d = 1e3 * np.abs(np.asarray(distance_m, float))
-    return {"median_mm": float(np.median(d)), "p95_mm": float(np.quantile(d, 0.95)), "max_mm": float(d.max()), "points": len(d)}
+    return {
+        "median_mm": float(np.median(d)),
+        "p95_mm": float(np.quantile(d, 0.95)),
+        "max_mm": float(d.max()),
+        "points": len(d),
+    }

@@ -1,4 +1,5 @@
-"""Defects of a triangulation repaired: flipped and doubled faces, edges of more than two faces, pinched vertices, crumbs, holes."""
+"""Defects of a triangulation repaired: flipped and doubled faces, edges of more than two faces, pinched vertices,
+crumbs, holes."""
 
 from __future__ import annotations
 
@@ -98,7 +99,9 @@ def _edge_manifold(vertices: Array, faces: Faces) -> tuple[Faces, int]:
     """Best-shaped faces first; one that would run along a directed edge a second time is left out."""
     if not len(faces):
         return faces, 0
-    longest = np.max([np.linalg.norm(vertices[faces[:, i]] - vertices[faces[:, i - 1]], axis=1) for i in range(3)], axis=0)
+    longest = np.max(
+        [np.linalg.norm(vertices[faces[:, i]] - vertices[faces[:, i - 1]], axis=1) for i in range(3)], axis=0
+    )
     taken: set[tuple[int, int]] = set()
     kept = []
     for k in np.lexsort((np.arange(len(faces)), longest)):

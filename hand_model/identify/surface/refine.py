@@ -1,4 +1,5 @@
-"""Flat triangles bent to the curvature that the normals at their corners tell: a coarse grid then no longer cuts corners."""
+"""Flat triangles bent to the curvature that the normals at their corners tell: a coarse grid then no longer cuts
+corners."""
 
 from __future__ import annotations
 
@@ -10,11 +11,13 @@ from .mend import directed_edges
 Array = NDArray[np.float64]
 Faces = NDArray[np.int64]
 
-BEND = 0.5  # cosine of the angle between the normals at an edge's ends from which the edge stays straight: a true ridge, or noise
+# cosine of the angle between the normals at an edge's ends from which the edge stays straight: a true ridge, or noise
+BEND = 0.5
 
 
 def refined(vertices: Array, faces: Faces, normals: Array) -> tuple[Array, Faces]:
-    """Every face cut in four; the new vertices lie on the cubics through their edges (PN triangles, Vlachos et al. 2001).
+    """Every face cut in four; the new vertices lie on the cubics through their edges (PN triangles, Vlachos et al.
+    2001).
 
     vertices: (v, 3) [m], faces: (f, 3), normals: (v, 3) unit, outward. What was closed stays closed.
     """

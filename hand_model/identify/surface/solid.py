@@ -33,8 +33,8 @@ def volume(vertices: Array, faces: Faces) -> float:
 def closed(vertices: Array, faces: Faces, points: Array, spacing_m: float) -> tuple[Array, Faces, str]:
     """A watertight mesh from a mended surface, and how it was closed.
 
-    In this order: closed already; a fan from the rim's middle, where every face of the surface can be seen from there; a shell of
-    2 mm; the convex hull of points (n, 3) [m], which lie about spacing_m [m] apart.
+    In this order: closed already; a fan from the rim's middle, where every face of the surface can be seen from there;
+    a shell of 2 mm; the convex hull of points (n, 3) [m], which lie about spacing_m [m] apart.
     """
     loops = rims(faces)
     if len(faces) >= 4:
@@ -104,8 +104,8 @@ def hull(points: Array, corners: int | None = None) -> tuple[Array, Faces]:
 def convex_parts(vertices: Array, faces: Faces, spacing_m: float) -> tuple[tuple[tuple[Array, Faces], ...], str]:
     """Convex meshes that together cover a watertight one, and how they were found.
 
-    One hull where hardly a vertex lies deeper in it than a part of spacing_m [m], the distance of the points that it was made
-    from; else the parts of V-HACD (Mamou 2009) where vhacdx is installed; else one hull.
+    One hull where hardly a vertex lies deeper in it than a part of spacing_m [m], the distance of the points that it
+    was made from; else the parts of V-HACD (Mamou 2009) where vhacdx is installed; else one hull.
     """
     from scipy.spatial import ConvexHull
 

@@ -67,11 +67,13 @@ class Surface:
 def identify_surfaces(
     session: Session, identified: Identification | Hand, voxel_m: float = VOXEL_M, pivoting: bool | None = None
 ) -> tuple[Surface, ...]:
-    """Surfaces of all segments that the session's `surface` trials sweep, in the palm frame of the identified hand at rest.
+    """Surfaces of all segments that the session's `surface` trials sweep, in the palm frame of the identified hand at
+    rest.
 
-    voxel_m: distance [m] to which the tip's path is resampled. pivoting: ball pivoting by Open3D (the extra `surface`), or the
-    built-in Delaunay carving; None: what is installed. Trials for validation are left out. A segment whose sweeps hold too
-    little comes back empty with a note that says so. Raises IdentificationError where the probe or the palm is unknown.
+    voxel_m: distance [m] to which the tip's path is resampled. pivoting: ball pivoting by Open3D (the extra `surface`),
+    or the built-in Delaunay carving; None: what is installed. Trials for validation are left out. A segment whose
+    sweeps hold too little comes back empty with a note that says so. Raises IdentificationError where the probe or the
+    palm is unknown.
     """
     hand = identified if isinstance(identified, Hand) else identified.hand
     trials: dict[str, list[Trial]] = {}

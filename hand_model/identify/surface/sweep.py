@@ -1,4 +1,5 @@
-"""Probe sweeps: the tip's path over one segment in the palm frame, freed of outliers and resampled on a grid of voxels."""
+"""Probe sweeps: the tip's path over one segment in the palm frame, freed of outliers and resampled on a grid of
+voxels."""
 
 from __future__ import annotations
 
@@ -37,7 +38,8 @@ class Cloud:
 
 
 def swept(trials: Sequence[Trial], session: Session, probe: Probe, hand: Hand) -> tuple[Array, Array]:
-    """Tip positions (n, 3) [m] and shaft directions (n, 3) of all sweeps of one segment, in the hand's palm frame at rest.
+    """Tip positions (n, 3) [m] and shaft directions (n, 3) of all sweeps of one segment, in the hand's palm frame at
+    rest.
 
     Where the segment's own markers are seen as well, its motion from rest is taken out: a probe pushes a finger.
     Raises IdentificationError where no frame shows palm and probe.
@@ -53,7 +55,8 @@ def swept(trials: Sequence[Trial], session: Session, probe: Probe, hand: Hand) -
 
 
 def displacement(trial: Trial, session: Session, hand: Hand, shape: Array) -> tuple[Array, Array]:
-    """Rotation (3, 3) and shift (3,) [m] of the swept segment from rest, median over the trial; none for unseen markers."""
+    """Rotation (3, 3) and shift (3,) [m] of the swept segment from rest, median over the trial; none for unseen
+    markers."""
     finger, _, name = (trial.segment or "palm").partition("/")
     rest = {j.name: j.markers_palm for j in hand.finger(finger).joints}.get(name, {}) if name else {}
     mocap = trial.mocap()
@@ -68,7 +71,8 @@ def displacement(trial: Trial, session: Session, hand: Hand, shape: Array) -> tu
 
 
 def resampled(tip: Array, shaft: Array, voxel_m: float) -> Cloud:
-    """One point per occupied voxel of that edge [m]: the mean of its tips, projected on the quadric through its neighbourhood.
+    """One point per occupied voxel of that edge [m]: the mean of its tips, projected on the quadric through its
+    neighbourhood.
 
     Tips off the surface around them (spikes, the way to and from the segment) are dropped first.
     Raises IdentificationError where too few points remain.
@@ -126,7 +130,8 @@ def _surrounded(points: Array, hint: Array, voxel_m: float) -> NDArray[np.bool_]
 
 
 def _continued(points: Array, hint: Array, voxel_m: float) -> NDArray[np.bool_]:
-    """Points that lie where the quadric through their neighbours expects them: not the last of a path that leaves the surface."""
+    """Points that lie where the quadric through their neighbours expects them: not the last of a path that leaves the
+    surface."""
     from scipy.spatial import cKDTree
 
     keep = np.ones(len(points), bool)

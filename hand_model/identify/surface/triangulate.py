@@ -35,7 +35,8 @@ def has_open3d() -> bool:
 def triangulated(points: Array, normals: Array, spacing_m: float, pivoting: bool | None = None) -> tuple[Faces, str]:
     """Faces (f, 3) over points (n, 3) [m] with outward unit normals (n, 3), and the method's name.
 
-    spacing_m: distance of the points [m]. pivoting: ball pivoting (Bernardini et al. 1999); None: if Open3D is installed.
+    spacing_m: distance of the points [m]. pivoting: ball pivoting (Bernardini et al. 1999); None: if Open3D is
+    installed.
     Raises MissingDependencyError where it is asked for and Open3D is not installed.
     """
     available = has_open3d() if pivoting is not False else False
@@ -76,8 +77,8 @@ def _back_to(points: Array, vertices: Array, faces: Faces) -> Faces:
 def carved(points: Array, radius_m: float) -> Faces:
     """Boundary of the Delaunay tetrahedra that a ball of that radius [m] cannot reach from outside.
 
-    The ball passes a triangle whose circumcircle is wider than it (alpha shape, Edelsbrunner & Mücke 1994, of the outside
-    only). Faces (f, 3) enclose a solid, counter-clockwise from outside.
+    The ball passes a triangle whose circumcircle is wider than it (alpha shape, Edelsbrunner & Mücke 1994, of the
+    outside only). Faces (f, 3) enclose a solid, counter-clockwise from outside.
     """
     from scipy.spatial import Delaunay, QhullError
 
@@ -111,8 +112,11 @@ def carved(points: Array, radius_m: float) -> Faces:
 
 
 def _touching(tetrahedra: Faces, faces: Faces) -> NDArray[np.bool_]:
-    """Tetrahedra (t, 4) at an edge along which more than two of the faces (f, 3) meet: filled, the solid no longer touches itself there."""
-    edges, count = np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0, return_counts=True)
+    """Tetrahedra (t, 4) at an edge along which more than two of the faces (f, 3) meet: filled, the solid no longer
+    touches itself there."""
+    edges, count = np.unique(
+        np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0, return_counts=True
+    )
     hit = np.zeros(len(tetrahedra), bool)
     for a, b in edges[count > 2]:
         hit |= (tetrahedra == a).any(1) & (tetrahedra == b).any(1)
@@ -122,7 +126,9 @@ def _touching(tetrahedra: Faces, faces: Faces) -> NDArray[np.bool_]:
 def circumradius(triangle: Array) -> Array:
     """Circumradius (...) [m] of triangles (..., 3, 3) [m]."""
     a, b, c = (np.linalg.norm(triangle[..., i, :] - triangle[..., j, :], axis=-1) for i, j in ((0, 1), (1, 2), (2, 0)))
-    twice = np.linalg.norm(np.cross(triangle[..., 1, :] - triangle[..., 0, :], triangle[..., 2, :] - triangle[..., 0, :]), axis=-1)
+    twice = np.linalg.norm(
+        np.cross(triangle[..., 1, :] - triangle[..., 0, :], triangle[..., 2, :] - triangle[..., 0, :]), axis=-1
+    )
     return a * b * c / np.maximum(2 * twice, 1e-300)
 
 

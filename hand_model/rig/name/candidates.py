@@ -32,14 +32,17 @@ NOT_FOR_RIGS = frozenset(
 PERIODIC = frozenset({"torque_ripple"})  # between two periods of a grid there is nothing to descend from
 SMOOTH = ("nonlinear_spring",)  # its knee belongs to fingers with a return spring; a joint has stops and detents
 LONGEST_DELAY_S = 0.03
-# Samples. A drive that holds its torque from one control step to the next acts half a step late: less than a sample of a log.
+# Samples. A drive that holds its torque from one control step to the next acts half a step late: less than a sample of
+# a log.
 DELAYS = (0.125, 0.25, 0.5, 1, 2, 3, 5, 8)
-TURNS = 4  # of friction and the load that it is reckoned from: what one changes of the load, friction changes by a fraction of
+# of friction and the load that it is reckoned from: what one changes of the load, friction changes by a fraction of
+TURNS = 4
 SAME = 0.05  # of a column's variance
 UNDECLARED = "no spring is declared"
 BY_LEVEL = "a level for each that trials declare"
 REACHES = tuple(np.geomspace(0.004, 0.5, 8))  # of the range, over which friction turns round
-PLACED = frozenset({"reach", "period", "centre"})  # what has one of these can be there twice: two springs, two tight spots
+# what has one of these can be there twice: two springs, two tight spots
+PLACED = frozenset({"reach", "period", "centre"})
 Bound = tuple[str, str, float, float]
 
 
@@ -67,8 +70,11 @@ class Candidate:
         return f"{self.effect}{'/' + self.variant if self.variant else ''}@{self.joint}"
 
 
-def beside(rows: Sequence[Rows], acting: Sequence[tuple[Candidate, Mapping[str, float], Array]]) -> dict[tuple[str, str], Array]:
-    """Effort (n,) at full rate, of every (trial, joint), of effects with shape and amplitudes (j,); delays are left out."""
+def beside(
+    rows: Sequence[Rows], acting: Sequence[tuple[Candidate, Mapping[str, float], Array]]
+) -> dict[tuple[str, str], Array]:
+    """Effort (n,) at full rate, of every (trial, joint), of effects with shape and amplitudes (j,); delays are left
+    out."""
     out: dict[tuple[str, str], Array] = {}
     for row in rows:
         for candidate, shape, amplitude in acting:
@@ -91,8 +97,8 @@ def drive_state(rig: RigModel, row: Rows, theta: Array) -> DriveState:
 
 
 def candidates(rig: RigModel, fit: DeclaredFit, joint: str, every: bool = False) -> tuple[Candidate, ...]:
-    """All candidates at one joint, from the catalogue and from the rig itself; every: also those that its recordings could
-    not tell from what is declared, as a file may name them."""
+    """All candidates at one joint, from the catalogue and from the rig itself; every: also those that its recordings
+    could not tell from what is declared, as a file may name them."""
     rows = [r for r in fit.rows if r.joint == joint and not r.validate]
     if not rows:
         return ()
@@ -123,7 +129,8 @@ def _from_catalogue(
 
 
 def _is_declared(columns: Sequence[Array], rows: Sequence[Rows]) -> bool:
-    """Whether a column (m,) of each row is, but for a small part of its variance, one of the declared ones or made of them:
+    """Whether a column (m,) of each row is, but for a small part of its variance, one of the declared ones or made of
+    them:
     beside a weight of unknown size a spring cannot be told."""
     y = np.concatenate([c[r.moving] for c, r in zip(columns, rows, strict=True)])
     x = np.concatenate([r.columns[r.moving] for r in rows])
@@ -139,13 +146,21 @@ def _with_line(bend: Candidate) -> Candidate:
 
 
 def _turning_round(
-    rig: RigModel, fit: DeclaredFit, joint: str, train: tuple[DriveState, ...], states: Mapping[str, DriveState], rows: list[Rows]
+    rig: RigModel,
+    fit: DeclaredFit,
+    joint: str,
+    train: tuple[DriveState, ...],
+    states: Mapping[str, DriveState],
+    rows: list[Rows],
 ) -> list[Candidate]:
-    """Friction that needs a distance to turn round: a constant one, one in proportion to the load, one that falls with speed (the
-    bristles of a LuGre model, Canudas de Wit et al. 1995, slow against their own state), and where trials declare Coulomb levels, one for each."""
+    """Friction that needs a distance to turn round: a constant one, one in proportion to the load, one that falls with
+    speed (the bristles of a LuGre model, Canudas de Wit et al. 1995, slow against their own state), and where trials
+    declare Coulomb levels, one for each."""
     stop = _from_catalogue(effect("elastoplastic_hysteresis"), joint, train, states)
     span = max(float(np.ptp(state.position)) for state in train)
-    stop = replace(stop, grid=tuple({"form": form, "reach": float(share * span)} for form in (0.0, 1.0) for share in REACHES))
+    stop = replace(
+        stop, grid=tuple({"form": form, "reach": float(share * span)} for form in (0.0, 1.0) for share in REACHES)
+    )
     load = {r.trial: np.abs(r.load(fit.theta))[:, None] for r in fit.rows if r.joint == joint}
     found = [stop, replace(stop, effect="load_dependent_friction", variant=TURNING, amplitudes=(("per_load", "1", 0.0, np.inf),),
                            columns=lambda r, s: load[r.trial] * stop.columns(r, s)),
@@ -162,17 +177,18 @@ def _turning_round(
 
 
 def _knees(rows: list[Rows], count: int = 4) -> tuple[dict[str, float], ...]:
-    """Stribeck speeds between the slow and the fast ones of what moves: at rest friction is unknown, and one that acts there alone would be
-    named for what holds the joint while it stands."""
+    """Stribeck speeds between the slow and the fast ones of what moves: at rest friction is unknown, and one that acts
+    there alone would be named for what holds the joint while it stands."""
     speeds = np.concatenate([np.abs(r.velocity) for r in rows])
     moving = speeds > np.concatenate([np.full(len(r.velocity), r.rest_speed) for r in rows])
-    speeds = speeds[moving] if moving.any() else np.maximum(speeds, 1e-12)  # of a joint that is held throughout all there is
+    # of a joint that is held throughout all there is
+    speeds = speeds[moving] if moving.any() else np.maximum(speeds, 1e-12)
     return tuple({"stribeck_speed": float(s)} for s in np.geomspace(*np.percentile(speeds, [10, 90]), count))
 
 
 def _by_load(fit: DeclaredFit, joint: str, rows: list[Rows], driven: bool) -> list[Candidate]:
-    """Friction by what the joint carries, by what its drive puts in, or by both sides of a gear at once: the mean of the
-    drive's effort and of the bias that it works against (Duclusaud et al. 2024, model M3)."""
+    """Friction by what the joint carries, by what its drive puts in, or by both sides of a gear at once: the mean of
+    the drive's effort and of the bias that it works against (Duclusaud et al. 2024, model M3)."""
     mine = [r for r in fit.rows if r.joint == joint]
     load = {r.trial: np.abs(r.load(fit.theta)) for r in mine}
     knees = _knees(rows, 6)
@@ -197,8 +213,14 @@ def _by_load(fit: DeclaredFit, joint: str, rows: list[Rows], driven: bool) -> li
         expected = {r.trial: fit.expected(r) for r in mine}
         motor = {t: np.abs(e) for t, e in expected.items()}
         gear = {r.trial: 0.5 * np.abs(expected[r.trial] + r.bias(fit.theta)) for r in mine}
-        found += [friction(MOTOR, "per_effort", motor), friction(GEAR, "per_load", gear),
-                  at_low_speed(MOTOR_LOW, motor), at_low_speed(GEAR_LOW, gear), more(MOTOR_MORE, motor), more(GEAR_MORE, gear)]
+        found += [
+            friction(MOTOR, "per_effort", motor),
+            friction(GEAR, "per_load", gear),
+            at_low_speed(MOTOR_LOW, motor),
+            at_low_speed(GEAR_LOW, gear),
+            more(MOTOR_MORE, motor),
+            more(GEAR_MORE, gear),
+        ]
     return found
 
 

@@ -1,7 +1,7 @@
 """Candidates compete by the error on blocks of the recording that they were not fitted to.
 
-The probability that a candidate is the best is the share of resampled sets of blocks in which it is (Efron's bootstrap). Validation
-trials are never seen.
+The probability that a candidate is the best is the share of resampled sets of blocks in which it is (Efron's
+bootstrap). Validation trials are never seen.
 """
 
 from __future__ import annotations
@@ -40,8 +40,9 @@ Settle = Callable[[tuple[Term, ...]], tuple[tuple[Term, ...], Sequence[Candidate
 
 @dataclass(frozen=True)
 class Score:
-    """A candidate added to the terms so far. error (B,): squared error of every block when left out [normalised]; parts: its
-    normal equations by block; others: the terms that it is added to, where all shapes have moved for each other (None: not yet)."""
+    """A candidate added to the terms so far. error (B,): squared error of every block when left out [normalised];
+    parts: its normal equations by block; others: the terms that it is added to, where all shapes have moved for each
+    other (None: not yet)."""
 
     term: Term
     error: Array
@@ -55,7 +56,8 @@ class Score:
 
 @dataclass(frozen=True)
 class Step:
-    """One round of the competition: the winner's probability against none, rivals with theirs, share of variance; equals:
+    """One round of the competition: the winner's probability against none, rivals with theirs, share of variance;
+    equals:
     effects not told from the best; close: which of the rivals these are."""
 
     probability: float
@@ -69,7 +71,8 @@ def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ..
             most: int | None = None, settle: Settle | None = None) -> tuple[tuple[Term, ...], tuple[Step, ...], tuple[Score, ...]]:  # fmt: skip
     """Forward selection: the candidate that lowers the held-out error most, while it does so beyond doubt.
 
-    begin: terms that stand already; settle: terms and rivals again, at the loads of a fit with these terms. Returns all terms, the rounds, and the scores of the last round.
+    begin: terms that stand already; settle: terms and rivals again, at the loads of a fit with these terms. Returns all
+    terms, the rounds, and the scores of the last round.
     """
     terms, most = begin, most or (MOST_TERMS if left_out_whole(problem) else MOST_OF_FEW)
     steps: list[Step] = []
@@ -91,7 +94,11 @@ def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ..
         if pair and not all(kept):  # one of them would have stood alone
             terms = begin
             break
-        steps = [replace(step, rivals=(), equals=()), step] if pair else [s for s, stays in zip((*steps, step), kept, strict=True) if stays]
+        steps = (
+            [replace(step, rivals=(), equals=()), step]
+            if pair
+            else [s for s, stays in zip((*steps, step), kept, strict=True) if stays]
+        )
         been.add(_names(terms))
         if settle is not None:
             terms, kept = _resettled(problem, terms, len(begin), been, settle)
@@ -103,13 +110,18 @@ def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ..
 
 def _round(problem: Problem, plain: tuple[tuple[Term, ...], tuple, Array], terms: tuple[Term, ...], rivals: Sequence[Candidate],
            first: int) -> tuple[list[Score], tuple[tuple[Term, ...], Step] | None]:  # fmt: skip
-    """Scores of the rivals beside the terms, and all terms with the winner and what the round says, or None where none is better than what stands (plain:
+    """Scores of the rivals beside the terms, and all terms with the winner and what the round says, or None where none
+    is better than what stands (plain:
     its terms, normal equations and errors (B,)). first: from which on shapes of terms move."""
     standing, its_parts, none = plain
     parts, taken = its_parts if terms is standing else normal(problem, terms), {t.candidate.key for t in terms}
     scores = [score(problem, terms, c, parts) for c in rivals if c.repeats or c.key not in taken]
     scores = _met(problem, terms, parts, scores, first)
-    stand = scores if left_out_whole(problem) else [s for s in scores if borne_out(problem, (standing, its_parts), (s.beside(terms), s.parts))]
+    stand = (
+        scores
+        if left_out_whole(problem)
+        else [s for s in scores if borne_out(problem, (standing, its_parts), (s.beside(terms), s.parts))]
+    )
     found = judge(none, stand, problem)
     if found is None:
         return scores, None
@@ -121,9 +133,9 @@ def _round(problem: Problem, plain: tuple[tuple[Term, ...], tuple, Array], terms
 
 
 def _met(problem: Problem, terms: tuple[Term, ...], parts: tuple, scores: list[Score], first: int) -> list[Score]:
-    """The scores, those of the rivals that explain most of what they were fitted to in their best shapes (a detent between two places of a grid is
-    half of itself) and with the shapes of the terms moved for them, from `first` on: a shape that has moved to take up what a rival is there for
-    hides it (a Stribeck speed that is too high, drag)."""
+    """The scores, those of the rivals that explain most of what they were fitted to in their best shapes (a detent
+    between two places of a grid is half of itself) and with the shapes of the terms moved for them, from `first` on: a
+    shape that has moved to take up what a rival is there for hides it (a Stribeck speed that is too high, drag)."""
     best = sorted(scores, key=lambda s: training_error(problem, (*terms, s.term), s.parts))[:TOGETHER]
     return [_together(problem, terms, parts, s, first) if any(s is b for b in best) else s for s in scores]
 
@@ -138,8 +150,11 @@ def _together(problem: Problem, terms: tuple[Term, ...], parts: tuple, rival: Sc
     return Score(every[-1], held_out(problem, every, more), more, every[:-1])
 
 
-def _settled_down(problem: Problem, terms: tuple[Term, ...], first: int, been: Collection[tuple[str, ...]]) -> tuple[tuple[Term, ...], list[bool]]:
-    """Terms in their best shapes beside each other, without those from `first` on that no longer pay, and which of these stay. been:
+def _settled_down(
+    problem: Problem, terms: tuple[Term, ...], first: int, been: Collection[tuple[str, ...]]
+) -> tuple[tuple[Term, ...], list[bool]]:
+    """Terms in their best shapes beside each other, without those from `first` on that no longer pay, and which of
+    these stay. been:
     sets of names that stood before, to which there is no way back."""
     stays = [True] * (len(terms) - first)
     while len(terms) - first > 1:
@@ -152,9 +167,11 @@ def _settled_down(problem: Problem, terms: tuple[Term, ...], first: int, been: C
     return terms, stays
 
 
-def _resettled(problem: Problem, terms: tuple[Term, ...], first: int, been: Collection[tuple[str, ...]], settle: Settle) -> tuple[tuple[Term, ...], list[bool]]:
-    """Terms at their own loads, without what, from `first` on, stood in for the last one alone where friction by load is among them: at the
-    loads of those that remain, refitted. Which of these stay."""
+def _resettled(
+    problem: Problem, terms: tuple[Term, ...], first: int, been: Collection[tuple[str, ...]], settle: Settle
+) -> tuple[tuple[Term, ...], list[bool]]:
+    """Terms at their own loads, without what, from `first` on, stood in for the last one alone where friction by load
+    is among them: at the loads of those that remain, refitted. Which of these stay."""
     stays = [True] * (len(terms) - first)
     if not any(t.candidate.effect == LOADED for t in terms):  # no loads to settle
         return terms, stays
@@ -174,8 +191,8 @@ def _resettled(problem: Problem, terms: tuple[Term, ...], first: int, been: Coll
 
 
 def _superfluous(problem: Problem, terms: tuple[Term, ...], first: int) -> int | None:
-    """The term, from `first` on, without which recordings left out are predicted next to as well; None where all pay. Friction by load
-    has columns from the loads of a fit with all terms before it: these are in it already, and stay."""
+    """The term, from `first` on, without which recordings left out are predicted next to as well; None where all pay.
+    Friction by load has columns from the loads of a fit with all terms before it: these are in it already, and stay."""
     first = max([first, *(k for k, t in enumerate(terms) if t.candidate.effect == LOADED)])
     total, loss = held_out(problem, terms, normal(problem, terms)).sum(), {}
     for k in range(first, len(terms)):
@@ -202,22 +219,32 @@ def score(problem: Problem, terms: Sequence[Term], candidate: Candidate, parts: 
 
 
 def judge(none: Array, scores: Sequence[Score], problem: Problem) -> tuple[int, Step] | None:
-    """Index of the winner and what the round says, or None where no candidate beats "nothing" (none (B,)) beyond doubt and by
-    enough of its error. Of few recordings the splits have said what is no chance."""
+    """Index of the winner and what the round says, or None where no candidate beats "nothing" (none (B,)) beyond doubt
+    and by enough of its error. Of few recordings the splits have said what is no chance."""
     able = [k for k, s in enumerate(scores) if not any(_as_good(r, s) for r in scores)]
     if not able:
         return None
     many, some = left_out_whole(problem), [scores[k] for k in able]
-    said = weigh(none, np.array([s.error for s in some]), [_size(s.term) for s in some], problem.group, by_chance=many, worth=LEAST_SHARE)
+    said = weigh(
+        none,
+        np.array([s.error for s in some]),
+        [_size(s.term) for s in some],
+        problem.group,
+        by_chance=many,
+        worth=LEAST_SHARE,
+    )
     if said is None:
         return None
-    rivals = tuple((some[i].term.candidate.key, float(said.wins[i])) for i in np.argsort(-said.wins) if said.wins[i] > 0.005)
+    rivals = tuple(
+        (some[i].term.candidate.key, float(said.wins[i])) for i in np.argsort(-said.wins) if said.wins[i] > 0.005
+    )
     equals = tuple(dict.fromkeys(some[k].term.candidate.effect for k in said.close))
     return able[said.chosen], Step(said.probability, rivals, said.gain, equals, tuple(able[k] for k in said.close))
 
 
 def _as_good(simple: Score, rich: Score) -> bool:
-    """Whether a form of the same effect with fewer parameters leaves so little more that the rest would be worth no name of its own."""
+    """Whether a form of the same effect with fewer parameters leaves so little more that the rest would be worth no
+    name of its own."""
     return (simple.term.candidate.effect == rich.term.candidate.effect and _size(simple.term) < _size(rich.term)
             and (1 - LEAST_SHARE) * simple.error.sum() <= rich.error.sum())  # fmt: skip
 
@@ -248,6 +275,10 @@ def splits(problem: Problem) -> list[Array]:
 
 
 def _own_parameters(problem: Problem) -> bool:
-    """Whether any declared parameter acts in one of several recordings alone (a level that the laboratory set there)."""
-    acts = {t: np.any([np.any(r.columns, 0) for r in problem.rows if r.trial == t], 0) for t in {r.trial for r in problem.rows}}
+    """Whether any declared parameter acts in one of several recordings alone (a level that the laboratory set
+    there)."""
+    acts = {
+        t: np.any([np.any(r.columns, 0) for r in problem.rows if r.trial == t], 0)
+        for t in {r.trial for r in problem.rows}
+    }
     return bool(np.any(np.sum(list(acts.values()), 0) == 1))

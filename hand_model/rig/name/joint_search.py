@@ -31,7 +31,9 @@ def offsets_first(rig: RigModel, fit: DeclaredFit, joints: Sequence[str]) -> dic
     return dict(zip(joints, _each(_offset_first, [(rig, _own(fit, j), j) for j in joints]), strict=True))
 
 
-def search_joints(rig: RigModel, fit: DeclaredFit, begin: Mapping[str, Won | None]) -> Iterator[tuple[list[Won], list[str]]]:
+def search_joints(
+    rig: RigModel, fit: DeclaredFit, begin: Mapping[str, Won | None]
+) -> Iterator[tuple[list[Won], list[str]]]:
     """Of every joint (begin: what stands there already), what was won beside that and the keys of what was not."""
     return _each(_search, [(rig, _own(fit, joint), joint, won) for joint, won in begin.items()])
 

@@ -1,4 +1,5 @@
-"""The regression that candidates compete in: rows cut into blocks, terms beside the declared columns, errors of blocks left out.
+"""The regression that candidates compete in: rows cut into blocks, terms beside the declared columns, errors of blocks
+left out.
 
 Blocks, not samples, because residuals are correlated (Bergmeir & Benitez 2012).
 """
@@ -37,8 +38,10 @@ class Term:
 
 @dataclass(frozen=True)
 class Problem:
-    """Training rows cut into blocks. fit: with scale; fold (B,): which fold leaves a block out; group (B,): its recording;
-    box: lower and upper bounds, prior mean and weight of the declared parameters (P,) each; designs: kept to save time."""
+    """Training rows cut into blocks. fit: with scale; fold (B,): which fold leaves a block out; group (B,): its
+    recording;
+    box: lower and upper bounds, prior mean and weight of the declared parameters (P,) each; designs: kept to save
+    time."""
 
     fit: DeclaredFit
     rows: tuple[Rows, ...]
@@ -50,8 +53,8 @@ class Problem:
 
 
 def pose(fit: DeclaredFit, joint: str | None = None) -> Problem:
-    """Cut the training recordings (of one joint, or all) into at least a dozen blocks. Whole recordings are left out where
-    there are several, as the validation trials are; else neighbouring blocks go to different folds."""
+    """Cut the training recordings (of one joint, or all) into at least a dozen blocks. Whole recordings are left out
+    where there are several, as the validation trials are; else neighbouring blocks go to different folds."""
     rows = tuple(r for r in fit.rows if not r.validate and joint in (None, r.joint) and r.moving.sum() > 10)
     trials = list(dict.fromkeys(r.trial for r in rows))
     each = int(np.clip(np.ceil(18 / max(len(trials), 1)), 2, 18))
@@ -71,7 +74,8 @@ def left_out_whole(problem: Problem) -> bool:
 
 
 def term_columns(row: Rows, term: Term, delay_s: float = 0.0) -> Array:
-    """Filtered, thinned columns (m, j) of a term, later by a delay; none of its own joint's rows are anything but zero elsewhere."""
+    """Filtered, thinned columns (m, j) of a term, later by a delay; none of its own joint's rows are anything but zero
+    elsewhere."""
     width = len(term.candidate.amplitudes)
     if row.joint != term.candidate.joint:
         return np.zeros((len(row.effort), width))
@@ -144,7 +148,10 @@ def _moving_design(problem: Problem, row: Rows, terms: Sequence[Term]) -> Array:
     if key not in problem.designs:
         if len(problem.designs) > MOST_DESIGNS:
             problem.designs.clear()
-        problem.designs[key] = [t.candidate for t in terms], design(row, terms)[row.moving] / problem.fit.scale[row.joint]
+        problem.designs[key] = (
+            [t.candidate for t in terms],
+            design(row, terms)[row.moving] / problem.fit.scale[row.joint],
+        )
     return problem.designs[key][1]
 
 
@@ -178,9 +185,9 @@ def training_error(problem: Problem, terms: Sequence[Term], parts: tuple) -> flo
 
 
 def rescaled(problem: Problem, terms: Sequence[Term]) -> Problem:
-    """The problem with every joint weighed by what declared parameters and terms leave there, not by what the declared ones
-    alone leave: weights and parameters in turn (Gautier & Poignet 2001). Beside a large effect that is not yet known the
-    recordings would say less than what was declared, and other joints would have to make up for it."""
+    """The problem with every joint weighed by what declared parameters and terms leave there, not by what the declared
+    ones alone leave: weights and parameters in turn (Gautier & Poignet 2001). Beside a large effect that is not yet
+    known the recordings would say less than what was declared, and other joints would have to make up for it."""
     box, sums = limits(problem, terms), []
     for row in problem.rows:
         x, y = design(row, terms)[row.moving], row.effort[row.moving]
@@ -201,7 +208,8 @@ def rescaled(problem: Problem, terms: Sequence[Term]) -> Problem:
 
 
 def solution(problem: Problem, terms: Sequence[Term]) -> Array:
-    """All parameters (P + J,) on all training blocks, every joint weighed by what it leaves; bodies are such as can exist."""
+    """All parameters (P + J,) on all training blocks, every joint weighed by what it leaves; bodies are such as can
+    exist."""
     problem = rescaled(problem, terms)
     gram, moment, _, _ = normal(problem, terms)
     sums, box, fit = (gram.sum(0), moment.sum(0)), limits(problem, terms), problem.fit

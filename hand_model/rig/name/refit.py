@@ -1,4 +1,5 @@
-"""Shapes of terms beside each other: the best of their forms, continuous shapes moved until the training error falls no more."""
+"""Shapes of terms beside each other: the best of their forms, continuous shapes moved until the training error falls no
+more."""
 
 from __future__ import annotations
 
@@ -15,7 +16,8 @@ ROUNDS = 2  # of all terms in turn
 
 
 def refined(problem: Problem, terms: Sequence[Term], term: Term, parts: tuple) -> Term:
-    """The term beside others (with their normal equations) in the best of its forms, its continuous shapes moved together."""
+    """The term beside others (with their normal equations) in the best of its forms, its continuous shapes moved
+    together."""
     train = _error_beside(problem, terms, term, parts)
     forms: dict[tuple, list[dict[str, float]]] = {}
     for shape in term.candidate.grid:
@@ -53,7 +55,9 @@ def _continuous(shapes: Sequence[Mapping[str, float]]) -> dict[str, Array]:
     return {n: values for n, values in grid.items() if len(values) > 1}
 
 
-def _error_beside(problem: Problem, terms: Sequence[Term], term: Term, parts: tuple) -> Callable[[Mapping[str, float]], float]:
+def _error_beside(
+    problem: Problem, terms: Sequence[Term], term: Term, parts: tuple
+) -> Callable[[Mapping[str, float]], float]:
     """Training error of the terms (with their normal equations) and one more, as a function of its shape."""
 
     def train(shape: Mapping[str, float]) -> float:

@@ -17,7 +17,8 @@ Array = NDArray[np.float64]
 
 
 def settled(rig: RigModel, fit: DeclaredFit, terms: Sequence[Term]) -> tuple[list[Term], Array, DeclaredFit]:
-    """Terms and solution (P + J,) whose loads are those of the solution itself, by turns, and the fit that says them."""
+    """Terms and solution (P + J,) whose loads are those of the solution itself, by turns, and the fit that says
+    them."""
     terms, problem, at = list(terms), pose(fit), fit
     theta = solution(problem, terms)
     for _ in range(TURNS if any(t.candidate.effect == "load_dependent_friction" for t in terms) else 0):

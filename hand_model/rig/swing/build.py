@@ -40,12 +40,14 @@ def windows_s(rig: RigModel) -> tuple[float, ...]:
 
 
 def search_step_s(rig: RigModel) -> float:
-    """Step [s] that is fine enough to choose by: a recorded drive is followed, a free swing has a period to be resolved."""
+    """Step [s] that is fine enough to choose by: a recorded drive is followed, a free swing has a period to be
+    resolved."""
     return DRIVEN_STEP_S if rig.drive(rig.joints[0]) is not None else free_period_s(rig) / STEPS_A_PERIOD
 
 
 def thinned(swing: Swing) -> Swing:
-    """The swing with every second, third, ... training stretch of each trial, where all of them are more than a choice needs."""
+    """The swing with every second, third, ... training stretch of each trial, where all of them are more than a choice
+    needs."""
     steps = sum(len(swing.lanes[i].position) for i in swing.train())
     every, seen, lanes = int(np.ceil(steps / ENOUGH_STEPS)), Counter(), []
     for lane in swing.lanes:
@@ -57,8 +59,8 @@ def thinned(swing: Swing) -> Swing:
 
 
 def can_swing(rig: RigModel) -> bool:
-    """Whether the rig is one joint whose drive is absent or a voltage, and that recorded: then simulation in open loop is the
-    natural test."""
+    """Whether the rig is one joint whose drive is absent or a voltage, and that recorded: then simulation in open loop
+    is the natural test."""
     drive = rig.drive(rig.joints[0])
     if len(rig.joints) != 1 or not (drive is None or drive.kind == "voltage"):
         return False
@@ -96,7 +98,8 @@ def build_swing(rig: RigModel, fit: DeclaredFit, step_s: float = STEP_S, longest
 
 
 def _rigid(model: Any) -> tuple[float, float, float]:
-    """Weight (sine, cosine: effort that holds it at a quarter turn, at zero) and the bodies' inertia about the joint."""
+    """Weight (sine, cosine: effort that holds it at a quarter turn, at zero) and the bodies' inertia about the
+    joint."""
     zero, right = np.zeros((1, 1)), np.full((1, 1), np.pi / 2)
     theta, gravity = inertial_parameters(model), np.array(model.opt.gravity)
     cosine, sine = (float(np.sum(inertial_columns(model, q, zero, zero, gravity)[0, 0] * theta)) for q in (zero, right))

@@ -42,8 +42,8 @@ class Variant:
 
 @dataclass(frozen=True)
 class Round:
-    """A round of the competition: the winner, its probability against "none" and what it takes away, rivals with probabilities; all
-    that is taken after it, in the variants of then, and the fit of that."""
+    """A round of the competition: the winner, its probability against "none" and what it takes away, rivals with
+    probabilities; all that is taken after it, in the variants of then, and the fit of that."""
 
     variant: Variant
     probability: float
@@ -70,7 +70,8 @@ def variants(swing: Swing) -> tuple[Variant, ...]:
         / swing.step_s
     )
     out = [
-        Variant("stribeck_friction", f"{k:g}", {"static_excess": 0.0, "stribeck_speed": k * speed}) for k in (0.05, 0.2, 0.8)
+        Variant("stribeck_friction", f"{k:g}", {"static_excess": 0.0, "stribeck_speed": k * speed})
+        for k in (0.05, 0.2, 0.8)
     ]
     out += [
         Variant("asymmetric_friction", "", {"offset": 0.0}),
@@ -95,9 +96,16 @@ def variants(swing: Swing) -> tuple[Variant, ...]:
             Variant(
                 "load_dependent_friction", "gear, low speed", {"load_gear_low": 0.0, "stribeck_speed": 0.2 * speed}
             ),
-            Variant("load_dependent_friction", "driven load squared, low speed", {"external_squared": 0.0, "stribeck_speed": speed}),
-            Variant("load_dependent_friction", "load squared, low speed",
-                    {"motor_squared": 0.0, "external_squared": 0.0, "stribeck_speed": speed}),
+            Variant(
+                "load_dependent_friction",
+                "driven load squared, low speed",
+                {"external_squared": 0.0, "stribeck_speed": speed},
+            ),
+            Variant(
+                "load_dependent_friction",
+                "load squared, low speed",
+                {"motor_squared": 0.0, "external_squared": 0.0, "stribeck_speed": speed},
+            ),
             Variant("drive_sag", "", {"sag": 0.0}),
             Variant("command_delay", "", {"delay": 0.005}),
         ]
@@ -114,7 +122,8 @@ def free_declared(swing: Swing) -> tuple[str, ...]:
 
 
 def _blocks(swing: Swing, theta: Array, lanes: Sequence[int]) -> Array:
-    """Root mean square error (runs, PARTS) of every part of every stretch lanes[k] from the start that theta[k] asks for, (runs, len(PARAMETERS)):
+    """Root mean square error (runs, PARTS) of every part of every stretch lanes[k] from the start that theta[k] asks
+    for, (runs, len(PARAMETERS)):
     one part in which the joint sticks when it should not would outweigh all others if squares were added."""
     own = started(replace(swing, lanes=tuple(swing.lanes[i] for i in lanes)), theta)
     residual = errors(own, theta, np.arange(len(lanes)))
@@ -123,8 +132,8 @@ def _blocks(swing: Swing, theta: Array, lanes: Sequence[int]) -> Array:
 
 
 def fit_apart(swing: Swing, tasks: Sequence[Task], iterations: int = 14) -> list[Fitted]:
-    """`fit_together` in two halves, one a core: tasks that need low-speed friction together, since all runs of a batch pay
-    for what one of them has. Few runs stay together: a step costs them hardly less than many."""
+    """`fit_together` in two halves, one a core: tasks that need low-speed friction together, since all runs of a batch
+    pay for what one of them has. Few runs stay together: a step costs them hardly less than many."""
     cost = [len(t.stretches) * (len(t.free) + 1) for t in tasks]
     if sum(cost) < FEW_RUNS:
         return fit_together(swing, tasks, iterations)
@@ -148,12 +157,17 @@ def fit_stages(stages: Sequence[Swing], tasks: Sequence[Task], iterations: int =
 
 
 def compete_swing(
-    stages: Sequence[Swing], current: Fitted, floor: float = 0.0, whole: Swing | None = None,
-    begin: Sequence[tuple[Variant, Round]] = (), without: frozenset[str] = frozenset(),
+    stages: Sequence[Swing],
+    current: Fitted,
+    floor: float = 0.0,
+    whole: Swing | None = None,
+    begin: Sequence[tuple[Variant, Round]] = (),
+    without: frozenset[str] = frozenset(),
 ) -> list[tuple[Variant, Round]]:
-    """Forward selection from the declared model (fitted as current), by pairs where no variant alone is better, while the error is above what the recordings can tell
-    (floor [rad or m]); returns the variants and their rounds, each with the fit of all taken so far. whole: the recordings
-    uncut; those left out whole are predicted so, as the ones that validate are. begin: what stands already (current has it);
+    """Forward selection from the declared model (fitted as current), by pairs where no variant alone is better, while
+    the error is above what the recordings can tell (floor [rad or m]); returns the variants and their rounds, each with
+    the fit of all taken so far. whole: the recordings uncut; those left out whole are predicted so, as the ones that
+    validate are. begin: what stands already (current has it);
     without: effects that are not asked."""
     train = tuple(int(i) for i in stages[-1].train())
     test, folds = _folds(stages[-1], train, whole)
@@ -162,10 +176,12 @@ def compete_swing(
     while len(taken) < most:
         stages = [freed(s, current.theta) for s in stages]
         current, none, rivals = _round(stages, taken, current, test, folds, without)
-        if max(current.cost, np.mean(none**2)) <= floor**2:  # a wrong law may fit to within the noise; what it predicts shows it
+        # a wrong law may fit to within the noise; what it predicts shows it
+        if max(current.cost, np.mean(none**2)) <= floor**2:
             break
         found = _judged(current, none, rivals, test, folds, floor)
-        if found is None and rivals and not taken:  # what one leaves may hide it, as a late drive hides friction: two at once
+        # what one leaves may hide it, as a late drive hides friction: two at once
+        if found is None and rivals and not taken:
             first = min(rivals, key=lambda r: r.error.sum())
             stages = [freed(s, first.fit.theta) for s in stages]
             rivals = _round(stages, (first.variant,), first.fit, test, folds, without)[2]
@@ -183,24 +199,28 @@ def compete_swing(
 
 def _round(stages: Sequence[Swing], taken: tuple[Variant, ...], current: Fitted, test: Swing, folds: list,
            without: frozenset[str] = frozenset()) -> tuple[Fitted, Array, list[_Rival]]:  # fmt: skip
-    """The fit of all taken so far, its errors (blocks,) of what is left out, and the best of those that might be added."""
+    """The fit of all taken so far, its errors (blocks,) of what is left out, and the best of those that might be
+    added."""
     swing, train = stages[-1], tuple(int(i) for i in stages[-1].train())
     free = all_free(swing, taken)
     others = [v for v in variants(swing) if not set(v.start) <= set(free) and v.effect not in without]
     tasks = [Task(all_free(swing, (*taken, v)), begun(current.theta, v), ()) for v in others]
     fits = fit_stages(stages, tasks, 8)
     order = _shortlist(others, fits)
-    same = Task(free, current.theta, train)  # nothing more has the same starts as they have, or they would win by theirs
+    # nothing more has the same starts as they have, or they would win by theirs
+    same = Task(free, current.theta, train)
     current, *best = _several(swing, [same, *(Task(tasks[k].free, fits[k].theta, train) for k in order)])
-    none, scores = _left_out(swing, test, folds, (same, current), [(tasks[k], f) for k, f in zip(order, best, strict=True)])
+    none, scores = _left_out(
+        swing, test, folds, (same, current), [(tasks[k], f) for k, f in zip(order, best, strict=True)]
+    )
     return current, none, [_Rival(others[k], f, s) for k, f, s in zip(order, best, scores, strict=True)]
 
 
 def _judged(current: Fitted, none: Array, rivals: Sequence[_Rival], test: Swing, folds: list, floor: float,
             least: float = ONE_STANDARD_ERROR) -> tuple[int, Round] | None:  # fmt: skip
-    """Index of the winner and what the round says. Only those are asked that explain what they were fitted to: another may predict
-    what is left out by chance. What is left out of a swing that dies away counts as shares of what "none" leaves there (not
-    below the floor [rad or m]), or its first turns would speak for all."""
+    """Index of the winner and what the round says. Only those are asked that explain what they were fitted to: another
+    may predict what is left out by chance. What is left out of a swing that dies away counts as shares of what "none"
+    leaves there (not below the floor [rad or m]), or its first turns would speak for all."""
     trials = [test.lanes[i].trial for _, some in folds for i in some]
     stretches = len({i for kept, _ in folds for i in kept})
     able = [k for k, r in enumerate(rivals) if r.fit.cost < (1 - LEAST_GAIN) ** 2 * current.cost]
@@ -208,7 +228,15 @@ def _judged(current: Fitted, none: Array, rivals: Sequence[_Rival], test: Swing,
         return None
     some = [rivals[k] for k in able]
     scale = np.ones(len(none)) if test.driven else np.maximum(none, max(floor, 1e-300))
-    said = _judge(none / scale, [r.error / scale for r in some], [r.variant for r in some], [r.fit for r in some], np.repeat(trials, PARTS), stretches, least)
+    said = _judge(
+        none / scale,
+        [r.error / scale for r in some],
+        [r.variant for r in some],
+        [r.fit for r in some],
+        np.repeat(trials, PARTS),
+        stretches,
+        least,
+    )
     return None if said is None else (able[said[0]], said[1])
 
 
@@ -224,8 +252,8 @@ def _shortlist(rivals: Sequence[Variant], fits: Sequence[Fitted]) -> list[int]:
 def _exchanged(
     stages: Sequence[Swing], taken: tuple[Variant, ...], current: Fitted
 ) -> tuple[tuple[Variant, ...], Fitted]:
-    """Another variant of an effect that was taken before, where beside the later ones it fits better with no more parameters, or as
-    well with fewer (by likelihood, `_bic`): what made up for a later effect goes."""
+    """Another variant of an effect that was taken before, where beside the later ones it fits better with no more
+    parameters, or as well with fewer (by likelihood, `_bic`): what made up for a later effect goes."""
     swing = stages[-1]
     if len(taken) < 2:
         return taken, current
@@ -244,7 +272,9 @@ def _exchanged(
     fits = fit_stages(stages, tasks, 12)
     size = len(swing.train())
     best = min(range(len(sets)), key=lambda k: _bic(fits[k], size))
-    pays = _bic(fits[best], size) + size * np.log(BETTER) < _bic(replace(current, free=len(all_free(swing, taken))), size)
+    pays = _bic(fits[best], size) + size * np.log(BETTER) < _bic(
+        replace(current, free=len(all_free(swing, taken))), size
+    )
     return (sets[best], fits[best]) if pays else (taken, current)
 
 
@@ -270,24 +300,28 @@ def _several(swing: Swing, tasks: Sequence[Task], starts: int = 2, iterations: i
 def _folds(
     swing: Swing, train: Sequence[int], whole: Swing | None = None
 ) -> tuple[Swing, list[tuple[tuple[int, ...], tuple[int, ...]]]]:
-    """The swing in which errors are measured, and (stretches kept, stretches of it left out): recordings are left out whole where
-    there are several, as the validation trials are, each alone (two of a kind together would leave unknown what they alone show,
-    a damping that is not the motor's, and the truest law at a loss) while they are not too many; else neighbouring stretches
-    together: what is held out then lies elsewhere in the motion, and a term that fits only where it was fitted is told
-    (blocked cross-validation, Roberts et al. 2017)."""
+    """The swing in which errors are measured, and (stretches kept, stretches of it left out): recordings are left out
+    whole where there are several, as the validation trials are, each alone (two of a kind together would leave unknown
+    what they alone show, a damping that is not the motor's, and the truest law at a loss) while they are not too many;
+    else neighbouring stretches together: what is held out then lies elsewhere in the motion, and a term that fits only
+    where it was fitted is told (blocked cross-validation, Roberts et al. 2017)."""
     trials = {name: k for k, name in enumerate(dict.fromkeys(swing.lanes[i].trial for i in train))}
     if len(trials) < FOLDS:
         count = min(FOLDS, len(train))
         fold = [k * count // len(train) for k in range(len(train))]
         return swing, [_parted(train, fold, train, fold, f) for f in range(count)]
     test, count = whole or swing, min(len(trials), MOST_FOLDS)
-    fold, apart = ([trials[s.lanes[i].trial] % count for i in some] for s, some in ((swing, train), (test, test.train())))
+    fold, apart = (
+        [trials[s.lanes[i].trial] % count for i in some] for s, some in ((swing, train), (test, test.train()))
+    )
     return test, [_parted(train, fold, test.train(), apart, f) for f in range(count)]
 
 
 def _parted(train: Sequence[int], fold: Sequence[int], test: Sequence[int], apart: Sequence[int], f: int) -> tuple:
     """Stretches of all folds but f to fit to, and those of fold f to measure on."""
-    return tuple(i for i, g in zip(train, fold, strict=True) if g != f), tuple(i for i, g in zip(test, apart, strict=True) if g == f)
+    return tuple(i for i, g in zip(train, fold, strict=True) if g != f), tuple(
+        i for i, g in zip(test, apart, strict=True) if g == f
+    )
 
 
 def all_free(swing: Swing, taken: Sequence[Variant]) -> tuple[str, ...]:
@@ -319,12 +353,18 @@ def _left_out(
 
 
 def _judge(
-    none: Array, scores: list[Array], rivals: Sequence[Variant], fits: Sequence[Fitted], group: Array, stretches: int,
+    none: Array,
+    scores: list[Array],
+    rivals: Sequence[Variant],
+    fits: Sequence[Fitted],
+    group: Array,
+    stretches: int,
     least: float = ONE_STANDARD_ERROR,
 ) -> tuple[int, Round] | None:
-    """Index of the winner and what the round says, or None where nothing beats "none" (with probability `least`, by a standard error). Which effect it
-    is, recordings left out decide; between what they leave within a standard error, and forms of one that they cannot tell apart, the
-    likelihood: BIC with every stretch as one sample (Schwarz 1978). One that has more parameters has to predict what is left out better as well."""
+    """Index of the winner and what the round says, or None where nothing beats "none" (with probability `least`, by a
+    standard error). Which effect it is, recordings left out decide; between what they leave within a standard error,
+    and forms of one that they cannot tell apart, the likelihood: BIC with every stretch as one sample (Schwarz 1978).
+    One that has more parameters has to predict what is left out better as well."""
     said = weigh(none, np.array(scores), [f.free for f in fits], group, least, worth=LEAST_GAIN)
     if said is None:
         return None

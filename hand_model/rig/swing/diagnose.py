@@ -43,9 +43,15 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
         declared = fit_stages(stages, [Task(free, declared.theta, ())], 15)[0]
     floor, held = _resolution(rig), bool(rig.select(True))  # without validation recordings the training ones measure
     whole = build_swing(rig, fit, step)
-    # Last, at the step of the replay; a free swing over whole recordings, for its phase is known well enough by now. What
-    # a coarse step there does to the period (4e-4 of it at most, with a hundred steps in each) the last steps take back.
-    last_stages = [(STEP_S, windows[-1], 8)] if stages[0].driven else [(2 * step, windows[-1], 8), (2 * step, np.inf, 12), (STEP_S, np.inf, 3)]
+    # Last, at the step of the replay; a free swing over whole recordings, for its phase is known well enough by now.
+    # What
+    # a coarse step there does to the period (4e-4 of it at most, with a hundred steps in each) the last steps take
+    # back.
+    last_stages = (
+        [(STEP_S, windows[-1], 8)]
+        if stages[0].driven
+        else [(2 * step, windows[-1], 8), (2 * step, np.inf, 12), (STEP_S, np.inf, 3)]
+    )
     fine = [(build_swing(rig, fit, step_s, window_s), most) for step_s, window_s, most in last_stages]
     known: dict[tuple[str, ...], Link] = {}
 
@@ -84,7 +90,8 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
 
 @dataclass(frozen=True)
 class Link:
-    """The declared model with some effects: free parameters, their fit, the file, its replay, and the held-out error of that."""
+    """The declared model with some effects: free parameters, their fit, the file, its replay, and the held-out error of
+    that."""
 
     free: tuple[str, ...]
     fit: Fitted
@@ -96,8 +103,9 @@ class Link:
 def _searched(search: Callable[[list[Taken], frozenset[str]], list[Taken]], chain_of: Callable[[Sequence[Taken]], list[Link]],
               ends_of: Callable[[Link], Ends], links_of: Callable[[Sequence[Sequence[Taken]]], list[Link]],
               ) -> tuple[list[Taken], list[Link], Ends, list[dict[str, Any]]]:  # fmt: skip
-    """What `_told` leaves of a search; an effect that came last and whose size cannot be told leaves its place to what came next to it. Where
-    all that a search found predicts no better than what stood after one of its rounds, that stands."""
+    """What `_told` leaves of a search; an effect that came last and whose size cannot be told leaves its place to what
+    came next to it. Where all that a search found predicts no better than what stood after one of its rounds, that
+    stands."""
     kept: list[Taken] = []
     vague: frozenset[str] = frozenset()
     rejected: list[dict[str, Any]] = []
@@ -124,9 +132,11 @@ def _states(taken: Sequence[Taken]) -> list[list[Taken]]:
     return [list(zip(r.taken, rounds, strict=False)) for r in rounds]
 
 
-def _figures(kept: Sequence[Taken], chain: Sequence[Link], links_of: Callable[[Sequence[Sequence[Taken]]], list[Link]]) -> list[float]:
-    """Held-out error of the declared model and with one, two, ... of the effects, in the variants that suited them before the later ones
-    came; in those of the last round, one after the other, where the search had others then."""
+def _figures(
+    kept: Sequence[Taken], chain: Sequence[Link], links_of: Callable[[Sequence[Sequence[Taken]]], list[Link]]
+) -> list[float]:
+    """Held-out error of the declared model and with one, two, ... of the effects, in the variants that suited them
+    before the later ones came; in those of the last round, one after the other, where the search had others then."""
     figures, every = [c.error for c in chain], Counter(v.effect for v, _ in kept)
     own = {len(s): s for s in _states(kept) if len(s) < len(kept) and Counter(v.effect for v, _ in s) <= every}
     for count, link in zip(own, links_of(list(own.values())), strict=True):
@@ -136,12 +146,17 @@ def _figures(kept: Sequence[Taken], chain: Sequence[Link], links_of: Callable[[S
 
 def _told(kept: list[Taken], chain_of: Callable[[Sequence[Taken]], list[Link]],
           ends_of: Callable[[Link], Ends]) -> tuple[list[Taken], list[Link], Ends, list[dict[str, Any]]]:  # fmt: skip
-    """`_standing`, and of those that stand the ones whose size is told from zero, with the interval of every parameter."""
+    """`_standing`, and of those that stand the ones whose size is told from zero, with the interval of every
+    parameter."""
     rejected: list[dict[str, Any]] = []
     while True:
         kept, chain, more = _standing(kept, chain_of)
         rejected, ends = [*rejected, *more], ends_of(chain[-1])
-        vague = [k for k, (v, _) in enumerate(kept) if all(ends[n][0] <= 0.0 <= ends[n][1] for n in v.start if n not in NEUTRAL)]
+        vague = [
+            k
+            for k, (v, _) in enumerate(kept)
+            if all(ends[n][0] <= 0.0 <= ends[n][1] for n in v.start if n not in NEUTRAL)
+        ]
         if not vague:
             return kept, chain, ends, rejected
         rejected.append({"effect": kept[vague[-1]][0].key, "reason": NOT_TOLD})
@@ -151,9 +166,9 @@ def _told(kept: list[Taken], chain_of: Callable[[Sequence[Taken]], list[Link]],
 def _standing(
     kept: list[Taken], chain_of: Callable[[Sequence[Taken]], list[Link]]
 ) -> tuple[list[Taken], list[Link], list[dict[str, Any]]]:
-    """Effects that stand, the chain of models with them, and those withdrawn: an effect falls when all that stand predict the
-    recordings held out no worse without it. One that has to wait for a later one before it helps comes after it, where
-    the others do without it so far."""
+    """Effects that stand, the chain of models with them, and those withdrawn: an effect falls when all that stand
+    predict the recordings held out no worse without it. One that has to wait for a later one before it helps comes
+    after it, where the others do without it so far."""
     needed: set[str] = set()
     rejected: list[dict[str, Any]] = []
     chain = chain_of(kept)
@@ -173,8 +188,11 @@ def _standing(
             kept, chain = [*others, kept[worse]], [*without, chain[-1]]
 
 
-def _sides(kept: Sequence[Taken], chain: Sequence[Link], k: int, chain_of: Callable[[Sequence[Taken]], list[Link]]) -> tuple[Link, Link]:
-    """What an effect is held to: the chain before and after it; of one that helps the later ones, all without and with it."""
+def _sides(
+    kept: Sequence[Taken], chain: Sequence[Link], k: int, chain_of: Callable[[Sequence[Taken]], list[Link]]
+) -> tuple[Link, Link]:
+    """What an effect is held to: the chain before and after it; of one that helps the later ones, all without and with
+    it."""
     if _falls(chain)[k]:
         return chain[k], chain[k + 1]
     return chain_of([*kept[:k], *kept[k + 1 :]])[-1], chain[-1]
@@ -187,7 +205,8 @@ def _falls(chain: Sequence[Link]) -> list[bool]:
 
 def _links(rig: RigModel, session: Session, held: bool, stages: Sequence[tuple[Swing, int]], declared: np.ndarray,
            sets: Sequence[Sequence[Taken]], last: np.ndarray, known: dict[tuple[str, ...], Link]) -> list[Link]:  # fmt: skip
-    """The declared model with every set of effects: fitted in one batch, written and replayed; stages: each with its most iterations;
+    """The declared model with every set of effects: fitted in one batch, written and replayed; stages: each with its
+    most iterations;
     last: parameters that know all effects; known holds those that were before, by the effects in them."""
     keys = [tuple(v.key for v, _ in some) for some in sets]
     new = {key: some for key, some in zip(keys, sets, strict=True) if key not in known}
@@ -195,8 +214,13 @@ def _links(rig: RigModel, session: Session, held: bool, stages: Sequence[tuple[S
     tries = [(k, start) for k, some in enumerate(new.values()) for start in _starts(free[k], some, declared, last)]
     for stage, most in stages if new else ():
         swing, stretches = started_each(stage, [start for _, start in tries])
-        fits = fit_apart(swing, [Task(free[k], start, some) for (k, start), some in zip(tries, stretches, strict=True)], most)
-        best = [min((f for (i, _), f in zip(tries, fits, strict=True) if i == k), key=lambda f: f.cost) for k in range(len(free))]
+        fits = fit_apart(
+            swing, [Task(free[k], start, some) for (k, start), some in zip(tries, stretches, strict=True)], most
+        )
+        best = [
+            min((f for (i, _), f in zip(tries, fits, strict=True) if i == k), key=lambda f: f.cost)
+            for k in range(len(free))
+        ]
         tries = [(k, f.theta) for k, f in enumerate(best)]
     files = [write_swing(rig, stages[0][0], theta) for _, theta in tries]
     replays = Background(_replayed, [(session, x, held) for x in files]).results() if files else ()
@@ -206,9 +230,9 @@ def _links(rig: RigModel, session: Session, held: bool, stages: Sequence[tuple[S
 
 
 def _starts(free: Sequence[str], some: Sequence[Taken], declared: np.ndarray, last: np.ndarray) -> list[np.ndarray]:
-    """Parameters to start a fit of some effects from: those of the last one's own round. Where a variant has since been exchanged for
-    another, what that round does not know as the `last` one has it, which knew later effects; and, for that may lead astray, what
-    the variants begin from beside the declared model."""
+    """Parameters to start a fit of some effects from: those of the last one's own round. Where a variant has since been
+    exchanged for another, what that round does not know as the `last` one has it, which knew later effects; and, for
+    that may lead astray, what the variants begin from beside the declared model."""
     neutral = vector({})
     if not some:
         return [declared]
@@ -227,8 +251,8 @@ def _replayed(session: Session, xml: bytes, held: bool) -> RigResiduals:
 
 
 def _resolution(rig: RigModel) -> float:
-    """What a recording cannot tell from no error: encoder noise, and of a driven joint the way that it goes within one sample, for
-    position and drive are read at some instant of it (uniform: step / sqrt(12))."""
+    """What a recording cannot tell from no error: encoder noise, and of a driven joint the way that it goes within one
+    sample, for position and drive are read at some instant of it (uniform: step / sqrt(12))."""
     joint, floors = rig.joints[0], []
     for t in rig.trials:
         q = fill_gaps(t.time_s, t.position[joint])

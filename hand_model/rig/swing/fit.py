@@ -28,7 +28,8 @@ class Task:
 
 @dataclass(frozen=True)
 class Fitted:
-    """A task's result: theta (len(PARAMETERS),), its mean squared error on its stretches, evaluations used, parameters free."""
+    """A task's result: theta (len(PARAMETERS),), its mean squared error on its stretches, evaluations used, parameters
+    free."""
 
     theta: Array
     cost: float
@@ -61,8 +62,8 @@ def typical(swing: Swing) -> Array:
 
 
 def fit_together(swing: Swing, tasks: Sequence[Task], iterations: int = 14) -> list[Fitted]:
-    """Levenberg-Marquardt on all tasks at once: every Jacobian column of every task is a lane of one simulation. Where the
-    lanes are few, they cost little: then the Jacobian of every damped step is simulated with the step itself."""
+    """Levenberg-Marquardt on all tasks at once: every Jacobian column of every task is a lane of one simulation. Where
+    the lanes are few, they cost little: then the Jacobian of every damped step is simulated with the step itself."""
     unit = typical(swing)
     low = np.array([LOW.get(name, 0.0) for name in PARAMETERS])
     theta = [t.start.copy() for t in tasks]
@@ -76,7 +77,9 @@ def fit_together(swing: Swing, tasks: Sequence[Task], iterations: int = 14) -> l
         if not todo:
             break
         blind = [k for k in todo if known[k] is None]
-        for k, (r, jac, _) in zip(blind, _jacobians(swing, [(tasks[k], theta[k]) for k in blind], unit, low), strict=True):
+        for k, (r, jac, _) in zip(
+            blind, _jacobians(swing, [(tasks[k], theta[k]) for k in blind], unit, low), strict=True
+        ):
             known[k] = r, jac
             count[k] += len(tasks[k].free) + 1
         for k in todo:
@@ -99,7 +102,10 @@ def fit_together(swing: Swing, tasks: Sequence[Task], iterations: int = 14) -> l
                 damping[k] *= 300.0
                 active[k] = damping[k] < 1e6
     size = [sum(swing.lanes[i].used.sum() for i in t.stretches) for t in tasks]
-    return [Fitted(th, c / max(s, 1), int(n), len(t.free)) for t, th, c, s, n in zip(tasks, theta, cost, size, count, strict=True)]
+    return [
+        Fitted(th, c / max(s, 1), int(n), len(t.free))
+        for t, th, c, s, n in zip(tasks, theta, cost, size, count, strict=True)
+    ]
 
 
 def _moved(task: Task, theta: Array, r: Array, jac: Array, damping: float, unit: Array, low: Array) -> Array:
@@ -148,9 +154,11 @@ def jacobian(swing: Swing, task: Task, theta: Array) -> tuple[Array, Array]:
     return _jacobians(swing, [(task, theta)], typical(swing), low)[0][:2]
 
 
-def _jacobians(swing: Swing, pairs: Sequence[tuple[Task, Array]], unit: Array, low: Array) -> list[tuple[Array, Array, float]]:
-    """Residuals (n,), every third sample, and Jacobian (n, free) in units of `unit`, forward differences; and the sum of all
-    squares."""
+def _jacobians(
+    swing: Swing, pairs: Sequence[tuple[Task, Array]], unit: Array, low: Array
+) -> list[tuple[Array, Array, float]]:
+    """Residuals (n,), every third sample, and Jacobian (n, free) in units of `unit`, forward differences; and the sum
+    of all squares."""
     varied = []
     if not pairs:
         return []

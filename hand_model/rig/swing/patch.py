@@ -1,4 +1,5 @@
-"""A fitted swing written as MJCF: the declared parameters and, where they exist, MuJoCo's own attributes for effects."""
+"""A fitted swing written as MJCF: the declared parameters and, where they exist, MuJoCo's own attributes for
+effects."""
 
 from __future__ import annotations
 
@@ -65,8 +66,8 @@ def _body_inertia(rig: RigModel) -> float:
 
 
 def _scale_inertia(root: Any, missing: float) -> None:
-    """Less inertia (missing < 0) at the same weight: out of the body's own about its centre as far as that goes, then by
-    a shorter lever of a larger mass."""
+    """Less inertia (missing < 0) at the same weight: out of the body's own about its centre as far as that goes, then
+    by a shorter lever of a larger mass."""
     for inertial in root.iter("inertial"):
         own = np.array([float(x) for x in inertial.get("diaginertia", "").split()])
         if len(own) != 3:
@@ -86,7 +87,9 @@ def _scale_inertia(root: Any, missing: float) -> None:
 def _levels(rig: RigModel, coulomb: float) -> list[dict[str, Any]]:
     """Coulomb levels of trials that set their own, in the ratio in which they are declared."""
     joint, declared = rig.joints[0], float(compile_model(rig).dof_frictionloss[0])
-    given = {float(np.atleast_1d(t.set[k])[0]) for t in rig.trials for k in [f"joint:{joint}:frictionloss"] if k in t.set}
+    given = {
+        float(np.atleast_1d(t.set[k])[0]) for t in rig.trials for k in [f"joint:{joint}:frictionloss"] if k in t.set
+    }
     if not given or not declared:
         return []
     return [{"joint": joint, "frictionloss_levels": {repr(v): coulomb * v / declared for v in sorted(given)}}]

@@ -31,14 +31,23 @@ INDEX = {name: i for i, name in enumerate(PARAMETERS)}
 DECLARED = PARAMETERS[:5]
 NEUTRAL = {"stribeck_speed": 1.0, "stribeck_exponent": 2.0}  # what is not zero where an effect is absent
 BY_LOAD = ("load_gear", "load_motor", "load_external")
-LOW_SPEED = ("static_excess", "load_gear_low", "load_motor_low", "load_external_low", "motor_squared", "external_squared")
+LOW_SPEED = (
+    "static_excess",
+    "load_gear_low",
+    "load_motor_low",
+    "load_external_low",
+    "motor_squared",
+    "external_squared",
+)
 
 
 def parameter_units(angle: str, effort: str) -> dict[str, str]:
     """Unit of every parameter that is no pure number; angle: "rad" or "m", effort: "N m" or "N"."""
     wet = f"{effort} s/{angle}"
     units = dict.fromkeys(("coulomb", "static_excess", "asymmetry", "offset", "lateral"), effort)
-    units |= dict.fromkeys(("damping", "back_emf", "damping_asymmetry"), wet) | dict.fromkeys(("sag", "motor_squared", "external_squared"), f"1/({effort})")
+    units |= dict.fromkeys(("damping", "back_emf", "damping_asymmetry"), wet) | dict.fromkeys(
+        ("sag", "motor_squared", "external_squared"), f"1/({effort})"
+    )
     return units | {"stribeck_speed": f"{angle}/s", "stiffness": f"{effort}/{angle}", "load_speed": f"s/{angle}",
                     "drag": f"{effort} s^2/{angle}^2", "delay": "s"}  # fmt: skip
 
@@ -47,11 +56,12 @@ def parameter_units(angle: str, effort: str) -> dict[str, str]:
 class Lane:
     """One stretch of one trial to be simulated: drive and measured position on an even grid of the swing's step_s.
 
-    drive (n,): recorded voltage, or effort, or zeros; live: the trial's gear over the declared one (zero: disconnected);
+    drive (n,): recorded voltage, or effort, or zeros; live: the trial's gear over the declared one (zero:
+    disconnected);
     position (n,) [rad or m]; start: (q, v); supply (n,): relative deviation of the supply from its mean; used (n,):
     weights 0 or 1 (recorded, not padded). Of the trial's own bodies: more_inertia [kg m2 or kg] than declared, sine and
-    cosine of its weight (None: the swing's); coulomb_scale: its own Coulomb level over the declared one. give (n, 2): what a
-    small change of the start does, orthonormal; residuals are what is left beyond it (None: the start is known).
+    cosine of its weight (None: the swing's); coulomb_scale: its own Coulomb level over the declared one. give (n, 2):
+    what a small change of the start does, orthonormal; residuals are what is left beyond it (None: the start is known).
     """
 
     trial: str
@@ -70,8 +80,8 @@ class Lane:
 
 @dataclass(frozen=True, eq=False)
 class Swing:
-    """All stretches of a session, the joint's weight: gravity effort = sine sin q + cosine cos q (what holds it), and the period
-    period_s [s] of its small swings."""
+    """All stretches of a session, the joint's weight: gravity effort = sine sin q + cosine cos q (what holds it), and
+    the period period_s [s] of its small swings."""
 
     lanes: tuple[Lane, ...]
     sine: float
@@ -95,13 +105,14 @@ def vector(values: Mapping[str, float]) -> Array:
 
 
 def simulate(swing: Swing, theta: Array, lanes: Array) -> Array:
-    """Positions (steps, L) of L runs: run l simulates stretch lanes[l] with parameters theta[l]; (L, len(PARAMETERS))."""
+    """Positions (steps, L) of L runs: run l simulates stretch lanes[l] with parameters theta[l]; (L,
+    len(PARAMETERS))."""
     return _chunks(swing, theta, lanes, False)
 
 
 def errors(swing: Swing, theta: Array, lanes: Array) -> Array:
-    """Position residuals (steps, L), zero where nothing was recorded, without what a start that is free takes up (variable
-    projection, Golub & Pereyra 1973)."""
+    """Position residuals (steps, L), zero where nothing was recorded, without what a start that is free takes up
+    (variable projection, Golub & Pereyra 1973)."""
     out = np.clip(np.nan_to_num(_chunks(swing, theta, lanes, True), nan=1e1, posinf=1e1, neginf=-1e1), -10.0, 10.0)
     for i in np.unique(lanes):
         if (give := swing.lanes[i].give) is not None:
@@ -115,7 +126,8 @@ LANES_AT_ONCE = 3000  # so many runs' state fits a core's own cache
 
 @lru_cache(maxsize=16)
 def _stacked(swing: Swing) -> tuple[Array, ...]:
-    """The recordings side by side, (steps, stretches) each: drive, relative supply, position, used; lengths (stretches,)."""
+    """The recordings side by side, (steps, stretches) each: drive, relative supply, position, used; lengths
+    (stretches,)."""
     length = np.array([len(lane.position) for lane in swing.lanes])
     out = np.zeros((4, length.max(), len(length)))
     for i, lane in enumerate(swing.lanes):
@@ -169,8 +181,9 @@ def _run(swing: Swing, theta: Array, lanes: Array, steps: int, residual: bool) -
 def _constants(swing: Swing, theta: Array, lanes: Array) -> tuple[dict[str, Array], dict[str, bool]]:
     """Parameters of every run (L,) with what follows from them and from its stretch, and which effects any run has.
 
-    hi: step over inertia; weight, phase: gravity's effort weight sin(q + phase); wet, share: damping with the motor's own
-    and what is left of a free speed after one step of it; shove: hi share; stop: speed that dry friction takes in a step.
+    hi: step over inertia; weight, phase: gravity's effort weight sin(q + phase); wet, share: damping with the motor's
+    own and what is left of a free speed after one step of it; shove: hi share; stop: speed that dry friction takes in a
+    step.
     """
     p = {name: np.ascontiguousarray(theta[:, i]) for name, i in INDEX.items()}
     has = {name: bool(np.any(values)) for name, values in p.items()}
@@ -195,7 +208,9 @@ def _constants(swing: Swing, theta: Array, lanes: Array) -> tuple[dict[str, Arra
     return p, has
 
 
-def _next_speed(p: Mapping[str, Array], has: Mapping[str, bool], v: Array, external: Array, motor: Array | None) -> Array:
+def _next_speed(
+    p: Mapping[str, Array], has: Mapping[str, bool], v: Array, external: Array, motor: Array | None
+) -> Array:
     """Velocity (L,) after one step under external effort and the motor's: implicit damping, clipped dry friction."""
     share, shove, stop, effort = p["share"], p["shove"], p["stop"], external
     if motor is not None:

@@ -1,10 +1,10 @@
 """Where the stretches of a free swing start: angle and speed that its first period asks for, and what they leave open.
 
-In multiple shooting (Bock 1981) the starts are unknowns too. A speed differentiated from an encoder is wrong by more than
-all that friction does in ten periods; over a single one friction does so little that any fit of it will do. But the start that
-suits one law does not suit another (an encoder's zero that is off by a few milliradians moves it by as much): beside that of
-the declared model the true law would look worse. So laws are fitted to what no small change of the start takes up, and what is
-kept out is predicted from the start that each law's own first period asks for.
+In multiple shooting (Bock 1981) the starts are unknowns too. A speed differentiated from an encoder is wrong by more
+than all that friction does in ten periods; over a single one friction does so little that any fit of it will do. But
+the start that suits one law does not suit another (an encoder's zero that is off by a few milliradians moves it by as
+much): beside that of the declared model the true law would look worse. So laws are fitted to what no small change of
+the start takes up, and what is kept out is predicted from the start that each law's own first period asks for.
 """
 
 from __future__ import annotations
@@ -23,8 +23,9 @@ LEAST_STEPS = 8
 
 
 def started(swing: Swing, theta: Array) -> Swing:
-    """The swing with the start of every stretch fitted to its first period at parameters theta, (len(PARAMETERS),) or of each stretch
-    (stretches, len(PARAMETERS)), and known; a driven one as it is, for there friction counts within a period."""
+    """The swing with the start of every stretch fitted to its first period at parameters theta, (len(PARAMETERS),) or
+    of each stretch (stretches, len(PARAMETERS)), and known; a driven one as it is, for there friction counts within a
+    period."""
     if swing.driven:
         return swing
     steps = max(LEAST_STEPS, round(swing.period_s / swing.step_s))
@@ -38,7 +39,8 @@ def started(swing: Swing, theta: Array) -> Swing:
 
 
 def freed(swing: Swing, theta: Array) -> Swing:
-    """The swing with the start of every stretch free to move a little from where `started` puts it; a driven one as it is."""
+    """The swing with the start of every stretch free to move a little from where `started` puts it; a driven one as it
+    is."""
     if swing.driven:
         return swing
     swing = started(swing, theta)
@@ -57,14 +59,17 @@ def started_each(swing: Swing, thetas: Sequence[Array]) -> tuple[Swing, list[tup
 
 
 def _slopes(swing: Swing, lanes: Sequence[Lane], theta: Array) -> tuple[Array, Array]:
-    """Residuals (steps, lanes) at parameters theta, and their slopes (steps, lanes, 2) by angle and speed of the start."""
+    """Residuals (steps, lanes) at parameters theta, and their slopes (steps, lanes, 2) by angle and speed of the
+    start."""
     sizes = 1e-3 * np.array([1.0, 2 * np.pi / swing.period_s])
     moved = [_errors(swing, [_moved(lane, sizes * at) for lane in lanes], theta) for at in ((0, 0), (1, 0), (0, 1))]
     return moved[0], np.stack([(m - moved[0]) / s for m, s in zip(moved[1:], sizes, strict=True)], -1)
 
 
 def _errors(swing: Swing, lanes: Sequence[Lane], theta: Array) -> Array:
-    return errors(replace(swing, lanes=tuple(lanes)), np.broadcast_to(theta, (len(lanes), theta.shape[-1])), np.arange(len(lanes)))
+    return errors(
+        replace(swing, lanes=tuple(lanes)), np.broadcast_to(theta, (len(lanes), theta.shape[-1])), np.arange(len(lanes))
+    )
 
 
 def _moved(lane: Lane, by: Array) -> Lane:

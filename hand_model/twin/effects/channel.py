@@ -41,13 +41,16 @@ def encoder_periodic(draw: Draw) -> Influence:
 
 @effect("drive_sag", "channel", "current", ("speed", "supply", "torque"))
 def drive_sag(draw: Draw) -> Influence:
-    """The drive delivers less speed per command as it is loaded, at once or as its supply droops; or less torque per current the more it asks for.
+    """The drive delivers less speed per command as it is loaded, at once or as its supply droops; or less torque per
+    current the more it asks for.
 
     (The same share of every torque would only rescale friction, damping and spring.)
     """
     share = draw.size("share_per_100_raw", 0.14, 0.24)
     if draw.form == "torque":
-        return Influence(terms=DriveTerms(load=(lambda now: now.current * min(0.45, share * abs(now.current) / 100.0),)))
+        return Influence(
+            terms=DriveTerms(load=(lambda now: now.current * min(0.45, share * abs(now.current) / 100.0),))
+        )
     droop = [0.0]
 
     def start(trial: TrialPlan) -> None:
@@ -91,7 +94,8 @@ def current_saturation(draw: Draw) -> Influence:
 
 @effect("current_channel_delay", "channel", "current", ("delay", "lag", "early"))
 def current_delay(draw: Draw) -> Influence:
-    """The current channel reports the past: a pure delay, or the lag of a first-order filter; or what the position will show only later."""
+    """The current channel reports the past: a pure delay, or the lag of a first-order filter; or what the position will
+    show only later."""
     delay = draw.size("delay_s", 0.035, 0.07)
 
     def shifted(motion: Motion, raw: Array) -> Array:

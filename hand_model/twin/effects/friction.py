@@ -86,7 +86,8 @@ def quadratic(draw: Draw) -> Influence:
 
 @effect("presliding_friction", "drive", "current", ("dahl", "lugre"))
 def presliding(draw: Draw) -> Influence:
-    """Friction is carried by a bristle that gives way over a small distance before it slides, at whatever level that is by then."""
+    """Friction is carried by a bristle that gives way over a small distance before it slides, at whatever level that is
+    by then."""
     give = max(0.05, draw.size("give_percent", 0.4, 0.9))
     if draw.motor.give:  # a drive that gives anyway gives more
         give = draw.note("give_percent", draw.motor.give * (1.0 + 2.0 * give))
