@@ -22,6 +22,7 @@ from .identify.motor.balance import NAMES, balance, friction_state
 from .identify.motor.moves import MoveData, shortened
 from .identify.motor.predict import known_moves
 from .identify.motor.recording import MotorTrial, actuator_trials, motor_trial
+from .identify.motor.residuals import whitened
 from .session import Log, Session
 
 Array = NDArray[np.float64]
@@ -84,7 +85,7 @@ def _from_commands(fit: MotorFit, trial: MotorTrial) -> list[tuple[MoveData, Arr
         return []
     early = [shortened(m, ALIGN_S) for m in data]
     own = output_error.fit(early, fit.simulated, (), noise, {}, fit.output_error.controller, output_error.ALIGN).own
-    found = output_error.whitened(data, fit.simulated, own, noise, fit.output_error.controller)
+    found = whitened(data, fit.simulated, own, noise, fit.output_error.controller)
     return [(m, z[:, 1]) for m, z in zip(data, found, strict=True)]
 
 

@@ -11,11 +11,13 @@ import pytest
 from hand_model.errors import IdentificationError
 from hand_model.identify.motor import identify_motor, identify_motors
 from hand_model.identify.motor.balance import NAMES, friction_state
+from hand_model.identify.motor.batch import Moves
 from hand_model.identify.motor.channel import channel_delay
-from hand_model.identify.motor.drive import Moves, profile, run, simulate
+from hand_model.identify.motor.drive import run, simulate
 from hand_model.identify.motor.fit import BOUNDS, fit_motor, white_noise
 from hand_model.identify.motor.moves import levelled, moves_from_rest, speed_levels
 from hand_model.identify.motor.predict import predict, reference, replay_table
+from hand_model.identify.motor.profile import profile
 from hand_model.identify.motor.published import MODELS, fit_published, smear_share
 from hand_model.identify.motor.recording import MotorTrial, actuator_trials, check_trials, motor_trial, trial_scale
 from hand_model.identify.motor.weak_form import fit_regressions

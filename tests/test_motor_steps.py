@@ -9,13 +9,15 @@ import numpy as np
 import pytest
 
 from hand_model.identify.motor import output_error
+from hand_model.identify.motor.batch import Moves
 from hand_model.identify.motor.creep import begins, continued, creeping, end_state
-from hand_model.identify.motor.drive import Moves, run
+from hand_model.identify.motor.drive import run
 from hand_model.identify.motor.fit import BOUNDS, _hardened
 from hand_model.identify.motor.friction import Bristles
 from hand_model.identify.motor.grid import NEVER, grid, rows
+from hand_model.identify.motor.jacobian import linearise
 from hand_model.identify.motor.moves import MoveData
-from hand_model.identify.motor.output_error import _linearise, simulate_moves
+from hand_model.identify.motor.residuals import simulate_moves
 
 VALUES = {
     "inertia": 0.0125, "viscous": 0.145, "coulomb": 34.0, "stiffness": 0.23, "preload": 9.0, "presliding": 0.0, "bristle": 0.0, "static_ratio": 1.0, "stribeck_speed": 20.0,
@@ -85,7 +87,7 @@ def test_full_speed_and_the_moves_own_make_up_for_each_other(controller: str) ->
     so."""
     moves = [_move(0.0, 100.0, s, 1.5, VALUES, controller) for s in (1.0, 0.45)]
     own, names = np.array([m.own for m in moves]), ("speed_full", "rise", "fall")[: 3 if controller == "profile" else 2]
-    _, shared, local, _ = _linearise(moves, VALUES, names, own, (0.05, 5.0), controller, 2e-3)
+    _, shared, local, _ = linearise(moves, VALUES, names, own, (0.05, 5.0), controller, 2e-3)
     for a, b, x in zip(shared, local, own, strict=True):
         times = sum(VALUES[n] * a[:, i] for i, n in enumerate(names) if n != "speed_full")
         left = VALUES["speed_full"] * a[:, 0] + times - x[2] * b[:, 2]

@@ -6,7 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .align import LEVER, Alignment, Features, Fit, align, mirrored
+from .align import Alignment, align
+from .coincidence import LEVER
+from .features import Features, mirrored
+from .joint_fit import Fit
 from .pairing import Pairing
 from .report import Finding
 from .tree import Tree

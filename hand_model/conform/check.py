@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import DescriptionError, HandModelError, did_you_mean
-from .align import Alignment, Features, align, features
+from .align import Alignment, align
 from .causes import geometry_findings, mirror_finding
 from .exchange import exchange
+from .features import Features, features
 from .mjcf import read_mjcf
 from .pairing import Pairing, pair_automatically, read_pair
 from .relations import relation_findings

@@ -6,7 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from .align import LEVER, Alignment, Features, align, features, line_cost
+from .align import Alignment, align
+from .coincidence import LEVER, line_cost
+from .features import Features, features
 from .pairing import Pairing, owner
 from .tree import Array, Tree
 

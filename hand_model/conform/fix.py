@@ -11,10 +11,12 @@ import numpy as np
 
 from ..errors import DescriptionError
 from ..output import new_file
-from .align import Features, Fit, align, features
+from .align import align
 from .check import conform, read
 from .edit import MjcfEditor, UrdfEditor, editor, relative
 from .exchange import exchange
+from .features import Features, features
+from .joint_fit import Fit
 from .pairing import Pairing, owner, pair_automatically, read_pair
 from .relations import COUPLING_TOLERANCE, LIMIT_TOLERANCE, resolved
 from .report import ConformReport

@@ -6,7 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from .align import Alignment, Features, Fit
+from .align import Alignment
+from .features import Features
+from .joint_fit import Fit
 from .pairing import Pairing
 from .report import Finding
 from .tree import Array, Coupling, Tree, half_units

@@ -159,6 +159,11 @@ def inverse(transform: Array) -> Array:
     return pose(r, -(r @ transform[..., :3, 3, None])[..., 0])
 
 
+def transformed(transform: Array, points: Array) -> Array:
+    """Points (..., 3) [m] moved by a transform (4, 4)."""
+    return points @ transform[:3, :3].T + transform[:3, 3]
+
+
 def forward(tree: Tree, values: Mapping[str, Array], wanted: Sequence[int], base: int = 0) -> list[tuple[Array, Array]]:
     """Rotations (n, 3, 3) and positions (n, 3) [m] of the wanted nodes in the base node's frame.
 

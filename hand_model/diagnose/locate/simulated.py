@@ -72,9 +72,9 @@ def _motion(fit: MotorFit, name: str, log: Log) -> tuple[Array, Array, Array, Ar
     """Time, position, velocity and acceleration of a log's simulated moves; None where they are farther from the
     recorded ones than noise."""
     from ...identify.motor.fit import white_noise
-    from ...identify.motor.output_error import simulate_states
     from ...identify.motor.predict import aligned_moves
     from ...identify.motor.recording import motor_trial
+    from ...identify.motor.residuals import simulate_states
 
     trial, found = motor_trial(name, log, fit.scale), fit.output_error
     data, own = aligned_moves(fit, trial)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from .drive import Moves
+    from .batch import Moves
     from .grid import Grid
 
 Array = NDArray[np.float64]

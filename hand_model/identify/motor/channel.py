@@ -13,7 +13,9 @@ import numpy as np
 
 from . import output_error
 from .drive import TICK_S
+from .misfit import held
 from .output_error import FINE, OutputErrorFit
+from .residuals import simulate_moves
 
 GLANCE_S = 2e-3  # step of a look at the lateness with all else as it is
 SURE = 3.0  # standard deviations of that look, below which all else is not fitted anew
@@ -44,7 +46,7 @@ def channel_delay(found: OutputErrorFit, bounds: Mapping[str, tuple[float, float
         fits[delay_s] = output_error.fit(
             found.moves, values, names, found.sigma, bounds, found.controller, (FINE,), near.own, found.memory
         )
-        return fits[delay_s].cost - output_error.held(fits[delay_s].values, "lead")
+        return fits[delay_s].cost - held(fits[delay_s].values, "lead")
 
     best, sd = _minimum(misfit, start, float(np.sign(toward)) * FIRST_S)
     return best, float(np.hypot(sd, TICK_S))
@@ -52,9 +54,7 @@ def channel_delay(found: OutputErrorFit, bounds: Mapping[str, tuple[float, float
 
 def _misfit(found: OutputErrorFit, delay_s: float) -> float:
     """Sum of squares of the current's residuals over its noise with a lateness, all else as it is."""
-    simulated = output_error.simulate_moves(
-        found.moves, {**found.values, "lead": -delay_s}, found.own, found.controller
-    )
+    simulated = simulate_moves(found.moves, {**found.values, "lead": -delay_s}, found.own, found.controller)
     left = np.concatenate([m.current - y[:, 1] for m, y in zip(found.moves, simulated, strict=True)])
     return float(np.sum((left / found.sigma[1]) ** 2))
 

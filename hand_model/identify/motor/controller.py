@@ -15,9 +15,11 @@ import numpy as np
 from . import output_error
 from .balance import NAMES
 from .drive import CONTROLLERS
+from .jacobian import COARSE_S
 from .moves import SETTLED, MoveData, shortened, without_rest
-from .output_error import COARSE_S, ROUGH, OutputErrorFit
+from .output_error import ROUGH, OutputErrorFit
 from .replicates import lack_of_fit
+from .residuals import whitened
 
 CLOSE = 1.15  # mean square of the residuals [noise variances] below which no other kind of friction is tried
 SOME = 12  # moves that the search simulates
@@ -86,7 +88,7 @@ def _first_misfit(
 ) -> float:
     """Sum of squares of the whitened residuals of a start: the kind that is nearest before anything is fitted mostly
     stays it."""
-    found = np.concatenate(output_error.whitened(some, values, np.array([m.own for m in some]), sigma, kind, COARSE_S))
+    found = np.concatenate(whitened(some, values, np.array([m.own for m in some]), sigma, kind, COARSE_S))
     return float(np.nan_to_num(np.sum(found**2), nan=np.inf))
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .moves import MoveData
-from .output_error import simulate_moves
+from .residuals import simulate_moves
 
 Array = NDArray[np.float64]
 

@@ -21,7 +21,6 @@ Integrated by the implicit midpoint rule, linear within a step.
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
@@ -30,9 +29,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .batch import Moves
 from .cascade import Cascade
+from .contact import Contact
+from .current_limit import Ceiling
 from .friction import Bristles, Stick
 from .grid import NEVER, Grid, grid, rows
+from .profile import Profile, Trapezoid
 
 Array = NDArray[np.float64]
 
@@ -57,80 +60,6 @@ SHARED = (
 )
 CONTROLLERS = {"profile": (*SHARED, "fall", "lag"), "cascade": (*SHARED, "position_gain", "deadband")}
 STRIBECK = ("static_ratio", "stribeck_speed", "stribeck_exponent")
-
-
-@dataclass(frozen=True)
-class Moves:
-    """Moves from rest, one per entry (B,): start_s of the command after the move's own zero [s], origin and target [%],
-    speed [share of full], limit [raw], position [%] and current hold [raw] at rest, duration_s [s], velocity [%/s] of a
-    drive that creeps within its deadband; when it may be simulated in long steps [s]: from when on it cruises, until
-    when, and from when on it rests."""
-
-    start_s: Array
-    origin: Array
-    target: Array
-    speed: Array
-    limit: Array
-    position: Array
-    hold: Array
-    duration_s: Array
-    velocity: Array | float = 0.0
-    cruise_s: Array | float = NEVER
-    stop_s: Array | float = NEVER
-    rest_s: Array | float = NEVER
-
-    def some(self, columns: NDArray[np.int64]) -> Moves:
-        """The moves of these columns."""
-        every = (getattr(self, f.name) + np.zeros(len(self.target)) for f in dataclasses.fields(self))
-        return Moves(*(x[columns] for x in every))
-
-
-def profile(time_s: Array, moves: Moves, q: Mapping[str, Array]) -> tuple[Array, Array]:
-    """Reference [%] and its velocity [%/s], (n, B), of trapezoidal moves at times (n,) [s]; the velocity `lag` [s]
-    behind."""
-    t = time_s[:, None] - moves.start_s
-    sign, shape = np.sign(moves.target - moves.origin), _Trapezoid(moves, q)
-    return moves.origin + sign * shape.way(t), sign * shape.speed(t - q["lag"])
-
-
-class _Trapezoid:
-    """Way [%] and speed [%/s] of moves over the time since their command."""
-
-    def __init__(self, moves: Moves, q: Mapping[str, Array]) -> None:
-        distance = np.abs(moves.target - moves.origin)
-        self.up, self.down = (
-            q["speed_full"] / np.maximum(q["rise"], 1e-4),
-            q["speed_full"] / np.maximum(q["fall"], 1e-4),
-        )
-        top = np.minimum(
-            q["speed_full"] * moves.speed, np.sqrt(2 * distance * self.up * self.down / (self.up + self.down))
-        )
-        self.top = np.maximum(top, 1e-9)
-        self.rise, self.fall = self.top / self.up, self.top / self.down
-        self.flat = np.maximum(distance / self.top - 0.5 * (self.rise + self.fall), 0.0)
-
-    def some(self, columns: NDArray[np.int64]) -> _Trapezoid:
-        """Those of these columns."""
-        found = copy.copy(self)
-        for name, x in vars(self).items():
-            setattr(found, name, x[columns])
-        return found
-
-    def way(self, t: Array) -> Array:
-        """Way [%] at times (n, B) [s] after the command."""
-        a = _within(t, self.rise)
-        b = _within(t - self.rise, self.flat)
-        c = _within(t - (self.rise + self.flat), self.fall)
-        return 0.5 * self.up * a * a + self.top * b + (self.top - 0.5 * self.down * c) * c
-
-    def speed(self, t: Array) -> Array:
-        """Speed [%/s] at times (n, B) [s] after the command."""
-        return self.up * _within(t, self.rise) - self.down * _within(t - (self.rise + self.flat), self.fall)
-
-
-def _within(t: Array, duration: Array) -> Array:
-    """Times (n, B) cut to 0..duration (B,)."""
-    return np.minimum(np.maximum(t, 0.0), duration)
 
 
 @dataclass(frozen=True)
@@ -160,7 +89,7 @@ class Run:
         if self.controller == "profile":
             t, shape, sign = (
                 t - moves.start_s[column],
-                _Trapezoid(moves, self.q).some(column),
+                Trapezoid(moves, self.q).some(column),
                 np.sign(moves.target - moves.origin)[column],
             )
             behind = t - self.q["lag"][column]
@@ -205,7 +134,7 @@ def run(
         moves, start_s=moves.start_s + EARLY_S, position=moves.position - EARLY_S * moves.velocity
     )
     times = grid(ends_s[:, order], int(steps[0]) + 1, step_s, width)
-    kind = Cascade if controller == "cascade" else _Profile
+    kind = Cascade if controller == "cascade" else Profile
     # values that a search tries may let a drive run away
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         steer = kind(moves, q, times)
@@ -240,7 +169,7 @@ def simulate(
 def _run(
     moves: Moves,
     q: Mapping[str, Array],
-    steer: _Profile | Cascade,
+    steer: Profile | Cascade,
     times: Grid,
     rows_of: NDArray[np.int64],
     limit: Array | float,
@@ -260,8 +189,8 @@ def _run(
     )
     late = np.minimum(q["delay"], 0.8 * q["inertia"] / np.maximum(q["damping"], 1e-9))
     late_push, sprung = q["damping"] * late, q["stiffness"] + steer.stiffness
-    contact = _Contact(q) if "contact_stiffness" in q else None
-    ceiling = _Ceiling(q, late, limit) if np.isfinite(limit).any() else None
+    contact = Contact(q) if "contact_stiffness" in q else None
+    ceiling = Ceiling(q, late, limit) if np.isfinite(limit).any() else None
     for first, last, k in _stretches(steps, rows_of):
         h, own_sprung = times.each(steps[first])[:k], sprung[:k]
         half = 0.5 * h
@@ -313,95 +242,3 @@ def _stretches(steps: Array, rows_of: NDArray[np.int64]) -> Iterator[tuple[int, 
     cuts = np.unique(np.concatenate([[0], change, ends]))
     for first, last in itertools.pairwise(cuts[cuts <= ends[0]].tolist()):
         yield first, last, int(np.count_nonzero(ends > first))
-
-
-class _Profile:
-    """What a trapezoidal profile adds to the current: gain r + damping r', the mean over each step (at)."""
-
-    def __init__(self, moves: Moves, q: Mapping[str, Array], times: Grid) -> None:
-        t, sign = times.at_s - moves.start_s, np.sign(moves.target - moves.origin)
-        shape = _Trapezoid(moves, q)
-        r = moves.origin + sign * shape.way(t)
-        t -= q["lag"]
-        way = shape.way(t)
-        # the mean over a step is exact where the velocity jumps within it
-        self.at = q["gain"] * r
-        self.at[:-1] = 0.5 * (self.at[1:] + self.at[:-1]) + q["damping"] * sign * np.diff(way, axis=0) / times.each(
-            times.steps()[:-1]
-        )
-        self.given, self.hold, self.stiffness = self.at - q["preload"], q["gain"] * r[0], q["gain"]
-
-    def begin(self, p: Array, v: Array) -> Array:
-        """Current (B,) [raw] before the move, at rest at positions (B,) [%]."""
-        return self.hold - self.stiffness * p
-
-    def pace(self, first: int, last: int, step_s: Array) -> None:
-        """Nothing: the reference is known beforehand."""
-
-    def push(self, i: int, p: Array, v: Array) -> Array:
-        """Its part of the current (k,) [raw] in the middle of step i, less the preload and what `stiffness` takes."""
-        return self.given[i, : len(p)]
-
-    def advance(self, gone: Array) -> None:
-        """Nothing: the profile does not see the drive."""
-
-    def asked(self, position: Array) -> Array:
-        """What the reference adds to the current at the steps, (n, B) [raw]."""
-        return self.at
-
-
-class _Ceiling:
-    """The most current [raw] that the controller may ask for."""
-
-    def __init__(self, q: Mapping[str, Array], late: Array, limit: Array | float) -> None:
-        self.q, self.late, self.limit = q, late, limit + np.zeros(len(late))
-
-    def pace(self, first: int, last: int, step_s: Array) -> None:
-        """The first k drives from here on, in steps (k,) [s]."""
-        k = len(step_s)
-        half, q, late = (
-            0.5 * step_s,
-            {n: self.q[n][:k] for n in ("inertia", "gain", "damping", "stiffness", "preload")},
-            self.late[:k],
-        )
-        self.now = q["inertia"] / half, q["stiffness"], q["preload"], self.limit[:k]
-        self.closed = 0.5 * (q["gain"] * (half - late) + q["damping"] * (1.0 - late / half))
-
-    def kept(
-        self,
-        both: Array,
-        total: Array,
-        resisting: Array,
-        p: Array,
-        v: Array,
-        pressed: Array | float,
-        friction: Stick | Bristles,
-    ) -> Array:
-        """Sum of the velocities (k,) [%/s] at both ends of a step where the current that gives `both` is more than the
-        limit."""
-        mass, stiffness, preload, limit = self.now
-        own = mass * v - stiffness * p - preload - pressed  # what is left without the controller
-        current = total - own - self.closed * both
-        over = np.abs(current) > limit
-        if not over.any():
-            return both
-        free = both.copy()
-        return np.where(over, friction.velocities(own + np.sign(current) * limit, resisting - self.closed, v), free)
-
-
-class _Contact:
-    """An object: a one-sided spring with damping."""
-
-    def __init__(self, q: Mapping[str, Array]) -> None:
-        self.stiffness, self.at, self.damping = q["contact_stiffness"], q["contact_at"], q["contact_damping"]
-
-    def pace(self, first: int, last: int, step_s: Array) -> None:
-        """The first k drives from here on, in steps (k,) [s]."""
-        k = len(step_s)
-        self.reach = 0.5 * step_s + self.damping[:k]
-
-    def load(self, p: Array) -> tuple[Array, Array]:
-        """Load (k,) [raw] at positions (k,) [%], and what it resists velocity with [raw s/%]."""
-        k = len(p)
-        pressed = np.where(p > self.at[:k], self.stiffness[:k], 0.0)
-        return pressed * (p - self.at[:k]), pressed * self.reach[:k]

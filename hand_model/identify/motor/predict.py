@@ -13,11 +13,13 @@ from ...errors import IdentificationError
 from ...session import Log
 from . import output_error
 from .balance import NAMES, balance
+from .batch import Moves
 from .creep import begins, continued, end_state
-from .drive import Moves, profile
 from .fit import MotorFit
 from .moves import MoveData, levelled, moves_from_rest
+from .profile import profile
 from .recording import MotorTrial, motor_trial
+from .residuals import simulate_moves
 
 Array = NDArray[np.float64]
 
@@ -82,7 +84,7 @@ def predict(fit: MotorFit, log: Log, name: str = "log", align: bool = True) -> P
             k = slice(0 if last is None else m.index, m.index)
             position[k], current[k] = x[1], (values["gain"] * (m.origin - x[1]) if controller == "profile" else x[3])
             predicted[k] = True
-        y = output_error.simulate_moves([m], values, x[None], controller, 1e-3)[0]
+        y = simulate_moves([m], values, x[None], controller, 1e-3)[0]
         k = slice(m.index + 1, m.index + 1 + len(m.time_s))
         position[k], current[k], predicted[k] = y[:, 0], y[:, 1], True
         phase[k] = _phases(m, x, y[:, 0])
