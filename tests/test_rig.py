@@ -1,139 +1,30 @@
-"""Rigs: known truths planted into recordings made here, and the published machines where they are at hand."""
+"""Rigs diagnosed: known truths planted into recordings made here, and the published machines where they are at hand."""
 
 from __future__ import annotations
 
 import shutil
-from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from rig_bench import HEAD
+from rig_pendulum import PENDULUM, planted
 
 from hand_model.errors import DescriptionError, SessionError
-from hand_model.report.rig_findings import write_rig_findings
-from hand_model.rig import diagnose_rig, fit_declared, load_rig, replay_rig
-from hand_model.rig.balance import Column
-from hand_model.rig.consistent import BASIS, consistent, is_physical, pseudo_inertia
-from hand_model.rig.dynamics import INERTIAL, inertial_columns, inertial_parameters
-from hand_model.rig.findings import NOT_BORNE_OUT, NOT_TAKEN
-from hand_model.rig.mjcf import read_effects, write_effects
-from hand_model.rig.name.candidates import Candidate
-from hand_model.rig.physical import physical
-from hand_model.rig.solve import solve_bounded
-from hand_model.rig.standing import _joint_finding
+from hand_model.rig import diagnose_rig, load_rig, replay_rig
+from hand_model.rig.mjcf import read_effects
 from hand_model.rig.states import local_states
-from hand_model.rig.swing.fit import Task, fit_together
-from hand_model.rig.swing.simulation import Lane, Swing, errors, simulate, vector
-from hand_model.rig.words import alternatives, joint_unit, rejection, shape_unit, statement
+from hand_model.rig.swing.simulation import Lane, Swing, simulate, vector
 from hand_model.session import read_session
 
 REAL = Path(__file__).resolve().parents[2] / "shared" / "real"
-
-PENDULUM = """<mujoco model="rig">
-  <compiler angle="radian"/><option timestep="0.001" integrator="implicitfast" gravity="0 0 -9.81"/>
-  <worldbody><body name="arm">
-    <joint name="hinge" axis="0 -1 0" damping="0.02" frictionloss="0.05"/>
-    <inertial pos="0 0 -0.2" mass="0.5" diaginertia="0.002 0.002 0.0001"/></body></worldbody>
-  <actuator><motor name="motor" joint="hinge"/></actuator></mujoco>
-"""
-MASS, LEVER, INERTIA = 0.6, 0.2, 0.6 * 0.04 + 0.002
-
-
-def planted(folder: Path, effect: str = "none", trials: int = 4, seconds: float = 12.0) -> Path:
-    """A pendulum moved along sums of sinusoids; its torque by the true balance (mass 0.6, not 0.5), with an effect or
-    none."""
-    (folder / "log").mkdir(parents=True)
-    (folder / "rig.xml").write_text(PENDULUM)
-    text, random = HEAD, np.random.default_rng(3)
-    for k in range(trials):
-        t = np.arange(0, seconds, 0.005)
-        w = 2 * np.pi * np.array([0.31, 0.83]) * (1 + 0.13 * k)
-        size, phase = np.array([0.7, 0.35]) * random.uniform(0.7, 1.3, 2), random.uniform(0, 6, 2)
-        q, v, a = (sum(f(s, w_, t, p) for s, w_, p in zip(size, w, phase, strict=True)) for f in (
-            lambda s, w_, t, p: s * np.sin(w_ * t + p), lambda s, w_, t, p: s * w_ * np.cos(w_ * t + p),
-            lambda s, w_, t, p: -s * w_**2 * np.sin(w_ * t + p)))  # fmt: skip
-        load = INERTIA * a + MASS * LEVER * 9.81 * np.sin(q)
-        torque = load + 0.03 * v + 0.08 * np.sign(v)
-        torque += {"stribeck": 0.06 * np.exp(-((v / 0.4) ** 2)) * np.sign(v), "none": 0 * t, "load": 0.25 * np.abs(load) * np.sign(v), "drag": 0.02 * v * np.abs(v), "offset": 0 * t + 0.15,
-                   "command": 0 * t, "dead": 0 * t, "unsigned": 0 * t}[effect]  # fmt: skip
-        torque = {"command": 0.5 * np.sin(2.1 * t), "dead": 0 * t + 0.3, "unsigned": np.abs(torque)}.get(effect, torque)
-        noise = 0 if effect in ("command", "dead") else 0.01
-        table = np.stack([t, np.round(q / 4e-4) * 4e-4, torque + noise * random.standard_normal(len(t))], 1)
-        name = f"log/run_{k}.csv"
-        np.savetxt(folder / name, table, delimiter=",", header="time,position,torque", comments="", fmt="%.9g")
-        text += f'[[trial]]\nkind = "motion"\nlog = "{name}"\n' + ('purpose = "validate"\n' if k == trials - 1 else "")
-    (folder / "session.toml").write_text(text)
-    return folder
 
 
 @pytest.fixture(scope="module")
 def planted_load(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A session with load-dependent friction in it."""
     return planted(tmp_path_factory.mktemp("load") / "session", "load")
-
-
-TREE = """<mujoco><compiler angle="radian"/><option gravity="0.3 -1 -9.81"/><worldbody>
-  <body name="a" pos="0.1 0 0.2" quat="0.9 0.1 0.3 0.2"><joint name="a" axis="0.3 1 0.2" pos="0.02 0.01 -0.03"/>
-   <inertial pos="0.1 0.05 -0.2" mass="1.3" fullinertia="0.02 0.03 0.025 0.001 0.002 -0.003"/>
-   <body name="b" pos="0 0.1 -0.3"><joint name="b" type="slide" axis="1 0.2 0"/>
-    <inertial pos="0.02 0 0.1" mass="0.7" diaginertia="0.01 0.012 0.008"/>
-    <body name="c" pos="0.1 0 0"><joint name="c" axis="0 0 1" pos="0 0.05 0"/>
-     <inertial pos="0 0.1 0" mass="0.4" diaginertia="0.002 0.001 0.002"/></body></body></body></worldbody></mujoco>"""
-
-
-def test_regressor_is_mujocos_inverse_dynamics() -> None:
-    """Hinges with offset anchors, a slide, turned frames, tilted gravity: columns x parameters = mj_inverse."""
-    import mujoco
-
-    model = mujoco.MjModel.from_xml_string(TREE)
-    data = mujoco.MjData(model)
-    q, v, a = np.random.default_rng(1).normal(size=(3, 6, model.nv))
-    effort = np.einsum(
-        "njbp,bp->nj", inertial_columns(model, q, v, a, np.array(model.opt.gravity)), inertial_parameters(model)
-    )
-    for i in range(len(q)):
-        data.qpos[:], data.qvel[:], data.qacc[:] = q[i], v[i], a[i]
-        mujoco.mj_inverse(model, data)
-        assert np.allclose(effort[i], data.qfrc_inverse, atol=1e-12)
-
-
-def test_bounded_solution_meets_the_optimality_conditions() -> None:
-    """Inside the box the gradient vanishes; on a bound it points outwards."""
-    random = np.random.default_rng(0)
-    for _ in range(20):
-        x, y = random.normal(size=(40, 6)), random.normal(size=40) * 3
-        low, high = np.array([0, 0, -np.inf, 0, -1, 0.0]), np.full(6, np.inf)
-        theta = solve_bounded(x.T @ x, x.T @ y, low, high, np.zeros(6), np.zeros(6))
-        slope = x.T @ (x @ theta - y)
-        assert np.all(theta >= low - 1e-12)
-        free = theta > low + 1e-9
-        assert np.all(np.abs(slope[free]) < 1e-6 * np.abs(x.T @ y).max())
-        assert np.all(slope[~free] > -1e-6)
-
-
-def test_physical_keeps_what_is_physical_and_mends_what_is_not() -> None:
-    """A true body comes back as it is; an impossible inertia becomes one with positive, triangular principal
-    moments."""
-    mass, centre, inertia = 2.0, np.array([0.1, -0.2, 0.3]), np.diag([0.3, 0.4, 0.5])
-    about = inertia + mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-    p = np.array([mass, *(mass * centre), about[0, 0], about[1, 1], about[2, 2], about[0, 1], about[0, 2], about[1, 2]])
-    back = physical(p)
-    assert back[0] == mass and np.allclose(back[1], centre) and np.allclose(back[2], inertia)
-    p[4] -= 1.0
-    level = np.linalg.eigvalsh(physical(p)[2])
-    assert level[0] > 0 and level[2] <= level[0] + level[1] + 1e-9
-
-
-def test_declared_fit_finds_the_true_weight_and_friction(tmp_path: Path) -> None:
-    """Mass moment, damping and Coulomb friction of a planted pendulum within two per cent."""
-    fit = fit_declared(load_rig(read_session(planted(tmp_path / "s"))))
-    value = {c.label: t for c, t in zip(fit.columns, fit.theta, strict=True)}
-    assert value["inertial:arm:hz"] == pytest.approx(-MASS * LEVER, rel=0.02)
-    assert value["frictionloss:hinge"] == pytest.approx(0.08, rel=0.05)
-    assert value["damping:hinge"] == pytest.approx(0.03, rel=0.1)
 
 
 @pytest.mark.parametrize(("effect", "name"), [("drag", "quadratic_damping"), ("offset", "asymmetric_friction"),
@@ -185,55 +76,6 @@ def test_unsigned_torque_is_refused(tmp_path: Path) -> None:
     findings = diagnose_rig(read_session(planted(tmp_path / "s", "unsigned")))
     assert findings.findings[0].effect == "command_as_measurement"
     assert "no sign" in findings.findings[0].statement
-
-
-def test_simulation_agrees_with_mujoco(tmp_path: Path) -> None:
-    """A free pendulum with friction: the batch simulator and MuJoCo's replay of the written file are the same
-    motion."""
-    text = (PENDULUM.replace('<actuator><motor name="motor" joint="hinge"/></actuator>', "")
-            .replace('frictionloss="0.05"', 'frictionloss="0.02"'))  # fmt: skip
-    (tmp_path / "log").mkdir()
-    (tmp_path / "rig.xml").write_text(text)
-    inertia, weight = 0.022, 0.5 * 0.2 * 9.81
-    n = 2500
-    lane = Lane("x", False, np.zeros(n), 1.0, np.zeros(n), (1.0, 0.0), np.zeros(n), np.ones(n))
-    swing = Swing((lane,), weight, 0.0, {"inertia": inertia, "damping": 0.02, "coulomb": 0.02}, False)
-    theta = vector(swing.initial)
-    q = simulate(swing, theta[None], np.array([0]))[:, 0]
-    table = np.stack([np.arange(n) * 2e-3, q], 1)
-    np.savetxt(tmp_path / "log/a.csv", table, delimiter=",", header="time,position", comments="", fmt="%.12g")
-    (tmp_path / "session.toml").write_text(
-        HEAD.replace('torque = "actuator:motor:force"\n', "") + '[[trial]]\nkind = "motion"\nlog = "log/a.csv"\n'
-    )
-    residuals = replay_rig(read_session(tmp_path))
-    assert residuals.figure("position_rmse", False) < 0.02 * np.std(q)
-
-
-def test_output_error_fit_returns_to_the_truth() -> None:
-    """Inertia, damping, friction and drag of a simulated swing, from a wrong start."""
-    n = 2000
-    lane = Lane("x", False, np.zeros(n), 1.0, np.zeros(n), (1.2, 0.0), np.zeros(n), np.ones(n))
-    swing = Swing((lane,), 1.0, 0.0, {"inertia": 0.02, "damping": 0.01, "coulomb": 0.01}, False)
-    truth = vector({"inertia": 0.022, "damping": 0.004, "coulomb": 0.006, "drag": 0.001})
-    recorded = simulate(swing, truth[None], np.array([0]))[:, 0]
-    swing = Swing(
-        (Lane("x", False, lane.drive, 1.0, recorded, lane.start, lane.supply, lane.used),),
-        1.0,
-        0.0,
-        swing.initial,
-        False,
-    )
-    fit = fit_together(swing, [Task(("inertia", "damping", "coulomb", "drag"), vector(swing.initial), (0,))], 40)[0]
-    assert np.abs(errors(swing, fit.theta[None], np.array([0]))).max() < 5e-3
-    assert fit.theta[0] == pytest.approx(0.022, rel=1e-3)
-
-
-def test_effects_in_the_file_are_replaced_not_piled_up() -> None:
-    """Writing effects twice keeps one entry; writing none removes it."""
-    once = write_effects(PENDULUM.encode(), [{"joint": "hinge", "swing": {"sag": 0.1}}])
-    twice = write_effects(once, [{"joint": "hinge", "swing": {"sag": 0.2}}])
-    assert read_effects(twice) == [{"joint": "hinge", "swing": {"sag": 0.2}}]
-    assert read_effects(write_effects(twice, [])) == []
 
 
 @pytest.mark.parametrize(("old", "new", "says"), [
@@ -303,39 +145,6 @@ def test_a_passive_session_without_validation_is_diagnosed(tmp_path: Path, zero:
     )
 
 
-def test_bodies_of_a_solution_can_exist() -> None:
-    """Where least squares asks for a negative moment of inertia, the constrained solution has none, and fits no worse
-    than any physical body drawn at random; a solution that is physical already comes back untouched."""
-    declared = np.array([1.0, 0, 0, -0.3, 0.15, 0.15, 0.02, 0, 0, 0])
-    free = [i for i, v in enumerate(declared) if v]
-    columns = tuple(Column("inertial", "arm", INERTIAL[i], declared[i]) for i in free)
-    random = np.random.default_rng(4)
-    x = random.normal(size=(60, len(free)))
-    box = np.full(len(free), -np.inf), np.full(len(free), np.inf), np.zeros(len(free)), np.full(len(free), 1e-9)
-    for wrong, physical_ in ((0.0, True), (0.3, False)):
-        wanted = declared[free] - wrong * np.eye(len(free))[2]
-        theta = consistent(columns, declared[None], wanted, x.T @ x, x.T @ (x @ wanted), *box)
-        full = declared.copy()
-        full[free] = theta
-        assert is_physical(full)
-        if physical_:
-            assert np.array_equal(theta, wanted)
-            continue
-        cost = np.sum((x @ (theta - wanted)) ** 2)
-        for _ in range(200):
-            other = full.copy()
-            other[free] = theta * (1 + 0.05 * random.normal(size=len(free)))
-            if is_physical(other):
-                assert np.sum((x @ (other[free] - wanted)) ** 2) >= cost * (1 - 1e-6)
-
-
-def test_pseudo_inertia_is_linear_in_the_parameters() -> None:
-    """The sum of its basis, and symmetric."""
-    p = np.random.default_rng(0).normal(size=10)
-    assert np.allclose(np.einsum("k,kij->ij", p, BASIS), pseudo_inertia(p))
-    assert np.allclose(pseudo_inertia(p), pseudo_inertia(p).T)
-
-
 def mirrored(table: np.ndarray) -> np.ndarray:
     """Position and torque with the other sign: the same machine seen from behind."""
     return table * [1, -1, -1]
@@ -354,66 +163,6 @@ def test_first_effect_stays_when_the_recording_changes(planted_load: Path, tmp_p
     first = diagnose_rig(read_session(folder)).findings[0]
     assert first.effect == "load_dependent_friction"
     assert next(v["value"] for k, v in first.parameters.items() if k.startswith("per_")) == pytest.approx(0.25, rel=0.3)
-
-
-def test_a_rigs_findings_say_names_and_units_as_the_format_has_them() -> None:
-    """Names of the table of effects, units of the joint, variants beside them."""
-    assert joint_unit("effort s/position", "rad", "N m") == "N m s/rad"
-    assert joint_unit("rad/effort^2", "rad", "N m") == "rad/(N m)^2"
-    assert joint_unit("effort", "m", "N") == "N"
-    assert [shape_unit(n, "m") for n in ("reach", "stribeck_speed", "delay", "form")] == ["m", "m/s", "s", "1"]
-    rivals = [
-        ("detent_load/a@hinge", 0.3),
-        ("detent_load@hinge", 0.5),
-        ("torque_ripple@hinge", 0.1),
-        ("stribeck_friction/b@hinge", 0.1),
-    ]
-    assert alternatives(rivals, "stribeck_friction") == (("detent_load", 0.5), ("torque_ripple", 0.1))
-    assert rejection("load_dependent_friction/low speed@hinge", NOT_TAKEN) == {
-        "effect": "load_dependent_friction", "variant": "low speed", "where": "hinge", "reason": NOT_TAKEN}  # fmt: skip
-    values = {
-        "drag": {"value": 0.5, "unit": "N s^2/m^2"},
-        "form": {"value": 0.0, "unit": "1"},
-        "ratio": {"value": 2.0, "unit": "1"},
-    }
-    said = statement(
-        "quadratic_damping", "", "slide", values, {"metric": "effort_rmse", "before": 2.0, "after": 1.0, "unit": "N"}
-    )
-    assert said == "slide: quadratic damping: drag 0.5 N s^2/m^2, ratio 2; held-out effort rmse falls from 2 to 1 N."
-
-
-@pytest.mark.parametrize(("effect", "told"), [("command_delay", 0.02), ("current_channel_delay", -0.02)])
-def test_a_late_drive_has_a_positive_delay(effect: str, told: float) -> None:
-    """As in the findings of a hand: a drive acts later than told; a channel recorded ahead is early."""
-    rig = SimpleNamespace(unit=lambda j: "rad", effort_unit=lambda j: "N m", drive=lambda j: None)
-    candidate = Candidate(effect, "", "hinge", (), ({"delay": -0.02},), lambda r, s: np.zeros((0, 0)), True)
-    proof = {"metric": "effort_rmse", "unit": "N m", "before": 2.0, "after": 1.0, "held_out": ["log/b.csv"]}
-    step = SimpleNamespace(rivals=(), equals=(), probability=0.9)
-    found = _joint_finding(
-        rig, None, step, SimpleNamespace(candidate=candidate, shape={"delay": -0.02}), np.zeros(0), proof, None
-    )
-    assert found.parameters["delay"] == {"value": told, "unit": "s", "ci95": None}
-    assert f"delay {told} s" in found.statement
-    assert found.where["region"] is None and found.where["finger"] is None
-
-
-def test_report_of_a_rig_shows_what_was_found(planted_load: Path, tmp_path: Path) -> None:
-    """One page with the map, the effect through the data, before and after; without outside resources."""
-    session = read_session(planted_load)
-    rejected = (
-        rejection("stribeck_friction@hinge", NOT_BORNE_OUT),
-        rejection("detent_load/of a kind@hinge", NOT_TAKEN),
-    )
-    findings = replace(diagnose_rig(session), rejected=rejected)
-    page = write_rig_findings(session, findings, tmp_path / "out").read_text()
-    assert (
-        "then withdrawn" in page
-        and f"stribeck friction at hinge: {NOT_BORNE_OUT}" in page
-        and "not taken: detent load (of a kind)." in page
-    )
-    for anchor in ('id="findings"', 'id="map"', 'id="effects"', 'id="validation"', "load dependent friction"):
-        assert anchor in page
-    assert "http://" not in page.replace("http://www.w3.org", "")
 
 
 def test_the_start_of_a_recording_is_read_without_bias() -> None:

@@ -1,0 +1,62 @@
+"""Path operators: strokes, hysteresis and filters against what they are by definition."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from drive_motion import state
+
+from hand_model.effects import effect
+from hand_model.effects.path import dahl, jenkins, lowpass, strokes, travelled
+
+
+def test_strokes_cover_every_sample_once_and_ignore_noise() -> None:
+    s = state()
+    noisy = s.position + np.random.default_rng(1).normal(0, 0.1, len(s.position))
+    cut = strokes(noisy)
+    assert cut[0][0] == 0 and cut[-1][1] == len(noisy)
+    assert all(a[1] == b[0] for a, b in itertools.pairwise(cut))
+    turns = np.sum(np.diff(np.sign(s.velocity[s.velocity != 0])) != 0)
+    assert len(cut) == turns + 1
+
+
+def test_travelled_restarts_at_reversals_and_never_falls_within_a_stroke() -> None:
+    x = state().position
+    for a, b, _ in strokes(x):
+        d = travelled(x)[a:b]
+        assert d[0] == 0 and (np.diff(d) >= 0).all()
+
+
+def test_dahl_solves_its_differential_equation() -> None:
+    x = np.concatenate([np.linspace(0, 20, 4000), np.linspace(20, 5, 3000)])
+    z = dahl(x, 3.0, threshold=0.5)
+    dx, dz = np.diff(x), np.diff(z)
+    inside = np.abs(dx) > 0
+    middle = 0.5 * (z[1:] + z[:-1])
+    np.testing.assert_allclose(dz[inside], ((1 - middle * np.sign(dx)) / 3.0 * dx)[inside], atol=2e-5)
+    assert np.abs(z).max() <= 1
+
+
+def test_damped_bristles_follow_the_state_of_lugre() -> None:
+    s, presliding = state(6000), effect("presliding_friction")
+    z, damped = (
+        presliding.declared(s, {"bristle_length": 8.0, "bristle_time": time, "form": 0.0})[:, 2] for time in (0.0, 0.05)
+    )
+    rate = np.gradient(z, s.time_s)
+    assert np.corrcoef(damped - z, 0.05 * rate)[0, 1] > 0.99
+    assert np.ptp(damped - z) == pytest.approx(np.ptp(0.05 * rate), rel=0.1)
+
+
+def test_jenkins_is_elastic_then_yields() -> None:
+    x = np.concatenate([np.linspace(0, 10, 500), np.linspace(10, 0, 500)])
+    z = jenkins(x, 2.0, threshold=0.1)
+    np.testing.assert_allclose(z[:100], x[:100] / 2.0, atol=1e-9)
+    assert z[499] == 1 and z[-1] == -1
+
+
+def test_lowpass_of_a_step_is_exponential() -> None:
+    t = np.linspace(0, 3, 3001)
+    y = lowpass(t, (t > 1e-4).astype(float), 0.5)
+    np.testing.assert_allclose(y, 1 - np.exp(-t / 0.5), atol=2e-3)
