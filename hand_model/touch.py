@@ -99,8 +99,18 @@ def _from_motion(fit: MotorFit, trial: MotorTrial) -> list[tuple[MoveData, Array
             continue
         rest = np.array([0.0, trial.position[i], 1.0, trial.current[i]])
         target = float(trial.position[k].max()) if trial.setpoint is None else float(trial.setpoint[i + 1])
-        m = MoveData(trial.name, i, trial.time_s[k] - trial.time_s[i], trial.position[k], trial.current[k],
-                     float(trial.position[i]), target, np.inf, rest, np.ones(4))  # fmt: skip
+        m = MoveData(
+            trial.name,
+            i,
+            trial.time_s[k] - trial.time_s[i],
+            trial.position[k],
+            trial.current[k],
+            float(trial.position[i]),
+            target,
+            np.inf,
+            rest,
+            np.ones(4),
+        )
         out.append((m, (trial.current - expected)[k] / fit.sigma_current))
     return out
 

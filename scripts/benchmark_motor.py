@@ -169,15 +169,24 @@ def main() -> None:
     values, theirs, at_bound = run_sysid(sysid, fit, training)
     same = {n: fit.values[n] for n in NAMES}
     result = {
-        "trials": [t.name for t in training], "held_out": [t.name for t in held], "noise_raw": fit.sigma_current,
+        "trials": [t.name for t in training],
+        "held_out": [t.name for t in held],
+        "noise_raw": fit.sigma_current,
         "start": begin_values(fit, training),
         "hand_model": {
-            "cpu_s": ours, "held_out_current_rmse": float(np.sqrt(np.nanmean(error**2))),
-            "held_out_current_rmse_in_sysids_model": held_out_current(fit, same, held), "parameters": same,
+            "cpu_s": ours,
+            "held_out_current_rmse": float(np.sqrt(np.nanmean(error**2))),
+            "held_out_current_rmse_in_sysids_model": held_out_current(fit, same, held),
+            "parameters": same,
         },
-        "mujoco.sysid": {"cpu_s": theirs, "held_out_current_rmse": held_out_current(fit, values, held), "parameters": values, "at_bound": at_bound},
+        "mujoco.sysid": {
+            "cpu_s": theirs,
+            "held_out_current_rmse": held_out_current(fit, values, held),
+            "parameters": values,
+            "at_bound": at_bound,
+        },
         "speed_ratio": theirs / ours,
-    }  # fmt: skip
+    }
     Path(args.output).write_text(json.dumps(result, indent=1) + "\n")
     print(json.dumps(result, indent=1))
 

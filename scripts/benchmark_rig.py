@@ -37,9 +37,16 @@ LADDER = {
     "M3 + load": ("load_gear",),
     "M4 + Stribeck x load": (*STRIBECK, "load_gear", "load_gear_low"),
     "M5 + directional": (*STRIBECK, "load_motor", "load_external", "load_motor_low", "load_external_low"),
-    "M6 + quadratic": (*STRIBECK, "load_motor", "load_external", "load_motor_low", "load_external_low",
-                       "motor_squared", "external_squared"),
-}  # fmt: skip
+    "M6 + quadratic": (
+        *STRIBECK,
+        "load_motor",
+        "load_external",
+        "load_motor_low",
+        "load_external_low",
+        "motor_squared",
+        "external_squared",
+    ),
+}
 
 
 def ladder(session_path: str, starts: int = 4) -> dict[str, dict[str, float]]:
@@ -72,8 +79,14 @@ def ladder(session_path: str, starts: int = 4) -> dict[str, dict[str, float]]:
         file = write_swing(rig, stages[0], best.theta)
         residuals = replay_rig(session, load_rig(session, file), efforts=False, validate=True)
         evaluations = sum(f.evaluations for f in fits)
-        out[name] = {"rmse_rad": residuals.figure("position_rmse", True), "mae_rad": residuals.figure("position_mae", True),
-                     "seconds": seconds, "cpu_s": cpu_s, "evaluations": evaluations, "ms_per_evaluation": 1e3 * cpu_s / evaluations}  # fmt: skip
+        out[name] = {
+            "rmse_rad": residuals.figure("position_rmse", True),
+            "mae_rad": residuals.figure("position_mae", True),
+            "seconds": seconds,
+            "cpu_s": cpu_s,
+            "evaluations": evaluations,
+            "ms_per_evaluation": 1e3 * cpu_s / evaluations,
+        }
     return out
 
 
@@ -98,20 +111,33 @@ def main() -> None:
     rungs = ladder(arguments.session)
     began = time.perf_counter()
     lack = diagnose_rig(read_session(arguments.session)).lack_of_fit
-    ours = {"declared_rmse_rad": lack["before"], "rmse_rad": lack["after"], "declared_mae_rad": lack["mae_before"],
-            "mae_rad": lack["mae_after"], "seconds": time.perf_counter() - began}  # fmt: skip
+    ours = {
+        "declared_rmse_rad": lack["before"],
+        "rmse_rad": lack["after"],
+        "declared_mae_rad": lack["mae_before"],
+        "mae_rad": lack["mae_after"],
+        "seconds": time.perf_counter() - began,
+    }
     for name, row in rungs.items():
-        print(f"{name:32s} rmse {row['rmse_rad']:.4f} mae {row['mae_rad']:.4f} rad, fitted in {row['seconds']:.1f} s, of a "
-              f"processor {row['cpu_s']:.1f} s ({row['ms_per_evaluation']:.2f} ms per evaluation)")  # fmt: skip
+        print(
+            f"{name:32s} rmse {row['rmse_rad']:.4f} mae {row['mae_rad']:.4f} rad, fitted in {row['seconds']:.1f} s, of a "
+            f"processor {row['cpu_s']:.1f} s ({row['ms_per_evaluation']:.2f} ms per evaluation)"
+        )
     smallest = next(iter(rungs.values()))
     print(
         f"{'M1 against bam.fit':32s} {BAM_FIT_S / smallest['cpu_s']:.0f} times faster ({BAM_FIT_S:g} s on two cores there)"
     )
-    print(f"{'diagnosed':32s} rmse {ours['rmse_rad']:.4f} mae {ours['mae_rad']:.4f} rad; declared {ours['declared_rmse_rad']:.4f} "
-          f"{ours['declared_mae_rad']:.4f}; {ours['seconds']:.1f} s")  # fmt: skip
+    print(
+        f"{'diagnosed':32s} rmse {ours['rmse_rad']:.4f} mae {ours['mae_rad']:.4f} rad; declared {ours['declared_rmse_rad']:.4f} "
+        f"{ours['declared_mae_rad']:.4f}; {ours['seconds']:.1f} s"
+    )
     if arguments.json:
-        arguments.json.write_text(json.dumps({"ladder": rungs, "diagnosed": ours,
-                                              "ms_per_evaluation": per_evaluation(arguments.session)}, indent=2) + "\n")  # fmt: skip
+        arguments.json.write_text(
+            json.dumps(
+                {"ladder": rungs, "diagnosed": ours, "ms_per_evaluation": per_evaluation(arguments.session)}, indent=2
+            )
+            + "\n"
+        )
 
 
 if __name__ == "__main__":

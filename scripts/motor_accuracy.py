@@ -87,11 +87,19 @@ def row(motor, fit: MotorFit, seconds: tuple[float, float], noise: float, plante
     truth = {n: getattr(motor, n) for n in NAMES} | planted
     sd = np.sqrt(np.diag(fit.regression.covariance))
     return {
-        "controller": motor.controller.kind, "method": fit.method, "cpu_s": seconds[0], "yard_s": seconds[1], "stribeck": bool(fit.stribeck), "noise_true": noise,
-        "noise": fit.sigma_current, "misfit": None if fit.output_error is None else list(fit.output_error.chi2),
+        "controller": motor.controller.kind,
+        "method": fit.method,
+        "cpu_s": seconds[0],
+        "yard_s": seconds[1],
+        "stribeck": bool(fit.stribeck),
+        "noise_true": noise,
+        "noise": fit.sigma_current,
+        "misfit": None if fit.output_error is None else list(fit.output_error.chi2),
         "parameters": {n: [truth[n], e.value, *(e.ci95 or (None, None))] for n, e in found.items()},
-        "regression_z": {n: float((v - getattr(motor, n)) / s) for n, v, s in zip(NAMES, fit.regression.values, sd, strict=True)},
-    }  # fmt: skip
+        "regression_z": {
+            n: float((v - getattr(motor, n)) / s) for n, v, s in zip(NAMES, fit.regression.values, sd, strict=True)
+        },
+    }
 
 
 def yardstick() -> float:
@@ -251,24 +259,54 @@ def summary(rows: list[dict]) -> dict:
             "coverage_regression": {n: float(np.mean([abs(r["regression_z"][n]) < 1.96 for r in some])) for n in NAMES},
             "stribeck_claimed": sum(r["stribeck"] for r in some),
             "cpu_s": {
-                "median": float(np.median([r["cpu_s"] for r in some])), "max": float(max(r["cpu_s"] for r in some)),
+                "median": float(np.median([r["cpu_s"] for r in some])),
+                "max": float(max(r["cpu_s"] for r in some)),
                 "below_2": float(np.mean([r["cpu_s"] < 2 for r in some])),
             },
-            "cpu_s_at_full_speed": {"median": float(np.median(full)), "max": float(full.max()), "below_2": float(np.mean(full < 2)), "yardstick_s": best},
+            "cpu_s_at_full_speed": {
+                "median": float(np.median(full)),
+                "max": float(full.max()),
+                "below_2": float(np.mean(full < 2)),
+                "yardstick_s": best,
+            },
             "position_rmse_percent": {"median": float(np.nanmedian(position)), "max": float(np.nanmax(position))},
             "current_rmse_over_noise": {
-                "median": float(np.nanmedian(ratio)), "max": float(np.nanmax(ratio)),
-                "within_1.05": float(np.mean(ratio < 1.05)), "within_1.15": float(np.mean(ratio < 1.15)),
+                "median": float(np.nanmedian(ratio)),
+                "max": float(np.nanmax(ratio)),
+                "within_1.05": float(np.mean(ratio < 1.05)),
+                "within_1.15": float(np.mean(ratio < 1.15)),
             },
             "current_rmse_over_true_drive": {
-                "median": float(np.median(over)), "max": float(over.max()), "within_1.05": float(np.mean(over < 1.05)), "trials": len(over),
-            } if len(over) else None,
-            "true_drive_rmse_over_noise": {"median": float(np.median(floor)), "max": float(floor.max()), "within_1.05": float(np.mean(floor < 1.05))} if len(floor) else None,
+                "median": float(np.median(over)),
+                "max": float(over.max()),
+                "within_1.05": float(np.mean(over < 1.05)),
+                "trials": len(over),
+            }
+            if len(over)
+            else None,
+            "true_drive_rmse_over_noise": {
+                "median": float(np.median(floor)),
+                "max": float(floor.max()),
+                "within_1.05": float(np.mean(floor < 1.05)),
+            }
+            if len(floor)
+            else None,
             "above_1.05": [
-                [h["seed"], *(round(h[a] / h[b], 3) for a, b in (("current_rmse", "noise"), ("true_drive_rmse", "noise"), ("current_rmse", "true_drive_rmse")))]
-                for h in known if h["current_rmse"] > 1.05 * min(h["noise"], h["true_drive_rmse"])
+                [
+                    h["seed"],
+                    *(
+                        round(h[a] / h[b], 3)
+                        for a, b in (
+                            ("current_rmse", "noise"),
+                            ("true_drive_rmse", "noise"),
+                            ("current_rmse", "true_drive_rmse"),
+                        )
+                    ),
+                ]
+                for h in known
+                if h["current_rmse"] > 1.05 * min(h["noise"], h["true_drive_rmse"])
             ],
-        }  # fmt: skip
+        }
     return out
 
 

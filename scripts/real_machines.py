@@ -42,16 +42,27 @@ def run(folder: Path, output: Path, only: list[str]) -> list[dict]:
 def record(name: str, findings: Findings, seconds: float, cpu_s: float) -> dict:
     """What the table of the README needs of one diagnosis."""
     table = json.loads(findings.to_json())
-    return {"session": name, "verdict": findings.verdict, "seconds": seconds, "cpu_s": cpu_s, "lack_of_fit": table["lack_of_fit"],
-            "findings": [{k: f[k] for k in ("effect", "class", "probability", "statement", "fit")} for f in table["findings"]],
-            "unexplained": table["unexplained"]}  # fmt: skip
+    return {
+        "session": name,
+        "verdict": findings.verdict,
+        "seconds": seconds,
+        "cpu_s": cpu_s,
+        "lack_of_fit": table["lack_of_fit"],
+        "findings": [
+            {k: f[k] for k in ("effect", "class", "probability", "statement", "fit")} for f in table["findings"]
+        ],
+        "unexplained": table["unexplained"],
+    }
 
 
 def section(records: list[dict]) -> str:
     """Markdown: for each session what is missing, how sure that is, and how much the held-out error falls."""
-    lines = ["## What it found in real recordings", "",
-             "| recording | missing from its declared model (class) | probability | held-out error, declared to with all effects |",
-             "| --- | --- | --- | --- |"]  # fmt: skip
+    lines = [
+        "## What it found in real recordings",
+        "",
+        "| recording | missing from its declared model (class) | probability | held-out error, declared to with all effects |",
+        "| --- | --- | --- | --- |",
+    ]
     for r in records:
         if "refused" in r:
             lines.append(f"| {r['session']} | refused: {r['refused']} | | |")
@@ -63,8 +74,10 @@ def section(records: list[dict]) -> str:
     for r in records:
         lines += [f"**{r['session']}** ({r.get('verdict', 'refused')})", ""]
         lines += [f"- {f['statement']}" for f in r.get("findings", [])]
-        lines += [f"- Unexplained: {100 * u['share_of_mismatch']:.0f} % of the mismatch at {u['where']['joint'] or 'the joint'}."
-                  for u in r.get("unexplained", [])]  # fmt: skip
+        lines += [
+            f"- Unexplained: {100 * u['share_of_mismatch']:.0f} % of the mismatch at {u['where']['joint'] or 'the joint'}."
+            for u in r.get("unexplained", [])
+        ]
         lines.append("")
     return "\n".join(lines)
 

@@ -93,8 +93,11 @@ def score(root: Path, name: str, answer: dict[str, Any], findings: dict[str, Any
     hidden = [names(e) for e in answer["effects"] if not e.startswith("outside")]
     classes = [set(f["class"]) for f in physics]
     small = SMALL | (BETWEEN if answer["machine"] == "stages" else set())
-    false = tuple(f["effect"] for f, c in zip(physics, classes, strict=True)
-                  if not any(c & h for h in hidden) and f["effect"] not in small and not _held(f))  # fmt: skip
+    false = tuple(
+        f["effect"]
+        for f, c in zip(physics, classes, strict=True)
+        if not any(c & h for h in hidden) and f["effect"] not in small and not _held(f)
+    )
     if answer["fault"]:
         kind = "current_saturation" if answer["fault"] == "clipped" else "command_as_measurement"
         first = every = any(f["effect"] == kind for f in refused)
@@ -149,9 +152,11 @@ def table(rows: list[Row]) -> str:
             f"{r.name:8s} {r.told + ' -> ' + r.named:100s} {one:>5s} {every:>5s}   {r.figures}; {r.seconds:.0f} s{marks}"
         )
     known = [[x for x in (r.one, r.all_) if x is not None] for r in rows]
-    lines.append(f"first right {sum(r.first for r in rows)}, all found {sum(r.every for r in rows)}, without a false name {sum(not r.false for r in rows)}, "
-                 f"of {len(rows)}; held-out error at most {CLOSE} of the true law's {sum(bool(k) and max(k) <= CLOSE for k in known)} of {sum(map(bool, known))}; "
-                 f"slowest {max(r.seconds for r in rows):.0f} s")  # fmt: skip
+    lines.append(
+        f"first right {sum(r.first for r in rows)}, all found {sum(r.every for r in rows)}, without a false name {sum(not r.false for r in rows)}, "
+        f"of {len(rows)}; held-out error at most {CLOSE} of the true law's {sum(bool(k) and max(k) <= CLOSE for k in known)} of {sum(map(bool, known))}; "
+        f"slowest {max(r.seconds for r in rows):.0f} s"
+    )
     return "\n".join(lines)
 
 

@@ -138,14 +138,22 @@ def one_hand(seed: int, repeats: int, free: int, measure: bool, asked: float) ->
     ):
         found = touch.detect(fit, detector, log, trial.name, measure=measure)
         closing = touch.residuals(fit, log, trial.name)
-        rows.append({
-            "seed": seed, "object": AIR if trial.object.startswith(AIR) else trial.object, "stiffness": trial.stiffness,
-            "scores": [float(touch.cumulative_sum(z).max()) for _, _, z in closing], "threshold": detector.threshold,
-            "delay_s": found[0].detected_s - contact_s if found and contact_s is not None else None,
-            "ideal_delay_s": None if known is None else ideal_delay(*known, asked, truth.log.interval_s),
-            "alarms": len(found), "minutes": sum(float(m.time_s[-1] - touch.ALIGN_S) for m, _, _ in closing) / 60, "method": fit.method, "current_noise": fit.sigma_current,
-            "fitted": [[c.stiffness.value, *c.stiffness.ci95, c.kind] for c in found if c.stiffness],
-        })  # fmt: skip
+        rows.append(
+            {
+                "seed": seed,
+                "object": AIR if trial.object.startswith(AIR) else trial.object,
+                "stiffness": trial.stiffness,
+                "scores": [float(touch.cumulative_sum(z).max()) for _, _, z in closing],
+                "threshold": detector.threshold,
+                "delay_s": found[0].detected_s - contact_s if found and contact_s is not None else None,
+                "ideal_delay_s": None if known is None else ideal_delay(*known, asked, truth.log.interval_s),
+                "alarms": len(found),
+                "minutes": sum(float(m.time_s[-1] - touch.ALIGN_S) for m, _, _ in closing) / 60,
+                "method": fit.method,
+                "current_noise": fit.sigma_current,
+                "fitted": [[c.stiffness.value, *c.stiffness.ci95, c.kind] for c in found if c.stiffness],
+            }
+        )
     return rows
 
 
@@ -173,8 +181,11 @@ def main() -> None:
     for seed in range(args.first_seed, args.first_seed + args.hands):
         rows += one_hand(seed, args.repeats, args.free, args.stiffness, args.rate)
         air = [r for r in rows if r["object"] == AIR and r["seed"] == seed]
-        print(f"hand {seed}: {sum(r['alarms'] for r in air)} alarms in {sum(r['minutes'] for r in air):.1f} min, threshold {rows[-1]['threshold']:.1f}, "
-              f"largest {max(s for r in air for s in r['scores']):.1f}", flush=True)  # fmt: skip
+        print(
+            f"hand {seed}: {sum(r['alarms'] for r in air)} alarms in {sum(r['minutes'] for r in air):.1f} min, threshold {rows[-1]['threshold']:.1f}, "
+            f"largest {max(s for r in air for s in r['scores']):.1f}",
+            flush=True,
+        )
     pool = {k: np.array([s for r in rows if r["object"] == k for s in r["scores"]]) for k in (AIR, STIFF, COMPLIANT)}
     summary = {
         "hands": args.hands,
@@ -191,13 +202,26 @@ def main() -> None:
             for h in thresholds[:: max(1, len(thresholds) // 100)]
         ]
         summary[kind] = {
-            "area_under_curve": area_under_curve(pool[kind], pool[AIR]), "grasps": len(pool[kind]),
+            "area_under_curve": area_under_curve(pool[kind], pool[AIR]),
+            "grasps": len(pool[kind]),
             "missed": sum(r["delay_s"] is None for r in rows if r["object"] == kind),
-            "delay_ms": {q: 1e3 * float(np.quantile(delay, p)) for q, p in (("median", 0.5), ("p90", 0.9), ("max", 1.0))} if len(delay) else None,
-            "ideal_delay_ms": {q: 1e3 * float(np.quantile(ideal, p)) for q, p in (("median", 0.5), ("p90", 0.9), ("max", 1.0))} if len(ideal) else None,
-            "later_than_60_ms": [[r["seed"], r["stiffness"], r["delay_s"], r["ideal_delay_s"]] for r in rows if r["object"] == kind == STIFF and (r["delay_s"] or 9) > WANTED_S],
+            "delay_ms": {
+                q: 1e3 * float(np.quantile(delay, p)) for q, p in (("median", 0.5), ("p90", 0.9), ("max", 1.0))
+            }
+            if len(delay)
+            else None,
+            "ideal_delay_ms": {
+                q: 1e3 * float(np.quantile(ideal, p)) for q, p in (("median", 0.5), ("p90", 0.9), ("max", 1.0))
+            }
+            if len(ideal)
+            else None,
+            "later_than_60_ms": [
+                [r["seed"], r["stiffness"], r["delay_s"], r["ideal_delay_s"]]
+                for r in rows
+                if r["object"] == kind == STIFF and (r["delay_s"] or 9) > WANTED_S
+            ],
             "roc": curve,
-        }  # fmt: skip
+        }
     air = [r for r in rows if r["object"] == AIR]
     summary["false_alarms_per_minute"] = sum(r["alarms"] for r in air) / max(sum(r["minutes"] for r in air), 1e-9)
     summary["free_minutes"] = sum(r["minutes"] for r in air)

@@ -191,7 +191,8 @@ def test_where_no_finger_is_a_hinge_to_the_cameras_angles_tell_nothing() -> None
     ],
 )
 def test_angles_of_markers_that_leave_segments_or_hinge_need_names_that_leave_nothing(
-        finger: str, signal: str, p: float, other: float, doubtful: bool) -> None:  # fmt: skip
+    finger: str, signal: str, p: float, other: float, doubtful: bool
+) -> None:
     """At no station of that finger's angles: other is the p of the index's other one."""
 
     def station(finger: str, signal: str, p: float) -> SimpleNamespace:

@@ -120,8 +120,10 @@ def test_the_published_hands_are_mirror_images_within_what_the_thesis_says():
 
         def published(finger, side=side):
             axes, centres = published_joint(side, finger.name)
-            joints = [replace(j, name=n, axis_palm=a, centre_palm=c) for j, n, a, c in
-                      zip(finger.joints, ("proximal", "distal"), axes, centres, strict=True)]  # fmt: skip
+            joints = [
+                replace(j, name=n, axis_palm=a, centre_palm=c)
+                for j, n, a, c in zip(finger.joints, ("proximal", "distal"), axes, centres, strict=True)
+            ]
             return replace(finger, joints=tuple(joints), couplings=())
 
         hands[side] = replace(hand, fingers=tuple(published(f) for f in hand.fingers))

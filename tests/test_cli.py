@@ -72,8 +72,14 @@ def test_mistyped_command_and_option(capsys):
 def test_the_loop(loop):
     assert (loop / "compiled" / "bebionic_left.xml").is_file() and (loop / "compiled" / "bebionic_left.urdf").is_file()
     figures = json.loads((loop / "report" / "figures.json").read_text())
-    assert figures["trials"] == [{"name": "log/flexion_index_b.csv", "finger": "index", "held_out": True,
-                                  "frames": figures["trials"][0]["frames"]}]  # fmt: skip
+    assert figures["trials"] == [
+        {
+            "name": "log/flexion_index_b.csv",
+            "finger": "index",
+            "held_out": True,
+            "frames": figures["trials"][0]["frames"],
+        }
+    ]
     assert figures["fingers"]["index"]["encoder"]["over_noise"] < 1.3
     assert max(figures["agreement_m"].values()) < 1e-9
     assert (loop / "report" / "report.html").read_text().startswith("<!DOCTYPE html>")

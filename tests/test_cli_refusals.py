@@ -40,8 +40,11 @@ def rewrite_markers(file: Path, change) -> None:
     """Change the trajectories of a QTM TSV: change(dict label -> (n, 3) [mm]) in place."""
     lines = file.read_text().splitlines()
     names = next(line for line in lines if line.startswith("MARKER_NAMES")).split("\t")[1:]
-    start = next(i for i, line in enumerate(lines) if line and line.split("\t")[-1].strip().lstrip("-")[:1].isdigit()
-                 and len(line.split("\t")) >= 3 * len(names))  # fmt: skip
+    start = next(
+        i
+        for i, line in enumerate(lines)
+        if line and line.split("\t")[-1].strip().lstrip("-")[:1].isdigit() and len(line.split("\t")) >= 3 * len(names)
+    )
     table = [line.split("\t") for line in lines[start:]]
     lead = len(table[0]) - 3 * len(names)
     value = np.array([[float(v) if v else np.nan for v in row[lead:]] for row in table]).reshape(

@@ -122,14 +122,38 @@ def _exchange(links, a, b):
 
 
 MUTATIONS = [
-    sign_flipped, offset_dropped, axis_shifted, axis_shifted_by_10_micrometres, axis_tilted, axis_tilted_with_its_link,
-    limits_differ, limits_degrees, limits_mirrored, limits_exchanged, joints_exchanged_in_the_chain,
-    joints_exchanged_between_fingers, equality_reversed, coupling_differs, coupling_missing, link_displaced_at_the_tip,
-]  # fmt: skip
+    sign_flipped,
+    offset_dropped,
+    axis_shifted,
+    axis_shifted_by_10_micrometres,
+    axis_tilted,
+    axis_tilted_with_its_link,
+    limits_differ,
+    limits_degrees,
+    limits_mirrored,
+    limits_exchanged,
+    joints_exchanged_in_the_chain,
+    joints_exchanged_between_fingers,
+    equality_reversed,
+    coupling_differs,
+    coupling_missing,
+    link_displaced_at_the_tip,
+]
 CAUSES = (
-    "sign_flipped", "offset_dropped", "axis_shifted", "axis_tilted", "limits_differ", "limits_degrees", "limits_mirrored",
-    "limits_exchanged", "joints_exchanged", "equality_reversed", "coupling_differs", "coupling_missing", "link_displaced",
-)  # fmt: skip
+    "sign_flipped",
+    "offset_dropped",
+    "axis_shifted",
+    "axis_tilted",
+    "limits_differ",
+    "limits_degrees",
+    "limits_mirrored",
+    "limits_exchanged",
+    "joints_exchanged",
+    "equality_reversed",
+    "coupling_differs",
+    "coupling_missing",
+    "link_displaced",
+)
 
 
 def compare(correct, changed, folder, in_mjcf: bool, frames=None, **options):

@@ -132,9 +132,21 @@ def _moves(**more: float) -> Moves:
 
 
 PARAMETERS = {
-    **TRUTH, "presliding": 0.5, "bristle": 0.0, "speed_full": 115.0, "rise": 0.1, "fall": 0.1, "gain": 22.0, "damping": 3.0, "delay": 0.0, "lag": 0.0, "edge": 0.1,
-    "static_ratio": 1.0, "stribeck_speed": 20.0, "stribeck_exponent": 1.0,
-}  # fmt: skip
+    **TRUTH,
+    "presliding": 0.5,
+    "bristle": 0.0,
+    "speed_full": 115.0,
+    "rise": 0.1,
+    "fall": 0.1,
+    "gain": 22.0,
+    "damping": 3.0,
+    "delay": 0.0,
+    "lag": 0.0,
+    "edge": 0.1,
+    "static_ratio": 1.0,
+    "stribeck_speed": 20.0,
+    "stribeck_exponent": 1.0,
+}
 CASCADE = {
     "presliding": 0.0,
     "gain": 12.0,

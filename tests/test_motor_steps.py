@@ -20,10 +20,28 @@ from hand_model.identify.motor.moves import MoveData
 from hand_model.identify.motor.residuals import simulate_moves
 
 VALUES = {
-    "inertia": 0.0125, "viscous": 0.145, "coulomb": 34.0, "stiffness": 0.23, "preload": 9.0, "presliding": 0.0, "bristle": 0.0, "static_ratio": 1.0, "stribeck_speed": 20.0,
-    "stribeck_exponent": 1.0, "speed_full": 115.0, "rise": 0.08, "fall": 0.1, "gain": 12.0, "damping": 2.5, "delay": 5e-4, "lead": 5e-4, "lag": 0.0, "edge": 0.05,
-    "position_gain": 14.0, "deadband": 1.0,
-}  # fmt: skip
+    "inertia": 0.0125,
+    "viscous": 0.145,
+    "coulomb": 34.0,
+    "stiffness": 0.23,
+    "preload": 9.0,
+    "presliding": 0.0,
+    "bristle": 0.0,
+    "static_ratio": 1.0,
+    "stribeck_speed": 20.0,
+    "stribeck_exponent": 1.0,
+    "speed_full": 115.0,
+    "rise": 0.08,
+    "fall": 0.1,
+    "gain": 12.0,
+    "damping": 2.5,
+    "delay": 5e-4,
+    "lead": 5e-4,
+    "lag": 0.0,
+    "edge": 0.05,
+    "position_gain": 14.0,
+    "deadband": 1.0,
+}
 
 
 def _move(

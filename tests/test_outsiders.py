@@ -92,9 +92,15 @@ def test_a_weight_is_named_where_only_the_recording_kept_out_shows_another_pose(
     assert abs(np.hypot(size["along"]["value"], size["across"]["value"]) / load_raw - 1) < within
 
 
-@pytest.mark.parametrize(("shares", "p", "scattered"), [
-    ((0.3, 0.3, 0.2, 0.1, 0.1), 1e-4, True), ((0.6, 0.1, 0.1, 0.1, 0.1), 1e-4, False),
-    ((0.3, 0.3, 0.2, 0.1, 0.1), 0.2, False), ((0.4, 0.3, 0.3), 1e-4, False)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("shares", "p", "scattered"),
+    [
+        ((0.3, 0.3, 0.2, 0.1, 0.1), 1e-4, True),
+        ((0.6, 0.1, 0.1, 0.1, 0.1), 1e-4, False),
+        ((0.3, 0.3, 0.2, 0.1, 0.1), 0.2, False),
+        ((0.4, 0.3, 0.3), 1e-4, False),
+    ],
+)
 def test_many_pieces_that_do_not_do_are_no_explanation(shares: tuple[float, ...], p: float, scattered: bool) -> None:
     station = object.__new__(Station)
     station.naming = SimpleNamespace(after=SimpleNamespace(p=p), found=[SimpleNamespace(share=s) for s in shares])

@@ -27,8 +27,10 @@ def planted_load(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return planted(tmp_path_factory.mktemp("load") / "session", "load")
 
 
-@pytest.mark.parametrize(("effect", "name"), [("drag", "quadratic_damping"), ("offset", "asymmetric_friction"),
-                                              ("stribeck", "stribeck_friction")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("effect", "name"),
+    [("drag", "quadratic_damping"), ("offset", "asymmetric_friction"), ("stribeck", "stribeck_friction")],
+)
 def test_planted_effects_are_named_first(tmp_path: Path, effect: str, name: str) -> None:
     """What was planted leads the list, or is in its class, and the held-out error falls by a fifth or more."""
     findings = diagnose_rig(read_session(planted(tmp_path / "s", effect)))
@@ -78,12 +80,15 @@ def test_unsigned_torque_is_refused(tmp_path: Path) -> None:
     assert "no sign" in findings.findings[0].statement
 
 
-@pytest.mark.parametrize(("old", "new", "says"), [
-    ('"joint:hinge:position"', '"joint:hing:position"', 'did you mean "hinge"'),
-    ('"joint:hinge:position"', '"joint:hinge:posture"', "position"),
-    ('"actuator:motor:force"', '"motor.force"', "valid"),
-    ('position = "joint', 'angle = "joint', 'no column "angle"'),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ('"joint:hinge:position"', '"joint:hing:position"', 'did you mean "hinge"'),
+        ('"joint:hinge:position"', '"joint:hinge:posture"', "position"),
+        ('"actuator:motor:force"', '"motor.force"', "valid"),
+        ('position = "joint', 'angle = "joint', 'no column "angle"'),
+    ],
+)
 def test_wrong_signals_are_refused_with_a_hint(tmp_path: Path, old: str, new: str, says: str) -> None:
     """Each breach names what is wrong and what would be valid."""
     folder = planted(tmp_path / "s", trials=2, seconds=2.0)
@@ -133,8 +138,14 @@ def test_a_passive_session_without_validation_is_diagnosed(tmp_path: Path, zero:
         lane = Lane("x", False, np.zeros(n), 1.0, np.zeros(n), (start, 0.0), np.zeros(n), np.ones(n))
         swing = Swing((lane,), 0.981, 0.0, {"inertia": 0.022, "damping": 0.004, "coulomb": 0.004}, False)
         q = np.round((zero + simulate(swing, truth[None], np.array([0]))[:, 0]) / 2e-4) * 2e-4
-        np.savetxt(tmp_path / f"log/{k}.csv", np.stack([np.arange(n) * 2e-3, q], 1), delimiter=",", header="time,position",
-                   comments="", fmt="%.9g")  # fmt: skip
+        np.savetxt(
+            tmp_path / f"log/{k}.csv",
+            np.stack([np.arange(n) * 2e-3, q], 1),
+            delimiter=",",
+            header="time,position",
+            comments="",
+            fmt="%.9g",
+        )
         manifest += f'[[trial]]\nkind = "motion"\nlog = "log/{k}.csv"\n'
     (tmp_path / "session.toml").write_text(manifest)
     findings = diagnose_rig(read_session(tmp_path))

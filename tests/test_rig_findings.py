@@ -42,7 +42,11 @@ def test_a_rigs_findings_say_names_and_units_as_the_format_has_them() -> None:
     ]
     assert alternatives(rivals, "stribeck_friction") == (("detent_load", 0.5), ("torque_ripple", 0.1))
     assert rejection("load_dependent_friction/low speed@hinge", NOT_TAKEN) == {
-        "effect": "load_dependent_friction", "variant": "low speed", "where": "hinge", "reason": NOT_TAKEN}  # fmt: skip
+        "effect": "load_dependent_friction",
+        "variant": "low speed",
+        "where": "hinge",
+        "reason": NOT_TAKEN,
+    }
     values = {
         "drag": {"value": 0.5, "unit": "N s^2/m^2"},
         "form": {"value": 0.0, "unit": "1"},

@@ -20,8 +20,11 @@ from hand_model.rig.name.settled import settled
 from hand_model.session import read_session
 
 SIZE = 0.25
-LAWS = {MOTOR: lambda drive, load, bias: np.abs(drive), GEAR: lambda drive, load, bias: 0.5 * np.abs(drive + bias),
-        "": lambda drive, load, bias: np.abs(load)}  # fmt: skip
+LAWS = {
+    MOTOR: lambda drive, load, bias: np.abs(drive),
+    GEAR: lambda drive, load, bias: 0.5 * np.abs(drive + bias),
+    "": lambda drive, load, bias: np.abs(load),
+}
 
 
 def bench(

@@ -65,8 +65,14 @@ def test_a_held_torque_comes_late_in_a_log(rate_hz: float, late_s: float) -> Non
     what `rig_trial` takes for there, since a value holds for a millisecond and a log that keeps step with it reads it
     at the end."""
     law, stiff = Law(60.0, viscous=80.0), 60.0 * (2 * np.pi * 12) ** 2
-    track = one_joint(law, Drive(), follow(cycles(6, 0.0, 0.3, 2, 0.25), stiff, 1.2 * stiff / (2 * np.pi * 12), 1e5), 6.0, (0.0, 0.0),
-                      np.random.default_rng(0))  # fmt: skip
+    track = one_joint(
+        law,
+        Drive(),
+        follow(cycles(6, 0.0, 0.3, 2, 0.25), stiff, 1.2 * stiff / (2 * np.pi * 12), 1e5),
+        6.0,
+        (0.0, 0.0),
+        np.random.default_rng(0),
+    )
     at = np.arange(1, int(5.9 * rate_hz)) / rate_hz
     filtered = lambda x: low_pass(x, rate_hz, 20.0)
     velocity = np.gradient(np.interp(at, track.time_s, track.position[:, 0]), at)

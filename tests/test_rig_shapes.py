@@ -110,8 +110,17 @@ def test_two_effects_of_which_neither_alone_is_worth_a_name(tmp_path: Path) -> N
     them alone is not."""
     columns = {"detent_load": lambda q: np.sin(7 * q), "torque_ripple": lambda q: np.sin(7 * q) + 0.1 * np.cos(19 * q)}
     _, fit = with_load(tmp_path / "s", lambda q: columns["torque_ripple"](q) - columns["detent_load"](q))
-    rivals = [Candidate(name, "", "hinge", (("size", "effort", -np.inf, np.inf),), ({},), lambda r, s, c=column: c(r.position)[:, None])
-              for name, column in columns.items()]  # fmt: skip
+    rivals = [
+        Candidate(
+            name,
+            "",
+            "hinge",
+            (("size", "effort", -np.inf, np.inf),),
+            ({},),
+            lambda r, s, c=column: c(r.position)[:, None],
+        )
+        for name, column in columns.items()
+    ]
     terms, steps, _ = compete(pose(fit, "hinge"), rivals)
     assert {t.candidate.effect for t in terms} == set(columns) and len(steps) == 2
     assert not any(compete(pose(fit, "hinge"), [rival])[0] for rival in rivals)

@@ -18,8 +18,9 @@ from hand_model.session import read_session
 def test_simulation_agrees_with_mujoco(tmp_path: Path) -> None:
     """A free pendulum with friction: the batch simulator and MuJoCo's replay of the written file are the same
     motion."""
-    text = (PENDULUM.replace('<actuator><motor name="motor" joint="hinge"/></actuator>', "")
-            .replace('frictionloss="0.05"', 'frictionloss="0.02"'))  # fmt: skip
+    text = PENDULUM.replace('<actuator><motor name="motor" joint="hinge"/></actuator>', "").replace(
+        'frictionloss="0.05"', 'frictionloss="0.02"'
+    )
     (tmp_path / "log").mkdir()
     (tmp_path / "rig.xml").write_text(text)
     inertia, weight = 0.022, 0.5 * 0.2 * 9.81

@@ -56,11 +56,15 @@ def _reaches(side: tuple) -> tuple[float, ...]:
     return tuple(t.shape["reach"] for t in side[1])
 
 
-@pytest.mark.parametrize(("errors", "whole", "holds"), [
-    ({(): 1.0, (5.0,): 0.5, (1.0, 2.0): 0.3}, {(): 1.0, (5.0,): 0.5, (1.0, 2.0): 0.3}, [1.0, 2.0]),
-    ({(): 1.0, (5.0,): 0.3, (1.0, 2.0): 0.32, (1.0,): 0.9}, {(): 1.0, (5.0,): 0.3}, [5.0]),
-    ({(): 1.0, (5.0,): 0.5, (1.0, 2.0): 0.3}, {(): 1.0, (5.0,): 0.5, (1.0, 2.0): 0.6}, [5.0]),
-], ids=["both help", "the first does as well in a shape of its own", "others pay for it"])  # fmt: skip
+@pytest.mark.parametrize(
+    ("errors", "whole", "holds"),
+    [
+        ({(): 1.0, (5.0,): 0.5, (1.0, 2.0): 0.3}, {(): 1.0, (5.0,): 0.5, (1.0, 2.0): 0.3}, [1.0, 2.0]),
+        ({(): 1.0, (5.0,): 0.3, (1.0, 2.0): 0.32, (1.0,): 0.9}, {(): 1.0, (5.0,): 0.3}, [5.0]),
+        ({(): 1.0, (5.0,): 0.5, (1.0, 2.0): 0.3}, {(): 1.0, (5.0,): 0.5, (1.0, 2.0): 0.6}, [5.0]),
+    ],
+    ids=["both help", "the first does as well in a shape of its own", "others pay for it"],
+)
 def test_an_effect_is_held_to_what_stands_at_its_best_without_it(
     monkeypatch: pytest.MonkeyPatch, errors: dict, whole: dict, holds: list
 ) -> None:
@@ -83,8 +87,16 @@ def test_what_stands_at_a_joint_keeps_its_shape_when_another_joint_is_asked(monk
     assert [r["effect"] for r in rejected] == ["b@elbow"]
 
 
-@pytest.mark.parametrize(("told", "against"), [({"ratio": 0.9}, False), ({"ratio": 1.001}, False), ({"ratio": 1.2}, True), ({"not_run": "no law in open loop for x"}, True),
-                                              ({"not_run": "a simulation leaves the recordings"}, False)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("told", "against"),
+    [
+        ({"ratio": 0.9}, False),
+        ({"ratio": 1.001}, False),
+        ({"ratio": 1.2}, True),
+        ({"not_run": "no law in open loop for x"}, True),
+        ({"not_run": "a simulation leaves the recordings"}, False),
+    ],
+)
 def test_a_motion_that_hardly_depends_on_an_effect_says_nothing_against_it(
     monkeypatch: pytest.MonkeyPatch, told: dict, against: bool
 ) -> None:
@@ -109,15 +121,30 @@ def test_a_delay_at_the_end_of_those_tried_is_none(delay: float, beyond: bool) -
 def _load(effect: str, joint: str, before: float, after: float, share: float, signal: str = "effort") -> Finding:
     fit = {"before": before, "after": after, "ci95_reduction": [0.1, 0.4]}
     value = {"value": 1.0, "unit": "N m", "ci95": None}
-    return Finding(effect, (effect, "stribeck_friction"), 0.98, (), {"joint": joint, "signal": signal, "share_of_mismatch": share},
-                   f"{effect} at {joint}.", {"load": value}, fit, {"native": False})  # fmt: skip
+    return Finding(
+        effect,
+        (effect, "stribeck_friction"),
+        0.98,
+        (),
+        {"joint": joint, "signal": signal, "share_of_mismatch": share},
+        f"{effect} at {joint}.",
+        {"load": value},
+        fit,
+        {"native": False},
+    )
 
 
 def test_on_one_path_all_loads_tied_to_a_joint_are_one_name() -> None:
     """A spring, a detent and a ripple at one joint bend one curve; other joints, other effects and angles of couplings
     stay as they are."""
-    found = [_load("nonlinear_spring", "a", 5.0, 4.0, 0.5), _load("asymmetric_friction", "a", 4.0, 3.5, 0.2), _load("detent_load", "b", 1.0, 0.5, 0.9),
-             _load("detent_load", "a", 3.5, 2.5, 0.2), _load("torque_ripple", "a", 2.5, 2.0, 0.1), _load("torque_ripple", "a", 2.0, 1.0, 0.1, "position")]  # fmt: skip
+    found = [
+        _load("nonlinear_spring", "a", 5.0, 4.0, 0.5),
+        _load("asymmetric_friction", "a", 4.0, 3.5, 0.2),
+        _load("detent_load", "b", 1.0, 0.5, 0.9),
+        _load("detent_load", "a", 3.5, 2.5, 0.2),
+        _load("torque_ripple", "a", 2.5, 2.0, 0.1),
+        _load("torque_ripple", "a", 2.0, 1.0, 0.1, "position"),
+    ]
     merged = one_load_each(found)
     assert [(f.effect, f.where["joint"]) for f in merged] == [
         ("nonlinear_spring", "a"),

@@ -46,8 +46,10 @@ def session(folder: Path, drive: str, column: str, logs: list[np.ndarray], heade
     (folder / "log").mkdir(parents=True)
     (folder / "rig.xml").write_text(BENCH.format(drive=drive))
     quantity = "ctrl" if drive == VOLTAGE else "force"
-    text = ('format = "hand-session/1"\n[hand]\nname = "bench"\n[rig]\nmodel = "rig.xml"\n[signals]\n'
-            f'position = "joint:hinge:position"\n{column} = "actuator:motor:{quantity}"\n')  # fmt: skip
+    text = (
+        'format = "hand-session/1"\n[hand]\nname = "bench"\n[rig]\nmodel = "rig.xml"\n[signals]\n'
+        f'position = "joint:hinge:position"\n{column} = "actuator:motor:{quantity}"\n'
+    )
     for k, table in enumerate(logs):
         np.savetxt(folder / f"log/{k}.csv", table, delimiter=",", header=header, comments="", fmt="%.10g")
         text += f'[[trial]]\nkind = "motion"\nlog = "log/{k}.csv"\n' + (OWN if k % 2 else "")
@@ -164,8 +166,17 @@ def test_evidence_takes_the_simplest_of_equals_and_nothing_from_noise() -> None:
     assert said.chosen == 1 and said.probability == 1.0 and set(said.close) == {0, 1}
 
 
-SIZE = {"asymmetric_friction": 0.3, "asymmetric_viscous_friction": -0.2, "quadratic_damping": 0.1, "stribeck_friction": 0.4,
-        "elastoplastic_hysteresis": 0.7, "nonlinear_spring": 0.5, "end_stop_contact": 2.0, "torque_ripple": 0.3, "detent_load": 0.6}  # fmt: skip
+SIZE = {
+    "asymmetric_friction": 0.3,
+    "asymmetric_viscous_friction": -0.2,
+    "quadratic_damping": 0.1,
+    "stribeck_friction": 0.4,
+    "elastoplastic_hysteresis": 0.7,
+    "nonlinear_spring": 0.5,
+    "end_stop_contact": 2.0,
+    "torque_ripple": 0.3,
+    "detent_load": 0.6,
+}
 
 
 @pytest.mark.parametrize("name", SIZE)
@@ -213,8 +224,19 @@ def test_motion_in_open_loop_falls_with_what_was_found(torque_bench: Path) -> No
     fit = fit_declared(rig)
     theta = solution(pose(fit), ())
     before = Bench(rig).file(fit, (), theta)
-    after = write_effects(before, [*read_effects(before), {"effect": "asymmetric_friction", "variant": "", "joint": "hinge",
-                                                           "shape": {}, "amplitude": {"offset": 0.05}}])  # fmt: skip
+    after = write_effects(
+        before,
+        [
+            *read_effects(before),
+            {
+                "effect": "asymmetric_friction",
+                "variant": "",
+                "joint": "hinge",
+                "shape": {},
+                "amplitude": {"offset": 0.05},
+            },
+        ],
+    )
     told = open_loop(rig, before, after)
     assert told["held_out"] == ["log/3.csv"] and told["ratio"] < 0.6
     assert "not_run" in open_loop(rig, before, after, {("log/3.csv", "hinge")})
@@ -304,8 +326,10 @@ def test_lost_motion_between_encoders_makes_no_load(tmp_path: Path) -> None:
             random.uniform([0.4, 0.1], [0.7, 0.2]),
             random.uniform(0, 6, 2),
         )
-        near, speed, acceleration = (sum(s * w_**d * np.sin(w_ * t + p + d * np.pi / 2) for s, w_, p in zip(size, w, phase, strict=True))
-                                     for d in range(3))  # fmt: skip
+        near, speed, acceleration = (
+            sum(s * w_**d * np.sin(w_ * t + p + d * np.pi / 2) for s, w_, p in zip(size, w, phase, strict=True))
+            for d in range(3)
+        )
         far, slack = np.empty(len(t)), near[0]
         for i, q in enumerate(near):
             slack = min(max(slack, q - 0.015), q + 0.015)

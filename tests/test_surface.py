@@ -226,11 +226,18 @@ def recorded(tmp_path_factory):
 def _known(truth):
     """The hand as it is, so that a surface's errors are its own."""
     fingers = tuple(
-        Finger(f.name, f.actuator, tuple(
-            Joint(j.name, j.axis_palm, j.centre_palm, 1e-8 * np.eye(6), (0.0, 1.2), j.markers_palm) for j in f.joints
-        ), (), (Coupling("proximal", "distal", np.array(f.distal_rad), {}, {}),))
+        Finger(
+            f.name,
+            f.actuator,
+            tuple(
+                Joint(j.name, j.axis_palm, j.centre_palm, 1e-8 * np.eye(6), (0.0, 1.2), j.markers_palm)
+                for j in f.joints
+            ),
+            (),
+            (Coupling("proximal", "distal", np.array(f.distal_rad), {}, {}),),
+        )
         for f in truth.fingers
-    )  # fmt: skip
+    )
     return Hand("swept", truth.side, truth.palm_markers_palm, truth.landmarks_palm, fingers, 1e-4, {})
 
 

@@ -127,11 +127,22 @@ def _write_motor(root: Any, finger: Finger, motor: Motor, scale: float | None) -
     )
     rotor = _free(root, f"{name}_motor")
     joint = child(
-        link, "joint", name=rotor, type="hinge", pos=(0, 0, 0), axis=(0, 0, 1), ref="0", limited=True, range=TRAVEL,
-        solreflimit=SOLREF, solimplimit=SOLIMP,
-        armature=unit * value["inertia"], damping=unit * max(value["viscous"], 0.0), stiffness=unit * max(value["stiffness"], 0.0),
+        link,
+        "joint",
+        name=rotor,
+        type="hinge",
+        pos=(0, 0, 0),
+        axis=(0, 0, 1),
+        ref="0",
+        limited=True,
+        range=TRAVEL,
+        solreflimit=SOLREF,
+        solimplimit=SOLIMP,
+        armature=unit * value["inertia"],
+        damping=unit * max(value["viscous"], 0.0),
+        stiffness=unit * max(value["stiffness"], 0.0),
         springref=-value["preload"] / value["stiffness"] if value["stiffness"] > 0 else 0.0,
-    )  # fmt: skip
+    )
     arm = _child_body(
         palm,
         _free(root, f"{name}_drive_link"),
@@ -142,9 +153,15 @@ def _write_motor(root: Any, finger: Finger, motor: Motor, scale: float | None) -
     coefficients = np.zeros(5)
     coefficients[: len(angle)] = angle
     child(
-        _section(root, "equality"), "joint", name=_free(root, f"{name}_map"), joint1=lever, joint2=rotor,
-        polycoef=coefficients, solref=SOLREF, solimp=SOLIMP,
-    )  # fmt: skip
+        _section(root, "equality"),
+        "joint",
+        name=_free(root, f"{name}_map"),
+        joint1=lever,
+        joint2=rotor,
+        polycoef=coefficients,
+        solref=SOLREF,
+        solimp=SOLIMP,
+    )
     _write_push(root, name, proximal, lever)
     _write_actuator(root, name, proximal.get("name"), motor, unit, rotor)
     lugre = _write_friction(root, joint, name, value, unit)
@@ -186,9 +203,17 @@ def _write_push(root: Any, name: str, proximal: Any, lever: str) -> None:
         position = np.array([float(x) for x in (inertial.get("pos") or "0 0 0").split()])
         inertia = float(inertial.get("mass")) * float(position @ position) + 1e-6
     tendon = child(
-        _section(root, "tendon"), "fixed", name=_free(root, f"{name}_push"), limited=True, range=(0.0, 10.0), stiffness=inertia * YIELD_RATE**2,
-        damping=2 * inertia * YIELD_RATE, springlength=0.0, solreflimit=SOLREF, solimplimit=SOLIMP,
-    )  # fmt: skip
+        _section(root, "tendon"),
+        "fixed",
+        name=_free(root, f"{name}_push"),
+        limited=True,
+        range=(0.0, 10.0),
+        stiffness=inertia * YIELD_RATE**2,
+        damping=2 * inertia * YIELD_RATE,
+        springlength=0.0,
+        solreflimit=SOLREF,
+        solimplimit=SOLIMP,
+    )
     child(tendon, "joint", joint=proximal.get("name"), coef=1.0)
     child(tendon, "joint", joint=lever, coef=-1.0)
 
@@ -203,9 +228,21 @@ def _write_friction(root: Any, joint: Any, name: str, value: dict[str, float], u
     bristle = value["coulomb"] * unit / max(presliding, PRESLIDING_LEAST)
     coulomb = unit * value["coulomb"]
     child(
-        _section(root, "actuator"), "dcmotor", name=_free(root, f"{name}_friction"), joint=joint.get("name"), input="none", motorconst=(0.0, 0.0),
-        resistance=1.0, lugre=(bristle, value.get("bristle", 0.0) * bristle, coulomb, coulomb * ratio, value.get("stribeck_speed", 20.0)),
-    )  # fmt: skip
+        _section(root, "actuator"),
+        "dcmotor",
+        name=_free(root, f"{name}_friction"),
+        joint=joint.get("name"),
+        input="none",
+        motorconst=(0.0, 0.0),
+        resistance=1.0,
+        lugre=(
+            bristle,
+            value.get("bristle", 0.0) * bristle,
+            coulomb,
+            coulomb * ratio,
+            value.get("stribeck_speed", 20.0),
+        ),
+    )
     return True
 
 
@@ -222,6 +259,14 @@ def _write_actuator(root: Any, name: str, proximal: str, motor: Motor, unit: flo
         section, f"{name}: force is the current; ctrl is the reference [%] plus {damping / gain!r} s times its velocity"
     )
     child(
-        section, "general", name=name, joint=rotor, gaintype="fixed", gainprm=(unit * gain,), biastype="affine",
-        biasprm=(0.0, -unit * gain, -unit * damping), ctrlrange=(-50.0, 150.0), forcerange=(-unit * limit, unit * limit),
-    )  # fmt: skip
+        section,
+        "general",
+        name=name,
+        joint=rotor,
+        gaintype="fixed",
+        gainprm=(unit * gain,),
+        biastype="affine",
+        biasprm=(0.0, -unit * gain, -unit * damping),
+        ctrlrange=(-50.0, 150.0),
+        forcerange=(-unit * limit, unit * limit),
+    )

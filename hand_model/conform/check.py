@@ -93,10 +93,23 @@ def conform(
         evaluated += "; " + verify((tree_a, tree_b), values, dict(given.joints), engines)
     turn = np.degrees(_angle(at.base[:3, :3]))
     return ConformReport(
-        str(a), str(b), ok, tuple(findings), _joint_rows(tree_a, tree_b, given, f, at), tuple(links), given.base,
-        tuple(at.base[:3, 3] * 1e3), float(turn), "pair.toml" if given.explicit else "automatic", given.unpaired, poses, evaluated,
-        float(explained), time.perf_counter() - start, _warnings(tree_a, tree_b),
-    )  # fmt: skip
+        str(a),
+        str(b),
+        ok,
+        tuple(findings),
+        _joint_rows(tree_a, tree_b, given, f, at),
+        tuple(links),
+        given.base,
+        tuple(at.base[:3, 3] * 1e3),
+        float(turn),
+        "pair.toml" if given.explicit else "automatic",
+        given.unpaired,
+        poses,
+        evaluated,
+        float(explained),
+        time.perf_counter() - start,
+        _warnings(tree_a, tree_b),
+    )
 
 
 def main_check(
@@ -196,9 +209,16 @@ def _link_row(x: str, y: str, one: tuple[Array, Array], other: tuple[Array, Arra
     shift = np.median(local, axis=0)
     rest = np.linalg.norm(local - shift, axis=-1)
     return LinkRow(
-        x, y, y, tuple(float(v) for v in shift * 1e3), float(np.degrees(_angle(mean))), float(np.linalg.norm(raw, axis=-1).max() * 1e3),
-        float(np.degrees(_angle(relative).max())), float(rest.max() * 1e3), float(np.degrees(_angle(mean.T @ relative).max())),
-    )  # fmt: skip
+        x,
+        y,
+        y,
+        tuple(float(v) for v in shift * 1e3),
+        float(np.degrees(_angle(mean))),
+        float(np.linalg.norm(raw, axis=-1).max() * 1e3),
+        float(np.degrees(_angle(relative).max())),
+        float(rest.max() * 1e3),
+        float(np.degrees(_angle(mean.T @ relative).max())),
+    )
 
 
 def _angle(rotation: Array) -> Array:
@@ -227,10 +247,19 @@ def _joint_rows(a: Tree, b: Tree, pairing: Pairing, f: Features, at: Alignment) 
     rows = []
     for (x, y), fit in zip(f.names, at.fits, strict=True):
         how = pairing.how.get(x, "") if before[x] == y else "its axis"
-        rows.append(JointRow(
-            x, y, how, float(np.degrees(fit.angle_rad)), fit.shift * 1e3, fit.sign, float(np.degrees(fit.offset)),
-            a.joint(x).limits, b.joint(y).limits,
-        ))  # fmt: skip
+        rows.append(
+            JointRow(
+                x,
+                y,
+                how,
+                float(np.degrees(fit.angle_rad)),
+                fit.shift * 1e3,
+                fit.sign,
+                float(np.degrees(fit.offset)),
+                a.joint(x).limits,
+                b.joint(y).limits,
+            )
+        )
     return tuple(rows)
 
 

@@ -123,6 +123,17 @@ def mirrored(f: Features) -> Features:
     """The same features with b reflected in its xz plane (axes are axial vectors, so they turn over as well)."""
     flip = np.diag([1.0, -1.0, 1.0])
     return Features(
-        f.names, f.axes_a, f.points_a, -f.axes_b @ flip, f.points_b @ flip, f.parent, f.parent_b, f.slide,
-        {-1: f.frames[-1][:1]}, {}, f.slack_a, f.slack_b, f.children,
-    )  # fmt: skip
+        f.names,
+        f.axes_a,
+        f.points_a,
+        -f.axes_b @ flip,
+        f.points_b @ flip,
+        f.parent,
+        f.parent_b,
+        f.slide,
+        {-1: f.frames[-1][:1]},
+        {},
+        f.slack_a,
+        f.slack_b,
+        f.children,
+    )

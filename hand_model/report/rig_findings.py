@@ -24,8 +24,18 @@ Array = NDArray[np.float64]
 CELLS = (28, 20)  # of a map, along position and velocity
 BINS = 32
 PICTURES = 8
-BY_POSITION = frozenset({"nonlinear_spring", "end_stop_contact", "detent_load", "torque_ripple", "gravity_load",
-                         "position_dependent_friction", "elastoplastic_hysteresis", "viscoelastic_spring"})  # fmt: skip
+BY_POSITION = frozenset(
+    {
+        "nonlinear_spring",
+        "end_stop_contact",
+        "detent_load",
+        "torque_ripple",
+        "gravity_load",
+        "position_dependent_friction",
+        "elastoplastic_hysteresis",
+        "viscoelastic_spring",
+    }
+)
 BY_TIME = frozenset({"thermal_friction_drift"})
 Pair = tuple[EffortResidual, EffortResidual]
 
@@ -58,16 +68,20 @@ def rig_findings_page(session: Session, findings: RigFindings) -> bytes:
             _rest(findings),
         )
     )
-    lead = (f"{session.path.name}: the declared model, fitted, against {count(len(rig.trials), 'trial')}; what is named below "
-            "was chosen on the training trials and measured on the others, by MuJoCo on the written files.")  # fmt: skip
+    lead = (
+        f"{session.path.name}: the declared model, fitted, against {count(len(rig.trials), 'trial')}; what is named below "
+        "was chosen on the training trials and measured on the others, by MuJoCo on the written files."
+    )
     return page(session.hand or session.path.name, lead, _tiles(findings), sections)
 
 
 def _tiles(findings: RigFindings) -> list[tuple[str, str]]:
     lack, tiles = findings.lack_of_fit, [(findings.verdict, "verdict")]
     if lack.get("before"):
-        tiles += [(f"{lack['after'] / lack['before']:.2f}", "held-out error, all effects over declared"),
-                  (f"{lack['one_effect'] / lack['before']:.2f}", "with the first effect alone")]  # fmt: skip
+        tiles += [
+            (f"{lack['after'] / lack['before']:.2f}", "held-out error, all effects over declared"),
+            (f"{lack['one_effect'] / lack['before']:.2f}", "with the first effect alone"),
+        ]
     return tiles
 
 
@@ -85,10 +99,17 @@ def _findings(findings: RigFindings) -> list[Element]:
     rows = []
     for f in findings.findings:
         known = f.fit["before"] is not None
-        rows.append([f.where.get("joint") or "", f.effect.replace("_", " "),
-                     Cell(", ".join(m.replace("_", " ") for m in f.members if m != f.effect) or "–", "wrap"), f"{f.probability:.2f}",
-                     f"{f.fit['before']:.4g}" if known else "–", f"{f.fit['after']:.4g}" if known else "–",
-                     f.fit.get("unit") or ""])  # fmt: skip
+        rows.append(
+            [
+                f.where.get("joint") or "",
+                f.effect.replace("_", " "),
+                Cell(", ".join(m.replace("_", " ") for m in f.members if m != f.effect) or "–", "wrap"),
+                f"{f.probability:.2f}",
+                f"{f.fit['before']:.4g}" if known else "–",
+                f"{f.fit['after']:.4g}" if known else "–",
+                f.fit.get("unit") or "",
+            ]
+        )
     head = ("joint", "effect", "not told from", "probability", "held-out error before", "after", "unit")
     parts = (
         [table(head, rows, "By share of the mismatch; each was measured beside those found before it", text_columns=3)]
@@ -116,8 +137,17 @@ def _map(rig: RigModel, pairs: Sequence[Pair]) -> Section:
         improved = np.concatenate([b.error for _, b in mine])
         drawn.append((f"{joint}: with what was found", _cells(q, v, improved, before, rig, joint)))
     words = "Mean residual effort over position and velocity, all trials: what the declared model leaves has a shape."
-    return Section("map", "Map of the mismatch", words, (figures(*drawn), note(
-        "Red: more effort recorded than simulated; blue: less. Both pictures of a joint share the scale in brackets.")))  # fmt: skip
+    return Section(
+        "map",
+        "Map of the mismatch",
+        words,
+        (
+            figures(*drawn),
+            note(
+                "Red: more effort recorded than simulated; blue: less. Both pictures of a joint share the scale in brackets."
+            ),
+        ),
+    )
 
 
 def _states(r: EffortResidual) -> tuple[Array, Array, Array]:
@@ -183,9 +213,12 @@ def _through(joint: str, variable: str, held: Sequence[Pair], rig: RigModel) -> 
     after = np.concatenate([b.error for _, b in held])
     time_s = np.concatenate([a.row.time_s[:: a.row.step][a.row.moving] for a, _ in held])
     load = np.concatenate([a.expected[a.row.moving] for a, _ in held])
-    x, label = {"position": (q, f"position [{rig.unit(joint)}]"), "time": (time_s, "time [s]"),
-                "load": (load * np.sign(v), f"declared effort along the motion [{rig.effort_unit(joint)}]"),
-                "velocity": (v, f"velocity [{rig.unit(joint)}/s]")}[variable]  # fmt: skip
+    x, label = {
+        "position": (q, f"position [{rig.unit(joint)}]"),
+        "time": (time_s, "time [s]"),
+        "load": (load * np.sign(v), f"declared effort along the motion [{rig.effort_unit(joint)}]"),
+        "velocity": (v, f"velocity [{rig.unit(joint)}/s]"),
+    }[variable]
     return _sides(x, label, before, after, f"residual [{rig.effort_unit(joint)}]")
 
 
@@ -216,8 +249,17 @@ def _binned(x: Array, y: Array) -> tuple[Array, Array, Array, Array]:
 
 def _validation(rig: RigModel, findings: RigFindings, pairs: Sequence[Pair]) -> Section:
     held = [p for p in pairs if p[0].validate] or list(pairs)
-    rows = [[a.trial, a.joint, f"{_rms(a.error):.4g}", f"{_rms(b.error):.4g}", f"{_rms(b.error) / max(_rms(a.error), 1e-300):.2f}",
-             rig.effort_unit(a.joint)] for a, b in held]  # fmt: skip
+    rows = [
+        [
+            a.trial,
+            a.joint,
+            f"{_rms(a.error):.4g}",
+            f"{_rms(b.error):.4g}",
+            f"{_rms(b.error) / max(_rms(a.error), 1e-300):.2f}",
+            rig.effort_unit(a.joint),
+        ]
+        for a, b in held
+    ]
     drawn = []
     for a, b in list({a.joint: (a, b) for a, b in held}.values())[:PICTURES]:
         grid = a.row.time_s[:: a.row.step]
@@ -237,10 +279,17 @@ def _validation(rig: RigModel, findings: RigFindings, pairs: Sequence[Pair]) -> 
     words = (
         f"Effort by inverse dynamics of the two files on {count(len({a.trial for a, _ in held}), 'trial')} held out."
     )
-    return Section("validation", "Before and after", words, (
-        table(head, rows, "Root mean square of the effort error, moving samples", text_columns=2),
-        key(("c2", "recorded"), ("c1", "declared model"), ("ink", "with what was found")), figures(*drawn),
-        *_open_loop(findings)))  # fmt: skip
+    return Section(
+        "validation",
+        "Before and after",
+        words,
+        (
+            table(head, rows, "Root mean square of the effort error, moving samples", text_columns=2),
+            key(("c2", "recorded"), ("c1", "declared model"), ("ink", "with what was found")),
+            figures(*drawn),
+            *_open_loop(findings),
+        ),
+    )
 
 
 def _open_loop(findings: RigFindings) -> list[Element]:
@@ -251,8 +300,10 @@ def _open_loop(findings: RigFindings) -> list[Element]:
     if "not_run" in told:
         return [note(f"Motion not simulated in open loop: {told['not_run']}.")]
     how = "over whole trials" if told["horizon_s"] == "whole" else f"over {told['horizon_s']:g} s from recorded states"
-    rows = [[j, f"{p['before']:.4g}", f"{p['after']:.4g}", f"{p['after'] / max(p['before'], 1e-300):.2f}", p["unit"]]
-            for j, p in told["joints"].items()]  # fmt: skip
+    rows = [
+        [j, f"{p['before']:.4g}", f"{p['after']:.4g}", f"{p['after'] / max(p['before'], 1e-300):.2f}", p["unit"]]
+        for j, p in told["joints"].items()
+    ]
     head = ("joint", "declared", "with what was found", "ratio", "unit")
     return [
         table(head, rows, f"Root mean square position error, simulated by MuJoCo in open loop {how}", text_columns=1)
@@ -266,8 +317,12 @@ def _couplings(residuals: Sequence[CouplingResidual]) -> Section:
     for c in residuals:
         scale = f"± {_limit(c.before):.2g} {c.unit}"
         for words, values in ((f"declared polynomial ({scale})", c.before), ("with what was found", c.after)):
-            drawn.append((f"{c.coupling}: {words}", _field(c.position, c.velocity, values, _limit(c.before),
-                                                           "position upstream", "velocity upstream")))  # fmt: skip
+            drawn.append(
+                (
+                    f"{c.coupling}: {words}",
+                    _field(c.position, c.velocity, values, _limit(c.before), "position upstream", "velocity upstream"),
+                )
+            )
         x, label = (c.velocity, "velocity upstream") if c.load is None else (c.load, "load [N m or N]")
         drawn.append((f"{c.coupling}: residual", _sides(x, label, c.before, c.after, f"residual [{c.unit}]")))
         one = c.trial == c.trial[0]
@@ -282,12 +337,21 @@ def _couplings(residuals: Sequence[CouplingResidual]) -> Section:
             mine = c.trial == name
             a, b = _rms(c.before[mine]), _rms(c.after[mine])
             rows.append([str(name), c.coupling, f"{a:.4g}", f"{b:.4g}", f"{b / max(a, 1e-300):.2f}", c.unit])
-    words = ("What the angle of one encoder leaves of the next along the transmission, on the trials held out: lost motion turns "
-             "over with the direction, stretch follows the load.")  # fmt: skip
+    words = (
+        "What the angle of one encoder leaves of the next along the transmission, on the trials held out: lost motion turns "
+        "over with the direction, stretch follows the load."
+    )
     head = ("trial", "coupling", "declared polynomial", "with what was found", "ratio", "unit")
-    return Section("couplings", "Between the encoders", words, (
-        key(("c1", "declared polynomial"), ("ink", "with what was found")), figures(*drawn),
-        table(head, rows, "Root mean square of the angle error", text_columns=2)))  # fmt: skip
+    return Section(
+        "couplings",
+        "Between the encoders",
+        words,
+        (
+            key(("c1", "declared polynomial"), ("ink", "with what was found")),
+            figures(*drawn),
+            table(head, rows, "Root mean square of the angle error", text_columns=2),
+        ),
+    )
 
 
 def _rms(values: Array) -> float:
@@ -315,14 +379,32 @@ def _motion(rig: RigModel, findings: RigFindings) -> list[Section]:
         drawn.append((trial.name, d.svg))
     q, v, before, after = np.concatenate(states, 1)
     scale = f"± {_limit(before):.2g} {rig.unit(joint)}"
-    maps = figures((f"declared model ({scale})", _cells(q, v, before, before, rig, joint)),
-                   (f"with what was found ({scale})", _cells(q, v, after, before, rig, joint)))  # fmt: skip
-    shape = Section("map", "Map of the mismatch", "Mean position error of the simulation over recorded position and velocity, "
-                    "trials held out.", (maps, note("Red: recorded ahead of simulated; blue: behind.")))  # fmt: skip
+    maps = figures(
+        (f"declared model ({scale})", _cells(q, v, before, before, rig, joint)),
+        (f"with what was found ({scale})", _cells(q, v, after, before, rig, joint)),
+    )
+    shape = Section(
+        "map",
+        "Map of the mismatch",
+        "Mean position error of the simulation over recorded position and velocity, trials held out.",
+        (maps, note("Red: recorded ahead of simulated; blue: behind.")),
+    )
     words = "Motion simulated by MuJoCo in open loop over whole trials, from the recorded start."
-    return [shape, Section("validation", "Before and after", words, (
-        table(("trial", "declared", "with what was found", "ratio"), rows, f"Position rmse [{rig.unit(joint)}]"),
-        key(("c2", "recorded"), ("c1", "declared model"), ("ink", "with what was found")), figures(*drawn[:PICTURES])))]  # fmt: skip
+    return [
+        shape,
+        Section(
+            "validation",
+            "Before and after",
+            words,
+            (
+                table(
+                    ("trial", "declared", "with what was found", "ratio"), rows, f"Position rmse [{rig.unit(joint)}]"
+                ),
+                key(("c2", "recorded"), ("c1", "declared model"), ("ink", "with what was found")),
+                figures(*drawn[:PICTURES]),
+            ),
+        ),
+    ]
 
 
 def _tried(rejected: Mapping[str, str]) -> str:
@@ -332,8 +414,10 @@ def _tried(rejected: Mapping[str, str]) -> str:
 
 
 def _rest(findings: RigFindings) -> tuple[Element, ...]:
-    said = [f"{u['where']['joint'] or 'the joint'}: {100 * u['share_of_mismatch']:.0f} % of the mismatch stays unexplained."
-            for u in findings.unexplained]  # fmt: skip
+    said = [
+        f"{u['where']['joint'] or 'the joint'}: {100 * u['share_of_mismatch']:.0f} % of the mismatch stays unexplained."
+        for u in findings.unexplained
+    ]
     withdrawn = [
         f"{_tried(r)}{' at ' + r['where'] if 'where' in r else ''}: {r['reason']}."
         for r in findings.rejected

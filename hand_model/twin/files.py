@@ -52,11 +52,17 @@ def _cells(position: Array, digits: int) -> list[list[str]]:
 
 def _write_tsv(path: Path, labels: list[str], position: Array, rate_hz: float, unit: str) -> None:
     head = [
-        ["NO_OF_FRAMES", len(position)], ["NO_OF_CAMERAS", 8],
-        ["NO_OF_MARKERS", len(labels)], ["FREQUENCY", f"{rate_hz:g}"],
-        ["NO_OF_ANALOG", 0], ["ANALOG_FREQUENCY", 0], ["DESCRIPTION", "--"], ["TIME_STAMP", "2024-01-01, 12:00:00"],
-        ["DATA_INCLUDED", "3D"], ["MARKER_NAMES", *labels],
-    ]  # fmt: skip
+        ["NO_OF_FRAMES", len(position)],
+        ["NO_OF_CAMERAS", 8],
+        ["NO_OF_MARKERS", len(labels)],
+        ["FREQUENCY", f"{rate_hz:g}"],
+        ["NO_OF_ANALOG", 0],
+        ["ANALOG_FREQUENCY", 0],
+        ["DESCRIPTION", "--"],
+        ["TIME_STAMP", "2024-01-01, 12:00:00"],
+        ["DATA_INCLUDED", "3D"],
+        ["MARKER_NAMES", *labels],
+    ]
     rows = ["\t".join(map(str, line)) for line in head] + ["\t".join(row) for row in _cells(position, 3)]
     path.write_text("\n".join(rows) + "\n")
 

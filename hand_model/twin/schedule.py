@@ -100,16 +100,27 @@ def _add_motions(add: object, truth: HandTruth, finger: str, plan: Plan) -> None
         program = excitation(controller, plan.middle_percent)
         last = i == plan.excitations - 1 and plan.excitations > 1
         add(
-            f"excitation_{finger}_{i + 1}", "excitation", program.duration_s,
-            finger=finger, program=program, validate=last, mocap=plan.mocap_excitation,
-        )  # fmt: skip
+            f"excitation_{finger}_{i + 1}",
+            "excitation",
+            program.duration_s,
+            finger=finger,
+            program=program,
+            validate=last,
+            mocap=plan.mocap_excitation,
+        )
     for name, stiffness in plan.grasps:
         for i in range(plan.grasp_repeats):
             program = grasp(controller, ("half", "full", "low")[i % 3])
             add(
-                f"grasp_{finger}_{name}_{i + 1}", "grasp", program.duration_s,
-                finger=finger, program=program, object=name, stiffness=stiffness, mocap=False,
-            )  # fmt: skip
+                f"grasp_{finger}_{name}_{i + 1}",
+                "grasp",
+                program.duration_s,
+                finger=finger,
+                program=program,
+                object=name,
+                stiffness=stiffness,
+                mocap=False,
+            )
 
 
 def motion_trials(trials: Sequence[TrialPlan], finger: str) -> tuple[TrialPlan, ...]:

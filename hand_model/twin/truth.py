@@ -186,8 +186,13 @@ class HandTruth:
             probe_m=0,
         )
         log = LogNoise(
-            interval_s=self.log.interval_s, jitter_s=self.log.jitter_s, lost_share=0, encoder_counts=0, current_raw=0,
-            clock_offset_s=self.log.clock_offset_s, quantised=False,
-        )  # fmt: skip
+            interval_s=self.log.interval_s,
+            jitter_s=self.log.jitter_s,
+            lost_share=0,
+            encoder_counts=0,
+            current_raw=0,
+            clock_offset_s=self.log.clock_offset_s,
+            quantised=False,
+        )
         motors = {name: replace(motor, unrest=0.0) for name, motor in self.motors.items()}
         return replace(self, mocap=mocap, log=log, motors=motors)

@@ -70,10 +70,21 @@ def arm(folder: Path, effects: tuple[str, ...], fault: str, random: np.random.Ge
                 fault if j == at else "", effort, 0.9 * effort, instants, 0.5 * float(np.abs(effort).max())
             )
         logs.append((columns, k >= count, {}))
-    xml = ARM.format(joint=_declared(random, armature=rotor, damping=0.02, frictionloss=0.05), z1=-c1, m1=_wrong(random, m1, 1.4), i1=i1,
-                     l1=-l1, z2=-c2, m2=_wrong(random, m2, 1.4), i2=i2)  # fmt: skip
-    signals = {f"{n}_{s}": f"{'joint' if s == 'position' else 'actuator'}:{n}:{'position' if s == 'position' else 'force'}"
-               for n in ("shoulder", "elbow") for s in ("position", "torque")}  # fmt: skip
+    xml = ARM.format(
+        joint=_declared(random, armature=rotor, damping=0.02, frictionloss=0.05),
+        z1=-c1,
+        m1=_wrong(random, m1, 1.4),
+        i1=i1,
+        l1=-l1,
+        z2=-c2,
+        m2=_wrong(random, m2, 1.4),
+        i2=i2,
+    )
+    signals = {
+        f"{n}_{s}": f"{'joint' if s == 'position' else 'actuator'}:{n}:{'position' if s == 'position' else 'force'}"
+        for n in ("shoulder", "elbow")
+        for s in ("position", "torque")
+    }
     write_session(folder, folder.name, xml, signals, logs)
     return Made(asdict(laws[at]), 0.0, {"joint": at, "l1": l1})
 
@@ -116,15 +127,38 @@ def stages(folder: Path, effects: tuple[str, ...], fault: str, random: np.random
         motor = ratio * _held_back(q, gap) if not gap else ratio * (2 * q - _held_back(q, gap))
         motor = motor + ratio * give * effort + ratio * 0.002 * np.sin(2 * np.pi * q / 0.7)
         at, stamps = logger.times(seconds, random)
-        logs.append(({"time": stamps, "motor_position": np.round(np.interp(at, t, motor) * 300) / 300, "output_position": logger.position(at, t, q),
-                      "jaw_position": logger.position(at, t, 0.9 * q - 0.01 * load / level), "torque": logger.effort(at, t, effort, random), "load_torque": logger.effort(at, t, -load / 0.9, random)}, k >= count, {}))  # fmt: skip
+        logs.append(
+            (
+                {
+                    "time": stamps,
+                    "motor_position": np.round(np.interp(at, t, motor) * 300) / 300,
+                    "output_position": logger.position(at, t, q),
+                    "jaw_position": logger.position(at, t, 0.9 * q - 0.01 * load / level),
+                    "torque": logger.effort(at, t, effort, random),
+                    "load_torque": logger.effort(at, t, -load / 0.9, random),
+                },
+                k >= count,
+                {},
+            )
+        )
     xml = STAGES.format(
         joint=_declared(random, damping=law.viscous, frictionloss=law.coulomb),
         own=_wrong(random, law.inertia, 3),
         ratio=_wrong(random, ratio, 1.1),
     )
-    write_session(folder, folder.name, xml, {"motor_position": "joint:motor:position", "output_position": "joint:output:position", "jaw_position": "joint:jaw:position",
-                                             "torque": "actuator:output:force", "load_torque": "actuator:load:force"}, logs)  # fmt: skip
+    write_session(
+        folder,
+        folder.name,
+        xml,
+        {
+            "motor_position": "joint:motor:position",
+            "output_position": "joint:output:position",
+            "jaw_position": "joint:jaw:position",
+            "torque": "actuator:output:force",
+            "load_torque": "actuator:load:force",
+        },
+        logs,
+    )
     return Made(asdict(law), 0.0, {"gap": gap, "give": give, "ratio": ratio})
 
 

@@ -12,8 +12,15 @@ from .chains import arm, brake, stages
 from .machines import Made, hinge, servo, slide, swing
 
 Machine = Callable[[Path, tuple[str, ...], str, np.random.Generator], Made]
-TORQUE = ("load_dependent_friction", "stribeck_friction", "asymmetric_viscous_friction", "quadratic_damping", "elastoplastic_hysteresis",
-          "asymmetric_friction", "late_channel")  # fmt: skip
+TORQUE = (
+    "load_dependent_friction",
+    "stribeck_friction",
+    "asymmetric_viscous_friction",
+    "quadratic_damping",
+    "elastoplastic_hysteresis",
+    "asymmetric_friction",
+    "late_channel",
+)
 # Machine -> (recorder, effects that it can hide, those beyond the vocabulary, faults of its channel).
 MACHINES: dict[str, tuple[Machine, tuple[str, ...], tuple[str, ...], tuple[str, ...]]] = {
     "hinge": (hinge, (*TORQUE, "load_dependent_friction"), ("outside_grit", "outside_slosh"), ("command", "dead", "unsigned", "clipped")),
@@ -42,8 +49,15 @@ def make_set(folder: Path, seed: int, cases: int) -> dict[str, dict[str, Any]]:
         fault = str(random.choice(faults)) if kind == "fault" else ""
         name = f"rig_{k:02d}"
         made = make(folder / name, effects, fault, np.random.default_rng([seed, k]))
-        answers[name] = {"machine": str(machine), "kind": kind, "effects": list(effects), "fault": fault, "law": made.law, "late_s": made.late_s,
-                         "extra": made.extra or {}}  # fmt: skip
+        answers[name] = {
+            "machine": str(machine),
+            "kind": kind,
+            "effects": list(effects),
+            "fault": fault,
+            "law": made.law,
+            "late_s": made.late_s,
+            "extra": made.extra or {},
+        }
     return answers
 
 

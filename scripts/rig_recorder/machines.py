@@ -40,8 +40,16 @@ def _logger(
 ) -> Logger:
     rate = float(random.choice(rates))
     jitter = float(random.choice([0.0, 0.0, 0.05, 0.3]))
-    return Logger(rate, jitter, float(random.choice([0.0, 0.0, 0.05])), float(random.choice([0.0, random.uniform(0, 2e4)])), counts,
-                  effort * random.uniform(0.003, 0.02), effort * random.uniform(0.0005, 0.01), late_s)  # fmt: skip
+    return Logger(
+        rate,
+        jitter,
+        float(random.choice([0.0, 0.0, 0.05])),
+        float(random.choice([0.0, random.uniform(0, 2e4)])),
+        counts,
+        effort * random.uniform(0.003, 0.02),
+        effort * random.uniform(0.0005, 0.01),
+        late_s,
+    )
 
 
 def _wrong(random: np.random.Generator, value: float, by: float = 2.0) -> float:
@@ -96,8 +104,13 @@ def hinge(folder: Path, effects: tuple[str, ...], fault: str, random: np.random.
         track = one_joint(law, drive, control, seconds, (0.0, 0.0), random)
         logs.append((_columns(track, logger, seconds, random, "torque", fault), k >= count, {}))
     joint = _declared(random, armature=0.002 * weight, damping=law.viscous, frictionloss=law.coulomb)
-    xml = HINGE.format(joint=joint, z=-length, mass=_wrong(random, mass), own=0.05 * mass * length**2,
-                       actuator='<actuator><motor name="motor" joint="hinge"/></actuator>')  # fmt: skip
+    xml = HINGE.format(
+        joint=joint,
+        z=-length,
+        mass=_wrong(random, mass),
+        own=0.05 * mass * length**2,
+        actuator='<actuator><motor name="motor" joint="hinge"/></actuator>',
+    )
     write_session(
         folder, folder.name, xml, {"position": "joint:hinge:position", "torque": "actuator:motor:force"}, logs
     )
@@ -195,8 +208,19 @@ def servo(folder: Path, effects: tuple[str, ...], fault: str, random: np.random.
                 control = follow(targets[kind], g * 2.0 * volts, 0.0, volts)
             track = one_joint(law, now, control, seconds, start, random, tick_s=2e-3)
             at, stamps = logger.times(seconds, random)
-            logs.append(({"time": stamps, "position": logger.position(at, track.time_s, track.position[:, 0]),
-                          "voltage": np.round(track.input[np.searchsorted(track.time_s, at), 0] / volts * 885) * volts / 885}, g == gains[0], own))  # fmt: skip
+            logs.append(
+                (
+                    {
+                        "time": stamps,
+                        "position": logger.position(at, track.time_s, track.position[:, 0]),
+                        "voltage": np.round(track.input[np.searchsorted(track.time_s, at), 0] / volts * 885)
+                        * volts
+                        / 885,
+                    },
+                    g == gains[0],
+                    own,
+                )
+            )
             starts.append(start)
     resistance = random.uniform(2, 5)
     constant = f"{_wrong(random, gain * resistance, 1.3):.3g}"

@@ -86,8 +86,17 @@ def _states(log: Log, answer: Mapping[str, Any], joint: int, cutoff_hz: float) -
     late = np.interp(
         grid, t, next(log[n] for n in (("shoulder_torque", "elbow_torque")[joint], "torque", "force") if n in log)
     )
-    return {"q": q, "v": v, "a": np.gradient(v, 1 / rate, axis=0), "effort": effort, "late": late, "rate": rate, "cutoff": cutoff_hz,
-            "joint": joint, "load": np.interp(grid, t, log.get("load_torque", 0 * t))}  # fmt: skip
+    return {
+        "q": q,
+        "v": v,
+        "a": np.gradient(v, 1 / rate, axis=0),
+        "effort": effort,
+        "late": late,
+        "rate": rate,
+        "cutoff": cutoff_hz,
+        "joint": joint,
+        "load": np.interp(grid, t, log.get("load_torque", 0 * t)),
+    }
 
 
 def _declared(s: Mapping[str, Any], machine: str, own: Mapping[str, Any], levels: Sequence[float]) -> tuple[Array, int]:
@@ -188,8 +197,11 @@ def _error(rows: list, machine: str, law: Law, answer: Mapping[str, Any], effect
 def motion(folder: Path, answer: Mapping[str, Any]) -> float:
     """Position error [rad] of the true law, without its small imperfections, simulated in open loop from the true
     starts."""
-    law = Law(**{k: tuple(v) if isinstance(v, list) else v for k, v in answer["law"].items()} | {"ripple": (0.0, 1.0, 0.0)}
-              | {"grit": (0.0, 1.0), "slosh": (0.0, 1.0, 0.0)})  # fmt: skip
+    law = Law(
+        **{k: tuple(v) if isinstance(v, list) else v for k, v in answer["law"].items()}
+        | {"ripple": (0.0, 1.0, 0.0)}
+        | {"grit": (0.0, 1.0), "slosh": (0.0, 1.0, 0.0)}
+    )
     more, left = answer["extra"], []
     for (log, held, own), start in zip(logs(folder), more["starts"], strict=True):
         if not held:

@@ -52,8 +52,16 @@ def grit(random: np.random.Generator, count: int, step_s: float, time_s: float) 
     return np.interp(np.arange(count), every * np.arange(len(level)), level)
 
 
-def one_joint(law: Law, drive: Drive, control: Control, seconds: float, start: tuple[float, float], random: np.random.Generator,
-              step_s: float = 2.5e-4, tick_s: float = 1e-3) -> Track:  # fmt: skip
+def one_joint(
+    law: Law,
+    drive: Drive,
+    control: Control,
+    seconds: float,
+    start: tuple[float, float],
+    random: np.random.Generator,
+    step_s: float = 2.5e-4,
+    tick_s: float = 1e-3,
+) -> Track:
     """Step one joint from start (position, velocity); control is asked every tick_s."""
     count, each = int(seconds / step_s), max(1, round(tick_s / step_s))
     wander = grit(random, count, step_s, law.grit[1]) if law.grit[0] else np.zeros(count)
@@ -101,8 +109,14 @@ class Arm:
     weights: tuple[float, float]
 
 
-def two_joints(arm: Arm, laws: Sequence[Law], controls: Callable[[int, Sequence[float], Sequence[float]], Sequence[float]],
-               seconds: float, step_s: float = 2.5e-4, tick_s: float = 1e-3) -> Track:  # fmt: skip
+def two_joints(
+    arm: Arm,
+    laws: Sequence[Law],
+    controls: Callable[[int, Sequence[float], Sequence[float]], Sequence[float]],
+    seconds: float,
+    step_s: float = 2.5e-4,
+    tick_s: float = 1e-3,
+) -> Track:
     """Step an arm from hanging still; controls give both torques every tick_s."""
     count, each = int(seconds / step_s), max(1, round(tick_s / step_s))
     out, q, v, torque, load = np.empty((count, 6)), [0.0, 0.0], [0.0, 0.0], (0.0, 0.0), [0.0, 0.0]

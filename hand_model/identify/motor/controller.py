@@ -141,10 +141,20 @@ def start_values(moves: Sequence[MoveData], plant: Mapping[str, float]) -> dict[
     gain = gain if 0.5 < gain < 1e3 else 20.0
     speed = float(np.median(ratio)) * 1.02 if ratio else 100.0
     return {
-        **(BRISTLES if "presliding" in plant else STICK), **plant,
-        "speed_full": speed, "rise": 0.1, "fall": 0.1, "delay": 5e-4, "lead": 5e-4, "lag": 0.0, "edge": 0.1,
-        "position_gain": 12.0, "deadband": float(np.median(np.abs(error))) if len(error) else 1.0, "gain": gain, "damping": 2 * np.sqrt(gain * plant["inertia"]),
-    }  # fmt: skip
+        **(BRISTLES if "presliding" in plant else STICK),
+        **plant,
+        "speed_full": speed,
+        "rise": 0.1,
+        "fall": 0.1,
+        "delay": 5e-4,
+        "lead": 5e-4,
+        "lag": 0.0,
+        "edge": 0.1,
+        "position_gain": 12.0,
+        "deadband": float(np.median(np.abs(error))) if len(error) else 1.0,
+        "gain": gain,
+        "damping": 2 * np.sqrt(gain * plant["inertia"]),
+    }
 
 
 def _spread(moves: Sequence[MoveData]) -> tuple[MoveData, ...]:

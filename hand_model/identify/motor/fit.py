@@ -213,13 +213,31 @@ def fit_motor(trials: Sequence[MotorTrial], scale: Scale, actuator: str = "motor
     if stribeck:
         notes.append(f"friction rises as speed falls (Stribeck): misfit falls by {evidence:.0f} noise variances")
     motor = Motor(
-        actuator, scale.counts_open, scale.counts_close, _estimates(values, names, covariance, accepted), float(sigma_u),
-        tuple(t.name for t in trials), tuple(notes),
-    )  # fmt: skip
+        actuator,
+        scale.counts_open,
+        scale.counts_close,
+        _estimates(values, names, covariance, accepted),
+        float(sigma_u),
+        tuple(t.name for t in trials),
+        tuple(notes),
+    )
     return MotorFit(
-        motor, scale, values, names, covariance, "output error" if accepted else "regression", float(sigma_p), float(sigma_u),
-        plain, published, alike, smear_share(published, alike), best, stribeck, evidence,
-    )  # fmt: skip
+        motor,
+        scale,
+        values,
+        names,
+        covariance,
+        "output error" if accepted else "regression",
+        float(sigma_p),
+        float(sigma_u),
+        plain,
+        published,
+        alike,
+        smear_share(published, alike),
+        best,
+        stribeck,
+        evidence,
+    )
 
 
 def _fit_output_error(

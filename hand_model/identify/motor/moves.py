@@ -92,11 +92,21 @@ def moves_from_rest(trial: MotorTrial, sigma: tuple[float, float], speed_full: f
         k = slice(i + 1, j + 1)
         found.append(
             MoveData(
-                trial.name, int(i), t[k] - t[i], p[k], trial.current[k], float(trial.setpoint[i]), float(trial.setpoint[i + 1]),
-                limit, np.array([0.5 * gap, rest[0], speed, held.mean()]),
-                np.array([max(gap / np.sqrt(12), 5e-3), rest[1], speed_sd, sigma[1] / np.sqrt(len(held))]), rest[2], speed, rest[3],
+                trial.name,
+                int(i),
+                t[k] - t[i],
+                p[k],
+                trial.current[k],
+                float(trial.setpoint[i]),
+                float(trial.setpoint[i + 1]),
+                limit,
+                np.array([0.5 * gap, rest[0], speed, held.mean()]),
+                np.array([max(gap / np.sqrt(12), 5e-3), rest[1], speed_sd, sigma[1] / np.sqrt(len(held))]),
+                rest[2],
+                speed,
+                rest[3],
             )
-        )  # fmt: skip
+        )
     return tuple(found)
 
 

@@ -28,10 +28,17 @@ def as_batch(data: Sequence[MoveData], own: Array, repeat: int, calm: bool = Tru
         return np.repeat(np.asarray(x, float), repeat)
 
     return Moves(
-        own[:, 0], tile([m.origin for m in data]), tile([m.target for m in data]), own[:, 2],
-        tile([m.limit for m in data]), own[:, 1], own[:, 3], tile([m.time_s[-1] for m in data]),
-        tile([m.velocity for m in data]), *((tile(x) for x in zip(*(m.calm_s for m in data), strict=True)) if calm else ()),
-    )  # fmt: skip
+        own[:, 0],
+        tile([m.origin for m in data]),
+        tile([m.target for m in data]),
+        own[:, 2],
+        tile([m.limit for m in data]),
+        own[:, 1],
+        own[:, 3],
+        tile([m.time_s[-1] for m in data]),
+        tile([m.velocity for m in data]),
+        *((tile(x) for x in zip(*(m.calm_s for m in data), strict=True)) if calm else ()),
+    )
 
 
 def simulate_moves(
