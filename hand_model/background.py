@@ -107,7 +107,8 @@ class Pair:
         mine, error = [], None
         try:
             mine = [function(self.state, items[i], *rest) for i in here]
-        except Exception as raised:  # noqa: BLE001, raised again, but only once the other one's answer is read: it would be taken for that of the next call
+        # raised again, but only once the other one's answer is read: it would be taken for that of the next call
+        except Exception as raised:  # noqa: BLE001
             error = raised
         try:
             theirs = self._pipe.recv()

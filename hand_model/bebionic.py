@@ -60,7 +60,10 @@ GRIPS: Mapping[str, Mapping[str, float]] = MappingProxyType(
 
 NOTES = (
     "The thesis rounds axes to three digits and centres to a millimetre; axes are set to length one here.",
-    "Covariances come from the thesis's own tables: axes from two captures of the left hand, centres from left and right.",
+    (
+        "Covariances come from the thesis's own tables: axes from two captures of the left hand, "
+        "centres from left and right."
+    ),
     "Ranges, linkages and fingertips are nominal: the thesis prints none. There is no marker, encoder map or motor.",
     "The tables orient every axis towards +y. The thumb closes against that sense, so its angles are negative.",
 )

@@ -120,16 +120,17 @@ def main() -> None:
     }
     for name, row in rungs.items():
         print(
-            f"{name:32s} rmse {row['rmse_rad']:.4f} mae {row['mae_rad']:.4f} rad, fitted in {row['seconds']:.1f} s, of a "
-            f"processor {row['cpu_s']:.1f} s ({row['ms_per_evaluation']:.2f} ms per evaluation)"
+            f"{name:32s} rmse {row['rmse_rad']:.4f} mae {row['mae_rad']:.4f} rad, fitted in {row['seconds']:.1f} s, "
+            f"of a processor {row['cpu_s']:.1f} s ({row['ms_per_evaluation']:.2f} ms per evaluation)"
         )
     smallest = next(iter(rungs.values()))
     print(
-        f"{'M1 against bam.fit':32s} {BAM_FIT_S / smallest['cpu_s']:.0f} times faster ({BAM_FIT_S:g} s on two cores there)"
+        f"{'M1 against bam.fit':32s} {BAM_FIT_S / smallest['cpu_s']:.0f} times faster ({BAM_FIT_S:g} "
+        "s on two cores there)"
     )
     print(
-        f"{'diagnosed':32s} rmse {ours['rmse_rad']:.4f} mae {ours['mae_rad']:.4f} rad; declared {ours['declared_rmse_rad']:.4f} "
-        f"{ours['declared_mae_rad']:.4f}; {ours['seconds']:.1f} s"
+        f"{'diagnosed':32s} rmse {ours['rmse_rad']:.4f} mae {ours['mae_rad']:.4f} rad; "
+        f"declared {ours['declared_rmse_rad']:.4f} {ours['declared_mae_rad']:.4f}; {ours['seconds']:.1f} s"
     )
     if arguments.json:
         arguments.json.write_text(

@@ -169,7 +169,10 @@ def hand_rows(side: str, seed: int | None) -> list[dict]:
             )
             for p, c in replayed:
                 print(
-                    f"{side:6}{seed!s:6}{finger:9}{motor.controller.kind:9}{fit.method:13}{p:7.3f} %{c / truth.log.current_raw:7.3f} x noise",
+                    (
+                        f"{side:6}{seed!s:6}{finger:9}{motor.controller.kind:9}{fit.method:13}{p:7.3f} "
+                        f"%{c / truth.log.current_raw:7.3f} x noise"
+                    ),
                     flush=True,
                 )
     return out

@@ -33,7 +33,10 @@ def run(folder: Path, output: Path, only: list[str]) -> list[dict]:
         records.append(record(path.name, findings, time.perf_counter() - began, sum(os.times()[:4]) - used))
         write_rig_findings(session, findings, output / path.name)
         print(
-            f"{path.name}: {findings.verdict}, {records[-1]['seconds']:.0f} s, of a processor {records[-1]['cpu_s']:.0f} s",
+            (
+                f"{path.name}: {findings.verdict}, {records[-1]['seconds']:.0f} s, "
+                f"of a processor {records[-1]['cpu_s']:.0f} s"
+            ),
             flush=True,
         )
     return records
@@ -60,7 +63,10 @@ def section(records: list[dict]) -> str:
     lines = [
         "## What it found in real recordings",
         "",
-        "| recording | missing from its declared model (class) | probability | held-out error, declared to with all effects |",
+        (
+            "| recording | missing from its declared model (class) | probability | held-out error, "
+            "declared to with all effects |"
+        ),
         "| --- | --- | --- | --- |",
     ]
     for r in records:
@@ -75,7 +81,10 @@ def section(records: list[dict]) -> str:
         lines += [f"**{r['session']}** ({r.get('verdict', 'refused')})", ""]
         lines += [f"- {f['statement']}" for f in r.get("findings", [])]
         lines += [
-            f"- Unexplained: {100 * u['share_of_mismatch']:.0f} % of the mismatch at {u['where']['joint'] or 'the joint'}."
+            (
+                f"- Unexplained: {100 * u['share_of_mismatch']:.0f} % of the mismatch at "
+                f"{u['where']['joint'] or 'the joint'}."
+            )
             for u in r.get("unexplained", [])
         ]
         lines.append("")

@@ -149,13 +149,15 @@ def table(rows: list[Row]) -> str:
         )
         one, every = ("" if x is None else f"{x:.2f}" for x in (r.one, r.all_))
         lines.append(
-            f"{r.name:8s} {r.told + ' -> ' + r.named:100s} {one:>5s} {every:>5s}   {r.figures}; {r.seconds:.0f} s{marks}"
+            f"{r.name:8s} {r.told + ' -> ' + r.named:100s} {one:>5s} {every:>5s}   {r.figures}; "
+            f"{r.seconds:.0f} s{marks}"
         )
     known = [[x for x in (r.one, r.all_) if x is not None] for r in rows]
     lines.append(
-        f"first right {sum(r.first for r in rows)}, all found {sum(r.every for r in rows)}, without a false name {sum(not r.false for r in rows)}, "
-        f"of {len(rows)}; held-out error at most {CLOSE} of the true law's {sum(bool(k) and max(k) <= CLOSE for k in known)} of {sum(map(bool, known))}; "
-        f"slowest {max(r.seconds for r in rows):.0f} s"
+        f"first right {sum(r.first for r in rows)}, all found {sum(r.every for r in rows)}, "
+        f"without a false name {sum(not r.false for r in rows)}, of {len(rows)}; "
+        f"held-out error at most {CLOSE} of the true law's {sum(bool(k) and max(k) <= CLOSE for k in known)} of "
+        f"{sum(map(bool, known))}; slowest {max(r.seconds for r in rows):.0f} s"
     )
     return "\n".join(lines)
 

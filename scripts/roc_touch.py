@@ -182,8 +182,8 @@ def main() -> None:
         rows += one_hand(seed, args.repeats, args.free, args.stiffness, args.rate)
         air = [r for r in rows if r["object"] == AIR and r["seed"] == seed]
         print(
-            f"hand {seed}: {sum(r['alarms'] for r in air)} alarms in {sum(r['minutes'] for r in air):.1f} min, threshold {rows[-1]['threshold']:.1f}, "
-            f"largest {max(s for r in air for s in r['scores']):.1f}",
+            f"hand {seed}: {sum(r['alarms'] for r in air)} alarms in {sum(r['minutes'] for r in air):.1f} min, "
+            f"threshold {rows[-1]['threshold']:.1f}, largest {max(s for r in air for s in r['scores']):.1f}",
             flush=True,
         )
     pool = {k: np.array([s for r in rows if r["object"] == k for s in r["scores"]]) for k in (AIR, STIFF, COMPLIANT)}

@@ -69,7 +69,10 @@ def record(folder: str | Path, findings: list[Finding]) -> None:
     path = Path(folder) / "README.md"
     head = path.read_text().split(VERIFICATION)[0]
     passed = sum(f.passed for f in findings)
-    text = f"{head}{VERIFICATION}\n\nMeasured by `hand-model check`: {passed} of {len(findings)} items passed.\n\n{table(findings)}\n"
+    text = (
+        f"{head}{VERIFICATION}\n\nMeasured by `hand-model check`: "
+        f"{passed} of {len(findings)} items passed.\n\n{table(findings)}\n"
+    )
     staging = path.with_name(".README.md.new")
     staging.write_text(text)
     os.replace(staging, path)

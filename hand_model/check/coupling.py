@@ -114,7 +114,10 @@ def stiffness(description: Description, model: Model) -> Finding:
                 gap = float(gaps.max() if held else gaps[len(gaps) // 2 :].max())
                 if not gap <= worst:
                     worst, where = gap, finger.name
-    said = f"{FORCE:.0f} N at the tip: at most {np.degrees(worst):.2g} deg ({where}), {np.degrees(moving):.2g} deg while a finger gives way"
+    said = (
+        f"{FORCE:.0f} N at the tip: at most {np.degrees(worst):.2g} deg ({where}), "
+        f"{np.degrees(moving):.2g} deg while a finger gives way"
+    )
     return Finding(item, bool(worst <= STIFFNESS), float(np.degrees(worst)), said)
 
 

@@ -54,11 +54,17 @@ def mirror(description: Description, other: Description) -> Finding:
     if not differences:
         return Finding("mirror", False, None, "the two hands share no joint")
     problems = [
-        f"{finger} {joint}: {np.degrees(turn):.2g} deg (sd {np.degrees(a):.2g}), {shift * 1e3:.2g} mm (sd {c * 1e3:.2g})"
+        (
+            f"{finger} {joint}: {np.degrees(turn):.2g} deg (sd {np.degrees(a):.2g}), "
+            f"{shift * 1e3:.2g} mm (sd {c * 1e3:.2g})"
+        )
         for (finger, joint), (turn, a, shift, c) in differences.items()
         if turn > SIGMAS * a + 1e-9 or shift > SIGMAS * c + 1e-9
     ]
     turns, shifts = np.array([d[0] for d in differences.values()]), np.array([d[2] for d in differences.values()])
-    said = f"{len(differences)} joints: axes {np.degrees(np.median(turns)):.2g} deg apart in the median, centres {np.median(shifts) * 1e3:.2g} mm"
+    said = (
+        f"{len(differences)} joints: axes {np.degrees(np.median(turns)):.2g} deg apart in the median, "
+        f"centres {np.median(shifts) * 1e3:.2g} mm"
+    )
     said += ", within what both files state" if not problems else "; beyond what they state: " + "; ".join(problems[:5])
     return Finding("mirror", not problems, float(np.degrees(turns.max())), said)

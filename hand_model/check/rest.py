@@ -74,5 +74,8 @@ def quiet(description: Description, model: Model) -> Finding:
             beyond = max(beyond, float(out.max(initial=0.0)))
     warnings = engine.raised(data)
     passed = bool(not warnings and beyond < 0.2 and np.isfinite(data.qpos).all())
-    said = f"{RANDOM_S:.0f} s of random control: {', '.join(warnings) or 'no warning'}, at most {np.degrees(beyond):.2g} deg beyond a limit"
+    said = (
+        f"{RANDOM_S:.0f} s of random control: {', '.join(warnings) or 'no warning'}, "
+        f"at most {np.degrees(beyond):.2g} deg beyond a limit"
+    )
     return Finding(f"quiet: {model.stem}", passed, float(np.degrees(beyond)), said)

@@ -64,6 +64,7 @@ def _proof(finding: Finding) -> str:
     if fit.get("before") is not None and fit.get("after") is not None:
         where = "of recordings kept out" if fit["held_out"] else "of the same recordings"
         words.append(
-            f"error {where} {scale * fit['before']:.3g} -> {scale * fit['after']:.3g} {unit} (noise {scale * fit['noise_floor']:.3g})"
+            f"error {where} {scale * fit['before']:.3g} -> {scale * fit['after']:.3g} {unit} (noise "
+            f"{scale * fit['noise_floor']:.3g})"
         )
     return "; ".join(words)

@@ -25,7 +25,8 @@ def settled(plan: Plan) -> Plan:
         one, other, where = next(t for t in sorted(touching) if worst in t[:2])
         with_ = other if worst == one else one
         notes.append(
-            f"`{plan.stem}`: contact of `{worst}` stays with capsules, its probed parts would touch `{with_}` at {where}."
+            f"`{plan.stem}`: contact of `{worst}` stays with capsules, "
+            f"its probed parts would touch `{with_}` at {where}."
         )
         plan = replace(plan, links=tuple(replace(k, parts=()) if k.name == worst else k for k in plan.links))
     return replace(plan, contact_notes=tuple(notes))

@@ -95,7 +95,10 @@ def scene_stem(plan: Plan) -> str:
 def _table(hand: Hand, plans: tuple[Plan, ...]) -> Mapping[str, Any]:
     """What hand.json holds beside the hand."""
     return {
-        "about": "the hand (fields beside this one) is a .hand file; here: what compile added to it, angles in rad, lengths in m",
+        "about": (
+            "the hand (fields beside this one) is a .hand file; "
+            "here: what compile added to it, angles in rad, lengths in m"
+        ),
         "models": [
             {
                 "stem": plan.stem,

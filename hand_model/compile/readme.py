@@ -35,7 +35,10 @@ COPYRIGHT HOLDERS BE LIABLE FOR ANY CLAIM, DAMAGES OR OTHER LIABILITY ARISING FR
 def readme(hand: Hand, plans: tuple[Plan, ...]) -> str:
     """The README's text."""
     parts = [
-        f"# {plans[0].stem}\n\nA {hand.side} {hand.name} hand for MuJoCo (MJCF) and ROS, Pinocchio and others (URDF).\n",
+        (
+            f"# {plans[0].stem}\n\nA {hand.side} {hand.name} hand for MuJoCo (MJCF) and ROS, "
+            "Pinocchio and others (URDF).\n"
+        ),
         _files(plans),
         _derivation(hand, plans),
         _joints(hand),
@@ -74,7 +77,10 @@ def _files(plans: tuple[Plan, ...]) -> str:
 def _derivation(hand: Hand, plans: tuple[Plan, ...]) -> str:
     steps = [
         "The `palm` body is the repeatable frame that the three probed palm landmarks define.",
-        "Every other body has the palm's orientation at rest, where angles are zero, and its origin at its joint's centre.",
+        (
+            "Every other body has the palm's orientation at rest, where angles are zero, "
+            "and its origin at its joint's centre."
+        ),
         hand.extra.get(
             "origin",
             "Axes, centres and markers were identified from the recordings listed below; covariances: `hand.json`.",
@@ -85,7 +91,10 @@ def _derivation(hand: Hand, plans: tuple[Plan, ...]) -> str:
         f"Masses and inertias are a fallback, not measured: solid capsules between the joints, {DENSITY:.0f} kg/m^3.",
         "Where a watertight surface was probed, mass and inertia are its inside's at that density.",
         "Visual meshes (group 2) are the probed surfaces, else these capsules.",
-        "Contact (group 3): convex parts of probed surfaces, else the capsules, shrunk until nothing touches at any keyframe.",
+        (
+            "Contact (group 3): convex parts of probed surfaces, else the capsules, "
+            "shrunk until nothing touches at any keyframe."
+        ),
     ]
     if any(plan.names.actuator for plan in plans) and not hand.motors:
         steps.append(
@@ -143,7 +152,8 @@ def _courses(hand: Hand) -> str:
         return ""
     rows = ["## Joints that are no plain hinges\n"]
     rows.append(
-        "In the MJCF their segments have extra joints, tied to the hinge's angle by equalities (`polycoef`). The URDF has the"
+        "In the MJCF their segments have extra joints, tied to the hinge's angle by equalities (`polycoef`). "
+        "The URDF has the"
     )
     rows.append("hinge alone; what that loses, at worst over the range:\n")
     rows += ["| finger | joint | extra joints | tilt, deg | tip, mm |", "| --- | --- | --- | --- | --- |"]
@@ -153,7 +163,8 @@ def _courses(hand: Hand) -> str:
         rows.append(f"| {finger.name} | {joint.name} | {kinds} | {np.degrees(tilt):.2f} | {tip * 1e3:.2f} |")
     if any(e.kind == "slide" for _, joint in crooked for e in joint.course.joints):
         rows.append(
-            "\nThe ties of slides have an absolute stiffness (`solref` below zero), right for this file's inertias: whoever makes their"
+            "\nThe ties of slides have an absolute stiffness (`solref` below zero), right for this file's inertias: "
+            "whoever makes their"
         )
         rows.append('finger much heavier gives them MuJoCo\'s own (`solref="0.002 1"`).')
     return "\n".join(rows) + "\n"
@@ -193,7 +204,8 @@ def _effects(hand: Hand) -> str:
         )
         held = "yes" if native else f"no: {kind.unwritten}" if kind.unwritten and not law else "no"
         rows.append(
-            f"| {found.effect} | {place} | {held} | {'yes' if law else 'not needed' if native else 'no'} | no: hand.json |"
+            f"| {found.effect} | {place} | {held} | "
+            f"{'yes' if law else 'not needed' if native else 'no'} | no: hand.json |"
         )
         called |= law
     if called:
@@ -234,7 +246,8 @@ def _known_issues(hand: Hand, plans: tuple[Plan, ...]) -> str:
         for joint in finger.joints:
             if joint.degenerate:
                 issues.append(
-                    f"{finger.name} {joint.name}: the recorded arc does not determine axis or centre; see its uncertainty."
+                    f"{finger.name} {joint.name}: the recorded arc does not determine axis or centre; "
+                    "see its uncertainty."
                 )
     for plan in plans:
         issues += [f"{finger}: the fingertip is a guess ({how})." for finger, how in plan.guessed_tips.items()]

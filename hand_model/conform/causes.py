@@ -39,7 +39,10 @@ def geometry_findings(
             and abs(fit.advance) > tolerance_m
         ):
             name = f.names[k][0]
-            text = f'the frame of the link beyond "{name}" sits {fit.advance * 1e3:.4g} mm along the axis: a convention or a displaced link, nothing farther out tells'
+            text = (
+                f'the frame of the link beyond "{name}" sits {fit.advance * 1e3:.4g} mm along the axis: '
+                "a convention or a displaced link, nothing farther out tells"
+            )
             out.append(Finding("link_displaced", 2, (name,), text, {"along_mm": fit.advance * 1e3}, False))
     skipped = set() if rounded is None else rounded[1]
     out += _points(a, b, f, at, tolerance_m, skipped)
@@ -113,8 +116,8 @@ def _rounding(a: Tree, b: Tree, f: Features, at: Alignment, wrong: Sequence[int]
     turned = float(np.degrees(max(max(at.fits[k].angle_rad, abs(at.fits[k].offset)) for k in inside)))
     place = max(float(slack[k, 0]) for k in inside) * 2 / np.sqrt(3) * 1e3
     text = (
-        f"{tree.path.name} writes the numbers of {other.path.name} with fewer digits (to about {place:.2g} mm) at {len(names)} "
-        f"joint(s), {', '.join(names)}: up to {moved:.3g} mm and {turned:.3g} deg"
+        f"{tree.path.name} writes the numbers of {other.path.name} with fewer digits (to about {place:.2g} mm) at "
+        f"{len(names)} joint(s), {', '.join(names)}: up to {moved:.3g} mm and {turned:.3g} deg"
     )
     return Finding(
         "numbers_rounded", 3, names, text, {"shift_mm": moved, "turn_deg": turned, "written_to_mm": place}
@@ -193,7 +196,10 @@ def _opposite(a: Tree, b: Tree, f: Features, k: int) -> str:
     same = [i for i in range(3) if abs(x[i] - y[i]) < 1e-9]
     if len(turned) == 1 and len(same) == 2:
         i = turned[0]
-        lines = f"{a.path.name}:{a.nodes[a.joint_node[f.names[k][0]]].line}, {b.path.name}:{b.nodes[b.joint_node[f.names[k][1]]].line}"
+        lines = (
+            f"{a.path.name}:{a.nodes[a.joint_node[f.names[k][0]]].line}, "
+            f"{b.path.name}:{b.nodes[b.joint_node[f.names[k][1]]].line}"
+        )
         return f"; the sign of its origin's {'xyz'[i]} is turned over, {x[i]:g} against {y[i]:g} m ({lines})"
     return ""
 
@@ -251,7 +257,10 @@ def _order(a: Tree, b: Tree, f: Features) -> list[Finding]:
         p, q = f.parent[k], f.parent_b[k]
         if p != q:
             said = [f'on "{f.names[i][s]}"' if i >= 0 else "on the base" for i, s in ((p, 0), (q, 1))]
-            text = f'the order of the chain differs: "{x}" sits {said[0]} in {a.path.name}, "{y}" {said[1]} in {b.path.name}'
+            text = (
+                f'the order of the chain differs: "{x}" sits {said[0]} in {a.path.name}, '
+                f'"{y}" {said[1]} in {b.path.name}'
+            )
             out.append(Finding("joints_exchanged", 3, (x,), text))
     return out
 
@@ -270,7 +279,10 @@ def _points(a: Tree, b: Tree, f: Features, at: Alignment, tolerance_m: float, sk
                 slack += max(_bound(f.slack_a, f, k, at.fits[k].reach), _bound(f.slack_b, f, k, at.fits[k].reach))
             if gap > max(tolerance_m, min(ROUNDING_CAP, 2 * slack)):
                 label = f'"{name}"' if name == partner else f'"{name}" (= "{partner}")'
-                text = f"{label} sits {gap * 1e3:.4g} mm elsewhere on its link: another length of the last link, or another point"
+                text = (
+                    f"{label} sits {gap * 1e3:.4g} mm elsewhere on its link: another length of the last link, "
+                    "or another point"
+                )
                 out.append(Finding("link_displaced", 3, (name,), text, {"shift_mm": gap * 1e3}))
     return out
 

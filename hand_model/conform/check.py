@@ -269,6 +269,7 @@ def _warnings(a: Tree, b: Tree) -> tuple[str, ...]:
         out += tree.warnings
         if tree.missing_meshes:
             out.append(
-                f"{tree.path.name}: {len(tree.missing_meshes)} mesh file(s) missing, such as {tree.missing_meshes[0]}; kinematics need none"
+                f"{tree.path.name}: {len(tree.missing_meshes)} mesh file(s) missing, such as {tree.missing_meshes[0]}; "
+                "kinematics need none"
             )
     return tuple(out)

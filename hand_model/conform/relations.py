@@ -110,7 +110,8 @@ def _misplaced(a: Tree, b: Tree, wrong: list[str], of_a, of_b, partner):
         neighbour = order[(k + step) % len(order)]
         where = "next" if step > 0 else "previous"
         text = (
-            f"limits shifted by one: {a.path.name} gives {len(hit) + len(ends)} joint(s) the limits that {b.path.name} gives the "
+            f"limits shifted by one: {a.path.name} gives {len(hit) + len(ends)} joint(s) the limits that "
+            f"{b.path.name} gives the "
             f'{where} one, first "{hit[0]}" those of "{partner[neighbour]}"'
         )
         yield "limits_shifted", text, hit + ends
@@ -211,7 +212,10 @@ def _reversed(a: Tree, b: Tree, x: str, y: str, back: Mapping[str, str]) -> Find
         if same < 1e-3
         else f"followed both ways round, {same:.3g} deg are lost"
     )
-    text = f'in {a.path.name} "{x}" follows "{ca.driver}", in {b.path.name} "{partner}" follows "{y}" (joint1 is the follower): {how}'
+    text = (
+        f'in {a.path.name} "{x}" follows "{ca.driver}", in {b.path.name} "{partner}" follows "{y}" (joint1 is '
+        f"the follower): {how}"
+    )
     return Finding("equality_reversed", 1, (x, ca.driver), text, {"loop_deg": same})
 
 
@@ -280,7 +284,10 @@ def _law(a: Tree, b: Tree, x: str, y: str, back: Mapping[str, str], fits: Mappin
         linear, curved = (a, b) if degrees[0] <= 1 else (b, a)
         target = follower_b if degrees[0] <= 1 else follower_a
         least = float(np.degrees(np.abs(target - np.polyval(np.polyfit(q, target, 1), q)).max()))
-        text = f"{said}: {linear.path.name} holds a straight line for the polynomial of degree {max(degrees)} in {curved.path.name}"
+        text = (
+            f"{said}: {linear.path.name} holds a straight line for the polynomial of degree {max(degrees)} "
+            f"in {curved.path.name}"
+        )
         text += f" (the best line would still lose {least:.3g} deg)"
         return [Finding("linear_mimic", 1, (x,), text, {**figures, "best_line_deg": least})]
     if len(chain_a) == len(chain_b) == 1 and _rounded(chain_a[0], chain_b[0]):
@@ -305,7 +312,10 @@ def _chains(a: Tree, b: Tree, joints: Sequence[tuple[str, str]], back: Mapping[s
         for tree, name, own, other in ((a, x, length_a, length_b), (b, y, length_b, length_a)):
             if own > 1 and (own != other or tree is a):
                 driver = tree.joint(name).coupling.driver
-                text = f'in {tree.path.name} "{name}" follows "{driver}", which follows "{tree.joint(driver).coupling.driver}" itself'
+                text = (
+                    f'in {tree.path.name} "{name}" follows "{driver}", '
+                    f'which follows "{tree.joint(driver).coupling.driver}" itself'
+                )
                 if tree.format == "urdf":
                     text += " (Pinocchio refuses such a chain and yourdfpy evaluates it wrongly)"
                 out.append(

@@ -174,7 +174,8 @@ class ConformReport:
             out.append("   largest differences at the links, as written | after one constant transform:")
             for r in far:
                 out.append(
-                    f"   {_names(r.a, r.b)}: {_mm(r.raw_mm)}, {r.raw_deg:.4g} deg | {_mm(r.rest_mm)}, {r.rest_deg:.4g} deg"
+                    f"   {_names(r.a, r.b)}: {_mm(r.raw_mm)}, {r.raw_deg:.4g} deg | {_mm(r.rest_mm)}, "
+                    f"{r.rest_deg:.4g} deg"
                 )
         return out
 

@@ -16,7 +16,7 @@ from ..rotation import rotation_about
 Array = NDArray[np.float64]
 
 DECIMALS_MIN = 3
-"""No description is published with fewer decimals (1 mm, 1 mrad) than this: shorter numbers are taken for exact to it."""
+"""No description is published with fewer decimals (1 mm, 1 mrad): shorter numbers are taken for exact to this."""
 
 
 @dataclass(frozen=True)

@@ -131,8 +131,8 @@ def _node(element: etree._Element, file: Path, warnings: list[str]) -> Node:
         for found in element.findall(tag):
             for extra in sorted(set(found.attrib) - valid):
                 warnings.append(
-                    f'{file.name}:{found.sourceline}: joint "{name}": <{tag}> has no attribute "{extra}", so every loader '
-                    f'ignores {extra}="{found.get(extra)}"; {did_you_mean(extra, valid)}'
+                    f'{file.name}:{found.sourceline}: joint "{name}": <{tag}> has no attribute "{extra}", '
+                    f'so every loader ignores {extra}="{found.get(extra)}"; {did_you_mean(extra, valid)}'
                 )
     origin, slack_m, slack_rad = _origin(element.find("origin"), where)
     joint = _joint(element, KINDS[kind], where, warnings, file) if KINDS[kind] else None

@@ -22,8 +22,8 @@ class AsymmetricFriction(Effect):
         half = parameters["half_difference"]
         way = "flexing" if half > 0 else "extending"
         return (
-            f"the motor needs some {abs(half):.0f} raw more {way}, and less the other way, than the hand's others: lopsided friction or "
-            "another preload (from current alone the same)"
+            f"the motor needs some {abs(half):.0f} raw more {way}, and less the other way, than the hand's others: "
+            "lopsided friction or another preload (from current alone the same)"
         )
 
 

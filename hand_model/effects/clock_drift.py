@@ -40,7 +40,10 @@ class ClockDrift(Effect):
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """Time gained or lost in every second."""
         rate = parameters["rate_minus_one"]
-        return f"the log's clock {'gains' if rate > 0 else 'loses'} {1e3 * abs(rate):.2f} ms on the mocap clock in every second"
+        return (
+            f"the log's clock {'gains' if rate > 0 else 'loses'} {1e3 * abs(rate):.2f} ms on the mocap "
+            "clock in every second"
+        )
 
 
 EFFECT = ClockDrift()

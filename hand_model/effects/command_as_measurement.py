@@ -18,7 +18,10 @@ class CommandAsMeasurement(Effect):
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """That nothing is fitted."""
-        return f"the {where.get('signal') or 'current'} is no measurement, but a command or a dead channel: nothing is fitted to it"
+        return (
+            f"the {where.get('signal') or 'current'} is no measurement, but a command or a dead channel: "
+            "nothing is fitted to it"
+        )
 
 
 EFFECT = CommandAsMeasurement()

@@ -51,11 +51,14 @@ class DetentLoad(Effect):
         if parameters["form"] < 0.5:
             side = "against" if load > 0 else "towards"
             return (
-                f"between {at - 2 * width:.1f} and {at + 2 * width:.1f} % a load acts {side} flexion whichever way the motor moves, "
-                f"up to {figure(abs(load))} raw at {at:.1f} %"
+                f"between {at - 2 * width:.1f} and {at + 2 * width:.1f} % a load acts {side} flexion whichever way the "
+                f"motor moves, up to {figure(abs(load))} raw at {at:.1f} %"
             )
         kind, way = ("notch", "towards") if load > 0 else ("hump", "away from")
-        return f"a {kind} at {at:.1f} %: a load of up to {figure(abs(load))} raw {way} it, largest {width:.1f} % on either side"
+        return (
+            f"a {kind} at {at:.1f} %: a load of up to {figure(abs(load))} raw {way} it, "
+            f"largest {width:.1f} % on either side"
+        )
 
     def law(self, parameters: Mapping[str, float]) -> Law:
         """A bell over position, or its slope."""

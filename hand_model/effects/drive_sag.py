@@ -52,8 +52,14 @@ class DriveSag(Effect):
         """Speed, or effort, lost per load."""
         if "torque_loss" in parameters:
             square = " (with its square)" if parameters.get("form") else ""
-            return f"the motor delivers less per current as it is loaded{square}: {figure(100 * parameters['torque_loss'])} % are lost at 100 raw"
-        return f"the motor loses {1e4 * parameters['sag']:.1f} % of its speed for every 100 raw of current that its load takes"
+            return (
+                f"the motor delivers less per current as it is loaded{square}: "
+                f"{figure(100 * parameters['torque_loss'])} % are lost at 100 raw"
+            )
+        return (
+            f"the motor loses {1e4 * parameters['sag']:.1f} % of its speed for every 100 raw of "
+            "current that its load takes"
+        )
 
     def law(self, parameters: Mapping[str, float]) -> Law | None:
         """What is lost of the effort; a loss of speed is no force: the command must be slowed by whoever gives it."""

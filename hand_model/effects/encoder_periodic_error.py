@@ -32,7 +32,10 @@ class EncoderPeriodicError(Sinusoid):
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """Error in degrees of the segment, and its period."""
         segment, error, period = where.get("joint") or "proximal", parameters["amplitude"], parameters["period"]
-        return f"against the {segment} segment the encoder errs by ±{error:.2f} deg, repeating every {period:.2f} % of its range"
+        return (
+            f"against the {segment} segment the encoder errs by ±{error:.2f} deg, "
+            f"repeating every {period:.2f} % of its range"
+        )
 
 
 EFFECT = EncoderPeriodicError()

@@ -60,7 +60,10 @@ class EndStopContact(Effect):
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """Where it begins and how stiff it is."""
         side, stiffness = "beyond" if parameters["side"] >= 0 else "below", figure(parameters["stiffness"])
-        return f"{side} {parameters['begin']:.1f} % the motor runs into an elastic stop, {stiffness} raw for every further %"
+        return (
+            f"{side} {parameters['begin']:.1f} % the motor runs into an elastic stop, "
+            f"{stiffness} raw for every further %"
+        )
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """A fixed tendon along the motor joint that is slack until the stop begins: the same line of force, exact in

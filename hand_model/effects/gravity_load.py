@@ -56,7 +56,10 @@ class GravityLoad(Effect):
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """The largest load that the weight can be."""
         load = figure(math.hypot(parameters["along"], parameters["across"]))
-        return f"weight loads the motor with up to {load} raw, changing with the pose of the hand and the angle of the finger"
+        return (
+            f"weight loads the motor with up to {load} raw, changing with the pose of the hand and "
+            "the angle of the finger"
+        )
 
     def law(self, parameters: Mapping[str, float]) -> Law:
         """Gravity in the finger's plane, turned with the finger."""

@@ -22,7 +22,10 @@ class LinkageCompliance(Compliance):
             "of the joint before it" if parameters["form"] == 0.0 else "of its own",
         )
         segment = where.get("joint") or "distal"
-        return f"the linkage gives: the {segment} segment stays back by {give} deg {end} for every 100 raw of the motor's load"
+        return (
+            f"the linkage gives: the {segment} segment stays back by {give} deg {end} for every 100 "
+            "raw of the motor's load"
+        )
 
 
 EFFECT = LinkageCompliance()

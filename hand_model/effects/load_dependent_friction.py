@@ -40,7 +40,10 @@ class LoadDependentFriction(Effect):
         """Friction over the whole range, and as a part of the spring's load."""
         part = parameters.get("load_coefficient", 0.0)
         rate = f"by {100 * part:.0f} % of it, " if part > 0 else ""
-        return f"friction grows with the load of the spring: {rate}{figure(100 * parameters['per_load'])} raw over the motor's whole range"
+        return (
+            f"friction grows with the load of the spring: {rate}{figure(100 * parameters['per_load'])} raw over "
+            "the motor's whole range"
+        )
 
     def law(self, parameters: Mapping[str, float]) -> Law:
         """Friction in proportion to the position: the spring's load."""

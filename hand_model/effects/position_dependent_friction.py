@@ -56,8 +56,8 @@ class PositionDependentFriction(Effect):
             f", {figure(parameters['ratio'])} times the Coulomb friction" if parameters.get("ratio", 0.0) > 0 else ""
         )
         return (
-            f"a tight spot between {at - 2 * width:.1f} and {at + 2 * width:.1f} %: up to {figure(extra)} raw more friction "
-            f"both ways{ratio}, most at {at:.1f} %"
+            f"a tight spot between {at - 2 * width:.1f} and {at + 2 * width:.1f} %: "
+            f"up to {figure(extra)} raw more friction both ways{ratio}, most at {at:.1f} %"
         )
 
     def law(self, parameters: Mapping[str, float]) -> Law:

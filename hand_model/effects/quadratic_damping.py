@@ -26,7 +26,10 @@ class QuadraticDamping(Effect):
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """Drag at a speed that one can picture."""
-        return f"drag grows with the speed squared: {figure(1e4 * parameters['drag'])} raw at 100 %/s, a quarter of that at half the speed"
+        return (
+            f"drag grows with the speed squared: {figure(1e4 * parameters['drag'])} raw at 100 %/s, "
+            "a quarter of that at half the speed"
+        )
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """Second coefficient of the joint's `damping`: MuJoCo's force is -(a v + b v |v| + c v^3)."""

@@ -22,7 +22,10 @@ class SeriesElasticity(Compliance):
             "% of the encoder's range" if parameters["form"] == 0.0 else "deg",
         )
         segment = where.get("joint") or "proximal"
-        return f"the drive train gives: the {segment} segment stays back by {give} {end} for every 100 raw of the motor's load"
+        return (
+            f"the drive train gives: the {segment} segment stays back by {give} {end} for every 100 "
+            "raw of the motor's load"
+        )
 
 
 EFFECT = SeriesElasticity()

@@ -66,8 +66,8 @@ class SpringDecoupling(Effect):
         """When the finger runs ahead, or where it stays behind."""
         if parameters["form"] > 0.5:
             return (
-                f"below {parameters['below']:.1f} % of the encoder's range the finger does not follow its motor open: it stays bent by "
-                f"{figure(parameters['lead'])} deg more for every %"
+                f"below {parameters['below']:.1f} % of the encoder's range the finger does not follow its motor open: "
+                f"it stays bent by {figure(parameters['lead'])} deg more for every %"
             )
         times = (where.get("region") or {}).get("time") or {}
         spans = [(b - a, a, b, trial) for trial, some in times.items() for a, b in some]

@@ -71,8 +71,8 @@ def align(mocap_time_s: Array, angle_rad: Array, log_time_s: Array, counts: Arra
             raise SessionError(f"{name}: `position` falls as the finger flexes; it must increase with flexion")
     if explained < LEAST_EXPLAINED:
         raise IdentificationError(
-            f"{name}: mocap and log never correlate (best alignment explains {100 * max(explained, 0):.0f} % of the motion); "
-            "a log of the same motion is needed"
+            f"{name}: mocap and log never correlate (best alignment explains {100 * max(explained, 0):.0f} % of the "
+            "motion); a log of the same motion is needed"
         )
     drifts = abs(rate - 1) > 4 * rate_sd
     rate_free = rate

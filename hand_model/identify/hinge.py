@@ -84,8 +84,9 @@ def hinge_note(fit: ChainFit, joint: int) -> str:
     if misfit.p > CERTAIN or misfit.rms_m < NOTABLE * fit.noise_m or fit.noise_m < 1e-7:
         return ""
     return (
-        f"no plain hinge: its markers leave the hinge's motion by {1e3 * misfit.rms_m:.2f} mm (up to {1e3 * misfit.most_m:.2f} mm) in step "
-        "with the angle; a wobbling or travelling axis, or markers that move on their segment"
+        f"no plain hinge: its markers leave the hinge's motion by {1e3 * misfit.rms_m:.2f} mm (up to "
+        f"{1e3 * misfit.most_m:.2f} mm) in step with the angle; a wobbling or travelling axis, "
+        "or markers that move on their segment"
     )
 
 

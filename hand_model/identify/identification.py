@@ -197,7 +197,8 @@ def _finger(
         if degenerate:
             sd = axis_sd_deg(covariance)
             notes.append(
-                f"{fit.finger.name} {segment.name}: the recorded arc ({arc:.0f} deg) does not determine the axis (sd {sd:.1f} deg)"
+                f"{fit.finger.name} {segment.name}: the recorded arc ({arc:.0f} deg) does not determine the "
+                f"axis (sd {sd:.1f} deg)"
             )
         columns = np.flatnonzero(fit.fit.data.body == k + 1)
         markers = {

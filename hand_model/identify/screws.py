@@ -54,7 +54,10 @@ class Screws:
             if np.isfinite(self.span_m) and abs(span - self.span_m) > max(
                 BLUNDER * np.sqrt(2) * self.placement_m, 0.4 * abs(self.span_m)
             ):
-                remark = f"the screw heads were probed {1e3 * abs(span):.1f} mm apart, elsewhere {1e3 * abs(self.span_m):.1f} mm"
+                remark = (
+                    f"the screw heads were probed {1e3 * abs(span):.1f} mm apart, "
+                    f"elsewhere {1e3 * abs(self.span_m):.1f} mm"
+                )
                 return np.mean(heads, axis=0), abs(span - self.span_m) / 2, remark
             return np.mean(heads, axis=0), self.placement_m / np.sqrt(2), ""
         if not sound:

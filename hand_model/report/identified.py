@@ -56,10 +56,10 @@ def axes_section(hand: Hand) -> Section:
     body = [table(columns, rows, groups=groups, text_columns=2)]
     body.append(
         note(
-            "Palm frame of the landmarks; ± is one standard deviation in the worst direction, the palm frame taken "
-            "as known. "
-            "Published method: axis by Gamage & Lasenby (2002), centre by Chang & Pollard (2007); dominant axis: Chang & Pollard's "
-            "planar and radial cost; all on the same markers, as their distance from the maximum-likelihood chain (for the centre, "
+            "Palm frame of the landmarks; ± is one standard deviation in the worst direction, "
+            "the palm frame taken as known. Published method: axis by Gamage & Lasenby (2002), "
+            "centre by Chang & Pollard (2007); dominant axis: Chang & Pollard's planar and radial cost; "
+            "all on the same markers, as their distance from the maximum-likelihood chain (for the centre, "
             "across the axis)."
         )
     )

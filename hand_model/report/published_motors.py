@@ -48,9 +48,10 @@ def published_motors_section(hand: Hand, session: Session) -> Section | None:
     body = (
         table(columns, rows, "Current, raw units; the form of tables 4.12 and 4.13", (("", 2), *WAYS), text_columns=2),
         note(
-            "The published way filters the position at 6 Hz, forwards and backwards, and not the current, takes velocity and acceleration by differences, and drops "
-            "samples below 5 %/s. Filtered alike, with a preload, what remains of the reciprocal term is friction that rises as speed falls. The thesis's "
-            "figures are of its own hands."
+            "The published way filters the position at 6 Hz, forwards and backwards, and not the current, "
+            "takes velocity and acceleration by differences, and drops samples below 5 %/s. Filtered alike, "
+            "with a preload, what remains of the reciprocal term is friction that rises as speed falls. "
+            "The thesis's figures are of its own hands."
         ),
     )
     return Section("published-motors", "Motors as published", words, body)

@@ -69,8 +69,9 @@ def rig_findings_page(session: Session, findings: RigFindings) -> bytes:
         )
     )
     lead = (
-        f"{session.path.name}: the declared model, fitted, against {count(len(rig.trials), 'trial')}; what is named below "
-        "was chosen on the training trials and measured on the others, by MuJoCo on the written files."
+        f"{session.path.name}: the declared model, fitted, against {count(len(rig.trials), 'trial')}; "
+        "what is named below was chosen on the training trials and measured on the others, "
+        "by MuJoCo on the written files."
     )
     return page(session.hand or session.path.name, lead, _tiles(findings), sections)
 
@@ -144,7 +145,8 @@ def _map(rig: RigModel, pairs: Sequence[Pair]) -> Section:
         (
             figures(*drawn),
             note(
-                "Red: more effort recorded than simulated; blue: less. Both pictures of a joint share the scale in brackets."
+                "Red: more effort recorded than simulated; blue: less. "
+                "Both pictures of a joint share the scale in brackets."
             ),
         ),
     )
@@ -338,8 +340,8 @@ def _couplings(residuals: Sequence[CouplingResidual]) -> Section:
             a, b = _rms(c.before[mine]), _rms(c.after[mine])
             rows.append([str(name), c.coupling, f"{a:.4g}", f"{b:.4g}", f"{b / max(a, 1e-300):.2f}", c.unit])
     words = (
-        "What the angle of one encoder leaves of the next along the transmission, on the trials held out: lost motion turns "
-        "over with the direction, stretch follows the load."
+        "What the angle of one encoder leaves of the next along the transmission, on the trials held out: "
+        "lost motion turns over with the direction, stretch follows the load."
     )
     head = ("trial", "coupling", "declared polynomial", "with what was found", "ratio", "unit")
     return Section(

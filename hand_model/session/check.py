@@ -93,8 +93,8 @@ def check_mocap(session: Session, trial: Trial, mocap: Mocap) -> list[str]:
         if together < needed:
             listed = ", ".join(labels)
             raise SessionError(
-                f"{mocap.path}: three of the markers {listed} ({body}) are seen together in {together} of {len(seen)} frames; "
-                f"{needed} or more are needed"
+                f"{mocap.path}: three of the markers {listed} ({body}) are seen together in {together} of {len(seen)} "
+                f"frames; {needed} or more are needed"
             )
         if (
             len(labels) >= 3
@@ -181,8 +181,9 @@ def _check_probe_size(session: Session, mocap: Mocap) -> None:
     measured, declared = _size(mocap.markers(session.probe.labels)), _size(session.probe.position_probe[None])
     if np.isfinite(measured) and not 1 / UNIT_RATIO < measured / declared < UNIT_RATIO:
         raise SessionError(
-            f"{mocap.path}: the probe's markers {', '.join(session.probe.labels)} are {measured:.3g} m apart, and "
-            f"{declared:.3g} m in [probe]; file and manifest must agree (manifest in metres, the file in its stated unit)"
+            f"{mocap.path}: the probe's markers {', '.join(session.probe.labels)} are {measured:.3g} m apart, "
+            f"and {declared:.3g} m in [probe]; file and manifest must agree (manifest in metres, "
+            "the file in its stated unit)"
         )
 
 
@@ -269,8 +270,8 @@ def _check_durations(mocap: Mocap, log: Log) -> None:
     if min(lengths_s) * 20.0 < max(lengths_s):
         if missing := missing_direction(log.column("position")):
             raise SessionError(
-                f"{log.path}: the log holds no {missing} (in {lengths_s[1]:.3g} s, of the {lengths_s[0]:.3g} s in {mocap.path.name}); "
-                "motion in both directions is needed"
+                f"{log.path}: the log holds no {missing} (in {lengths_s[1]:.3g} s, "
+                f"of the {lengths_s[0]:.3g} s in {mocap.path.name}); motion in both directions is needed"
             )
         raise SessionError(
             f"{log.path}: the log lasts {lengths_s[1]:.3g} s and {mocap.path.name} {lengths_s[0]:.3g} s; "

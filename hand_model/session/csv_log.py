@@ -44,7 +44,8 @@ def read_csv_log(path: Path) -> Log:
     if np.isinf(table).any():
         row, column = np.argwhere(np.isinf(table))[0]
         raise SessionError(
-            f'{path}: line {numbers[row] + 1}, column "{header[column]}" is infinite; a number or an empty cell is needed'
+            f'{path}: line {numbers[row] + 1}, column "{header[column]}" is infinite; '
+            "a number or an empty cell is needed"
         )
     columns = {name: table[:, i] for i, name in enumerate(header)}
     return build_log(columns.pop("time"), columns, path)

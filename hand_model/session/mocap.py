@@ -45,7 +45,8 @@ class Mocap:
             count = self.labels.count(name)
             if count > 1:
                 raise SessionError(
-                    f'{self.path}: {count} trajectories are labelled "{name}" at the same time; each label once is needed'
+                    f'{self.path}: {count} trajectories are labelled "{name}" at the same time; '
+                    "each label once is needed"
                 )
             if count == 1:
                 return self.labels.index(name)

@@ -225,7 +225,10 @@ def servo(folder: Path, effects: tuple[str, ...], fault: str, random: np.random.
     resistance = random.uniform(2, 5)
     constant = f"{_wrong(random, gain * resistance, 1.3):.3g}"
     joint = _declared(random, armature=0.004 * weight, damping=0.01 * stall, frictionloss=law.coulomb)
-    motor = f'<actuator><dcmotor name="motor" joint="hinge" motorconst="{constant} {constant}" resistance="{resistance:.3g}"/></actuator>'
+    motor = (
+        f'<actuator><dcmotor name="motor" joint="hinge" motorconst="{constant} {constant}" '
+        f'resistance="{resistance:.3g}"/></actuator>'
+    )
     xml = HINGE.format(joint=joint, z=-length, mass=weight / 9.81 / length, own=1e-5, actuator=motor)
     write_session(
         folder, folder.name, xml, {"position": "joint:hinge:position", "voltage": "actuator:motor:ctrl"}, logs

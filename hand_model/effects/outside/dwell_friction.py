@@ -53,7 +53,10 @@ class DwellFriction(Outsider):
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """How much and for how long."""
-        return f"after a rest friction is {figure(parameters['excess'])} raw higher, which {figure(parameters['distance'])} % of travel wear off"
+        return (
+            f"after a rest friction is {figure(parameters['excess'])} raw higher, "
+            f"which {figure(parameters['distance'])} % of travel wear off"
+        )
 
 
 EFFECT = DwellFriction()

@@ -31,7 +31,10 @@ class FrictionJump(Outsider):
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """When and by how much."""
-        return f"friction changes by {figure(parameters['change'])} raw at {figure(parameters['moment'])} s, at once, and stays"
+        return (
+            f"friction changes by {figure(parameters['change'])} raw at {figure(parameters['moment'])} s, "
+            "at once, and stays"
+        )
 
 
 EFFECT = FrictionJump()

@@ -40,7 +40,10 @@ class GainChange(Outsider):
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """By how much all readings grow."""
         how = "over the session" if parameters["form"] < 0.5 else f"at {figure(parameters['moment'])} s"
-        return f"all of the current changes by {100 * parameters['change']:+.0f} % {how}: its scale does, not the friction alone"
+        return (
+            f"all of the current changes by {100 * parameters['change']:+.0f} % {how}: its scale does, "
+            "not the friction alone"
+        )
 
 
 EFFECT = GainChange()

@@ -36,7 +36,10 @@ class ScaleChange(Outsider):
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """By how much."""
-        return f"the encoder's scale changes by {100 * parameters['change']:+.1f} % after {figure(parameters['since'])} recordings"
+        return (
+            f"the encoder's scale changes by {100 * parameters['change']:+.1f} % after "
+            f"{figure(parameters['since'])} recordings"
+        )
 
 
 def _place(state: DriveState) -> Array:

@@ -29,7 +29,10 @@ class SegmentSwing(Outsider):
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """How slow the resonance is."""
         rate = 1 / (2 * np.pi * np.sqrt(abs(parameters["inverse_square"]) + 1e-12))
-        return f"the {where.get('joint') or 'distal'} segment swings with acceleration, like markers on something soft of {rate:.1f} Hz"
+        return (
+            f"the {where.get('joint') or 'distal'} segment swings with acceleration, "
+            f"like markers on something soft of {rate:.1f} Hz"
+        )
 
 
 EFFECT = SegmentSwing()

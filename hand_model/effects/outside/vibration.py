@@ -56,7 +56,10 @@ class Vibration(Outsider):
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """Its frequency."""
-        return f"something shakes the drive or its reading at {figure(parameters['frequency'])} Hz, whatever the drive does"
+        return (
+            f"something shakes the drive or its reading at {figure(parameters['frequency'])} Hz, "
+            "whatever the drive does"
+        )
 
 
 EFFECT = Vibration()

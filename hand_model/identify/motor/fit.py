@@ -197,18 +197,20 @@ def fit_motor(trials: Sequence[MotorTrial], scale: Scale, actuator: str = "motor
         if min(plain.misfit, curved.misfit) > REGRESSION_MISFIT:
             names, covariance = (), np.empty((0, 0))
             notes.append(
-                f"the balance of currents does not explain the strokes either (residual variance {plain.misfit:.1f} in units of the noise): "
-                "parameters are given without intervals"
+                f"the balance of currents does not explain the strokes either (residual variance {plain.misfit:.1f} in "
+                "units of the noise): parameters are given without intervals"
             )
         if best is None:
             notes.append(
-                "no moves from rest with logged setpoints: controller not identified, setpoints do not predict the motion"
+                "no moves from rest with logged setpoints: controller not identified, "
+                "setpoints do not predict the motion"
             )
         else:
             values = {**best.values, **values}
             notes.append(
-                f"setpoints do not explain the motion (residual variance {best.chi2[0]:.1f} of position, {best.chi2[1]:.1f} of current, "
-                "in units of the noise): parameters are those of the regression, and something is missing from the model"
+                f"setpoints do not explain the motion (residual variance {best.chi2[0]:.1f} of position, "
+                f"{best.chi2[1]:.1f} of current, in units of the noise): parameters are those of the regression, "
+                "and something is missing from the model"
             )
     if stribeck:
         notes.append(f"friction rises as speed falls (Stribeck): misfit falls by {evidence:.0f} noise variances")

@@ -130,7 +130,8 @@ def check_trials(trials: Sequence[MotorTrial]) -> None:
     if min(share) < 0.02 * len(trials):
         way = "extension" if share[1] < share[0] else "flexion"
         raise IdentificationError(
-            f"{', '.join(t.name for t in trials)}: the log holds no {way}; motion in both directions separates friction from spring"
+            f"{', '.join(t.name for t in trials)}: the log holds no {way}; "
+            "motion in both directions separates friction from spring"
         )
     for t in trials:
         _check_current(t)
@@ -141,8 +142,8 @@ def check_trials(trials: Sequence[MotorTrial]) -> None:
     friction = flexing.mean() - extending.mean()
     if friction < 5 * np.sqrt(flexing.var() / len(flexing) + extending.var() / len(extending)):
         raise IdentificationError(
-            f'{", ".join(t.name for t in trials)}: column "current" is no higher in flexion than in extension ({friction:.3g} raw); '
-            "a drive's current overcomes friction, positive towards flexion"
+            f'{", ".join(t.name for t in trials)}: column "current" is no higher in flexion than in extension '
+            f"({friction:.3g} raw); a drive's current overcomes friction, positive towards flexion"
         )
 
 
@@ -185,8 +186,8 @@ def _check_current(t: MotorTrial) -> None:
         share, ceiling = _quiet_ceiling(side * u[moving])
         if share > 0.05:
             raise IdentificationError(
-                f'{t.name}: column "current" is saturated near {side * ceiling:.3g} in {100 * share:.0f} % of the samples in motion, where it hardly varies; '
-                "friction cannot be read from a clipped current"
+                f'{t.name}: column "current" is saturated near {side * ceiling:.3g} in {100 * share:.0f} % of the samples in '
+                "motion, where it hardly varies; friction cannot be read from a clipped current"
             )
 
 
@@ -240,7 +241,8 @@ def motor_trials(session: Session, actuator: str) -> tuple[list[MotorTrial], Sca
     found = actuator_trials(session, actuator)
     if not found:
         raise IdentificationError(
-            f'{session.path}: actuator "{actuator}" has no excitation or flexion trial with a log; one with motion both ways is needed'
+            f'{session.path}: actuator "{actuator}" has no excitation or flexion trial with a log; '
+            "one with motion both ways is needed"
         )
     full = next(a.speed_full for a in session.actuators if a.name == actuator)
     logs = [(t.name, t.log()) for t in found]

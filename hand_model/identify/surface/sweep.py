@@ -86,8 +86,8 @@ def resampled(tip: Array, shaft: Array, voxel_m: float) -> Cloud:
         points, hint = points[part], hint[part]
     if len(points) < LEAST_POINTS:
         raise IdentificationError(
-            f"{len(tip)} tips make {len(points)} points {voxel_m * 1e3:g} mm apart, too few for a surface ({LEAST_POINTS} or more); "
-            "sweep longer, or ask for smaller voxels"
+            f"{len(tip)} tips make {len(points)} points {voxel_m * 1e3:g} mm apart, "
+            f"too few for a surface ({LEAST_POINTS} or more); sweep longer, or ask for smaller voxels"
         )
     points, normals = _projected(points, hint, tip[kept], voxel_m)
     return Cloud(points, normals, tip[kept], len(tip) - int(kept.sum()))

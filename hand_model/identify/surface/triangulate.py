@@ -42,8 +42,8 @@ def triangulated(points: Array, normals: Array, spacing_m: float, pivoting: bool
     available = has_open3d() if pivoting is not False else False
     if pivoting and not available:
         raise MissingDependencyError(
-            "ball pivoting needs Open3D: pip install 'hand_model[surface]' (on a bare Linux also libegl1, libgl1, libx11-6, libusb-1.0-0); "
-            "without it surfaces come from the built-in Delaunay carving"
+            "ball pivoting needs Open3D: pip install 'hand_model[surface]' (on a bare Linux also libegl1, libgl1, "
+            "libx11-6, libusb-1.0-0); without it surfaces come from the built-in Delaunay carving"
         )
     if available:
         return _pivoted(points, normals, spacing_m), PIVOTING
