@@ -133,8 +133,11 @@ def declared_columns(rig: RigModel, off_axis: bool = False) -> tuple[Column, ...
             if inertial[b - 1, p] != 0 or (off_axis and part in MOMENTS):
                 columns.append(Column("inertial", model.body(b).name, part, float(inertial[b - 1, p])))
     for j, joint in enumerate(rig.joints):
-        for kind, value in (("armature", model.dof_armature[j]), ("damping", model.dof_damping[j]),
-                            ("stiffness", model.jnt_stiffness[j])):  # fmt: skip
+        for kind, value in (
+            ("armature", model.dof_armature[j]),
+            ("damping", model.dof_damping[j]),
+            ("stiffness", model.jnt_stiffness[j]),
+        ):
             if value != 0:
                 columns.append(Column(kind, joint, "", float(value)))
         key = f"joint:{joint}:frictionloss"
@@ -148,8 +151,11 @@ def declared_columns(rig: RigModel, off_axis: bool = False) -> tuple[Column, ...
         # Back-EMF: damping while the leads are connected, unless what the drive gives after it is recorded.
         if drive.kind == "voltage" and not any(drive.joint in t.effort for t in rig.trials):
             columns.append(Column("back_emf", drive.name, "", _back_emf(model, drive.name)))
-    columns += [Column("spring", model.tendon(t).name, "", float(model.tendon_stiffness[t])) for t in range(model.ntendon)
-                if model.tendon_stiffness[t] != 0]  # fmt: skip
+    columns += [
+        Column("spring", model.tendon(t).name, "", float(model.tendon_stiffness[t]))
+        for t in range(model.ntendon)
+        if model.tendon_stiffness[t] != 0
+    ]
     return tuple(columns)
 
 
@@ -159,8 +165,15 @@ def _back_emf(model: Any, name: str) -> float:
     return float(constant**2 / resistance * model.actuator_gear[a, 0] ** 2)
 
 
-def trial_rows(rig: RigModel, trial: RigTrial, columns: tuple[Column, ...], cutoff_hz: float | None = None, trim_s: float | None = None,
-               weights: Mapping[str, Array] | None = None, kept: Collection[str] = ()) -> tuple[Rows, ...]:  # fmt: skip
+def trial_rows(
+    rig: RigModel,
+    trial: RigTrial,
+    columns: tuple[Column, ...],
+    cutoff_hz: float | None = None,
+    trim_s: float | None = None,
+    weights: Mapping[str, Array] | None = None,
+    kept: Collection[str] = (),
+) -> tuple[Rows, ...]:
     """The balance of every independent joint whose effort is known (or whose drive is absent or open) in one trial.
     trim_s [s]: what is left out at each of its ends, where the filter knows one side only; by default what the filter
     reaches; weights: joint -> weight of its samples, as another balance of the same trial has them; kept: joints whose
@@ -185,8 +198,12 @@ def trial_rows(rig: RigModel, trial: RigTrial, columns: tuple[Column, ...], cuto
     q = np.stack([low_pass(raw[j], rate, wide, STEEP) for j in rig.joints], 1)
     v = differentiate(q, rate, wide < PASSED * rate)
     a = differentiate(v, rate, wide < PASSED * rate)
-    rest = np.array([max(3 * velocity_noise(raw[j], rate, min(wide, PASSED * rate)), RINGING * float(np.std(v[:, i])))
-                     for i, j in enumerate(rig.joints)])  # fmt: skip
+    rest = np.array(
+        [
+            max(3 * velocity_noise(raw[j], rate, min(wide, PASSED * rate)), RINGING * float(np.std(v[:, i])))
+            for i, j in enumerate(rig.joints)
+        ]
+    )
     sign = np.clip(v / rest, -1.0, 1.0)
     thin = max(1, int(rate / max(12 * cutoff, 24.0)))
     if weights is None:
@@ -213,11 +230,34 @@ def trial_rows(rig: RigModel, trial: RigTrial, columns: tuple[Column, ...], cuto
         w = weights.get(joint, np.zeros(0))
         seen = (settled & (np.abs(v[:, i]) > rest[i]) & (w > 0 if len(w) else True))[::step]
         rows.append(
-            Rows(trial.name, joint, trial.validate, grid, q[:, i], v[:, i], a[:, i],
-                 low_pass(_weighed(y, w), rate, cutoff)[::step], low_pass(_weighed(x, w), rate, cutoff)[::step],
-                 seen, float(rest[i]), cutoff, rate,
-                 {"effort": y, **channels}, x, external, y - effort[joint], step, (q, v, a), sign[:, i], sign, jacobian, columns, x_still, w)
-        )  # fmt: skip
+            Rows(
+                trial.name,
+                joint,
+                trial.validate,
+                grid,
+                q[:, i],
+                v[:, i],
+                a[:, i],
+                low_pass(_weighed(y, w), rate, cutoff)[::step],
+                low_pass(_weighed(x, w), rate, cutoff)[::step],
+                seen,
+                float(rest[i]),
+                cutoff,
+                rate,
+                {"effort": y, **channels},
+                x,
+                external,
+                y - effort[joint],
+                step,
+                (q, v, a),
+                sign[:, i],
+                sign,
+                jacobian,
+                columns,
+                x_still,
+                w,
+            )
+        )
     return tuple(rows)
 
 
@@ -290,8 +330,9 @@ def _joint_effort(rig: RigModel, trial: RigTrial, grid: Array) -> dict[str, Arra
     return out
 
 
-def _column_values(rig: RigModel, trial: RigTrial, model: Any, columns: tuple[Column, ...], q: Array, v: Array, a: Array,
-                   sign: Array) -> Array:  # fmt: skip
+def _column_values(
+    rig: RigModel, trial: RigTrial, model: Any, columns: tuple[Column, ...], q: Array, v: Array, a: Array, sign: Array
+) -> Array:
     """Effort per unit of each parameter at each joint, (n, joints, P); what the physics takes is positive."""
     out = np.zeros((len(q), len(rig.joints), len(columns)))
     inertial = inertial_columns(model, q, v, a, np.array(model.opt.gravity))

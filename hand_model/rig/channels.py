@@ -188,8 +188,10 @@ def copy_left(values: Array, other: Array) -> float:
 def check_balance(rig: RigModel, fit: DeclaredFit) -> tuple[ChannelIssue, ...]:
     """Issues that only the balance shows: an unsigned effort, a computed one, one that explains nothing of the
     motion."""
-    force, told = ({name: c for c, (kind, name, attribute) in rig.quantity.items() if kind == "actuator" and attribute == a}
-                   for a in ("force", "ctrl"))  # fmt: skip
+    force, told = (
+        {name: c for c, (kind, name, attribute) in rig.quantity.items() if kind == "actuator" and attribute == a}
+        for a in ("force", "ctrl")
+    )
     start = np.array([c.value for c in fit.columns])
     live = {(t.name, j) for t in rig.trials for j in t.live}
     trials = {t.name: t for t in rig.trials}
@@ -220,13 +222,25 @@ def check_balance(rig: RigModel, fit: DeclaredFit) -> tuple[ChannelIssue, ...]:
     lacking = {row.joint: (name, share) for name, row, reason, share in looks if reason == UNSIGNED}
     known = {(row.trial, row.joint) for _, row, _, _ in looks}
     # A column that has no sign has none in recordings either whose efforts all go one way.
-    looks += [(lacking[r.joint][0], r, UNSIGNED, lacking[r.joint][1]) for r in fit.rows
-              if r.joint in lacking and (r.trial, r.joint) in live - known]  # fmt: skip
+    looks += [
+        (lacking[r.joint][0], r, UNSIGNED, lacking[r.joint][1])
+        for r in fit.rows
+        if r.joint in lacking and (r.trial, r.joint) in live - known
+    ]
     out = []
     for name, joint, reason in dict.fromkeys((name, row.joint, reason) for name, row, reason, _ in looks):
         hits = [(row.trial, share) for n, row, r, share in looks if (n, row.joint, r) == (name, joint, reason)]
-        out.append(ChannelIssue("command_as_measurement", name, joint, tuple(t for t, _ in hits), f"{name} {reason}", True,
-                                float(np.median([share for _, share in hits]))))  # fmt: skip
+        out.append(
+            ChannelIssue(
+                "command_as_measurement",
+                name,
+                joint,
+                tuple(t for t, _ in hits),
+                f"{name} {reason}",
+                True,
+                float(np.median([share for _, share in hits])),
+            )
+        )
     return tuple(out)
 
 
@@ -299,8 +313,17 @@ def _check_position(rig: RigModel, joint: str, channel: str) -> list[ChannelIssu
             dead.append(trial.name)
     out = []
     if wrapped:
-        out.append(ChannelIssue("command_as_measurement", channel, joint, tuple(wrapped),
-                                f"{channel} jumps by a whole turn: it is not unwrapped", True, 1.0))  # fmt: skip
+        out.append(
+            ChannelIssue(
+                "command_as_measurement",
+                channel,
+                joint,
+                tuple(wrapped),
+                f"{channel} jumps by a whole turn: it is not unwrapped",
+                True,
+                1.0,
+            )
+        )
     if dead and len(dead) == len(rig.trials):
         out.append(
             ChannelIssue(

@@ -43,8 +43,17 @@ def is_physical(p: Array) -> bool:
     return bool(level[0] >= -1e-12 * max(level[-1], 1e-300))
 
 
-def consistent(columns: Sequence[Column], declared: Array, theta: Array, gram: Array, moment: Array, low: Array,
-               high: Array, mean: Array, weight: Array) -> Array:  # fmt: skip
+def consistent(
+    columns: Sequence[Column],
+    declared: Array,
+    theta: Array,
+    gram: Array,
+    moment: Array,
+    low: Array,
+    high: Array,
+    mean: Array,
+    weight: Array,
+) -> Array:
     """theta (P + J,) again, or, where a body of it cannot exist, the least-squares solution over bodies that can.
 
     declared (bodies, 10): parameters as declared (what is zero there and no column stays zero), in the order in which

@@ -79,8 +79,13 @@ def prior(columns: Sequence[Column], anchored: bool = False) -> tuple[Array, Arr
     return value, np.where(value_size == 0, 1e-12, weight)
 
 
-def fit_rows(columns: Sequence[Column], rows: Sequence[Rows], scale: dict[str, float], weight: dict[str, float],
-             anchored: bool = False) -> Array:  # fmt: skip
+def fit_rows(
+    columns: Sequence[Column],
+    rows: Sequence[Rows],
+    scale: dict[str, float],
+    weight: dict[str, float],
+    anchored: bool = False,
+) -> Array:
     """theta (P,) from the moving samples of the rows; scale: joint -> residual rms; weight: trial -> 0..1."""
     p = len(columns)
     gram, moment = np.zeros((p, p)), np.zeros(p)
@@ -95,9 +100,12 @@ def fit_rows(columns: Sequence[Column], rows: Sequence[Rows], scale: dict[str, f
 
 
 def fit_declared(
-    rig: RigModel, refused: Collection[tuple[str, str]] = (), cutoff_hz: float | None = None, off_axis: bool = False,
+    rig: RigModel,
+    refused: Collection[tuple[str, str]] = (),
+    cutoff_hz: float | None = None,
+    off_axis: bool = False,
     kept: Collection[str] = (),
-) -> DeclaredFit:  # fmt: skip
+) -> DeclaredFit:
     """Fit the declared parameters to the trials that do not validate.
 
     refused: (trial, joint) whose effort channel cannot be trusted; their balance is not fitted, nor kept; kept: joints
@@ -181,8 +189,13 @@ def _drowns(rows: Sequence[Rows]) -> bool:
 def _powers(fit: DeclaredFit) -> Array:
     """Mean squares of what the balance has to explain and of what it leaves, (joints, 2)."""
     joints = sorted({r.joint for r in fit.rows})
-    sides = [[np.concatenate([side(r) for r in fit.rows if r.joint == j]) for side in (lambda r: _known(r, fit.columns), fit.residual)]
-             for j in joints]  # fmt: skip
+    sides = [
+        [
+            np.concatenate([side(r) for r in fit.rows if r.joint == j])
+            for side in (lambda r: _known(r, fit.columns), fit.residual)
+        ]
+        for j in joints
+    ]
     return np.array([[np.mean(known**2), np.mean(left**2)] for known, left in sides])
 
 
@@ -247,8 +260,10 @@ def _robust_fit(columns: tuple[Column, ...], rows: tuple[Rows, ...], cutoff: flo
         left = {(r.trial, r.joint): _rms((r.effort - r.columns @ theta)[r.moving]) for r in train}
         for j in joints:
             scale[j] = max(float(np.median([left[r.trial, r.joint] for r in train if r.joint == j])), 1e-3 * size[j])
-        weight = {t: min(1.0, min((2.0 * scale[j] / max(left[t, j], 1e-300)) ** 2 for j in joints if (t, j) in left))
-                  for t in {r.trial for r in train}}  # fmt: skip
+        weight = {
+            t: min(1.0, min((2.0 * scale[j] / max(left[t, j], 1e-300)) ** 2 for j in joints if (t, j) in left))
+            for t in {r.trial for r in train}
+        }
     quality = {}
     for r in rows:
         m = r.moving

@@ -37,16 +37,28 @@ from .words import rejection, shares
 
 Array = NDArray[np.float64]
 PROBABILITY = (
-    "of an effect: share of resampled blocks of the training recordings, each left out of the fit, on which it lowers the "
-    "error against nothing; of an alternative: share on which it is the best of all"
+    "of an effect: share of resampled blocks of the training recordings, each left out of the fit, "
+    "on which it lowers the error against nothing; of an alternative: share on which it is the best of all"
 )
-UNMEASURED = {"metric": None, "unit": None, "before": None, "after": None, "noise_floor": None, "ci95_reduction": None, "held_out": [],
-              "engine": None}  # fmt: skip
+UNMEASURED = {
+    "metric": None,
+    "unit": None,
+    "before": None,
+    "after": None,
+    "noise_floor": None,
+    "ci95_reduction": None,
+    "held_out": [],
+    "engine": None,
+}
 
 
 @single_threaded()
-def diagnose_rig(session: Session, output: str | Path | None = None, progress: Callable[[str], None] | None = None,
-                 model: bool = True) -> RigFindings:  # fmt: skip
+def diagnose_rig(
+    session: Session,
+    output: str | Path | None = None,
+    progress: Callable[[str], None] | None = None,
+    model: bool = True,
+) -> RigFindings:
     """Diagnose a rig session; with `output`, also write findings.json there and, with `model`, the improved rig.xml.
 
     Raises SessionError or DescriptionError where the session or its MJCF cannot be read, HandModelError for an output
@@ -89,10 +101,16 @@ def diagnose_rig(session: Session, output: str | Path | None = None, progress: C
         session=rig.name,
         verdict=_verdict(found, lack),
         lack_of_fit=lack,
-        protocol={"repeats": len(rig.select(False)), "rate_hz": _rate(rig), "speeds": None, "isolable": [], "held_out": [t.name for t in rig.select(True)],
-                  "held_out_repeats_the_training_trajectory": again,
-                  "probability": PROBABILITY,
-                  "not_isolable": [list(f.members) for f in found if len(f.members) > 1]},
+        protocol={
+            "repeats": len(rig.select(False)),
+            "rate_hz": _rate(rig),
+            "speeds": None,
+            "isolable": [],
+            "held_out": [t.name for t in rig.select(True)],
+            "held_out_repeats_the_training_trajectory": again,
+            "probability": PROBABILITY,
+            "not_isolable": [list(f.members) for f in found if len(f.members) > 1],
+        },
         findings=tuple(sorted(found, key=_rank)),
         rejected=tuple(rejection(r["effect"], r["reason"]) for r in rejected),
         unexplained=unexplained,
@@ -101,7 +119,7 @@ def diagnose_rig(session: Session, output: str | Path | None = None, progress: C
         xml=xml,
         declared_xml=declared_xml,
         couplings=tuple(angles),
-    )  # fmt: skip
+    )
     if output is not None:
         findings.write(output, model)
     return findings
@@ -135,10 +153,17 @@ def _channel_finding(issue: ChannelIssue) -> Finding:
         "it is refused, nothing is fitted to it" if issue.refuse else "samples there say only that it is at least that"
     )
     return Finding(
-        issue.kind, (issue.kind,), 1.0, (), whereabouts(issue.joint, None, issue.channel, issue.trials, 1.0 if issue.refuse else 0.0),
-        f"{issue.reason}: {action}.", {"share_left": {"value": issue.share, "unit": "1"}}, UNMEASURED, None,
+        issue.kind,
+        (issue.kind,),
+        1.0,
+        (),
+        whereabouts(issue.joint, None, issue.channel, issue.trials, 1.0 if issue.refuse else 0.0),
+        f"{issue.reason}: {action}.",
+        {"share_left": {"value": issue.share, "unit": "1"}},
+        UNMEASURED,
+        None,
         "channel refused" if issue.refuse else "channel clipped",
-    )  # fmt: skip
+    )
 
 
 # --- joints by the balance of effort ---------------------------------------------------------------------------------
@@ -208,10 +233,16 @@ def _held_out(rig: RigModel, search: _Search) -> tuple[tuple, tuple[str, ...]]:
     later, kept = proved(bench, fit, search.stories, kept, rejected)
     found += later
     one, two, every = ((fit, *solved(bench, fit, first_of(fit, kept, k))) for k in (1, 2, len(kept)))
-    lack = {"metric": "effort_rmse", "unit": "share of the declared model's", "before": 1.0,
-            "after": bench.ratio(plain, every), "one_effect": bench.ratio(plain, one),
-            "two_effects": bench.ratio(plain, two), "engine": bench.engine,
-            "joints": {j: bench.proof(j, plain, every) for j in _balanced(rig, fit)}}  # fmt: skip
+    lack = {
+        "metric": "effort_rmse",
+        "unit": "share of the declared model's",
+        "before": 1.0,
+        "after": bench.ratio(plain, every),
+        "one_effect": bench.ratio(plain, one),
+        "two_effects": bench.ratio(plain, two),
+        "engine": bench.engine,
+        "joints": {j: bench.proof(j, plain, every) for j in _balanced(rig, fit)},
+    }
     return (shares(found, lack["joints"]), rejected, lack, bench.file(*every), bench.file(*plain)), known_at_rest(
         *every
     )
@@ -239,17 +270,30 @@ def _off_axis(bench: Bench, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple[
     ratio = float(np.sqrt(np.mean([(p["after"] / p["before"]) ** 2 for p in proofs.values()])))
     if ratio >= 1 or proofs[best]["ci95_reduction"][0] <= 0:
         return None
-    moved = {c.label: {"value": float(v), "unit": "kg m"} for c, v in zip(freed.columns, after)
-             if c.kind == "inertial" and c.value == 0}  # fmt: skip
+    moved = {
+        c.label: {"value": float(v), "unit": "kg m"}
+        for c, v in zip(freed.columns, after)
+        if c.kind == "inertial" and c.value == 0
+    }
     where = whereabouts(
         best, None, "effort", proofs[best]["held_out"], proofs[best]["before"] ** 2 - proofs[best]["after"] ** 2
     )
     words = (
-        f"Centres of mass lie off the axes on which they are declared: held-out effort error falls to "
-        f"{100 * ratio:.0f} % over all joints (most at {best}: {proofs[best]['before']:.4g} to {proofs[best]['after']:.4g})."
+        "Centres of mass lie off the axes on which they are declared: "
+        f"held-out effort error falls to {100 * ratio:.0f} % over all joints (most at {best}: "
+        f"{proofs[best]['before']:.4g} to {proofs[best]['after']:.4g})."
     )
-    return freed, Finding("gravity_load", ("gravity_load",), found[1].probability, (), where, words, moved, proofs[best],
-                          {"native": True, "mjcf": "body/inertial/@pos", "urdf": "link/inertial/origin"})  # fmt: skip
+    return freed, Finding(
+        "gravity_load",
+        ("gravity_load",),
+        found[1].probability,
+        (),
+        where,
+        words,
+        moved,
+        proofs[best],
+        {"native": True, "mjcf": "body/inertial/@pos", "urdf": "link/inertial/origin"},
+    )
 
 
 def _better_alone(rig: RigModel, fit: DeclaredFit, terms: Sequence[Term], error: float) -> bool:
@@ -304,8 +348,13 @@ def _unexplained(lack: Mapping[str, Any], found: Sequence[Finding]) -> tuple[Map
         excess, whole = p["after"] ** 2 - floor**2, p["before"] ** 2 - floor**2
         if whole > 0 and excess > 0.02 * whole and p["after"] > FITS * floor:
             signal = "position" if lack.get("metric") == "position_rmse" else "effort"
-            out.append({"where": {"finger": None, "joint": joint or None, "signal": signal}, "share_of_mismatch": float(min(excess / whole, 1.0)),
-                        "shape": "what no effect known here lowers on recordings held out"})  # fmt: skip
+            out.append(
+                {
+                    "where": {"finger": None, "joint": joint or None, "signal": signal},
+                    "share_of_mismatch": float(min(excess / whole, 1.0)),
+                    "shape": "what no effect known here lowers on recordings held out",
+                }
+            )
     return tuple(out)
 
 
@@ -313,10 +362,16 @@ def _next(found: Sequence[Finding], issues: Sequence[ChannelIssue], again: bool)
     if any(i.refuse for i in issues):
         return "record the torque that the drive measures (phase current), not the one that it is asked for"
     if again:
-        return "record another trajectory: the held-out recording repeats the fitted one, so what is tied to time or place passes"
+        return (
+            "record another trajectory: the held-out recording repeats the fitted one, "
+            "so what is tied to time or place passes"
+        )
     for f in found:
         if len(f.members) > 1:
-            return f"repeat the motion at other speeds and loads: that separates {', '.join(f.members[:-1])} and {f.members[-1]}"
+            return (
+                "repeat the motion at other speeds and loads: that separates "
+                f"{', '.join(f.members[:-1])} and {f.members[-1]}"
+            )
     return "repeat one trial three times unchanged: that shows the noise floor"
 
 

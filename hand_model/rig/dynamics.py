@@ -31,8 +31,14 @@ def inertial_columns(model: Any, position: Array, velocity: Array, acceleration:
     """
     n, bodies = len(position), model.nbody
     world = [None] * bodies
-    world[0] = (np.broadcast_to(np.eye(3), (n, 3, 3)), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3)),
-                np.broadcast_to(-gravity, (n, 3)), {})  # fmt: skip
+    world[0] = (
+        np.broadcast_to(np.eye(3), (n, 3, 3)),
+        np.zeros((n, 3)),
+        np.zeros((n, 3)),
+        np.zeros((n, 3)),
+        np.broadcast_to(-gravity, (n, 3)),
+        {},
+    )
     out = np.zeros((n, model.njnt, bodies - 1, 10))
     for b in range(1, bodies):
         world[b] = _move(model, b, world[model.body_parentid[b]], position, velocity, acceleration)

@@ -72,8 +72,15 @@ def beyond_chance(none: Array, errors: Array, worth: float = 0.0, flips: int = R
     return float(np.mean(by_chance < best - 1e-9))
 
 
-def weigh(none: Array, errors: Array, sizes: Sequence[int], group: Array,
-          least: float = BEYOND_DOUBT, by_chance: bool = True, worth: float = 0.0) -> Verdict | None:  # fmt: skip
+def weigh(
+    none: Array,
+    errors: Array,
+    sizes: Sequence[int],
+    group: Array,
+    least: float = BEYOND_DOUBT,
+    by_chance: bool = True,
+    worth: float = 0.0,
+) -> Verdict | None:
     """Compare rivals (errors (rivals, blocks), sizes: parameters) with each other and with "nothing" (none (blocks,));
     None where none of them beats nothing with probability `least`, the choice among them allowed for (by_chance: that
     they are more than chance is asked here), or gains enough (worth: share of the error of "nothing")."""

@@ -26,8 +26,16 @@ def whereabouts(
 ) -> dict[str, Any]:
     """Where a finding of a rig is; share: of the mismatch, squared [effort or position unit] until `shares` divides
     it."""
-    return {"finger": None, "joint": joint, "actuator": drive.name if drive else None, "signal": signal, "marker": None,
-            "trials": list(trials), "region": None, "share_of_mismatch": share}  # fmt: skip
+    return {
+        "finger": None,
+        "joint": joint,
+        "actuator": drive.name if drive else None,
+        "signal": signal,
+        "marker": None,
+        "trials": list(trials),
+        "region": None,
+        "share_of_mismatch": share,
+    }
 
 
 @dataclass(frozen=True)

@@ -26,8 +26,14 @@ NO_LAW = "no law in open loop"
 CARRIES = 0.5  # an error below this share of the recorded motion's standard deviation still predicts it
 
 
-def open_loop(rig: RigModel, before: bytes, after: bytes, refused: Collection[tuple[str, str]] = (),
-              validate: bool = True, known: dict[tuple[bytes, float, bool], Array] | None = None) -> dict[str, Any]:  # fmt: skip
+def open_loop(
+    rig: RigModel,
+    before: bytes,
+    after: bytes,
+    refused: Collection[tuple[str, str]] = (),
+    validate: bool = True,
+    known: dict[tuple[bytes, float, bool], Array] | None = None,
+) -> dict[str, Any]:
     """Position error of both files on the trials held out (on all where none is), at the longest horizon that carries.
 
     refused: (trial, joint) whose effort cannot be trusted; their trials are left out. validate: False for the training
@@ -58,11 +64,18 @@ def open_loop(rig: RigModel, before: bytes, after: bytes, refused: Collection[tu
             continue
         new = error(after, horizon)
         if np.isfinite(new).all():
-            joints = {j: {"before": float(a), "after": float(b), "unit": rig.unit(j)}
-                      for j, a, b in zip(rig.joints, old, new, strict=True)}  # fmt: skip
-            return {"metric": "position_rmse", "horizon_s": "whole" if np.isinf(horizon) else horizon, "engine": "mujoco",
-                    "ratio": float(np.sqrt(np.mean((new / np.maximum(old, 1e-300)) ** 2))), "joints": joints,
-                    "held_out": [t.name for t in trials]}  # fmt: skip
+            joints = {
+                j: {"before": float(a), "after": float(b), "unit": rig.unit(j)}
+                for j, a, b in zip(rig.joints, old, new, strict=True)
+            }
+            return {
+                "metric": "position_rmse",
+                "horizon_s": "whole" if np.isinf(horizon) else horizon,
+                "engine": "mujoco",
+                "ratio": float(np.sqrt(np.mean((new / np.maximum(old, 1e-300)) ** 2))),
+                "joints": joints,
+                "held_out": [t.name for t in trials],
+            }
     return {"not_run": f"a simulation leaves the recordings within {HORIZONS_S[-1]:g} s"}
 
 

@@ -67,8 +67,17 @@ def _of_state(record: Mapping[str, Any]) -> Law:
     one, friction, line = np.ones(1), record["effect"] in FRICTION, record["amplitude"].get(LINE, 0.0)
 
     def act(now: Now) -> tuple[float, float]:
-        state = DriveState("", "", 0 * one, now.position * one, now.velocity * one, 0 * one, np.nan * one, one[:, None],
-                           declared_names=("coulomb",))  # fmt: skip
+        state = DriveState(
+            "",
+            "",
+            0 * one,
+            now.position * one,
+            now.velocity * one,
+            0 * one,
+            np.nan * one,
+            one[:, None],
+            declared_names=("coulomb",),
+        )
         value = float((named.columns(state, shape) @ size)[0])
         return (0.0, value) if friction else (value + line * now.position, 0.0)
 

@@ -225,5 +225,16 @@ def _map_trial(trial: Trial, quantity: Mapping[str, tuple], drives: tuple[Drive,
         elif joint in maps["ctrl"] and drive.kind == "voltage":
             voltage[joint] = maps["ctrl"][joint]
     extra = {c: v[keep] for c, v in log.columns.items() if c not in quantity and np.isfinite(v).any()}
-    return RigTrial(trial.name, trial.validate, time_s, maps["position"], maps["velocity"], effort, voltage,
-                    maps["setpoint"], extra, dict(trial.set), live)  # fmt: skip
+    return RigTrial(
+        trial.name,
+        trial.validate,
+        time_s,
+        maps["position"],
+        maps["velocity"],
+        effort,
+        voltage,
+        maps["setpoint"],
+        extra,
+        dict(trial.set),
+        live,
+    )

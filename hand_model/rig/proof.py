@@ -65,13 +65,20 @@ class Bench:
                 self.known[xml] = effort_residuals(replace(self.rig, xml=xml), fit.rows, keep)
             rows = [(r.trial, r.validate, r.error) for r in self.known[xml] if r.joint == joint and len(r.error) > 10]
         else:
-            rows = [(r.trial, r.validate, (r.effort - design(r, terms) @ theta)[r.moving])
-                    for r in fit.rows if r.joint == joint and r.moving.sum() > 10]  # fmt: skip
+            rows = [
+                (r.trial, r.validate, (r.effort - design(r, terms) @ theta)[r.moving])
+                for r in fit.rows
+                if r.joint == joint and r.moving.sum() > 10
+            ]
         chosen = [r for r in rows if r[1]] or rows
         return [(trial, error) for trial, _, error in chosen]
 
-    def proof(self, joint: str, before: tuple[DeclaredFit, Sequence[Term], Array],
-              after: tuple[DeclaredFit, Sequence[Term], Array]) -> dict[str, Any]:  # fmt: skip
+    def proof(
+        self,
+        joint: str,
+        before: tuple[DeclaredFit, Sequence[Term], Array],
+        after: tuple[DeclaredFit, Sequence[Term], Array],
+    ) -> dict[str, Any]:
         """Error of a joint under two fits (fit, terms, theta), with an interval of its fall from resampled blocks."""
         a, b = (self.residuals(*side, joint) for side in (before, after))
         pieces = max(2, PARTS // max(len(a), 1))
@@ -84,18 +91,25 @@ class Bench:
         metric, unit = (
             ("effort_rmse", self.rig.effort_unit(joint)) if self.mujoco else ("angle_rmse", self.rig.unit(joint))
         )
-        return {"metric": metric, "unit": unit, "before": float(whole[0]),
-                "after": float(whole[1]), "noise_floor": self._floor(before[0], joint),
-                "ci95_reduction": [float(fall[0]), float(fall[1])], "held_out": [t for t, _ in a],
-                "engine": self.engine}  # fmt: skip
+        return {
+            "metric": metric,
+            "unit": unit,
+            "before": float(whole[0]),
+            "after": float(whole[1]),
+            "noise_floor": self._floor(before[0], joint),
+            "ci95_reduction": [float(fall[0]), float(fall[1])],
+            "held_out": [t for t, _ in a],
+            "engine": self.engine,
+        }
 
     def _floor(self, fit: DeclaredFit, joint: str) -> float:
         rows = [r for r in fit.rows if r.joint == joint]
         own = [noise_std(r.extra["effort"]) * np.sqrt(min(1.0, 2 * r.cutoff_hz / r.rate_hz)) for r in rows]
         return self.floor.get(joint, float(np.median(own)))
 
-    def ratio(self, before: tuple[DeclaredFit, Sequence[Term], Array],
-              after: tuple[DeclaredFit, Sequence[Term], Array]) -> float:  # fmt: skip
+    def ratio(
+        self, before: tuple[DeclaredFit, Sequence[Term], Array], after: tuple[DeclaredFit, Sequence[Term], Array]
+    ) -> float:
         """Root mean over joints of the squared ratio of held-out errors."""
         ratios = []
         for joint in sorted({r.joint for r in before[0].rows}):
@@ -111,7 +125,13 @@ def term_records(terms: Sequence[Term], amplitude: Array) -> list[dict[str, Any]
         names = [a[0] for a in t.candidate.amplitudes]
         values = amplitude[at : at + len(names)]
         at += len(names)
-        out.append({"effect": t.candidate.effect, "variant": t.candidate.variant, "joint": t.candidate.joint,
-                    "shape": {k: float(v) for k, v in t.shape.items()},
-                    "amplitude": {n: float(v) for n, v in zip(names, values, strict=True)}})  # fmt: skip
+        out.append(
+            {
+                "effect": t.candidate.effect,
+                "variant": t.candidate.variant,
+                "joint": t.candidate.joint,
+                "shape": {k: float(v) for k, v in t.shape.items()},
+                "amplitude": {n: float(v) for n, v in zip(names, values, strict=True)},
+            }
+        )
     return out

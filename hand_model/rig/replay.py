@@ -111,9 +111,12 @@ class EffectStepper:
             shaft = float(data.qfrc_actuator[joint])
             damping = get("load_speed", 0.0) * abs(external) + get("damping_asymmetry", 0.0) * np.sign(v)
             data.qfrc_passive[joint] -= damping * v
-            more = (get("load_gear", 0.0) * abs(external - shaft) + get("asymmetry", 0.0) * np.sign(v)
-                    + abs(get("load_external", 0.0) * external - get("load_motor", 0.0) * shaft)
-                    + _low_speed(e, v, external, shaft))  # fmt: skip
+            more = (
+                get("load_gear", 0.0) * abs(external - shaft)
+                + get("asymmetry", 0.0) * np.sign(v)
+                + abs(get("load_external", 0.0) * external - get("load_motor", 0.0) * shaft)
+                + _low_speed(e, v, external, shaft)
+            )
             # the bound takes effect in the next step: the constraint of this one stands already
             model.dof_frictionloss[joint] = max(self.coulomb[joint] + more, 1e-9)
         bound: dict[int, float] = {}
@@ -131,8 +134,11 @@ class EffectStepper:
 def _low_speed(e: dict[str, float], v: float, external: float, shaft: float) -> float:
     """Dry friction that standing still adds, by load, at joint velocity v under external and shaft effort."""
     get = e.get
-    level = (get("static_excess", 0.0) + get("load_gear_low", 0.0) * abs(external - shaft)
-             + abs(get("load_external_low", 0.0) * external - get("load_motor_low", 0.0) * shaft))  # fmt: skip
+    level = (
+        get("static_excess", 0.0)
+        + get("load_gear_low", 0.0) * abs(external - shaft)
+        + abs(get("load_external_low", 0.0) * external - get("load_motor_low", 0.0) * shaft)
+    )
     if external * shaft < 0:
         drives = abs(shaft) > abs(external)
         level += get("external_squared", 0.0) * external**2 if drives else get("motor_squared", 0.0) * shaft**2
@@ -164,8 +170,9 @@ def simulate_trial(
     return trial.time_s, at
 
 
-def _asked_start(model: Any, effects: EffectStepper, trial: RigTrial, joint: str, start: tuple[Array, Array],
-                 period_s: float) -> tuple[Array, Array]:  # fmt: skip
+def _asked_start(
+    model: Any, effects: EffectStepper, trial: RigTrial, joint: str, start: tuple[Array, Array], period_s: float
+) -> tuple[Array, Array]:
     """Position and velocity (1, 1) each that fit the first period best (Gauss and Newton): a speed differentiated from
     an encoder is wrong by more than friction does within it, and the error stays for good."""
     recorded, step = fill_gaps(trial.time_s, trial.position[joint]), float(model.opt.timestep)
@@ -276,8 +283,13 @@ def _controls(rig: RigModel, trial: RigTrial, model: Any, effects: EffectStepper
     return out, applied
 
 
-def replay_rig(session: Session, model: bytes | RigModel | None = None, simulate: bool = True,
-               efforts: bool = True, validate: bool | None = None) -> RigResiduals:  # fmt: skip
+def replay_rig(
+    session: Session,
+    model: bytes | RigModel | None = None,
+    simulate: bool = True,
+    efforts: bool = True,
+    validate: bool | None = None,
+) -> RigResiduals:
     """Replay the trials of a rig session on its own file, or on `model` (MJCF bytes, or a RigModel).
 
     simulate, efforts: which of the two comparisons to make; validate: only trials that do, or do not (None: all).
@@ -309,5 +321,15 @@ def _residual(
     effort, count = float("nan"), 0
     if effort_error is not None and len(effort_error):
         effort, count = float(np.sqrt(np.mean(effort_error**2))), len(effort_error)
-    return JointResidual(trial.name, joint, trial.validate, rmse, mae, effort, len(recorded), time_s,
-                         np.zeros(0) if simulated is None else simulated, count)  # fmt: skip
+    return JointResidual(
+        trial.name,
+        joint,
+        trial.validate,
+        rmse,
+        mae,
+        effort,
+        len(recorded),
+        time_s,
+        np.zeros(0) if simulated is None else simulated,
+        count,
+    )

@@ -29,8 +29,11 @@ def repeated_trajectory(rig: RigModel) -> bool:
         return np.interp(np.linspace(0, trial.time_s[-1], 200), trial.time_s, q)
 
     def same(a: Any, b: Any) -> bool:
-        return all(np.std(path(a, j) - path(b, j)) < 0.01 * np.ptp(path(a, j)) for j in rig.joints
-                   if j in a.position and j in b.position)  # fmt: skip
+        return all(
+            np.std(path(a, j) - path(b, j)) < 0.01 * np.ptp(path(a, j))
+            for j in rig.joints
+            if j in a.position and j in b.position
+        )
 
     held = rig.select(True)
     return bool(held) and all(any(same(v, t) for t in rig.select(False)) for v in held)
@@ -64,8 +67,14 @@ def _together(pieces: Sequence[Finding]) -> Finding:
         k if not i else f"{p.effect}_{i + 1}_{k}": v for i, p in enumerate(pieces) for k, v in p.parameters.items()
     }
     return replace(
-        first, members=tuple(dict.fromkeys(members)), parameters=parameters,
+        first,
+        members=tuple(dict.fromkeys(members)),
+        parameters=parameters,
         where={**first.where, "share_of_mismatch": sum(p.where["share_of_mismatch"] for p in pieces)},
-        fit={**fit, "after": float(np.sqrt(max(fit["before"] ** 2 - falls, 0.0))), "ci95_reduction": [float(x) for x in ends]},
+        fit={
+            **fit,
+            "after": float(np.sqrt(max(fit["before"] ** 2 - falls, 0.0))),
+            "ci95_reduction": [float(x) for x in ends],
+        },
         statement=" Along the same path, as part of the same load: ".join(p.statement for p in pieces),
-    )  # fmt: skip
+    )

@@ -30,8 +30,13 @@ FORMED, FORM = 2, 0.07**2
 OF_FORM = "it takes no more than the forms of the effects before it may be off by"
 
 
-def proved(bench: Bench, fit: DeclaredFit, stories: Sequence[tuple[Step, Term]], kept: Sequence[Term],
-           rejected: list[dict[str, Any]]) -> tuple[list[Finding], list[Term]]:  # fmt: skip
+def proved(
+    bench: Bench,
+    fit: DeclaredFit,
+    stories: Sequence[tuple[Step, Term]],
+    kept: Sequence[Term],
+    rejected: list[dict[str, Any]],
+) -> tuple[list[Finding], list[Term]]:
     """Findings that hold on the validation recordings, one after the other beside `kept`, all in the shapes that are
     best without the later ones; the rest goes to rejected. Returns them and the terms that hold."""
     terms, found = list(kept), list(kept)
@@ -148,8 +153,9 @@ def first_of(fit: DeclaredFit, terms: Sequence[Term], count: int) -> list[Term]:
     return out
 
 
-def _joint_finding(rig: RigModel, fit: DeclaredFit, step: Step, term: Term, amplitude: Array, proof: dict,
-                   spread: Array | None) -> Finding:  # fmt: skip
+def _joint_finding(
+    rig: RigModel, fit: DeclaredFit, step: Step, term: Term, amplitude: Array, proof: dict, spread: Array | None
+) -> Finding:
     c = term.candidate
     position, effort = rig.unit(c.joint), rig.effort_unit(c.joint)
     parameters = {}
@@ -158,12 +164,20 @@ def _joint_finding(rig: RigModel, fit: DeclaredFit, step: Step, term: Term, ampl
         parameters[name] = {"value": float(v), "unit": joint_unit(unit, position, effort), "ci95": ends}
     # what a late drive leaves comes early in the balance: its command is ahead
     sign = -1.0 if c.effect == "command_delay" else 1.0
-    parameters |= {k: {"value": sign * float(v) if k == "delay" else float(v), "unit": shape_unit(k, position), "ci95": None}
-                   for k, v in term.shape.items()}  # fmt: skip
+    parameters |= {
+        k: {"value": sign * float(v) if k == "delay" else float(v), "unit": shape_unit(k, position), "ci95": None}
+        for k, v in term.shape.items()
+    }
     fall = max(proof["before"] ** 2 - proof["after"] ** 2, 0.0)
     where = whereabouts(c.joint, rig.drive(c.joint), "effort", proof["held_out"], fall)
     return Finding(
-        c.effect, (c.effect, *(e for e in step.equals if e != c.effect)), step.probability,
-        alternatives(step.rivals, c.effect), where, statement(c.effect, c.variant, c.joint, parameters, proof), parameters, proof,
+        c.effect,
+        (c.effect, *(e for e in step.equals if e != c.effect)),
+        step.probability,
+        alternatives(step.rivals, c.effect),
+        where,
+        statement(c.effect, c.variant, c.joint, parameters, proof),
+        parameters,
+        proof,
         {"native": False, "mjcf": 'custom/text[@name="hand_model"]', "urdf": "not expressible: kept in rig.xml"},
-    )  # fmt: skip
+    )

@@ -58,9 +58,26 @@ def _rows(rig: RigModel, coupling: Coupling, columns: tuple[Column, ...], trial:
     a = differentiate(v, rate)
     moving = np.ones(len(q[s]), bool)
     moving[: int(0.5 * rate / skip)] = False  # the first half second: the transmission is not yet wound up
-    return Rows(trial.name, coupling.dependent, trial.validate, grid[s], q[s], v[s], a[s], out[s], powers, moving, rest,
-                cutoff, rate / skip, {"effort": out[s], **{k: c[s] for k, c in extra.items()}},
-                powers, np.zeros(5, bool), np.zeros(len(q[s])), 1)  # fmt: skip
+    return Rows(
+        trial.name,
+        coupling.dependent,
+        trial.validate,
+        grid[s],
+        q[s],
+        v[s],
+        a[s],
+        out[s],
+        powers,
+        moving,
+        rest,
+        cutoff,
+        rate / skip,
+        {"effort": out[s], **{k: c[s] for k, c in extra.items()}},
+        powers,
+        np.zeros(5, bool),
+        np.zeros(len(q[s])),
+        1,
+    )
 
 
 def coupling_candidates(fit: DeclaredFit, coupling: Coupling) -> tuple[Candidate, ...]:
@@ -70,18 +87,49 @@ def coupling_candidates(fit: DeclaredFit, coupling: Coupling) -> tuple[Candidate
     span = max(float(np.ptp(r.position)) for r in train)
     free = (-np.inf, np.inf)
     gaps = tuple({"gap": float(g)} for g in span * np.geomspace(0.003, 0.3, 8))
-    out = [Candidate("drive_backlash", "", joint, (("half_gap", "rad", *free),), gaps,
-                     lambda r, s: jenkins(r.position, s["gap"])[:, None])]  # fmt: skip
+    out = [
+        Candidate(
+            "drive_backlash",
+            "",
+            joint,
+            (("half_gap", "rad", *free),),
+            gaps,
+            lambda r, s: jenkins(r.position, s["gap"])[:, None],
+        )
+    ]
     for channel in sorted({k for r in train for k in r.extra if k.startswith("effort:")}):
         name = channel.split(":")[1]
-        out.append(Candidate("series_elasticity", f"load at {name}", joint, (("compliance", "rad/effort", *free),), ({},),
-                             lambda r, s, c=channel: _load(r, c)[:, None]))  # fmt: skip
-        out.append(Candidate("series_elasticity", f"stiffening with load at {name}", joint,
-                             (("compliance", "rad/effort", *free), ("stiffening", "rad/effort^2", *free)), ({},),
-                             lambda r, s, c=channel: np.stack([_load(r, c), _load(r, c) * np.abs(_load(r, c))], 1)))  # fmt: skip
+        out.append(
+            Candidate(
+                "series_elasticity",
+                f"load at {name}",
+                joint,
+                (("compliance", "rad/effort", *free),),
+                ({},),
+                lambda r, s, c=channel: _load(r, c)[:, None],
+            )
+        )
+        out.append(
+            Candidate(
+                "series_elasticity",
+                f"stiffening with load at {name}",
+                joint,
+                (("compliance", "rad/effort", *free), ("stiffening", "rad/effort^2", *free)),
+                ({},),
+                lambda r, s, c=channel: np.stack([_load(r, c), _load(r, c) * np.abs(_load(r, c))], 1),
+            )
+        )
     delays = tuple({"lag": k * 1.0} for k in (1.0,))
-    out.append(Candidate("clock_drift", "channels sampled apart", joint, (("lag", "s", *free),), delays,
-                         lambda r, s: r.velocity[:, None]))  # fmt: skip
+    out.append(
+        Candidate(
+            "clock_drift",
+            "channels sampled apart",
+            joint,
+            (("lag", "s", *free),),
+            delays,
+            lambda r, s: r.velocity[:, None],
+        )
+    )
     return tuple(out)
 
 
@@ -114,8 +162,18 @@ def angle_residual(rig: RigModel, coupling: Coupling, fit: DeclaredFit, terms: S
     time_s, position, velocity = (
         np.concatenate([getattr(r, k)[r.moving] for r in rows]) for k in ("time_s", "position", "velocity")
     )
-    return CouplingResidual(coupling.name, coupling.dependent, rig.unit(coupling.dependent), trial, time_s, position, velocity,
-                            load, np.concatenate(before), np.concatenate(after))  # fmt: skip
+    return CouplingResidual(
+        coupling.name,
+        coupling.dependent,
+        rig.unit(coupling.dependent),
+        trial,
+        time_s,
+        position,
+        velocity,
+        load,
+        np.concatenate(before),
+        np.concatenate(after),
+    )
 
 
 def _load(row: Rows, channel: str) -> Array:

@@ -91,9 +91,21 @@ def drive_state(rig: RigModel, row: Rows, theta: Array) -> DriveState:
         extra[channel.split(":")[0] if channel == f"setpoint:{row.joint}" else channel] = values
     declared = np.stack([row.acceleration, row.velocity, row.direction], 1)
     effort = np.where(np.abs(row.velocity) > row.rest_speed, row.extra["effort"], np.nan)  # at rest friction is unknown
-    return DriveState(row.trial, row.joint, row.time_s, row.position, row.velocity, row.acceleration, effort, declared,
-                      rig.unit(row.joint), rig.effort_unit(row.joint), extra,
-                      ("inertia", "viscous", "coulomb"), row.validate)  # fmt: skip
+    return DriveState(
+        row.trial,
+        row.joint,
+        row.time_s,
+        row.position,
+        row.velocity,
+        row.acceleration,
+        effort,
+        declared,
+        rig.unit(row.joint),
+        rig.effort_unit(row.joint),
+        extra,
+        ("inertia", "viscous", "coulomb"),
+        row.validate,
+    )
 
 
 def candidates(rig: RigModel, fit: DeclaredFit, joint: str, every: bool = False) -> tuple[Candidate, ...]:
@@ -124,8 +136,15 @@ def _from_catalogue(
     grid = ({},) if found.name in SMOOTH else tuple(found.grid(train))
     if len(grid) > 16 and found.name not in PERIODIC:  # a coarse look first; the winner's shape is refined
         grid = grid[:: int(np.ceil(len(grid) / 16))]
-    return Candidate(found.name, "", joint, tuple(found.amplitudes()), grid,
-                     lambda row, shape: np.asarray(found.columns(states[row.trial], shape), float), bool(found.warps))  # fmt: skip
+    return Candidate(
+        found.name,
+        "",
+        joint,
+        tuple(found.amplitudes()),
+        grid,
+        lambda row, shape: np.asarray(found.columns(states[row.trial], shape), float),
+        bool(found.warps),
+    )
 
 
 def _is_declared(columns: Sequence[Array], rows: Sequence[Rows]) -> bool:
@@ -141,8 +160,12 @@ def _is_declared(columns: Sequence[Array], rows: Sequence[Rows]) -> bool:
 
 def _with_line(bend: Candidate) -> Candidate:
     """A spring's bend with the line that it bends from: no spring is declared, nor what could pass for one."""
-    return replace(bend, variant=UNDECLARED, amplitudes=((LINE, "effort/position", -np.inf, np.inf), *bend.amplitudes),
-                   columns=lambda r, s: np.column_stack([r.position, bend.columns(r, s)]))  # fmt: skip
+    return replace(
+        bend,
+        variant=UNDECLARED,
+        amplitudes=((LINE, "effort/position", -np.inf, np.inf), *bend.amplitudes),
+        columns=lambda r, s: np.column_stack([r.position, bend.columns(r, s)]),
+    )
 
 
 def _turning_round(
@@ -162,17 +185,38 @@ def _turning_round(
         stop, grid=tuple({"form": form, "reach": float(share * span)} for form in (0.0, 1.0) for share in REACHES)
     )
     load = {r.trial: np.abs(r.load(fit.theta))[:, None] for r in fit.rows if r.joint == joint}
-    found = [stop, replace(stop, effect="load_dependent_friction", variant=TURNING, amplitudes=(("per_load", "1", 0.0, np.inf),),
-                           columns=lambda r, s: load[r.trial] * stop.columns(r, s)),
-             replace(stop, effect="stribeck_friction", variant=TURNING, amplitudes=(("static_excess", rig.effort_unit(joint), 0.0, np.inf),),
-                     grid=tuple({"form": 0.0, "reach": float(share * span), **knee} for share in REACHES[::2] for knee in _knees(rows)),
-                     columns=lambda r, s: stop.columns(r, s) * np.exp(-((r.velocity / s["stribeck_speed"]) ** 2))[:, None])]  # fmt: skip
+    found = [
+        stop,
+        replace(
+            stop,
+            effect="load_dependent_friction",
+            variant=TURNING,
+            amplitudes=(("per_load", "1", 0.0, np.inf),),
+            columns=lambda r, s: load[r.trial] * stop.columns(r, s),
+        ),
+        replace(
+            stop,
+            effect="stribeck_friction",
+            variant=TURNING,
+            amplitudes=(("static_excess", rig.effort_unit(joint), 0.0, np.inf),),
+            grid=tuple(
+                {"form": 0.0, "reach": float(share * span), **knee} for share in REACHES[::2] for knee in _knees(rows)
+            ),
+            columns=lambda r, s: stop.columns(r, s) * np.exp(-((r.velocity / s["stribeck_speed"]) ** 2))[:, None],
+        ),
+    ]
     key = f"joint:{joint}:frictionloss"
     level = {t.name: float(np.atleast_1d(t.set[key])[0]) for t in rig.trials if key in t.set}
     levels = np.unique(list(level.values()))
     if len(levels) > 1 and all(t.name in level for t in rig.trials):
-        found.append(replace(stop, variant=BY_LEVEL, amplitudes=tuple((f"yield_load_{k:g}", "effort", 0.0, np.inf) for k in levels),
-                             columns=lambda r, s: (levels == level[r.trial]) * stop.columns(r, s)))  # fmt: skip
+        found.append(
+            replace(
+                stop,
+                variant=BY_LEVEL,
+                amplitudes=tuple((f"yield_load_{k:g}", "effort", 0.0, np.inf) for k in levels),
+                columns=lambda r, s: (levels == level[r.trial]) * stop.columns(r, s),
+            )
+        )
     return found
 
 
@@ -194,21 +238,45 @@ def _by_load(fit: DeclaredFit, joint: str, rows: list[Rows], driven: bool) -> li
     knees = _knees(rows, 6)
 
     def friction(variant: str, amplitude: str, by: Mapping[str, Array]) -> Candidate:
-        return Candidate("load_dependent_friction", variant, joint, ((amplitude, "1", 0.0, np.inf),), ({},),
-                         lambda r, s: (r.direction * by[r.trial])[:, None])  # fmt: skip
+        return Candidate(
+            "load_dependent_friction",
+            variant,
+            joint,
+            ((amplitude, "1", 0.0, np.inf),),
+            ({},),
+            lambda r, s: (r.direction * by[r.trial])[:, None],
+        )
 
     def at_low_speed(variant: str, by: Mapping[str, Array]) -> Candidate:
-        return Candidate("load_dependent_friction", variant, joint, (("per_load", "1", 0.0, np.inf),), knees,
-                         lambda r, s: (r.direction * by[r.trial] * np.exp(-((r.velocity / s["stribeck_speed"]) ** 2)))[:, None])  # fmt: skip
+        return Candidate(
+            "load_dependent_friction",
+            variant,
+            joint,
+            (("per_load", "1", 0.0, np.inf),),
+            knees,
+            lambda r, s: (r.direction * by[r.trial] * np.exp(-((r.velocity / s["stribeck_speed"]) ** 2)))[:, None],
+        )
 
     def more(variant: str, by: Mapping[str, Array]) -> Candidate:
         slow = at_low_speed(variant, by)
-        return replace(slow, amplitudes=(*slow.amplitudes, ("per_load_low", "1", 0.0, np.inf)),
-                       columns=lambda r, s: np.column_stack([r.direction * by[r.trial], slow.columns(r, s)]))  # fmt: skip
+        return replace(
+            slow,
+            amplitudes=(*slow.amplitudes, ("per_load_low", "1", 0.0, np.inf)),
+            columns=lambda r, s: np.column_stack([r.direction * by[r.trial], slow.columns(r, s)]),
+        )
 
-    found = [at_low_speed(LOW, load), more(MORE, load),
-             Candidate("load_dependent_friction", "with speed", joint, (("per_load_speed", "s", 0.0, np.inf),), ({},),
-                       lambda r, s: (r.velocity * load[r.trial])[:, None])]  # fmt: skip
+    found = [
+        at_low_speed(LOW, load),
+        more(MORE, load),
+        Candidate(
+            "load_dependent_friction",
+            "with speed",
+            joint,
+            (("per_load_speed", "s", 0.0, np.inf),),
+            ({},),
+            lambda r, s: (r.velocity * load[r.trial])[:, None],
+        ),
+    ]
     if driven:
         expected = {r.trial: fit.expected(r) for r in mine}
         motor = {t: np.abs(e) for t, e in expected.items()}
@@ -237,9 +305,26 @@ def _own(rig: RigModel, fit: DeclaredFit, joint: str, rows: list[Rows]) -> list[
         measured = drive.kind == "force"
         if not measured:  # a drive can act later than told, not earlier
             delays = tuple(d for d in delays if d["delay"] < 0)
-        own.append(Candidate("current_channel_delay" if measured else "command_delay", "", joint, (), delays,
-                             lambda r, s: np.zeros((len(r.time_s), 0)), True))  # fmt: skip
+        own.append(
+            Candidate(
+                "current_channel_delay" if measured else "command_delay",
+                "",
+                joint,
+                (),
+                delays,
+                lambda r, s: np.zeros((len(r.time_s), 0)),
+                True,
+            )
+        )
     if drive is None or not drive.offset:
-        own.append(Candidate("asymmetric_friction", "", joint, (("offset", rig.effort_unit(joint), *free),), ({},),
-                             lambda r, s: np.ones((len(r.time_s), 1))))  # fmt: skip
+        own.append(
+            Candidate(
+                "asymmetric_friction",
+                "",
+                joint,
+                (("offset", rig.effort_unit(joint), *free),),
+                ({},),
+                lambda r, s: np.ones((len(r.time_s), 1)),
+            )
+        )
     return own

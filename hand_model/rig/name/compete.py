@@ -67,8 +67,13 @@ class Step:
     close: tuple[int, ...] = ()
 
 
-def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ...] = (),
-            most: int | None = None, settle: Settle | None = None) -> tuple[tuple[Term, ...], tuple[Step, ...], tuple[Score, ...]]:  # fmt: skip
+def compete(
+    problem: Problem,
+    rivals: Sequence[Candidate],
+    begin: tuple[Term, ...] = (),
+    most: int | None = None,
+    settle: Settle | None = None,
+) -> tuple[tuple[Term, ...], tuple[Step, ...], tuple[Score, ...]]:
     """Forward selection: the candidate that lowers the held-out error most, while it does so beyond doubt.
 
     begin: terms that stand already; settle: terms and rivals again, at the loads of a fit with these terms. Returns all
@@ -108,8 +113,13 @@ def compete(problem: Problem, rivals: Sequence[Candidate], begin: tuple[Term, ..
     return terms, tuple(steps), tuple(scores)
 
 
-def _round(problem: Problem, plain: tuple[tuple[Term, ...], tuple, Array], terms: tuple[Term, ...], rivals: Sequence[Candidate],
-           first: int) -> tuple[list[Score], tuple[tuple[Term, ...], Step] | None]:  # fmt: skip
+def _round(
+    problem: Problem,
+    plain: tuple[tuple[Term, ...], tuple, Array],
+    terms: tuple[Term, ...],
+    rivals: Sequence[Candidate],
+    first: int,
+) -> tuple[list[Score], tuple[tuple[Term, ...], Step] | None]:
     """Scores of the rivals beside the terms, and all terms with the winner and what the round says, or None where none
     is better than what stands (plain:
     its terms, normal equations and errors (B,)). first: from which on shapes of terms move."""
@@ -245,8 +255,11 @@ def judge(none: Array, scores: Sequence[Score], problem: Problem) -> tuple[int, 
 def _as_good(simple: Score, rich: Score) -> bool:
     """Whether a form of the same effect with fewer parameters leaves so little more that the rest would be worth no
     name of its own."""
-    return (simple.term.candidate.effect == rich.term.candidate.effect and _size(simple.term) < _size(rich.term)
-            and (1 - LEAST_SHARE) * simple.error.sum() <= rich.error.sum())  # fmt: skip
+    return (
+        simple.term.candidate.effect == rich.term.candidate.effect
+        and _size(simple.term) < _size(rich.term)
+        and (1 - LEAST_SHARE) * simple.error.sum() <= rich.error.sum()
+    )
 
 
 def _size(term: Term) -> int:
@@ -259,8 +272,9 @@ def borne_out(problem: Problem, few: tuple[Sequence[Term], tuple], many: tuple[S
     training recordings are split (repeated learning and testing, Burman 1989), and by enough to be worth a name."""
     sides = [(parts, limits(problem, terms)) for terms, parts in (few, many)]
     error = np.array([[left_out(*side, out).sum() for side in sides] for out in splits(problem)])
-    return bool(np.mean(error[:, 1] < error[:, 0]) >= BEYOND_DOUBT
-                and error[:, 1].sum() < (1 - LEAST_SHARE) * error[:, 0].sum())  # fmt: skip
+    return bool(
+        np.mean(error[:, 1] < error[:, 0]) >= BEYOND_DOUBT and error[:, 1].sum() < (1 - LEAST_SHARE) * error[:, 0].sum()
+    )
 
 
 def splits(problem: Problem) -> list[Array]:

@@ -100,8 +100,12 @@ def limits(problem: Problem, terms: Sequence[Term]) -> tuple[Array, Array, Array
     extra = [a for t in terms for a in t.candidate.amplitudes]
     more = np.array([[a[2], a[3]] for a in extra]).reshape(-1, 2)
     zero = np.zeros(len(extra))
-    return (np.concatenate([low, more[:, 0]]), np.concatenate([high, more[:, 1]]),
-            np.concatenate([mean, zero]), np.concatenate([weight, zero + 1e-12]))  # fmt: skip
+    return (
+        np.concatenate([low, more[:, 0]]),
+        np.concatenate([high, more[:, 1]]),
+        np.concatenate([mean, zero]),
+        np.concatenate([weight, zero + 1e-12]),
+    )
 
 
 def normal(problem: Problem, terms: Sequence[Term]) -> tuple[Array, Array, Array, Array]:

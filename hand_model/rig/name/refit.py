@@ -68,8 +68,9 @@ def _error_beside(
     return train
 
 
-def _descended(train: Callable[[Mapping[str, float]], float], shapes: Sequence[Mapping[str, float]],
-               start: Mapping[str, float]) -> Mapping[str, float]:  # fmt: skip
+def _descended(
+    train: Callable[[Mapping[str, float]], float], shapes: Sequence[Mapping[str, float]], start: Mapping[str, float]
+) -> Mapping[str, float]:
     """The shape of least training error near one of a grid of shapes and within their bounds (Nelder & Mead 1965)."""
     from scipy.optimize import minimize
 
@@ -86,6 +87,10 @@ def _descended(train: Callable[[Mapping[str, float]], float], shapes: Sequence[M
     near = np.array([grid[n][np.argsort(np.abs(grid[n] - x))[1]] for n, x in zip(names, at, strict=True)])
     corners = at + np.concatenate([np.zeros((1, len(names))), np.diag(0.5 * (near - at))])
     begin = train(start)
-    found = minimize(lambda x: train(shape(x)), at, method="Nelder-Mead", options={
-        "initial_simplex": corners, "maxfev": 15 + 20 * len(names), "xatol": 0, "fatol": 1e-4 * begin})  # fmt: skip
+    found = minimize(
+        lambda x: train(shape(x)),
+        at,
+        method="Nelder-Mead",
+        options={"initial_simplex": corners, "maxfev": 15 + 20 * len(names), "xatol": 0, "fatol": 1e-4 * begin},
+    )
     return shape(found.x) if found.fun < begin else start
