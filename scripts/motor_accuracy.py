@@ -234,17 +234,60 @@ def commands(trial: MotorTrial, moves, starts) -> tuple[np.ndarray, np.ndarray, 
     return np.array(begins), trial.setpoint[change + 1], np.array(speeds)
 
 
+def replay_summary(rows: list[dict]) -> dict:
+    """How near the identified drives come on held-out trials: to the noise, and to the true drive where it is known."""
+    held = [h | {"noise": r["noise_true"], "seed": r["seed"]} for r in rows for h in r["held_out"]]
+    ratio = np.array([h["current_rmse"] / h["noise"] for h in held])
+    position = np.array([h["position_rmse"] for h in held])
+    known = [h for h in held if "true_drive_rmse" in h]
+    over = np.array([h["current_rmse"] / h["true_drive_rmse"] for h in known])
+    floor = np.array([h["true_drive_rmse"] / h["noise"] for h in known])
+    return {
+        "position_rmse_percent": {"median": float(np.nanmedian(position)), "max": float(np.nanmax(position))},
+        "current_rmse_over_noise": {
+            "median": float(np.nanmedian(ratio)),
+            "max": float(np.nanmax(ratio)),
+            "within_1.05": float(np.mean(ratio < 1.05)),
+            "within_1.15": float(np.mean(ratio < 1.15)),
+        },
+        "current_rmse_over_true_drive": {
+            "median": float(np.median(over)),
+            "max": float(over.max()),
+            "within_1.05": float(np.mean(over < 1.05)),
+            "trials": len(over),
+        }
+        if len(over)
+        else None,
+        "true_drive_rmse_over_noise": {
+            "median": float(np.median(floor)),
+            "max": float(floor.max()),
+            "within_1.05": float(np.mean(floor < 1.05)),
+        }
+        if len(floor)
+        else None,
+        "above_1.05": [
+            [
+                h["seed"],
+                *(
+                    round(h[a] / h[b], 3)
+                    for a, b in (
+                        ("current_rmse", "noise"),
+                        ("true_drive_rmse", "noise"),
+                        ("current_rmse", "true_drive_rmse"),
+                    )
+                ),
+            ]
+            for h in known
+            if h["current_rmse"] > 1.05 * min(h["noise"], h["true_drive_rmse"])
+        ],
+    }
+
+
 def summary(rows: list[dict]) -> dict:
     """Coverage per parameter, replay and time, over all rows and per kind of controller."""
     out, best = {}, min(r["yard_s"] for r in rows)
     for kind in ("all", *sorted({r["controller"] for r in rows})):
         some = [r for r in rows if kind in ("all", r["controller"])]
-        held = [h | {"noise": r["noise_true"], "seed": r["seed"]} for r in some for h in r["held_out"]]
-        ratio = np.array([h["current_rmse"] / h["noise"] for h in held])
-        position = np.array([h["position_rmse"] for h in held])
-        known = [h for h in held if "true_drive_rmse" in h]
-        over = np.array([h["current_rmse"] / h["true_drive_rmse"] for h in known])
-        floor = np.array([h["true_drive_rmse"] / h["noise"] for h in known])
         full = np.array([r["cpu_s"] * best / r["yard_s"] for r in some])
         names = sorted(
             {n for r in some for n in r["parameters"]}, key=[*NAMES, *(n for r in some for n in r["parameters"])].index
@@ -272,43 +315,7 @@ def summary(rows: list[dict]) -> dict:
                 "below_2": float(np.mean(full < 2)),
                 "yardstick_s": best,
             },
-            "position_rmse_percent": {"median": float(np.nanmedian(position)), "max": float(np.nanmax(position))},
-            "current_rmse_over_noise": {
-                "median": float(np.nanmedian(ratio)),
-                "max": float(np.nanmax(ratio)),
-                "within_1.05": float(np.mean(ratio < 1.05)),
-                "within_1.15": float(np.mean(ratio < 1.15)),
-            },
-            "current_rmse_over_true_drive": {
-                "median": float(np.median(over)),
-                "max": float(over.max()),
-                "within_1.05": float(np.mean(over < 1.05)),
-                "trials": len(over),
-            }
-            if len(over)
-            else None,
-            "true_drive_rmse_over_noise": {
-                "median": float(np.median(floor)),
-                "max": float(floor.max()),
-                "within_1.05": float(np.mean(floor < 1.05)),
-            }
-            if len(floor)
-            else None,
-            "above_1.05": [
-                [
-                    h["seed"],
-                    *(
-                        round(h[a] / h[b], 3)
-                        for a, b in (
-                            ("current_rmse", "noise"),
-                            ("true_drive_rmse", "noise"),
-                            ("current_rmse", "true_drive_rmse"),
-                        )
-                    ),
-                ]
-                for h in known
-                if h["current_rmse"] > 1.05 * min(h["noise"], h["true_drive_rmse"])
-            ],
+            **replay_summary(some),
         }
     return out
 

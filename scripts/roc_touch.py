@@ -164,6 +164,38 @@ def area_under_curve(positive: np.ndarray, negative: np.ndarray) -> float:
     return float(np.mean((positive[:, None] > negative) + 0.5 * (positive[:, None] == negative)))
 
 
+def grasp_summary(rows: list[dict], kind: str, pool: dict[str, np.ndarray]) -> dict:
+    """How well and how late grasps of one kind of object are told; pool: scores by kind."""
+    delay, ideal = (
+        np.array([r[name] for r in rows if r["object"] == kind and r[name] is not None])
+        for name in ("delay_s", "ideal_delay_s")
+    )
+    thresholds = np.unique(np.concatenate([pool[AIR], pool[kind]]))
+    curve = [
+        [float(np.mean(pool[AIR] >= h)), float(np.mean(pool[kind] >= h))]
+        for h in thresholds[:: max(1, len(thresholds) // 100)]
+    ]
+    return {
+        "area_under_curve": area_under_curve(pool[kind], pool[AIR]),
+        "grasps": len(pool[kind]),
+        "missed": sum(r["delay_s"] is None for r in rows if r["object"] == kind),
+        "delay_ms": {q: 1e3 * float(np.quantile(delay, p)) for q, p in (("median", 0.5), ("p90", 0.9), ("max", 1.0))}
+        if len(delay)
+        else None,
+        "ideal_delay_ms": {
+            q: 1e3 * float(np.quantile(ideal, p)) for q, p in (("median", 0.5), ("p90", 0.9), ("max", 1.0))
+        }
+        if len(ideal)
+        else None,
+        "later_than_60_ms": [
+            [r["seed"], r["stiffness"], r["delay_s"], r["ideal_delay_s"]]
+            for r in rows
+            if r["object"] == kind == STIFF and (r["delay_s"] or 9) > WANTED_S
+        ],
+        "roc": curve,
+    }
+
+
 def main() -> None:
     """Run and write."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -192,36 +224,7 @@ def main() -> None:
         "without_controller": len({r["seed"] for r in rows if r["method"] != "output error"}),
     }
     for kind in (STIFF, COMPLIANT):
-        delay, ideal = (
-            np.array([r[name] for r in rows if r["object"] == kind and r[name] is not None])
-            for name in ("delay_s", "ideal_delay_s")
-        )
-        thresholds = np.unique(np.concatenate([pool[AIR], pool[kind]]))
-        curve = [
-            [float(np.mean(pool[AIR] >= h)), float(np.mean(pool[kind] >= h))]
-            for h in thresholds[:: max(1, len(thresholds) // 100)]
-        ]
-        summary[kind] = {
-            "area_under_curve": area_under_curve(pool[kind], pool[AIR]),
-            "grasps": len(pool[kind]),
-            "missed": sum(r["delay_s"] is None for r in rows if r["object"] == kind),
-            "delay_ms": {
-                q: 1e3 * float(np.quantile(delay, p)) for q, p in (("median", 0.5), ("p90", 0.9), ("max", 1.0))
-            }
-            if len(delay)
-            else None,
-            "ideal_delay_ms": {
-                q: 1e3 * float(np.quantile(ideal, p)) for q, p in (("median", 0.5), ("p90", 0.9), ("max", 1.0))
-            }
-            if len(ideal)
-            else None,
-            "later_than_60_ms": [
-                [r["seed"], r["stiffness"], r["delay_s"], r["ideal_delay_s"]]
-                for r in rows
-                if r["object"] == kind == STIFF and (r["delay_s"] or 9) > WANTED_S
-            ],
-            "roc": curve,
-        }
+        summary[kind] = grasp_summary(rows, kind, pool)
     air = [r for r in rows if r["object"] == AIR]
     summary["false_alarms_per_minute"] = sum(r["alarms"] for r in air) / max(sum(r["minutes"] for r in air), 1e-9)
     summary["free_minutes"] = sum(r["minutes"] for r in air)

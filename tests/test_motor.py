@@ -14,8 +14,10 @@ from hand_model.identify.motor.balance import NAMES, friction_state
 from hand_model.identify.motor.batch import Moves
 from hand_model.identify.motor.channel import channel_delay
 from hand_model.identify.motor.drive import run, simulate
-from hand_model.identify.motor.fit import BOUNDS, fit_motor, white_noise
+from hand_model.identify.motor.fit import fit_motor
 from hand_model.identify.motor.moves import levelled, moves_from_rest, speed_levels
+from hand_model.identify.motor.noise import white_noise
+from hand_model.identify.motor.parameters import BOUNDS
 from hand_model.identify.motor.predict import predict, reference, replay_table
 from hand_model.identify.motor.profile import profile
 from hand_model.identify.motor.published import MODELS, fit_published, smear_share

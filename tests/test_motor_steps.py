@@ -12,12 +12,13 @@ from hand_model.identify.motor import output_error
 from hand_model.identify.motor.batch import Moves
 from hand_model.identify.motor.creep import begins, continued, creeping, end_state
 from hand_model.identify.motor.drive import run
-from hand_model.identify.motor.fit import BOUNDS, _hardened
 from hand_model.identify.motor.friction import Bristles
 from hand_model.identify.motor.grid import NEVER, grid, rows
 from hand_model.identify.motor.jacobian import linearise
 from hand_model.identify.motor.moves import MoveData
+from hand_model.identify.motor.parameters import BOUNDS
 from hand_model.identify.motor.residuals import simulate_moves
+from hand_model.identify.motor.stribeck import hardened
 
 VALUES = {
     "inertia": 0.0125,
@@ -210,6 +211,6 @@ def test_a_hard_drive_with_a_rise_is_not_left_on_bristles() -> None:
         "profile",
         (output_error.NEARLY,),
     )
-    hard = _hardened(soft)
+    hard = hardened(soft)
     assert hard is not None and hard.values["presliding"] == 0.0 and "bristle" not in hard.names
-    assert _hardened(hard) is None
+    assert hardened(hard) is None

@@ -120,29 +120,8 @@ def _write_motor(root: Any, finger: Finger, motor: Motor, scale: float | None) -
     unit = 1.0 if scale is None else scale * full / 100
     palm = root.find("worldbody").find("body")
     label = "raw units of current" if scale is None else f"N m at {proximal.get('name')} times {full / 100!r} rad/%"
-    link = _child_body(
-        palm,
-        _free(root, f"{name}_motor_link"),
-        f"motor of {name}: coordinate in percent of the encoder range, effort in {label}",
-    )
     rotor = _free(root, f"{name}_motor")
-    joint = child(
-        link,
-        "joint",
-        name=rotor,
-        type="hinge",
-        pos=(0, 0, 0),
-        axis=(0, 0, 1),
-        ref="0",
-        limited=True,
-        range=TRAVEL,
-        solreflimit=SOLREF,
-        solimplimit=SOLIMP,
-        armature=unit * value["inertia"],
-        damping=unit * max(value["viscous"], 0.0),
-        stiffness=unit * max(value["stiffness"], 0.0),
-        springref=-value["preload"] / value["stiffness"] if value["stiffness"] > 0 else 0.0,
-    )
+    joint = _write_rotor(root, name, rotor, value, unit, label)
     arm = _child_body(
         palm,
         _free(root, f"{name}_drive_link"),
@@ -175,6 +154,32 @@ def _write_motor(root: Any, finger: Finger, motor: Motor, scale: float | None) -
             f'motor "{name}": friction is the LuGre element {name}_friction (presliding or Stribeck), not frictionloss'
         )
     return notes
+
+
+def _write_rotor(root: Any, name: str, rotor: str, value: dict[str, float], unit: float, label: str) -> Any:
+    """The motor's own joint, in percent of the encoder range, with its inertia, damping and spring."""
+    link = _child_body(
+        root.find("worldbody").find("body"),
+        _free(root, f"{name}_motor_link"),
+        f"motor of {name}: coordinate in percent of the encoder range, effort in {label}",
+    )
+    return child(
+        link,
+        "joint",
+        name=rotor,
+        type="hinge",
+        pos=(0, 0, 0),
+        axis=(0, 0, 1),
+        ref="0",
+        limited=True,
+        range=TRAVEL,
+        solreflimit=SOLREF,
+        solimplimit=SOLIMP,
+        armature=unit * value["inertia"],
+        damping=unit * max(value["viscous"], 0.0),
+        stiffness=unit * max(value["stiffness"], 0.0),
+        springref=-value["preload"] / value["stiffness"] if value["stiffness"] > 0 else 0.0,
+    )
 
 
 def _child_body(palm: Any, name: str, text: str) -> Any:

@@ -37,6 +37,14 @@ def read(path: str | Path) -> Tree:
     raise DescriptionError(f"{file}: neither a URDF (<robot>) nor an MJCF (<mujoco>), but <{root.tag}>")
 
 
+def _check_options(accept: Collection[str], poses: int, tolerance_mm: float) -> None:
+    unknown = set(accept) - set(CAUSES)
+    if unknown:
+        raise DescriptionError(f'no cause "{min(unknown)}"; {did_you_mean(min(unknown), CAUSES)}')
+    if poses < 1 or tolerance_mm <= 0:
+        raise DescriptionError(f"poses ({poses}) and tolerance_mm ({tolerance_mm}) should be positive")
+
+
 def conform(
     a: str | Path,
     b: str | Path,
@@ -59,11 +67,7 @@ def conform(
     Raises DescriptionError for what cannot be read or paired.
     """
     start = time.perf_counter()
-    unknown = set(accept) - set(CAUSES)
-    if unknown:
-        raise DescriptionError(f'no cause "{min(unknown)}"; {did_you_mean(min(unknown), CAUSES)}')
-    if poses < 1 or tolerance_mm <= 0:
-        raise DescriptionError(f"poses ({poses}) and tolerance_mm ({tolerance_mm}) should be positive")
+    _check_options(accept, poses, tolerance_mm)
     tree_a, tree_b = read(a), read(b)
     given = read_pair(pair, tree_a, tree_b) if pair is not None else pair_automatically(tree_a, tree_b)
     f = features(tree_a, tree_b, given)

@@ -51,7 +51,7 @@ def simulated_drive(session: Session, actuator: str) -> SimulatedDrive | None:
     """One drive simulated from its commands; None where these are not known."""
     from ...identify.motor import identify_motor
     from ...identify.motor.channel import channel_delay
-    from ...identify.motor.fit import BOUNDS
+    from ...identify.motor.parameters import BOUNDS
     from .drive import drive_trials
 
     try:
@@ -71,7 +71,7 @@ def simulated_drive(session: Session, actuator: str) -> SimulatedDrive | None:
 def _motion(fit: MotorFit, name: str, log: Log) -> tuple[Array, Array, Array, Array] | None:
     """Time, position, velocity and acceleration of a log's simulated moves; None where they are farther from the
     recorded ones than noise."""
-    from ...identify.motor.fit import white_noise
+    from ...identify.motor.noise import white_noise
     from ...identify.motor.predict import aligned_moves
     from ...identify.motor.recording import motor_trial
     from ...identify.motor.residuals import simulate_states

@@ -15,67 +15,26 @@ from ...hand import Estimate, Motor
 from ...session import Session
 from . import output_error
 from .balance import NAMES
-from .controller import JUMP, STICK, SUDDEN_S, find_controller
+from .controller import find_controller
 from .creep import begins, creeping
 from .drive import STRIBECK
-from .moves import BEFORE, MoveData, moves_from_rest
+from .moves import MoveData, moves_from_rest
+from .noise import rest_noise, white_noise
 from .output_error import FINE, OutputErrorFit
+from .parameters import BOUNDS, UNITS
 from .published import PublishedFit, fit_published, smear_share
 from .recording import MotorTrial, Scale, actuator_trials, motor_trials
 from .replicates import lack_of_fit
+from .stribeck import with_other_shape, with_other_speed, with_rise
 from .weak_form import GIVE, Regression, fit_regressions
 
 Array = NDArray[np.float64]
 
-UNITS = {
-    "inertia": "raw s^2/%",
-    "viscous": "raw s/%",
-    "coulomb": "raw",
-    "stiffness": "raw/%",
-    "preload": "raw",
-    "presliding": "%",
-    "bristle": "s",
-    "static_ratio": "1",
-    "stribeck_speed": "%/s",
-    "stribeck_exponent": "1",
-    "speed_full": "%/s",
-    "rise": "s",
-    "fall": "s",
-    "position_gain": "1/s",
-    "deadband": "%",
-    "gain": "raw/%",
-    "damping": "raw s/%",
-    "delay": "s",
-    "lead": "s",
-    "lag": "s",
-    "edge": "%",
-}
-BOUNDS = {
-    "inertia": (1e-5, 1e3),
-    "viscous": (-1e3, 1e4),
-    "coulomb": (1e-3, 1e5),
-    "presliding": (0.02, 10.0),
-    "bristle": (0.0, 0.2),
-    "speed_full": (1.0, 1e4),
-    "rise": (1e-4, 3.0),
-    "fall": (1e-4, 3.0),
-    "position_gain": (0.5, 200.0),
-    "deadband": (0.0, 10.0),
-    "gain": (1e-2, 1e4),
-    "damping": (0.0, 1e3),
-    "delay": (-0.002, 0.02),
-    "lead": (-0.01, 0.01),
-    "lag": (-0.005, 0.005),
-    "static_ratio": (1.0, 8.0),
-    "stribeck_speed": (1.5, 100.0),
-    "stribeck_exponent": (1.0, 3.0),  # below 1 the rise would be infinitely steep at rest
-}
 LACK_OF_FIT = 0.5  # systematic misfit [noise variances] above which output error does not describe the recording
 # standard errors, by a jackknife over some forty strokes, above which the regression claims a Stribeck rise
 CLAIM = 6.0
 ROOM = 3.0  # the same, above which output error tries one
 REGRESSION_MISFIT = 4.0  # the same for the regression; noise with a memory of a sample or two reaches 3
-EVIDENCE = 16.0  # fall of the misfit (in variances, of three parameters): once in about a thousand by chance
 
 
 @dataclass(frozen=True)
@@ -120,32 +79,6 @@ class MotorFit:
         return None if self.output_error is None else self.output_error.values
 
 
-def white_noise(values: Array, time_s: Array) -> float:
-    """Standard deviation of white noise on a smooth signal (n,): from each sample's distance to the line of its
-    neighbours.
-
-    Rice's difference estimator for irregular times, by the median, so that jumps do not count.
-    """
-    t0, t1, t2 = time_s[:-2], time_s[1:-1], time_s[2:]
-    w = (t1 - t0) / (t2 - t0)
-    d = (values[1:-1] - (1 - w) * values[:-2] - w * values[2:]) / np.sqrt(1 + (1 - w) ** 2 + w**2)
-    return float(1.4826 * np.median(np.abs(d)))
-
-
-def rest_noise(trials: Sequence[MotorTrial], sigma: tuple[float, float], speed_full: float) -> float:
-    """Standard deviation of the current [raw] while the drive rests before a command, 0 with fewer than four rests.
-
-    Noise with a memory is more than its differences show.
-    """
-    rests = []
-    for t in trials:
-        for m in moves_from_rest(t, sigma, speed_full):
-            held = t.current[max(0, m.index - BEFORE + 1) : m.index]
-            if len(held) >= 8:
-                rests.append(float(np.var(held, ddof=1)))
-    return float(np.sqrt(np.median(rests) * 1.07)) if len(rests) >= 4 else 0.0
-
-
 def identify_motor(session: Session, actuator: str) -> MotorFit:
     """Identify one motor from the session's excitation and flexion logs (validation trials take no part).
 
@@ -187,7 +120,7 @@ def fit_motor(trials: Sequence[MotorTrial], scale: Scale, actuator: str = "motor
     if len(moves) >= 4:
         best, evidence = _fit_output_error(moves, plain, curved, (sigma_p, sigma_u))
     accepted = best is not None and lack_of_fit(best) < LACK_OF_FIT
-    notes = []
+    notes: list[str] = []
     if accepted:
         sigma_p, sigma_u = (s * np.sqrt(c) for s, c in zip(best.sigma, best.chi2, strict=True))
         values, names, covariance = dict(best.values), best.names, best.covariance
@@ -196,22 +129,9 @@ def fit_motor(trials: Sequence[MotorTrial], scale: Scale, actuator: str = "motor
         values, names, covariance, stribeck = _from_regression(plain, curved)
         if min(plain.misfit, curved.misfit) > REGRESSION_MISFIT:
             names, covariance = (), np.empty((0, 0))
-            notes.append(
-                f"the balance of currents does not explain the strokes either (residual variance {plain.misfit:.1f} in "
-                "units of the noise): parameters are given without intervals"
-            )
-        if best is None:
-            notes.append(
-                "no moves from rest with logged setpoints: controller not identified, "
-                "setpoints do not predict the motion"
-            )
-        else:
+        if best is not None:
             values = {**best.values, **values}
-            notes.append(
-                f"setpoints do not explain the motion (residual variance {best.chi2[0]:.1f} of position, "
-                f"{best.chi2[1]:.1f} of current, in units of the noise): parameters are those of the regression, "
-                "and something is missing from the model"
-            )
+        notes += _shortcomings(best, plain, curved)
     if stribeck:
         notes.append(f"friction rises as speed falls (Stribeck): misfit falls by {evidence:.0f} noise variances")
     motor = Motor(
@@ -250,121 +170,15 @@ def _fit_output_error(
     best, evidence = find_controller(moves, _plant(plain), sigma, BOUNDS, LACK_OF_FIT), 0.0
     # a rise is tried where the regression, which knows no controller, leaves room for one
     if curved.excess_z > (ROOM if max(best.chi2) < 4.0 else CLAIM):
-        best, evidence = _with_rise(
+        best, evidence = with_rise(
             output_error.fit(best.moves, best.values, best.names, sigma, BOUNDS, best.controller, (FINE,), best.own),
             curved,
         )
     if lack_of_fit(best) < LACK_OF_FIT:
         states = begins(moves, best.values, best.own, best.controller)
         best = output_error.refined(dataclasses.replace(best, moves=creeping(best.moves, states)), BOUNDS)
-        best = _with_other_shape(_with_other_speed(best)) if evidence else best
+        best = with_other_shape(with_other_speed(best)) if evidence else best
     return best, evidence
-
-
-def _with_rise(base: OutputErrorFit, curved: Regression) -> tuple[OutputErrorFit, float]:
-    """The fit with a Stribeck rise, or without where it is not worth it, and the fall of the misfit by it.
-
-    The shape of the rise is one of its unknowns: held at a wrong one, Coulomb and viscous friction make up for it.
-    """
-    level = max(float(curved.values[2]), 0.2 * base.values["coulomb"])
-    rise = {
-        "static_ratio": float(np.clip(1 + curved.static_excess / level, 1.2, 5.0)),
-        "stribeck_speed": curved.stribeck_speed,
-    }
-    start = {
-        **base.values,
-        "viscous": float(curved.values[1]),
-        "coulomb": level,
-        **rise,
-        "stribeck_exponent": curved.stribeck_exponent,
-    }
-    best = output_error.fit(
-        base.moves, start, (*base.names, *STRIBECK), base.sigma, BOUNDS, base.controller, (FINE,), base.own
-    )
-    if base.cost - best.cost > EVIDENCE:  # far from where it began: once more
-        best = _hardened(best) or output_error.fit(
-            base.moves, best.values, best.names, base.sigma, BOUNDS, base.controller, (FINE,), best.own
-        )
-    evidence = (base.cost - best.cost) / max(1.0, *best.chi2)
-    return (base, 0.0) if evidence < EVIDENCE else (best, evidence)
-
-
-def _hardened(f: OutputErrorFit) -> OutputErrorFit | None:
-    """The fit with friction that sticks hard and a reference whose speed jumps, where bristles and ramps were no more
-    than what a rise does at low speed;
-    None where the encoder sees both, or without them the moves are not explained as well."""
-    bends = 0 < f.values["presliding"] < f.sigma[0]
-    ramps = f.controller == "profile" and 0 < min(f.values["rise"], f.values["fall"]) < SUDDEN_S
-    if not (bends or ramps):
-        return None
-    changed = (STICK if bends else {}) | (JUMP if ramps else {})
-    names = tuple(n for n in f.names if n not in changed)
-    hard = output_error.fit(f.moves, {**f.values, **changed}, names, f.sigma, BOUNDS, f.controller, (FINE,), f.own)
-    return hard if hard.cost < f.cost + EVIDENCE else None
-
-
-def _with_other_shape(best: OutputErrorFit) -> OutputErrorFit:
-    """The fit, its covariance as wide as the misfit tells between its own shape of the rise and the other usual one
-    (exponential; Gaussian).
-
-    Along this way the misfit is no parabola: the secant over it says how far the recording allows to go.
-    """
-    exponent = 2.0 if best.values["stribeck_exponent"] < 1.5 else 1.0
-    names = tuple(n for n in best.names if n != "stribeck_exponent")
-    other = output_error.fit(
-        best.moves,
-        {**best.values, "stribeck_exponent": exponent},
-        names,
-        best.sigma,
-        BOUNDS,
-        best.controller,
-        (FINE,),
-        best.own,
-        best.memory,
-    )
-    return _widened(best, other)
-
-
-def _with_other_speed(best: OutputErrorFit) -> OutputErrorFit:
-    """The better of the fit and of one begun at half the speed of the rise, its covariance as wide as the misfit tells
-    between the two.
-
-    Coulomb and viscous friction make up for a broad rise: a long, flat valley, in which a search among kinks may end
-    anywhere.
-    """
-    v0, exponent = best.values["stribeck_speed"], best.values["stribeck_exponent"]
-    v = np.linspace(0.01, 1.0, 100) * best.values["speed_full"]
-    columns = [np.column_stack([np.ones_like(v), np.exp(-((v / speed) ** exponent)), v]) for speed in (v0, 0.5 * v0)]
-    level = best.values["coulomb"]
-    friction = columns[0] @ [level, level * (best.values["static_ratio"] - 1), best.values["viscous"]]
-    # what comes nearest to the same friction
-    level, rise, viscous = map(float, np.linalg.lstsq(columns[1], friction, rcond=None)[0])
-    start = {
-        "coulomb": level,
-        "static_ratio": max(1 + rise / level, 1.05),
-        "viscous": viscous,
-        "stribeck_speed": 0.5 * v0,
-    }
-    other = output_error.fit(
-        best.moves,
-        {**best.values, **start},
-        best.names,
-        best.sigma,
-        BOUNDS,
-        best.controller,
-        (FINE,),
-        best.own,
-        best.memory,
-    )
-    return _widened(*sorted((best, other), key=lambda f: f.cost))
-
-
-def _widened(best: OutputErrorFit, other: OutputErrorFit) -> OutputErrorFit:
-    """The fit, its covariance as wide as the secant of the misfit to another says."""
-    if (rise := other.cost - best.cost) > EVIDENCE:
-        return best
-    way = np.array([other.values[n] - best.values[n] for n in best.names])
-    return dataclasses.replace(best, covariance=best.covariance + np.outer(way, way) / max(rise, 3.84))
 
 
 def _claims(curved: Regression) -> bool:
@@ -382,6 +196,27 @@ def _plant(r: Regression) -> dict[str, float]:
         | {"static_ratio": 1.0, "stribeck_speed": 20.0, "stribeck_exponent": 1.0}
         | ({"presliding": r.give} if r.give > GIVE[0] else {})
     )
+
+
+def _shortcomings(best: OutputErrorFit | None, plain: Regression, curved: Regression) -> list[str]:
+    """Why a drive is known from the regression alone, a sentence each."""
+    notes = []
+    if min(plain.misfit, curved.misfit) > REGRESSION_MISFIT:
+        notes.append(
+            f"the balance of currents does not explain the strokes either (residual variance {plain.misfit:.1f} in "
+            "units of the noise): parameters are given without intervals"
+        )
+    if best is None:
+        notes.append(
+            "no moves from rest with logged setpoints: controller not identified, setpoints do not predict the motion"
+        )
+    else:
+        notes.append(
+            f"setpoints do not explain the motion (residual variance {best.chi2[0]:.1f} of position, "
+            f"{best.chi2[1]:.1f} of current, in units of the noise): parameters are those of the regression, "
+            "and something is missing from the model"
+        )
+    return notes
 
 
 def _from_regression(plain: Regression, curved: Regression) -> tuple[dict[str, float], tuple[str, ...], Array, bool]:
