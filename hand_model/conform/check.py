@@ -15,6 +15,7 @@ from .align import Alignment, align
 from .causes import geometry_findings, mirror_finding
 from .exchange import exchange
 from .features import Features, features
+from .lines import rotation_angle
 from .mjcf import read_mjcf
 from .pairing import Pairing, pair_automatically, read_pair
 from .relations import relation_findings
@@ -95,7 +96,7 @@ def conform(
         from .evaluate import verify
 
         evaluated += "; " + verify((tree_a, tree_b), values, dict(given.joints), engines)
-    turn = np.degrees(_angle(at.base[:3, :3]))
+    turn = np.degrees(rotation_angle(at.base[:3, :3]))
     return ConformReport(
         str(a),
         str(b),
@@ -196,7 +197,7 @@ def _frames(f: Features, at: Alignment) -> dict[str, dict]:
             between = inverse(pose_a) @ carry @ pose_b
             out[name] = {
                 "frame_mm": tuple(float(v) for v in between[:3, 3] * 1e3),
-                "frame_deg": float(np.degrees(_angle(between[:3, :3]))),
+                "frame_deg": float(np.degrees(rotation_angle(between[:3, :3]))),
             }
     return out
 
@@ -217,19 +218,12 @@ def _link_row(x: str, y: str, one: tuple[Array, Array], other: tuple[Array, Arra
         y,
         y,
         tuple(float(v) for v in shift * 1e3),
-        float(np.degrees(_angle(mean))),
+        float(np.degrees(rotation_angle(mean))),
         float(np.linalg.norm(raw, axis=-1).max() * 1e3),
-        float(np.degrees(_angle(relative).max())),
+        float(np.degrees(rotation_angle(relative).max())),
         float(rest.max() * 1e3),
-        float(np.degrees(_angle(mean.T @ relative).max())),
+        float(np.degrees(rotation_angle(mean.T @ relative).max())),
     )
-
-
-def _angle(rotation: Array) -> Array:
-    """Rotation angle [rad] of (..., 3, 3), exact near zero."""
-    r = np.asarray(rotation)
-    skew = np.stack([r[..., 2, 1] - r[..., 1, 2], r[..., 0, 2] - r[..., 2, 0], r[..., 1, 0] - r[..., 0, 1]], axis=-1)
-    return np.arctan2(np.linalg.norm(skew, axis=-1), np.trace(r, axis1=-2, axis2=-1) - 1)
 
 
 def _explained(a: Tree, b: Tree, pairing: Pairing, f: Features, at: Alignment, values: Mapping[str, Array]) -> float:

@@ -18,9 +18,11 @@ def line_distance(axis_a: Array, point_a: Array, axis_b: Array, point_b: Array) 
     return angle, gap - (gap * axis_b).sum(-1, keepdims=True) * axis_b
 
 
-def rotation_angle(frame: Array) -> float:
-    """Angle [rad] (0 to pi) of a rotation matrix (3, 3)."""
-    return float(np.arctan2(np.linalg.norm(frame - frame.T) / np.sqrt(8), (np.trace(frame) - 1) / 2))
+def rotation_angle(rotation: Array) -> Array:
+    """Angles (...) [rad] (0 to pi) of rotation matrices (..., 3, 3), exact near zero."""
+    odd = rotation - np.swapaxes(rotation, -1, -2)
+    twice_sine = np.sqrt((odd * odd).sum((-2, -1)) / 2)
+    return np.arctan2(twice_sine, np.trace(rotation, axis1=-2, axis2=-1) - 1)
 
 
 def about(axis: Array, point: Array, angle: float) -> Array:

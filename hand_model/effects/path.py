@@ -5,6 +5,7 @@ Every one runs over strokes (between turning points), in closed form inside a st
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 from itertools import pairwise
 
@@ -92,31 +93,27 @@ def dahl(position: Array, length: float, start: float = 0.0, threshold: float | 
 
     length: [position unit] over which friction builds up after a reversal; start: state at the first sample.
     """
-    x = np.asarray(position, float)
-    out = np.empty(len(x))
-    z = start
-    for a, b, d in strokes(x, threshold):
-        if d:
-            path = np.maximum.accumulate(np.maximum((x[a:b] - x[a]) * d, 0.0))
-            out[a:b] = d + (z - d) * np.exp(-path / max(length, 1e-12))
-        else:
-            out[a:b] = z
-        z = out[b - 1]
-    return out
+    reach = max(length, 1e-12)
+    return _along_strokes(position, lambda z, d, path: d + (z - d) * np.exp(-path / reach), start, threshold)
 
 
 def jenkins(position: Array, length: float, start: float = 0.0, threshold: float | None = None) -> Array:
     """Jenkins element state (n,) in [-1, 1]: an elastic element of reach `length` [position unit] that yields (stop
     operator)."""
+    reach = max(length, 1e-12)
+    return _along_strokes(position, lambda z, d, path: np.clip(z + d * path / reach, -1, 1), start, threshold)
+
+
+def _along_strokes(
+    position: Array, law: Callable[[float, float, Array], Array], start: float, threshold: float | None
+) -> Array:
+    """A state (n,) that goes on from stroke to stroke and holds at rest; law: of the state at a stroke's begin, its
+    direction and the way since then (k,)."""
     x = np.asarray(position, float)
     out = np.empty(len(x))
     z = start
     for a, b, d in strokes(x, threshold):
-        if d:
-            path = np.maximum.accumulate(np.maximum((x[a:b] - x[a]) * d, 0.0))
-            out[a:b] = np.clip(z + d * path / max(length, 1e-12), -1, 1)
-        else:
-            out[a:b] = z
+        out[a:b] = law(z, d, np.maximum.accumulate(np.maximum((x[a:b] - x[a]) * d, 0.0))) if d else z
         z = out[b - 1]
     return out
 
