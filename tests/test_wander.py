@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from test_diagnose import drive, planted
 
-from hand_model.diagnose.locate.drive import echoes_command, rests_on_command
+from hand_model.diagnose.locate.measurement import echoes_command, is_measured, rests_on_command
 from hand_model.diagnose.locate.stamps import stamps
 from hand_model.diagnose.name.balance import Balance
 from hand_model.diagnose.name.selection import name_effects
@@ -133,8 +133,31 @@ def test_a_position_that_rests_on_every_setpoint_to_the_count_is_no_measurement(
     log = replace(log, columns={**log.columns, "setpoint": setpoint})
     assert rests_on_command([log]) and not echoes_command([log])
     assert not rests_on_command([replace(log, columns={**log.columns, "position": reference + ended})])
+    # an integrator ends there, too, but its motion begins when the current has overcome friction
+    current = np.random.default_rng(2).normal(0, 3.0, len(setpoint)) + 60.0 * np.sign(setpoint - reference)
+    answers = {**log.columns, "current": np.roll(current, 4)}
+    assert rests_on_command([replace(log, columns=answers)])
+    driven = {**log.columns, "current": current, "position": np.roll(reference, 4)}
+    assert not rests_on_command([replace(log, columns=driven)])
     coarse = {**log.columns, "position": 3000.0 * (reference / 3000.0).round()}
     assert not rests_on_command([replace(log, columns=coarse)])
+
+
+def test_a_current_of_one_value_a_stroke_is_no_measurement():
+    states = drive(12)
+    assert is_measured(states)
+    levels = np.array([16.0, 26.0, 58.0, 68.0, 115.0])
+
+    def commanded(state):
+        level = levels[
+            np.searchsorted(np.quantile(np.abs(state.velocity), [0.2, 0.4, 0.6, 0.8]), np.abs(state.velocity))
+        ]
+        way = np.sign(state.velocity)
+        stroke = np.cumsum(np.r_[0, np.diff(way) != 0])
+        value = np.array([np.median(level[stroke == k]) for k in range(stroke[-1] + 1)])[stroke] * way
+        return replace(state, effort=np.where(np.isfinite(state.effort), value, np.nan))
+
+    assert not is_measured(tuple(commanded(s) for s in states))
 
 
 def test_a_ripple_is_not_read_from_starts_and_stops():

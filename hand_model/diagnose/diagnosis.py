@@ -27,14 +27,12 @@ from .locate.decoupled import while_driven, without_excursions
 from .locate.drive import (
     drive_states,
     drive_trials,
-    echoes_command,
-    is_measured,
     opposes,
-    rests_on_command,
     too_short,
     with_gives,
 )
 from .locate.gravity import with_gravity
+from .locate.measurement import echoes_command, is_measured, rests_on_command
 from .locate.preload import preload_findings
 from .locate.simulated import SimulatedDrive, delays_apart, simulated_drive
 from .locate.stamps import Stamps, stamps

@@ -90,9 +90,11 @@ class ExternalContact(Effect):
     def parameters(
         self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]
     ) -> dict[str, float]:
-        """Where it begins and how stiff it is."""
+        """When it is there, where it begins and how stiff it is: over the first 10 of the position's unit, of either
+        form."""
         return {
             "trial": shape["trial"],
+            "form": shape["form"],
             "since": shape["since"],
             "until": shape["until"],
             "begin": shape["begin"],

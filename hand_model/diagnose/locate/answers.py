@@ -52,8 +52,8 @@ class Lateness:
 
 def answers_of(states: Sequence[DriveState], currents: Sequence[Array]) -> Answers:
     """Answers of one drive. currents: raw current (n,) of each state (its `effort` is masked at rest)."""
-    current = [x for s, c in zip(states, currents, strict=True) for x in _latencies(s, c, EARLY_S)]
-    motion = [x for s in states for x in _latencies(s, s.position)]
+    current = [x for s, c in zip(states, currents, strict=True) for x in _answered(s, c, EARLY_S)]
+    motion = [x for s in states for x in _answered(s, s.position)]
     step = sample_interval(states)
     return Answers(_usual(np.array(current), step), _usual(np.array(motion), step), step)
 
@@ -105,23 +105,25 @@ def _both_late(x: Answers, current_s: float, motion_s: float) -> bool:
     return sure and least > BOTH_LATE * x.step_s and least > 0.5 * float(late_s.max())
 
 
-def _latencies(state: DriveState, channel: Array, early_s: float = 0.0) -> list[float]:
-    """Time from each setpoint change to the first two samples beyond three standard deviations, in its direction.
+def _answered(state: DriveState, channel: Array, early_s: float = 0.0) -> list[float]:
+    return latencies(state.time_s, state.extra["setpoint"], channel, early_s) if "setpoint" in state.extra else []
+
+
+def latencies(time_s: Array, setpoint: Array, channel: Array, early_s: float = 0.0) -> list[float]:
+    """Time [s] from each change of the setpoint (n,) to the first two samples of a channel (n,) beyond three standard
+    deviations, in its direction.
 
     early_s: by how much a channel may answer before it is told; it does where that much before the change it stood, and
     no longer does at the change.
     """
-    if "setpoint" not in state.extra:
-        return []
-    setpoint, t = state.extra["setpoint"], state.time_s
     out = []
     for k in np.flatnonzero(np.diff(setpoint)) + 1:
-        way, ahead = np.sign(setpoint[k] - setpoint[k - 1]), int(np.searchsorted(t, t[k] - early_s))
-        hit, away = _departure(t, way * channel, ahead, k + 60) if ahead < k else (None, None)
+        way, ahead = np.sign(setpoint[k] - setpoint[k - 1]), int(np.searchsorted(time_s, time_s[k] - early_s))
+        hit, away = _departure(time_s, way * channel, ahead, k + 60) if ahead < k else (None, None)
         if hit is None or hit >= k - 1 or not away[hit - ahead : k - ahead].all():
-            hit, _ = _departure(t, way * channel, k, k + 60)
+            hit, _ = _departure(time_s, way * channel, k, k + 60)
         if hit is not None:
-            out.append(float(t[hit] - t[k]))
+            out.append(float(time_s[hit] - time_s[k]))
     return out
 
 

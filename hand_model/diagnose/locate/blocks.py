@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 BLOCK = 8  # frames averaged into one row block
 # blocks over which the noise is read, and the share of the usual variance from which it is louder
 LOUD_BLOCKS, LOUD = 5, 0.6
+TURNED = 0.02  # of a joint's range: over so much of it play changes sides
 LASTING_S = 2.0  # half of it is how long something must last that is no ghost
 
 
@@ -130,6 +131,17 @@ def share_of_range(blocks: Blocks, joint: int) -> Array:
     angle = blocks.angle[:, joint]
     low, high = np.quantile(angle, [0.005, 0.995])
     return (angle - low) / max(high - low, 1e-9)
+
+
+def way_of_motion(blocks: Blocks, joint: int) -> Array:
+    """Which way (b,) a joint was moving last: one while its angle grows, minus one while it falls, between the two while
+    it turns round over TURNED of its range (stop operator; Visintin 1994, "Differential models of hysteresis", III.1).
+    Zero until each recording's first motion."""
+    u, out = share_of_range(blocks, joint), np.zeros(len(blocks.time_s))
+    for i in range(1, len(out)):
+        if blocks.record[i] == blocks.record[i - 1]:
+            out[i] = min(max(out[i - 1] + 2 * (u[i] - u[i - 1]) / TURNED, -1.0), 1.0)
+    return out
 
 
 def project(blocks: Blocks, columns: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -17,9 +17,11 @@ from .simulated import SimulatedDrive
 Array = NDArray[np.float64]
 
 RUN_IN_S, RUN_OUT_S = 0.3, 0.25  # a stroke's part at steady speed begins and ends this far from rest
+RUNNING = 0.7  # of its median speed: slower at either end, a stroke still starts or stops
 # of the speed, over the recorded loads: less is within what controllers do (the most of 560 healthy drives 0.029)
 SAG_LEAST = 0.035
 SAG_T = 10.0
+ALIKE = 2.0  # times the loss of speed of the session's least sagging drive: drives of one kind may differ by as much
 FULL_SPEED = 0.9  # quantile of the velocity in the fastest strokes
 # of the current beyond its limit that a drive takes from its speed: one, but for noise in the limit
 CEILING_SHARE = 0.6
@@ -45,6 +47,11 @@ class CommandFacts:
     share_cut: float = 0.0
     strokes: int = 0
     trials: tuple[str, ...] = ()
+
+    @property
+    def lost(self) -> float:
+        """Share of its speed that the drive loses over the recorded loads; nan where strokes do not tell."""
+        return self.sag * self.load_range
 
 
 @dataclass(frozen=True)
@@ -77,10 +84,18 @@ def _strokes(states: tuple[DriveState, ...], currents: tuple[Array, ...]) -> lis
         for a, b in pairwise(edges.tolist()):
             t = state.time_s[a:b]
             keep = np.arange(a, b)[(t > t[0] + RUN_IN_S) & (t < t[-1] - RUN_OUT_S)]
+            fast = np.flatnonzero(np.abs(state.velocity[keep]) > RUNNING * np.median(np.abs(state.velocity[a:b])))
+            keep = keep[fast[0] : fast[-1] + 1] if len(fast) else keep[:0]
             speeds = state.extra["speed"][keep]
             if way[a] and len(keep) >= 10 and np.ptp(speeds) == 0 and speeds[0] > 0:
                 out.append(
-                    Stroke(float(way[a]), float(speeds[0]), state.position[keep], state.velocity[keep], current[keep])
+                    Stroke(
+                        float(way[a]),
+                        float(speeds[0]),
+                        state.position[keep],
+                        state.velocity[keep],
+                        current[keep],
+                    )
                 )
     return out
 
@@ -160,7 +175,8 @@ def _load_design(strokes: list[Stroke]) -> Array:
 
 
 def command_findings(facts: dict[str, CommandFacts], fingers: dict[str, str | None]) -> list[tuple[float, Finding]]:
-    """Delays and sags of the session's drives; the least delayed drive shows what a healthy one does."""
+    """Delays and sags of the session's drives; the least delayed, and the least sagging one, show what a healthy one
+    does."""
     out = []
     late = lateness({a: f.answers for a, f in facts.items()})
     for actuator, fact in facts.items():
@@ -168,9 +184,17 @@ def command_findings(facts: dict[str, CommandFacts], fingers: dict[str, str | No
             out.append(_delay(actuator, fingers.get(actuator), fact, late[actuator].drive_s))
         if np.isfinite(fact.ceiling):
             out.append(_ceiling_finding(actuator, fingers.get(actuator), fact))
-        elif np.isfinite(fact.sag) and fact.sag > SAG_T * fact.sag_se and fact.sag * fact.load_range > SAG_LEAST:
+        elif _sags(fact, [f for a, f in facts.items() if a != actuator]):
             out.append(_sag_finding(actuator, fingers.get(actuator), fact))
     return out
+
+
+def _sags(fact: CommandFacts, others: Sequence[CommandFacts]) -> bool:
+    """Whether a drive loses speed for sure, more than controllers do, and plainly more than the session's other
+    drives: one without much feedback loses more under load."""
+    usual = min((f.lost for f in others if np.isfinite(f.lost)), default=0.0)
+    sure = fact.sag > SAG_T * fact.sag_se and fact.lost > SAG_LEAST
+    return bool(sure and fact.lost > ALIKE * usual and fact.lost - usual > SAG_LEAST)
 
 
 def with_lateness(
@@ -303,7 +327,7 @@ def _delay(actuator: str, finger: str | None, fact: CommandFacts, late_s: Array)
 
 
 def _sag_finding(actuator: str, finger: str | None, fact: CommandFacts) -> tuple[float, Finding]:
-    loss = fact.sag * fact.load_range
+    loss = fact.lost
     parameters = {
         "sag": {
             "value": fact.sag,

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from .blocks import Blocks, share_of_range
+from .blocks import Blocks, share_of_range, way_of_motion
 
 Array = NDArray[np.float64]
 
@@ -23,7 +23,8 @@ UNNAMED = (NO_HINGE, CREEP)  # what no table of effects names
 class Candidate:
     """base: (b, 3m, d) [m per unit], shared by several candidates. pick: which of its columns are this one's, None for
     all. shifts: which of them (c,) shift what a joint carries and do not turn it. step: it begins at some moment.
-    lasting: a step that lasts for the session, or until the end of the recording (it was put right after)."""
+    lasting: a step that lasts for the session, or until the end of the recording (it was put right after). sides: it
+    changes sides with the way of motion, and does not follow the angle."""
 
     effect: str
     body: int
@@ -33,6 +34,7 @@ class Candidate:
     lasting: bool = True
     shifts: tuple[bool, ...] = ()
     pick: tuple[int, ...] | None = None
+    sides: bool = False
 
     @property
     def columns(self) -> Array:
@@ -57,6 +59,7 @@ class MarkerEffect:
     coefficients: Array = field(default_factory=lambda: np.zeros(0))
     covariance: Array = field(default_factory=lambda: np.zeros((0, 0)))
     shifts: tuple[bool, ...] = ()
+    sides: bool = False
 
     @property
     def columns(self) -> Array:
@@ -122,12 +125,14 @@ def _frames(blocks: Blocks, body: int, marker: int) -> list[Array]:
 def _no_hinge(blocks: Blocks, k: int) -> list[Candidate]:
     """Wobble and moving centre of joint k - 1, each with a few forms over its angle. The other axis of a wobble meets
     the hinge where the centre is taken to be, or passes anywhere: then what it carries is shifted in step with the
-    tilt."""
+    tilt. A pin with play changes sides with the way of motion."""
     b, m = blocks.weight.shape
     u = share_of_range(blocks, k - 1)[:, None]
-    functions = [u, u**2, u**3, np.sin(2 * np.pi * u), np.cos(2 * np.pi * u)]
-    even, square, cube, *wave = range(len(functions))
-    forms = [[square], [square, cube], wave, [square, cube, *wave]]
+    way = way_of_motion(blocks, k - 1)[:, None]
+    functions = [u, u**2, u**3, *_waves(u, 2), *_waves(u, 3), *_waves(u, 4), way]
+    even, square, cube, *waves, side = range(len(functions))
+    wave = waves[:2]
+    forms = [[square], [square, cube], wave, [square, cube, *wave], [square, cube, *waves], [side]]
     moved = np.flatnonzero(blocks.body >= k)
     axis = blocks.axes[:, k - 1]
     helper = np.eye(3)[np.argmin(np.abs(axis.mean(0)))]
@@ -143,18 +148,22 @@ def _no_hinge(blocks: Blocks, k: int) -> list[Candidate]:
 
     def candidate(name: str, form: Sequence[int], which: Sequence[int]) -> Candidate:
         pick = tuple(len(ways) * f + way for f in form for way in which)
-        return Candidate(
-            name, k, None, base, False, shifts=tuple(way in shifts for _ in form for way in which), pick=pick
-        )
+        shifted = tuple(way in shifts for _ in form for way in which)
+        return Candidate(name, k, None, base, False, shifts=shifted, pick=pick, sides=side in form)
 
     out = []
     for form in forms:
         out += [
             candidate("joint_wobble", form, tilts),
             candidate("joint_wobble", form, tilts + shifts),
-            candidate("moving_centre", form if form is wave else [even, *form], shifts),
+            candidate("moving_centre", form if form in (wave, [side]) else [even, *form], shifts),
         ]
     return out
+
+
+def _waves(u: Array, halves: int) -> tuple[Array, Array]:
+    """Sine and cosine of that many half waves over a joint's range."""
+    return np.sin(halves * np.pi * u), np.cos(halves * np.pi * u)
 
 
 def _any_motion(blocks: Blocks, k: int) -> list[Candidate]:
@@ -162,7 +171,7 @@ def _any_motion(blocks: Blocks, k: int) -> list[Candidate]:
     each marker of its segment (skin, a loose support)."""
     b, m = blocks.weight.shape
     u = share_of_range(blocks, k - 1)
-    forms = [u, u**2, u**3, np.sin(2 * np.pi * u), np.cos(2 * np.pi * u)]
+    forms = [u, u**2, u**3, *_waves(u, 2)]
     moved, mine = np.flatnonzero(blocks.body >= k), np.flatnonzero(blocks.body == k)
     rigid = np.zeros((b, m, 3, 6))
     rigid[:, moved, :, :3] = np.eye(3)

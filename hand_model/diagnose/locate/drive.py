@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...effects.base import DriveState
 from ...effects.path import dahl, from_rest
 from ...session import Log, Session, Trial
+from .measurement import coefficients, extremes, is_measured
 from .motion import Motion, estimate_motion, sure_acceleration
 from .simulated import SimulatedDrive, with_simulated
 
@@ -24,9 +25,6 @@ GIVE_UNSEEN = 0.12  # [%] differences of bristles below this are within what sta
 SETTLE_SAMPLES = (14, 13)  # after a start and before a stop: where acceleration is smeared by the kernel
 
 UNFOLLOWED = 0.25  # of the range: commands that end farther than this from where the motion does are not its own
-ECHO = 0.003  # of the range: a third of what a fast motion covers in one sample
-UNMOVED = 0.95  # of a current's standard deviation: more than this left by the motion, and it measures nothing
-FEWEST_RESTS, FINE = 10, 200  # rests that are looked at, and different readings of an encoder that is no coarse one
 TOLD_S = 2e-3  # to which the instants of a simulated motion are known
 SETTLE_TRAVEL = 4.0  # [%] some six bristle lengths of a healthy drive
 
@@ -45,21 +43,14 @@ def drive_trials(session: Session) -> dict[str, list[Trial]]:
 def count_range(logs: list[Log]) -> tuple[float, float]:
     """Counts at 0 % and 100 % of the range: the commanded extremes, else the recorded ones, where the commands are not
     those that the motion follows (lost, constant, in another unit)."""
-    low, high = _extremes(logs, "position")
+    low, high = extremes(logs, "position")
     if all("setpoint" in log.columns for log in logs):
-        told_low, told_high = _extremes(logs, "setpoint")
+        told_low, told_high = extremes(logs, "setpoint")
         # a glitch reaches farther
         reached = np.nanpercentile(np.concatenate([log.columns["position"] for log in logs]), [1, 99])
         if max(abs(told_low - reached[0]), abs(told_high - reached[1])) < UNFOLLOWED * (reached[1] - reached[0]):
             low, high = told_low, told_high
     return low, max(high, low + 1e-9)
-
-
-def _extremes(logs: list[Log], name: str) -> tuple[float, float]:
-    """Least and largest value of a column over several logs, nan where it is empty in all."""
-    values = np.concatenate([log.columns[name] for log in logs])
-    values = values[np.isfinite(values)]
-    return (float(values.min()), float(values.max())) if len(values) else (np.nan, np.nan)
 
 
 def drive_states(
@@ -194,22 +185,6 @@ def bouts(time_s: Array, moving: NDArray[np.bool_]) -> list[tuple[float, float]]
     ]
 
 
-def is_measured(states: tuple[DriveState, ...]) -> bool:
-    """False where the current channel is dead, where the motion explains nothing of it (friction alone turns over with
-    every reversal), or where it is so free of noise beside a motion that it does not explain that it can only be a
-    command."""
-    current = np.concatenate([s.effort[np.isfinite(s.effort)] for s in states])
-    if len(current) < 50:
-        return True
-    spread = float(np.std(current))
-    if len(np.unique(current)) <= 3 or spread == 0:
-        return False
-    declared = np.concatenate([s.declared[np.isfinite(s.effort)] for s in states])
-    left = float(np.std(current - declared @ _coefficients(declared, current)))
-    jitter = float(np.median(np.abs(np.diff(current, 2)))) / 0.6745 / np.sqrt(6)
-    return left < UNMOVED * spread and not (jitter < 0.03 * spread and left > 10 * max(jitter, 0.02 * spread))
-
-
 def opposes(states: tuple[DriveState, ...]) -> bool:
     """Whether friction would drive the motion: the current and the position of a drive have opposite signs. Of steady
     samples, by ten standard errors."""
@@ -219,41 +194,10 @@ def opposes(states: tuple[DriveState, ...]) -> bool:
     effort = effort[np.isfinite(effort)]
     if len(effort) < 50:
         return False
-    beta = _coefficients(columns, effort)
+    beta = coefficients(columns, effort)
     scale = np.linalg.norm(columns, axis=0) + 1e-12
     spread = np.linalg.pinv((columns / scale).T @ (columns / scale))[2, 2] * np.var(effort - columns @ beta)
     return bool(beta[2] < -10 * np.sqrt(spread) / scale[2])
-
-
-def echoes_command(logs: Sequence[Log]) -> bool:
-    """Whether the position column repeats the setpoint: just after each change of the setpoint it is already there,
-    which no machine of finite speed is."""
-    near = []
-    for log in logs:
-        if "setpoint" not in log.columns:
-            return False
-        position, setpoint = log.column("position"), log.column("setpoint")
-        low, high = _extremes([log], "setpoint")
-        span = max(high - low, 1e-9)
-        changed = np.r_[False, np.abs(np.diff(setpoint)) > 0]
-        near.append(np.abs(position - setpoint)[changed & np.isfinite(position) & np.isfinite(setpoint)] / span)
-    gaps = np.concatenate(near) if near else np.zeros(0)
-    return len(gaps) >= 5 and float(np.mean(gaps < ECHO)) > 0.9
-
-
-def rests_on_command(logs: Sequence[Log]) -> bool:
-    """Whether the position column is at the setpoint to the count wherever the next one finds it: no drive with
-    friction ends every move there, nor does an encoder of so many counts read so."""
-    on, seen = [np.zeros(0)], [np.zeros(0)]
-    for log in logs:
-        if "setpoint" not in log.columns:
-            return False
-        position, setpoint = log.column("position"), log.column("setpoint")
-        before = np.flatnonzero(np.diff(setpoint) != 0)
-        on.append((position == setpoint)[before][np.isfinite(position[before])])
-        seen.append(position[np.isfinite(position)])
-    rests = np.concatenate(on)
-    return len(rests) >= FEWEST_RESTS and len(np.unique(np.concatenate(seen))) >= FINE and float(np.mean(rests)) > 0.9
 
 
 def steady(time_s: Array, motion: Motion) -> NDArray[np.bool_]:
@@ -284,7 +228,7 @@ def with_timing(state: DriveState) -> DriveState:
     seen = np.isfinite(state.effort)
     if seen.sum() < 20:
         return state
-    beta = _coefficients(state.declared[seen], state.effort[seen])
+    beta = coefficients(state.declared[seen], state.effort[seen])
     step = float(np.median(np.diff(state.time_s)))
     slope = np.abs(np.gradient(state.declared @ beta, state.time_s))
     slope = np.maximum.reduce([np.roll(slope, k) for k in (-2, -1, 0, 1, 2)])
@@ -301,7 +245,7 @@ def with_required(states: tuple[DriveState, ...]) -> tuple[DriveState, ...]:
     """The states with the effort "required" (n,) by the declared model fitted to all of them."""
     seen = [np.isfinite(s.effort) for s in states]
     matrix = np.concatenate([s.declared[k] for s, k in zip(states, seen, strict=True)])
-    beta = _coefficients(matrix, np.concatenate([s.effort[k] for s, k in zip(states, seen, strict=True)]))
+    beta = coefficients(matrix, np.concatenate([s.effort[k] for s, k in zip(states, seen, strict=True)]))
     return tuple(replace(s, extra={**s.extra, "required": s.declared @ beta}) for s in states)
 
 
@@ -330,10 +274,4 @@ def _misfit(states: Sequence[DriveState], give: float) -> float:
         columns.append(declared[seen])
         efforts.append(state.effort[seen])
     a, y = np.concatenate(columns), np.concatenate(efforts)
-    return float(np.sum((y - a @ _coefficients(a, y)) ** 2))
-
-
-def _coefficients(columns: Array, effort: Array) -> Array:
-    """Of columns (n, k) of any size, by least squares on the effort (n,)."""
-    scale = np.linalg.norm(columns, axis=0) + 1e-12
-    return np.linalg.lstsq(columns / scale, effort, rcond=None)[0] / scale
+    return float(np.sum((y - a @ coefficients(a, y)) ** 2))

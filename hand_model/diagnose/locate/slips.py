@@ -17,7 +17,7 @@ from .angles import FingerAngles
 from .blocks import Blocks
 from .displacement import NO_HINGE, NOT_RIGID, UNNAMED, MarkerEffect
 from .markers import ALPHA, UNHINGED, MarkerNaming
-from .wobble import centre_travel, wobble_amplitude
+from .wobble import centre_travel, side_to_side, wobble_amplitude
 
 Array = NDArray[np.float64]
 
@@ -115,11 +115,13 @@ def _finding(
     elif name == "joint_wobble":
         tilt, interval = _amount(naming, main)
         parameters["amplitude"] = {"value": tilt, "unit": "rad", "ci95": interval}
-        text = f"{angles.finger.name} {joint}: a second rotation of up to {np.rad2deg(tilt):.2f} deg across the axis, as the angle grows."
+        how = "and back when the motion turns round" if main.sides else "as the angle grows"
+        text = f"{angles.finger.name} {joint}: a second rotation of up to {np.rad2deg(tilt):.2f} deg across the axis, {how}."
     else:
         travel, interval = _amount(naming, main)
         parameters["travel"] = {"value": travel, "unit": "m", "ci95": interval}
-        text = f"{angles.finger.name} {joint}: the centre of rotation travels by up to {1e3 * travel:.2f} mm as the angle grows."
+        how = "and back when the motion turns round" if main.sides else "as the angle grows"
+        text = f"{angles.finger.name} {joint}: the centre of rotation travels by up to {1e3 * travel:.2f} mm {how}."
     share = sum(e.gain for e in members) / max(sum(e.gain for e in naming.found), 1e-9)
     where = {
         "finger": angles.finger.name,
@@ -212,10 +214,13 @@ def _amount(naming: MarkerNaming, effect: MarkerEffect) -> tuple[float, list[flo
     """Amplitude of a joint's second rotation [rad], or the largest travel of its centre [m], over the recorded angles,
     with its 95 % interval: of what the fitted coefficients' covariance lets it be (parametric bootstrap, Efron &
     Tibshirani 1993, ch. 6)."""
-    blocks, read = naming.blocks, wobble_amplitude if effect.effect == "joint_wobble" else centre_travel
+    blocks, tilts = naming.blocks, effect.effect == "joint_wobble"
 
     def amount(coefficients: Array) -> float:
-        return read(blocks, effect.body, (effect.columns @ coefficients).reshape(len(blocks.residual), -1, 3))
+        shift = (effect.columns @ coefficients).reshape(len(blocks.residual), -1, 3)
+        if effect.sides:
+            return side_to_side(blocks, effect.body, shift, tilts)
+        return (wobble_amplitude if tilts else centre_travel)(blocks, effect.body, shift)
 
     rng = np.random.default_rng(0)
     drawn = rng.multivariate_normal(effect.coefficients, effect.covariance, DRAWS, method="eigh")

@@ -71,7 +71,16 @@ class _Trial:
         """The candidate as chosen."""
         c = self.candidate
         return MarkerEffect(
-            c.effect, c.body, c.label, self.begin, self.end, c.columns, self.evidence, self.gain, shifts=c.shifts
+            c.effect,
+            c.body,
+            c.label,
+            self.begin,
+            self.end,
+            c.columns,
+            self.evidence,
+            self.gain,
+            shifts=c.shifts,
+            sides=c.sides,
         )
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .blocks import Blocks, share_of_range
+from .blocks import Blocks, share_of_range, way_of_motion
 
 Array = NDArray[np.float64]
 
@@ -41,6 +41,14 @@ def centre_travel(blocks: Blocks, body: int, shift: Array) -> float:
     left = [_course(moved, angle, form(u), False) for form in forms]
     best = min(range(len(forms)), key=lambda i: left[i][0])
     return float(np.linalg.norm(left[best][1] @ np.array(forms[best](at)), axis=0).max())
+
+
+def side_to_side(blocks: Blocks, body: int, shift: Array, tilts: bool) -> float:
+    """Half of the tilt [rad], or of the travel of the centre [m], by which a joint's play changes sides with the way of
+    motion. Arguments as in `wobble_amplitude`."""
+    across = _tilt(blocks, body, shift) if tilts else _across(blocks, body, shift[:, blocks.body == body].mean(1))
+    _, along = _course(across, blocks.angle[:, body - 1], [way_of_motion(blocks, body - 1)], False)
+    return float(np.linalg.norm(along))
 
 
 def _tilt(blocks: Blocks, body: int, shift: Array) -> Array:

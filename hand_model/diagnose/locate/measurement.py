@@ -1,0 +1,104 @@
+"""Whether a drive's columns are measurements: what is a command, dead or unmoved is refused, not fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...effects.base import DriveState
+from ...session import Log
+from .answers import latencies
+
+Array = NDArray[np.float64]
+
+ECHO = 0.003  # of the range: a third of what a fast motion covers in one sample
+UNMOVED = 0.95  # of a current's standard deviation: more than this left by the motion, and it measures nothing
+FEWEST_RESTS, FINE = 10, 200  # rests that are looked at, and different readings of an encoder that is no coarse one
+LONG_STROKE = 15  # samples, over which a current changes
+
+
+def is_measured(states: tuple[DriveState, ...]) -> bool:
+    """False where the current channel is dead or stays the same all along a stroke (the load of a spring or a polynomial
+    of position does not, nor does noise), where the motion explains nothing of it (friction alone turns over with every
+    reversal), or where it is so free of noise beside a motion that it does not explain that it can only be a
+    command."""
+    current = np.concatenate([s.effort[np.isfinite(s.effort)] for s in states])
+    if len(current) < 50:
+        return True
+    spread = float(np.std(current))
+    if len(np.unique(current)) <= 3 or spread == 0 or _level(states):
+        return False
+    declared = np.concatenate([s.declared[np.isfinite(s.effort)] for s in states])
+    left = float(np.std(current - declared @ coefficients(declared, current)))
+    jitter = float(np.median(np.abs(np.diff(current, 2)))) / 0.6745 / np.sqrt(6)
+    return left < UNMOVED * spread and not (jitter < 0.03 * spread and left > 10 * max(jitter, 0.02 * spread))
+
+
+def _level(states: tuple[DriveState, ...]) -> bool:
+    """Whether the current has, nearly all along, a single value in each stroke that is long enough to tell."""
+    alike = []
+    for state in states:
+        way = np.where(np.isfinite(state.effort), np.sign(state.velocity), 0)
+        for part in np.split(np.arange(len(way)), np.flatnonzero(np.diff(way)) + 1):
+            if way[part[0]] and len(part) >= LONG_STROKE:
+                alike.append(np.median(state.effort[part]) == state.effort[part])
+    return len(alike) >= FEWEST_RESTS and float(np.mean(np.concatenate(alike))) > 0.9
+
+
+def echoes_command(logs: Sequence[Log]) -> bool:
+    """Whether the position column repeats the setpoint: just after each change of the setpoint it is already there,
+    which no machine of finite speed is."""
+    near = []
+    for log in logs:
+        if "setpoint" not in log.columns:
+            return False
+        position, setpoint = log.column("position"), log.column("setpoint")
+        low, high = extremes([log], "setpoint")
+        span = max(high - low, 1e-9)
+        changed = np.r_[False, np.abs(np.diff(setpoint)) > 0]
+        near.append(np.abs(position - setpoint)[changed & np.isfinite(position) & np.isfinite(setpoint)] / span)
+    gaps = np.concatenate(near) if near else np.zeros(0)
+    return len(gaps) >= 5 and float(np.mean(gaps < ECHO)) > 0.9
+
+
+def rests_on_command(logs: Sequence[Log]) -> bool:
+    """Whether the position column is a drive's reference: at the setpoint to the count wherever the next one finds it,
+    as an encoder of so many counts reads only where an integrator is at work, and under way before the current is, as
+    no drive with friction."""
+    on, seen = [np.zeros(0)], [np.zeros(0)]
+    for log in logs:
+        if "setpoint" not in log.columns:
+            return False
+        position, setpoint = log.column("position"), log.column("setpoint")
+        before = np.flatnonzero(np.diff(setpoint) != 0)
+        on.append((position == setpoint)[before][np.isfinite(position[before])])
+        seen.append(position[np.isfinite(position)])
+    rests = np.concatenate(on)
+    fine = len(rests) >= FEWEST_RESTS and len(np.unique(np.concatenate(seen))) >= FINE
+    return fine and float(np.mean(rests)) > 0.9 and not _driven(logs)
+
+
+def _driven(logs: Sequence[Log]) -> bool:
+    """Whether the position begins to move after the current has answered a new setpoint."""
+    moved, drove = list[float](), list[float]()
+    for log in (log for log in logs if "current" in log.columns):
+        setpoint, position, current = (log.column(name) for name in ("setpoint", "position", "current"))
+        whole = np.isfinite(setpoint + position + current)
+        moved += latencies(log.time_s[whole], setpoint[whole], position[whole])
+        drove += latencies(log.time_s[whole], setpoint[whole], current[whole])
+    return bool(moved) and bool(drove) and float(np.median(moved)) > float(np.median(drove))
+
+
+def extremes(logs: list[Log], name: str) -> tuple[float, float]:
+    """Least and largest value of a column over several logs, nan where it is empty in all."""
+    values = np.concatenate([log.columns[name] for log in logs])
+    values = values[np.isfinite(values)]
+    return (float(values.min()), float(values.max())) if len(values) else (np.nan, np.nan)
+
+
+def coefficients(columns: Array, effort: Array) -> Array:
+    """Of columns (n, k) of any size, by least squares on the effort (n,)."""
+    scale = np.linalg.norm(columns, axis=0) + 1e-12
+    return np.linalg.lstsq(columns / scale, effort, rcond=None)[0] / scale
