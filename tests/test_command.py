@@ -90,6 +90,31 @@ def test_what_is_no_limit_has_none(profile) -> None:
         assert np.isnan(command_facts((state,), (current,)).ceiling)
 
 
+def sags(**profiles) -> set[str | None]:
+    facts = {}
+    for seed, (name, profile) in enumerate(profiles.items()):
+        state, current = strokes(profile, seed, noise=1.0)
+        facts[name] = command_facts((state,), (current,))
+    found = command_findings(facts, {name: name for name in facts})
+    return {f.where["actuator"] for _, f in found if f.effect == "drive_sag"}
+
+
+def test_drives_that_lose_speed_alike_are_of_a_kind_and_one_that_loses_more_sags() -> None:
+    def softer(x: float, full: float) -> float:
+        return full * (1 - 0.0012 * load(x))
+
+    assert sags(index=sagging, ring=healthy) == {"index"}
+    assert sags(index=sagging) == {"index"}
+    assert sags(index=sagging, ring=sagging) == set()
+    assert sags(index=sagging, ring=softer) == {"index"}
+
+
+def test_a_stroke_that_ends_slowly_is_at_no_limit() -> None:
+    """A controller that takes half a second to stop: less current is needed there, and speed falls."""
+    state, current = strokes(lambda x, full: full * min(1.0, 0.02 + (100 - x) / (0.35 * full)), 1, 8, 1.0)
+    assert np.isnan(command_facts((state,), (current,)).ceiling)
+
+
 def answering(delay_s: float, seed: int) -> tuple[DriveState, np.ndarray]:
     """Eighty commands that current and position answer after `delay_s`, at moments that no sample knows."""
     rng = np.random.default_rng(seed)

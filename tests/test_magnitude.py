@@ -84,3 +84,13 @@ def test_bristles_count_by_what_they_are_longer_than_any_drive_is_granted() -> N
         for length in (0.9, 1.9, 2.9)
     ]
     assert sizes[0] == LEAST and sizes[2] == pytest.approx(2 * sizes[1])
+
+
+def test_an_obstacle_that_stiffens_counts_by_the_load_at_the_end_of_the_range() -> None:
+    """Stiffness is told over the first 10 % of either form."""
+    channel = channel_figures(drive(0))
+    even = {"begin": 50.0, "form": 0.0, "stiffness": 0.5}
+    bent = {**even, "form": 1.0, "stiffness": 0.1}  # 0.1 * 50^2 / 10 = 0.5 * 50
+    assert magnitude("external_contact", bent, channel) == pytest.approx(
+        magnitude("external_contact", even, channel), rel=0.05
+    )

@@ -11,26 +11,27 @@ from scipy.spatial.transform import Rotation
 from hand_model.diagnose.locate.blocks import _assembled
 from hand_model.diagnose.locate.displacement import CREEP, NO_HINGE
 from hand_model.diagnose.locate.markers import MarkerNaming, named_in
-from hand_model.diagnose.locate.slips import unexplained
+from hand_model.diagnose.locate.slips import _finding, unexplained
 from hand_model.identify.chain import Chain
 
 BODY = np.repeat([0, 1, 2], 4)
 LABELS = tuple(f"M{i}" for i in range(12))
 COUNT, RECORDS = 240, 2
+FLEXED = np.array([0.6, 0.4])  # rad, half of each joint's range
 
 
-def seen(shift, seed: int = 0) -> MarkerNaming:
+def seen(shift, seed: int = 0, body: int = 1) -> MarkerNaming:
     """The naming of two recordings of a finger of two joints whose markers are displaced by shift(share, turn, arm):
-    (b, 4, 3) [m] of the first segment's markers. share: (b,) of the recording. turn: (b, 3, 3) of that segment. arm:
+    (b, 4, 3) [m] of one segment's markers. share: (b,) of the recording. turn: (b, 3, 3) of the first segment. arm:
     (4, 3) [m] from the support's middle, at rest."""
     rng = np.random.default_rng(seed)
     rest = np.concatenate([rng.normal(0, 0.012, (4, 3)) + [0.03 * k + 0.01, 0, 0.01] for k in range(3)])
     chain = Chain(rest, np.array([[0, 1, 0], [0, 1, 0]], float), np.array([[0.03, 0, 0], [0.06, 0, 0]]))
     share = np.tile(np.linspace(0, 1, COUNT), RECORDS)
-    angle = (1 - np.cos(2 * np.pi * 4 * share))[:, None] * np.array([0.6, 0.4])
+    angle = (1 - np.cos(2 * np.pi * 4 * share))[:, None] * FLEXED
     residual = rng.normal(0, 3e-5, (COUNT * RECORDS, 12, 3))
     turn = Rotation.from_rotvec(angle[:, :1] * chain.axis_palm[0]).as_matrix()
-    residual[:, BODY == 1] += shift(share, turn, rest[BODY == 1] - rest[BODY == 1].mean(0))
+    residual[:, BODY == body] += shift(share, turn, rest[BODY == body] - rest[BODY == body].mean(0))
     record = np.repeat(np.arange(RECORDS), COUNT)
     return named_in(
         _assembled(chain, BODY, LABELS, residual, np.full((len(share), 12), 8.0), angle, record, 30 * share)
@@ -101,3 +102,41 @@ def test_a_support_that_turns_all_the_time_does_not_slip() -> None:
         and told["shape"] == "a support moves all the time"
         and NO_HINGE not in told["shape"]
     )
+
+
+def tilting(amount):
+    """The second joint tilts by amount(share of range, way of motion) [rad] about an axis across its own, which the
+    first segment carries."""
+
+    def shift(share, turn, arm):
+        phase = 4 * share % 1
+        u = 0.5 * (1 - np.cos(2 * np.pi * phase))
+        tilt = amount(u, np.where(phase < 0.5, 1.0, -1.0))
+        own = Rotation.from_rotvec(np.outer(2 * u * FLEXED[1], [0.0, 1.0, 0.0])).as_matrix()
+        carried = np.einsum("bij,mj->bmi", own, arm + [0.012, 0.0, 0.01])  # from the joint
+        return np.einsum("bij,bmj->bmi", turn, np.cross([1.0, 0.0, 0.0], carried)) * tilt[:, None, None]
+
+    return shift
+
+
+def wobble_of(naming: MarkerNaming) -> float:
+    angles = SimpleNamespace(
+        finger=SimpleNamespace(name="index", segments=[SimpleNamespace(name=n) for n in ("proximal", "distal")]),
+        records=[SimpleNamespace(trial=SimpleNamespace(name=f"log/{k}.csv")) for k in range(RECORDS)],
+    )
+    first, found = naming.found[0], list(naming.found)
+    return _finding(angles, naming, first.effect, first.body, first.label, found).parameters["amplitude"]["value"]
+
+
+def test_a_joint_with_play_tilts_to_the_side_that_its_motion_takes_it() -> None:
+    naming = seen(tilting(lambda u, way: 0.012 * way), body=2)
+    assert naming.believed and places(naming) == {("joint_wobble", None)} and naming.p_after > 0.003
+    assert naming.found[0].sides
+    assert wobble_of(naming) == pytest.approx(0.012, rel=0.1)
+
+
+@pytest.mark.parametrize("waves", [1.0, 1.4, 1.7])
+def test_a_second_axis_may_swing_more_than_once_over_the_range(waves: float) -> None:
+    naming = seen(tilting(lambda u, way: 0.012 * np.sin(2 * np.pi * waves * u + 0.7)), body=2)
+    assert naming.believed and places(naming) == {("joint_wobble", None)} and naming.p_after > 0.003
+    assert not naming.found[0].sides

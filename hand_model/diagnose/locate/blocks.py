@@ -133,6 +133,18 @@ def share_of_range(blocks: Blocks, joint: int) -> Array:
     return (angle - low) / max(high - low, 1e-9)
 
 
+def across_axis(blocks: Blocks, joint: int) -> tuple[Array, Array]:
+    """Two directions (b, 3) across a joint's axis and across each other, that turn with the segment before it."""
+    axis = blocks.axes[:, joint]
+    helper = np.eye(3)[np.argmin(np.abs(axis[0]))]
+    if joint > 0:
+        before = blocks.rotation[:, int(np.flatnonzero(blocks.body == joint)[0])]
+        helper = before @ before[0].T @ helper
+    first = np.cross(axis, helper)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return first, np.cross(axis, first)
+
+
 def way_of_motion(blocks: Blocks, joint: int) -> Array:
     """Which way (b,) a joint was moving last: one while its angle grows, minus one while it falls, between the two while
     it turns round over TURNED of its range (stop operator; Visintin 1994, "Differential models of hysteresis", III.1).

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from .blocks import Blocks, share_of_range, way_of_motion
+from .blocks import Blocks, across_axis, share_of_range, way_of_motion
 
 Array = NDArray[np.float64]
 
@@ -134,11 +134,7 @@ def _no_hinge(blocks: Blocks, k: int) -> list[Candidate]:
     wave = waves[:2]
     forms = [[square], [square, cube], wave, [square, cube, *wave], [square, cube, *waves], [side]]
     moved = np.flatnonzero(blocks.body >= k)
-    axis = blocks.axes[:, k - 1]
-    helper = np.eye(3)[np.argmin(np.abs(axis.mean(0)))]
-    first = np.cross(axis, helper)
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    across = (first, np.cross(axis, first))
+    across = across_axis(blocks, k - 1)
     arm = blocks.position[:, moved] - blocks.centres[:, k - 1][:, None]
     ways = [np.cross(d[:, None], arm) for d in across] + [np.broadcast_to(d[:, None], arm.shape) for d in across]
     tilts, shifts = (0, 1), (2, 3)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .blocks import Blocks, share_of_range, way_of_motion
+from .blocks import Blocks, across_axis, share_of_range, way_of_motion
 
 Array = NDArray[np.float64]
 
@@ -65,14 +65,7 @@ def _tilt(blocks: Blocks, body: int, shift: Array) -> Array:
 def _across(blocks: Blocks, body: int, vector: Array) -> Array:
     """Components (b, 2) of vectors (b, 3) across a joint's axis, along two directions that turn with the segment before
     it."""
-    axis = blocks.axes[:, body - 1]
-    helper = np.eye(3)[np.argmin(np.abs(axis[0]))]
-    if body > 1:
-        before = blocks.rotation[:, int(np.flatnonzero(blocks.body == body - 1)[0])]
-        helper = before @ before[0].T @ helper
-    first = np.cross(axis, helper)
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    return np.stack([np.einsum("bi,bi->b", vector, d) for d in (first, np.cross(axis, first))], axis=1)
+    return np.stack([np.einsum("bi,bi->b", vector, d) for d in across_axis(blocks, body - 1)], axis=1)
 
 
 def _course(across: Array, angle: Array, forms: list[Array], own: bool) -> tuple[float, Array]:
