@@ -204,19 +204,23 @@ def test_angles_of_markers_that_leave_segments_or_hinge_need_names_that_leave_no
 
 
 @pytest.mark.parametrize(
-    ("named", "believed", "stays"),
+    ("named", "figures", "believed", "stays"),
     [
-        ("drive_sag", True, False),
-        ("current_saturation", True, False),
-        ("drive_sag", False, True),
-        ("stribeck_friction", True, True),
+        ("drive_sag", {}, True, False),
+        ("current_saturation", {}, True, False),
+        ("drive_sag", {}, False, True),
+        ("stribeck_friction", {}, True, True),
+        ("load_dependent_friction", {"load_coefficient": {"value": 0.4}}, True, False),
+        ("load_dependent_friction", {"load_coefficient": {"value": 0.05}}, True, True),
     ],
 )
-def test_a_loss_of_speed_is_named_once_and_not_where_the_current_is_cut(
-    named: str, believed: bool, stays: bool
+def test_a_loss_of_speed_is_named_once_and_not_where_the_current_is_cut_or_friction_grows_with_the_load(
+    named: str, figures: dict[str, dict[str, float]], believed: bool, stays: bool
 ) -> None:
-    kept = [SimpleNamespace(term=SimpleNamespace(effect=effect(named)))]
-    station = SimpleNamespace(actuator="index", believed=believed, kept=kept)
+    term = SimpleNamespace(effect=effect(named))
+    naming = SimpleNamespace(fit=SimpleNamespace(terms=(term,)))
+    kept = [SimpleNamespace(term=term)]
+    station = SimpleNamespace(actuator="index", believed=believed, kept=kept, naming=naming, parameters={0: figures})
     mine, other = (
         (1.0, finding("drive_sag", "index", "command", sag=0.1)),
         (1.0, finding("drive_sag", "ring", "command", sag=0.1)),

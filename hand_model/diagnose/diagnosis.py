@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -36,6 +36,7 @@ from .locate.measurement import echoes_command, is_measured, rests_on_command
 from .locate.preload import preload_findings
 from .locate.simulated import SimulatedDrive, delays_apart, simulated_drive
 from .locate.stamps import Stamps, stamps
+from .magnitude import magnitude
 from .name.balance import Balance
 from .name.evidence import gain, typical_coefficients
 from .name.reread import reread
@@ -46,6 +47,7 @@ from .prove.correct import refuse_output, write_corrected
 from .prove.improve import read_model, refuse_other, write_improved
 from .prove.replays import Replay
 
+REASON = 0.5  # of the size at which friction by load is plain: a soft controller falls behind by so much
 EARLY = 3.0  # standard deviations by which answers that come before the command say so for sure
 # log likelihood that a shift of a drive's current must bring: less, and its drive tells none (two standard deviations)
 DELAY_TOLD = 2.0
@@ -228,15 +230,23 @@ def _without_settled_sags(
     found: list[tuple[float, Finding]], stations: Sequence[Station]
 ) -> list[tuple[float, Finding]]:
     """Without losses of speed of drives whose current settles the matter: a reading that clips says little of the load
-    on which such a sag is judged, and one that the current shows, too, is named there, with a law to write."""
+    on which such a sag is judged, one that the current shows, too, is named there, with a law to write, and friction
+    that plainly grows with the load is a reason for a soft controller to fall behind."""
     settled = {
         s.actuator
         for s in stations
         if s.believed
-        for f in s.kept
-        if f.term.effect.clips or f.term.effect.name == "drive_sag"
+        for which, f in ((s.naming.fit.terms.index(f.term), f) for f in s.kept)
+        if f.term.effect.clips
+        or f.term.effect.name == "drive_sag"
+        or f.term.effect.name == "load_dependent_friction"
+        and magnitude("load_dependent_friction", _values(s.parameters[which])) > REASON
     }
     return [i for i in found if i[1].effect != "drive_sag" or i[1].where["actuator"] not in settled]
+
+
+def _values(parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, float]:
+    return {name: entry["value"] for name, entry in parameters.items()}
 
 
 def _timed(
