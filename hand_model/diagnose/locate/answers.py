@@ -9,7 +9,7 @@ once.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,18 +26,26 @@ BOTH_LATE = 0.8
 CERTAIN = 3.0  # standard errors by which the means of both are late beyond what healthy drives differ by
 UNCLEAR = 0.3  # share of the lateness that the motion has too, from which it is no longer clear what is late
 LEAST_ANSWERS = 5
+STOOD = 0.5  # [%] a drive that moves less just before a change stands
 UNLIKE = 0.4  # sample intervals by which the answers of healthy drives of one session differ
 USUAL_START = 2.0  # sample intervals after which a healthy drive is seen to move
+SHARES = (0.1, 0.25, 0.5)  # of a current's rise, by which a late one is told from a slow one
+SLOWER = 3.0  # times as slow as another drive's, at most, is the rise of a healthy one
+BIN_S, RISEN_S = 0.005, 0.35  # in which samples after all changes are averaged, and after which the rise is over
+SHIFTED = 0.5  # of what a drive's answers are late, at least, is a shift of its rise and no slowness
 EARLY_S = 0.2  # by which a current's time stamps may run ahead
 
 
 @dataclass(frozen=True)
 class Answers:
-    """current_s, motion_s: (e,) from each change of the setpoint to its answer. step_s: sample interval."""
+    """current_s, motion_s: (e,) from each change of the setpoint to its answer. step_s: sample interval. rise_s: (s,)
+    time from the changes until the current, mean over them all, has risen to SHARES (s) of its most; nan where
+    that is not told."""
 
     current_s: Array
     motion_s: Array
     step_s: float
+    rise_s: Array = field(default_factory=lambda: np.full(len(SHARES), np.nan))
 
 
 @dataclass(frozen=True)
@@ -55,7 +63,7 @@ def answers_of(states: Sequence[DriveState], currents: Sequence[Array]) -> Answe
     current = [x for s, c in zip(states, currents, strict=True) for x in _answered(s, c, EARLY_S)]
     motion = [x for s in states for x in _answered(s, s.position)]
     step = sample_interval(states)
-    return Answers(_usual(np.array(current), step), _usual(np.array(motion), step), step)
+    return Answers(_usual(np.array(current), step), _usual(np.array(motion), step), step, _rise(states, currents))
 
 
 def lateness(answers: Mapping[str, Answers]) -> dict[str, Lateness]:
@@ -79,7 +87,8 @@ def lateness(answers: Mapping[str, Answers]) -> dict[str, Lateness]:
             and np.mean(late) > LATE * x.step_s
             and np.mean(late > x.step_s) > MOSTLY
         )
-        drive = plain or (not alone and _both_late(x, total, behind))
+        others = [y.rise_s for a, y in told.items() if a != actuator]
+        drive = (plain or (not alone and _both_late(x, total, behind))) and _shift(x.rise_s, others) > SHIFTED * total
         channel = max(total - np.nan_to_num(behind, nan=total), 0.0) if drive else total
         # Neither clearly the one nor the other: the motion's own scatter decides between the two.
         torn = total > LATE * x.step_s and UNCLEAR * total < behind < (1 - UNCLEAR) * total
@@ -88,6 +97,42 @@ def lateness(answers: Mapping[str, Answers]) -> dict[str, Lateness]:
         doubt = float(np.hypot(unlike + between, np.std(x.current_s) / np.sqrt(len(x.current_s))))
         out[actuator] = Lateness(late if drive else np.zeros(0), channel, doubt)
     return out
+
+
+def _shift(rise_s: Array, others: Sequence[Array]) -> float:
+    """By how much [s] a rise begins later than those of other drives, the least of them: one is another stretched in
+    time, as by another gain, and shifted. Infinite where nothing is told."""
+    shifts = []
+    for other in (o for o in others if np.isfinite(o + rise_s).all()):
+        # slower than the other, or as fast: a late drive that is faster would seem later still
+        stretch = float(np.clip(np.ptp(rise_s) / max(float(np.ptp(other)), 1e-9), 1.0, SLOWER))
+        shifts.append(float(np.mean(rise_s - stretch * other)))
+    return min(shifts, default=np.inf)
+
+
+def _rise(states: Sequence[DriveState], currents: Sequence[Array]) -> Array:
+    """Times (len(SHARES),) [s] at which a drive's current has risen to SHARES of its most, mean over all changes of the
+    setpoint before which it stood: their moments lie anywhere between samples, so that the mean tells much less than
+    one."""
+    since, risen = [np.zeros(0)], [np.zeros(0)]
+    for state, current in zip(states, currents, strict=True):
+        setpoint, t = state.extra.get("setpoint", np.zeros(len(state.time_s))), state.time_s
+        for k in np.flatnonzero(np.diff(setpoint)) + 1:
+            before, after = (t > t[k] - EARLY_S) & (t < t[k]), (t > t[k] - EARLY_S) & (t < t[k] + RISEN_S)
+            if before.sum() >= 5 and np.ptp(state.position[before]) < STOOD:
+                since.append(t[after] - t[k])
+                risen.append(np.sign(setpoint[k] - setpoint[k - 1]) * (current[after] - np.median(current[before])))
+    since_s, rise = np.concatenate(since), np.concatenate(risen)
+    cell = np.floor(since_s / BIN_S).astype(int)
+    known, at = np.unique(cell[cell >= 0], return_inverse=True)
+    if len(since) <= LEAST_ANSWERS or len(known) < 2:
+        return np.full(len(SHARES), np.nan)
+    mean = np.maximum.accumulate(np.bincount(at, rise[cell >= 0]) / np.bincount(at))
+    return (
+        np.interp(np.array(SHARES) * mean[-1], mean, BIN_S * (known + 0.5))
+        if mean[-1] > 0
+        else np.full(len(SHARES), np.nan)
+    )
 
 
 def _both_late(x: Answers, current_s: float, motion_s: float) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,19 +12,12 @@ from ...effects.base import DriveState
 from ..findings import UNWRITTEN, Finding, weighed
 from .answers import Answers, answers_of, lateness
 from .simulated import SimulatedDrive
+from .strokes import LEAST_LOSS, ceiling, sag, settled_sag, strokes_of
 
 Array = NDArray[np.float64]
 
-RUN_IN_S, RUN_OUT_S = 0.3, 0.25  # a stroke's part at steady speed begins and ends this far from rest
-RUNNING = 0.7  # of its median speed: slower at either end, a stroke still starts or stops
-# of the speed, over the recorded loads: less is within what controllers do (the most of 560 healthy drives 0.029)
-SAG_LEAST = 0.035
-SAG_T = 10.0
+SAG_T, SETTLED_T = 10.0, 4.0
 ALIKE = 2.0  # times the loss of speed of the session's least sagging drive: drives of one kind may differ by as much
-FULL_SPEED = 0.9  # quantile of the velocity in the fastest strokes
-# of the current beyond its limit that a drive takes from its speed: one, but for noise in the limit
-CEILING_SHARE = 0.6
-CEILING_LEFT, CEILING_T = 0.1, 6.0
 REACTION_S = 0.15  # a person's quickest: a delay counts beside it
 UNLIKE = 0.1  # of a delay by which answers may miss it: controllers of other gains rise otherwise
 
@@ -33,15 +25,17 @@ UNLIKE = 0.1  # of a delay by which answers may miss it: controllers of other ga
 @dataclass(frozen=True)
 class CommandFacts:
     """answers: to commands. sag, sag_se, load_range: loss of speed per load [1/raw], its standard error [1/raw] and the
-    range of loads [raw];
-    nan where strokes do not tell. ceiling: current [raw] at which the drive is at its limit, or nan; cut: the weight of
-    what it takes away; share_cut: of the time at steady speed in which more would be needed. strokes: how many tell the
-    sag. trials: names of the recordings."""
+    range of loads [raw]; nan where strokes do not tell. settled, settled_se: share of the speed that is lost over the
+    loads where strokes are compared at equal times after their starts, and its standard error. ceiling: current [raw]
+    at which the drive is at its limit, or nan; cut: the weight of what it takes away; share_cut: of the time at steady
+    speed in which more would be needed. strokes: how many tell the sag. trials: names of the recordings."""
 
     answers: Answers
     sag: float
     sag_se: float
     load_range: float
+    settled: float
+    settled_se: float
     ceiling: float = float("nan")
     cut: float = 0.0
     share_cut: float = 0.0
@@ -54,124 +48,17 @@ class CommandFacts:
         return self.sag * self.load_range
 
 
-@dataclass(frozen=True)
-class Stroke:
-    """A stroke at one commanded speed, away from its start and stop. way: 1 flexing, -1 extending. position [%],
-    velocity [%/s], current [raw]: (n,)."""
-
-    way: float
-    commanded: float
-    position: Array
-    velocity: Array
-    current: Array
-
-
 def command_facts(states: tuple[DriveState, ...], currents: tuple[Array, ...]) -> CommandFacts:
     """Facts of one drive. currents: raw current (n,) of each state (its `effort` is masked at rest)."""
-    strokes = _strokes(states, currents)
+    strokes = strokes_of(states, currents)
     return CommandFacts(
-        answers_of(states, currents), *_sag(strokes), *_ceiling(strokes), len(strokes), tuple(s.trial for s in states)
+        answers_of(states, currents),
+        *sag(strokes),
+        *settled_sag(strokes),
+        *ceiling(strokes),
+        len(strokes),
+        tuple(s.trial for s in states),
     )
-
-
-def _strokes(states: tuple[DriveState, ...], currents: tuple[Array, ...]) -> list[Stroke]:
-    out = []
-    for state, current in zip(states, currents, strict=True):
-        if "speed" not in state.extra:
-            return []
-        way = np.where(np.isfinite(state.effort), np.sign(state.velocity), 0)
-        edges = np.r_[0, np.flatnonzero(np.diff(way)) + 1, len(way)]
-        for a, b in pairwise(edges.tolist()):
-            t = state.time_s[a:b]
-            keep = np.arange(a, b)[(t > t[0] + RUN_IN_S) & (t < t[-1] - RUN_OUT_S)]
-            fast = np.flatnonzero(np.abs(state.velocity[keep]) > RUNNING * np.median(np.abs(state.velocity[a:b])))
-            keep = keep[fast[0] : fast[-1] + 1] if len(fast) else keep[:0]
-            speeds = state.extra["speed"][keep]
-            if way[a] and len(keep) >= 10 and np.ptp(speeds) == 0 and speeds[0] > 0:
-                out.append(
-                    Stroke(
-                        float(way[a]),
-                        float(speeds[0]),
-                        state.position[keep],
-                        state.velocity[keep],
-                        current[keep],
-                    )
-                )
-    return out
-
-
-def _load_rise(strokes: list[Stroke]) -> dict[float, np.poly1d]:
-    """Rise of the load over position [raw/%] flexing and extending, as polynomials of position: current = cubic in
-    position + viscous velocity, each of its own for the two ways."""
-    scale = 100.0 ** -np.arange(4)
-    out = {}
-    for way in (1.0, -1.0):
-        mine = [s for s in strokes if s.way == way]
-        beta = np.linalg.lstsq(_load_design(mine), np.concatenate([s.current for s in mine]), rcond=None)[0]
-        out[way] = np.poly1d((beta[:4] * scale)[::-1]).deriv()
-    return out
-
-
-def _sag(strokes: list[Stroke]) -> tuple[float, float, float]:
-    """Loss of log speed per load, its standard error and the range of loads. Strokes of one commanded speed are
-    compared; a reference that a proportional controller follows falls behind by the rise of the load, which is no
-    sag."""
-    if len(strokes) < 12 or {s.way for s in strokes} != {1.0, -1.0}:
-        return np.nan, np.nan, np.nan
-    rise = _load_rise(strokes)
-    y = np.log([max(s.way * float(np.mean(s.velocity)), 1e-9) for s in strokes])
-    load = np.array([s.way * float(np.mean(s.current)) for s in strokes])
-    levels = np.array(
-        [[float(s.commanded == level) for level in sorted({s.commanded for s in strokes})] for s in strokes]
-    )
-    rises = np.array([float(np.mean(rise[s.way](s.position))) for s in strokes])
-    design = np.concatenate([levels, rises[:, None], load[:, None]], axis=1)
-    beta = np.linalg.lstsq(design, y, rcond=None)[0]
-    spread = np.median(np.abs(y - design @ beta)) / 0.6745
-    covariance = np.linalg.pinv(design.T @ design) * spread**2
-    return -float(beta[-1]), float(np.sqrt(covariance[-1, -1])), float(np.ptp(load))
-
-
-def _ceiling(strokes: list[Stroke]) -> tuple[float, float, float]:
-    """Current [raw] at which the drive is at its limit, nan where it is at none, the weight of what that cuts and the
-    share of time in which it does: in the fastest flexing strokes speed falls by just what keeps the current from
-    exceeding it. What current each place would need at full speed is told by the slower strokes."""
-    none = np.nan, 0.0, 0.0
-    fast = max((s.commanded for s in strokes), default=0.0)
-    mine = [s for s in strokes if s.way > 0 and s.commanded == fast]
-    slower = [s for s in strokes if s.way > 0 and s.commanded < fast]
-    if len(mine) < 3 or not slower:
-        return none
-    beta = np.linalg.lstsq(_load_design(slower), np.concatenate([s.current for s in slower]), rcond=None)[0]
-    viscous = float(beta[-1])
-    if viscous <= 0:
-        return none
-    velocity, current = (np.concatenate([getattr(s, name) for s in mine]) for name in ("velocity", "current"))
-    full = float(np.quantile(velocity, FULL_SPEED))
-    lost = full - velocity
-    needed = _load_design(mine) @ beta + viscous * lost
-    limit = float(np.median(current[needed > np.quantile(needed, 0.75)]))
-    over = needed > limit
-    if over.sum() < 10:
-        return none
-    x, y = (needed - limit)[over], viscous * lost[over]
-    share = float(x @ y / max(x @ x, 1e-12))
-    rest = y - share * x
-    told = share > CEILING_T * float(np.std(rest)) / np.sqrt(max(float(x @ x), 1e-12))
-    alone = float(rest @ rest) < CEILING_LEFT * float(y @ y)  # speed changes for no other reason
-    slight = float(np.quantile(lost[over], FULL_SPEED)) < SAG_LEAST * full  # a healthy controller loses as much
-    if slight or not (told and alone and CEILING_SHARE < share < 1 / CEILING_SHARE):
-        return none
-    noise = max(float(np.std(np.concatenate([s.current for s in slower]) - _load_design(slower) @ beta)), 1e-9)
-    every = np.concatenate([s.current for s in strokes])
-    weight = weighed(float(np.sqrt(y @ y / len(every))) / noise, float(np.std(every)) / noise)
-    return limit, weight, np.count_nonzero(over) / len(every)
-
-
-def _load_design(strokes: list[Stroke]) -> Array:
-    """Columns (n, 5): powers 0 to 3 of position / 100 %, and velocity [%/s]."""
-    position, velocity = (np.concatenate([getattr(s, name) for s in strokes]) for name in ("position", "velocity"))
-    return np.stack([*((position / 100) ** k for k in range(4)), velocity], axis=-1)
 
 
 def command_findings(facts: dict[str, CommandFacts], fingers: dict[str, str | None]) -> list[tuple[float, Finding]]:
@@ -190,11 +77,12 @@ def command_findings(facts: dict[str, CommandFacts], fingers: dict[str, str | No
 
 
 def _sags(fact: CommandFacts, others: Sequence[CommandFacts]) -> bool:
-    """Whether a drive loses speed for sure, more than controllers do, and plainly more than the session's other
-    drives: one without much feedback loses more under load."""
+    """Whether a drive loses speed for sure, more than controllers do, also once it has settled, and plainly more than
+    the session's other drives: one without much feedback loses more under load."""
     usual = min((f.lost for f in others if np.isfinite(f.lost)), default=0.0)
-    sure = fact.sag > SAG_T * fact.sag_se and fact.lost > SAG_LEAST
-    return bool(sure and fact.lost > ALIKE * usual and fact.lost - usual > SAG_LEAST)
+    settled = fact.settled > SETTLED_T * fact.settled_se and fact.settled > LEAST_LOSS
+    sure = fact.sag > SAG_T * fact.sag_se and fact.lost > LEAST_LOSS and settled
+    return bool(sure and fact.lost > ALIKE * usual and fact.lost - usual > LEAST_LOSS)
 
 
 def with_lateness(

@@ -1,0 +1,188 @@
+"""Steady strokes of a drive: what its speed loses under load, and where a limit of its current cuts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...effects.base import DriveState
+from ..findings import weighed
+
+Array = NDArray[np.float64]
+
+RUN_IN_S, RUN_OUT_S = 0.3, 0.25  # a stroke's part at steady speed begins and ends this far from rest
+PIECE_S = 0.15  # of strokes, that are compared
+RUNNING = 0.7  # of its median speed: slower at either end, a stroke still starts or stops
+# of the speed, over the recorded loads: less is within what controllers do (the most of 560 healthy drives 0.029)
+LEAST_LOSS = 0.035
+FULL_SPEED = 0.9  # quantile of the velocity in the fastest strokes
+# of the current beyond its limit that a drive takes from its speed: one, but for noise in the limit
+CEILING_SHARE = 0.6
+CEILING_LEFT, CEILING_T = 0.1, 6.0
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """A stroke at one commanded speed, away from its start and stop. way: 1 flexing, -1 extending. time_s (since it
+    began), position [%], velocity [%/s], current [raw]: (n,)."""
+
+    way: float
+    commanded: float
+    time_s: Array
+    position: Array
+    velocity: Array
+    current: Array
+
+
+def strokes_of(states: tuple[DriveState, ...], currents: tuple[Array, ...]) -> list[Stroke]:
+    """Strokes of one drive that are long enough to tell; none where it is not recorded what speed was asked for.
+    currents: raw current (n,) of each state."""
+    out = []
+    for state, current in zip(states, currents, strict=True):
+        if "speed" not in state.extra:
+            return []
+        way = np.where(np.isfinite(state.effort), np.sign(state.velocity), 0)
+        edges = np.r_[0, np.flatnonzero(np.diff(way)) + 1, len(way)]
+        for a, b in pairwise(edges.tolist()):
+            t = state.time_s[a:b]
+            keep = np.arange(a, b)[(t > t[0] + RUN_IN_S) & (t < t[-1] - RUN_OUT_S)]
+            fast = np.flatnonzero(np.abs(state.velocity[keep]) > RUNNING * np.median(np.abs(state.velocity[a:b])))
+            keep = keep[fast[0] : fast[-1] + 1] if len(fast) else keep[:0]
+            speeds = state.extra["speed"][keep]
+            if way[a] and len(keep) >= 10 and np.ptp(speeds) == 0 and speeds[0] > 0:
+                out.append(
+                    Stroke(
+                        float(way[a]),
+                        float(speeds[0]),
+                        state.time_s[keep] - t[0],
+                        state.position[keep],
+                        state.velocity[keep],
+                        current[keep],
+                    )
+                )
+    return out
+
+
+def _load_rise(strokes: list[Stroke]) -> dict[float, np.poly1d]:
+    """Rise of the load over position [raw/%] flexing and extending, as polynomials of position: current = cubic in
+    position + viscous velocity, each of its own for the two ways."""
+    scale = 100.0 ** -np.arange(4)
+    out = {}
+    for way in (1.0, -1.0):
+        mine = [s for s in strokes if s.way == way]
+        beta = np.linalg.lstsq(_load_design(mine), np.concatenate([s.current for s in mine]), rcond=None)[0]
+        out[way] = np.poly1d((beta[:4] * scale)[::-1]).deriv()
+    return out
+
+
+def sag(strokes: list[Stroke]) -> tuple[float, float, float]:
+    """Loss of log speed per load, its standard error and the range of loads. Strokes of one commanded speed are
+    compared; a reference that a proportional controller follows falls behind by the rise of the load, which is no
+    sag."""
+    if len(strokes) < 12 or {s.way for s in strokes} != {1.0, -1.0}:
+        return np.nan, np.nan, np.nan
+    rise = _load_rise(strokes)
+    y = np.log([max(s.way * float(np.mean(s.velocity)), 1e-9) for s in strokes])
+    load = np.array([s.way * float(np.mean(s.current)) for s in strokes])
+    levels = np.array(
+        [[float(s.commanded == level) for level in sorted({s.commanded for s in strokes})] for s in strokes]
+    )
+    rises = np.array([float(np.mean(rise[s.way](s.position))) for s in strokes])
+    design = np.concatenate([levels, rises[:, None], load[:, None]], axis=1)
+    beta = np.linalg.lstsq(design, y, rcond=None)[0]
+    spread = np.median(np.abs(y - design @ beta)) / 0.6745
+    covariance = np.linalg.pinv(design.T @ design) * spread**2
+    return -float(beta[-1]), float(np.sqrt(covariance[-1, -1])), float(np.ptp(load))
+
+
+def settled_sag(strokes: list[Stroke]) -> tuple[float, float]:
+    """Loss of log speed over the loads, and its standard error, where what strokes of one commanded speed do at the
+    same time after their start is compared: a slow controller still settles then. Pieces of one stroke err together
+    (Liang & Zeger 1986)."""
+    if len(strokes) < 12 or {s.way for s in strokes} != {1.0, -1.0}:
+        return np.nan, np.nan
+    rise = _load_rise(strokes)
+    pieces = [p for i, s in enumerate(strokes) for p in _pieces(s, rise[s.way], i)]
+    speed, since, climb, load, y, stroke = np.array(pieces).T
+    _, kind, times = np.unique(np.stack([speed, since]), axis=1, return_inverse=True, return_counts=True)
+    shared = times[kind.ravel()] >= 3
+    if shared.sum() < 12:
+        return np.nan, np.nan
+    kind, stroke = (np.unique(v[shared], return_inverse=True)[1] for v in (kind.ravel(), stroke))
+    load, y = load[shared], y[shared]
+    design = np.concatenate([np.eye(kind.max() + 1)[kind], np.stack([climb[shared], load], axis=1)], axis=1)
+    beta = np.linalg.lstsq(design, y, rcond=None)[0]
+    score = np.zeros((stroke.max() + 1, design.shape[1]))
+    np.add.at(score, stroke, design * (y - design @ beta)[:, None])
+    doubt = float(np.linalg.norm(score @ np.linalg.pinv(design.T @ design)[-1]))
+    return -float(beta[-1]) * float(np.ptp(load)), doubt * float(np.ptp(load))
+
+
+def _pieces(stroke: Stroke, rise: np.poly1d, number: int) -> list[tuple[float, ...]]:
+    """Commanded speed, time after its start [PIECE_S], rise of the load, load, log speed and number of each piece of a
+    stroke."""
+    out, at = [], (stroke.time_s // PIECE_S).astype(int)
+    for piece in np.unique(at):
+        mine = at == piece
+        speed = max(stroke.way * float(np.mean(stroke.velocity[mine])), 1e-9)
+        load = stroke.way * float(np.mean(stroke.current[mine]))
+        climb = float(np.mean(rise(stroke.position[mine])))
+        out.append((stroke.commanded, float(piece), climb, load, float(np.log(speed)), float(number)))
+    return out
+
+
+def ceiling(strokes: list[Stroke]) -> tuple[float, float, float]:
+    """Current [raw] at which the drive is at its limit, nan where it is at none, the weight of what that cuts and the
+    share of time in which it does: in the fastest flexing strokes speed falls by just what keeps the current from
+    exceeding it. What current each place would need at full speed is told by the slower strokes."""
+    none = np.nan, 0.0, 0.0
+    fast = max((s.commanded for s in strokes), default=0.0)
+    mine = [s for s in strokes if s.way > 0 and s.commanded == fast]
+    slower = [s for s in strokes if s.way > 0 and s.commanded < fast]
+    if len(mine) < 3 or not slower:
+        return none
+    beta = np.linalg.lstsq(_load_design(slower), np.concatenate([s.current for s in slower]), rcond=None)[0]
+    viscous = float(beta[-1])
+    if viscous <= 0:
+        return none
+    velocity, current = (np.concatenate([getattr(s, name) for s in mine]) for name in ("velocity", "current"))
+    full = float(np.quantile(velocity, FULL_SPEED))
+    lost = np.minimum(full, _unloaded(strokes, mine)) - velocity
+    needed = _load_design(mine) @ beta + viscous * lost
+    limit = float(np.median(current[needed > np.quantile(needed, 0.75)]))
+    over = needed > limit
+    if over.sum() < 10:
+        return none
+    x, y = (needed - limit)[over], viscous * lost[over]
+    share = float(x @ y / max(x @ x, 1e-12))
+    rest = y - share * x
+    told = share > CEILING_T * float(np.std(rest)) / np.sqrt(max(float(x @ x), 1e-12))
+    alone = float(rest @ rest) < CEILING_LEFT * float(y @ y)  # speed changes for no other reason
+    slight = float(np.quantile(lost[over], FULL_SPEED)) < LEAST_LOSS * full  # a healthy controller loses as much
+    if slight or not (told and alone and CEILING_SHARE < share < 1 / CEILING_SHARE):
+        return none
+    noise = max(float(np.std(np.concatenate([s.current for s in slower]) - _load_design(slower) @ beta)), 1e-9)
+    every = np.concatenate([s.current for s in strokes])
+    weight = weighed(float(np.sqrt(y @ y / len(every))) / noise, float(np.std(every)) / noise)
+    return limit, weight, np.count_nonzero(over) / len(every)
+
+
+def _unloaded(strokes: list[Stroke], mine: list[Stroke]) -> Array:
+    """Speed (n,) [%/s] of extending strokes of the same commanded speed at the same time after their start as each
+    sample of `mine`, which a spring helps: what is settling still is no limit. Infinite where there are none."""
+    back = [s for s in strokes if s.way < 0 and s.commanded == mine[0].commanded]
+    time_s = np.concatenate([s.time_s for s in mine])
+    if not back:
+        return np.full(len(time_s), np.inf)
+    at, speed = (np.concatenate(v) for v in ([s.time_s // PIECE_S for s in back], [-s.velocity for s in back]))
+    known = np.unique(at)
+    return np.interp(time_s / PIECE_S - 0.5, known, [float(np.median(speed[at == k])) for k in known])
+
+
+def _load_design(strokes: list[Stroke]) -> Array:
+    """Columns (n, 5): powers 0 to 3 of position / 100 %, and velocity [%/s]."""
+    position, velocity = (np.concatenate([getattr(s, name) for s in strokes]) for name in ("position", "velocity"))
+    return np.stack([*((position / 100) ** k for k in range(4)), velocity], axis=-1)
