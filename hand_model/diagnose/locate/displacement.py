@@ -149,11 +149,9 @@ def _no_hinge(blocks: Blocks, k: int) -> list[Candidate]:
 
     out = []
     for form in forms:
-        out += [
-            candidate("joint_wobble", form, tilts),
-            candidate("joint_wobble", form, tilts + shifts),
-            candidate("moving_centre", form if form in (wave, [side]) else [even, *form], shifts),
-        ]
+        out += [candidate("joint_wobble", form, tilts), candidate("joint_wobble", form, tilts + shifts)]
+        if side not in form:
+            out.append(candidate("moving_centre", form if form is wave else [even, *form], shifts))
     return out
 
 

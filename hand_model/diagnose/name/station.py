@@ -192,8 +192,9 @@ def _stands(naming: Naming, named: Named, which: int, least: float) -> bool:
 
 def _plain_at_ends(naming: Naming, named: Named, least: float) -> bool:
     """Whether the only effect is that plain that it needs no steady motion to be told from zero: some act where motion
-    starts and stops, as a stop of the open hand."""
-    return len(naming.found) == 1 and _stands(naming, named, 0, least + EVIDENCE_LEAST)
+    starts and stops, as a stop of the open hand. What no table names and only starts and stops show may be how these
+    are read."""
+    return len(naming.found) == 1 and named.term.effect.listed and _stands(naming, named, 0, least + EVIDENCE_LEAST)
 
 
 def _elsewhere(naming: Naming) -> bool:
@@ -221,6 +222,11 @@ def _altered(naming: Naming) -> bool:
         if float(own @ own) / (2 * balance.inflation) - matrix.shape[1] / 2 * np.log(count) > EVIDENCE_LEAST:
             return True
     return False
+
+
+def _eventful(naming: Naming) -> bool:
+    """Whether what one recording had alone is among the names, and others were kept out."""
+    return not all(f.term.effect.of_the_hand for f in naming.found) and any(s.validate for s in naming.balance.states)
 
 
 def judged(
@@ -267,6 +273,12 @@ def judged(
         # another pose is plain to see, whatever small is left
         seen = other.naming.after.p >= ALPHA or _altered(station.naming)
         station = other if seen and other.believed and other.wander <= max(station.wander, UNREST) else station
+    if station.missing and not station.believed and not hopeless and _eventful(station.naming):
+        # events of one recording foretell nothing of those kept out: theirs are learned from all
+        told = tuple(replace(s, validate=False) for s in states)
+        other = Station(signal, finger, actuator, joint, name_effects(told, every, typical=typical))
+        known = {f.term.effect.name for f in station.naming.found}
+        station = other if other.believed and {f.term.effect.name for f in other.kept} <= known else station
     if station.forms:
         left = tuple(e for e in left if e.name not in {f.term.effect.name for f in station.forms})
         other = Station(signal, finger, actuator, joint, name_effects(states, left, typical=typical))
