@@ -24,8 +24,10 @@ from hand_model.rig.swing import compete as swing_compete
 from hand_model.rig.swing.build import ENOUGH_STEPS, thinned
 from hand_model.rig.swing.compete import PARTS, Variant, _folds
 from hand_model.rig.swing.diagnose import _figures, _searched, _standing, _starts
-from hand_model.rig.swing.fit import Fitted
-from hand_model.rig.swing.simulation import INDEX, PARAMETERS, Lane, Swing, errors, simulate, vector
+from hand_model.rig.swing.fit import Fitted, jacobian
+from hand_model.rig.swing.free import free_errors
+from hand_model.rig.swing.free_fit import Task
+from hand_model.rig.swing.simulation import INDEX, PARAMETERS, Lane, Swing, simulate, vector
 from hand_model.rig.swing.start import freed, started
 from hand_model.session import read_session
 
@@ -277,16 +279,17 @@ def test_a_free_start_takes_no_part_in_what_a_law_is_held_to() -> None:
     theta, steps = vector({"inertia": 0.02, "damping": 4e-4, "coulomb": 1e-3, "lateral": 4e-3}), 1500
     blank = Lane("a", False, np.zeros(steps), 1.0, np.zeros(steps), (0.5, -1.5), np.zeros(steps), np.ones(steps))
     swing = Swing((blank,), 0.8, 0.0, {"inertia": 0.02}, False, 4e-3, 1.0)
-    q = simulate(swing, theta[None], np.array([0]))[:, 0]
+    q = free_errors(swing, theta[None], np.array([0]))[:, 0]
     swing = replace(swing, lanes=(replace(blank, position=q, start=(0.504, -1.53)),))
     zero = vector({"inertia": 0.02, "damping": 4e-4, "coulomb": 1e-3})  # whose encoder's zero is 5 mrad off
 
-    def left(some: Swing, law: np.ndarray) -> float:
-        return float(np.sqrt(np.mean(errors(some, law[None], np.array([0])) ** 2)))
+    def left(law: np.ndarray) -> float:
+        residual, _ = jacobian(started(swing, law), Task(("inertia",), law, (0,)), law)
+        return float(np.sqrt(np.mean(residual**2)))
 
-    fixed, free = started(swing, zero), freed(swing, zero)
-    assert left(free, theta) < 0.05 * left(fixed, theta)
-    assert left(free, zero) > 0.5 * left(fixed, zero)
+    fixed = free_errors(started(swing, zero), zero[None], np.array([0]))
+    assert left(theta) < 1e-4 * np.sqrt(np.mean(fixed**2))
+    assert left(zero) > 0.5 * np.sqrt(np.mean(fixed**2))
 
 
 def test_recordings_left_out_whole_are_predicted_whole() -> None:
@@ -361,6 +364,7 @@ def test_what_one_effect_hides_is_sought_beside_another(
 
     monkeypatch.setattr(swing_compete, "_round", two_rounds)
     monkeypatch.setattr(swing_compete, "freed", lambda swing, theta: swing)
+    monkeypatch.setattr(swing_compete, "swings_free", lambda swing: False)
     monkeypatch.setattr(swing_compete, "_exchanged", lambda stages, taken, fit: (taken, fit))
     monkeypatch.setattr(
         swing_compete,
@@ -391,6 +395,7 @@ def test_a_fit_within_the_noise_is_held_to_what_it_predicts(
 
     monkeypatch.setattr(swing_compete, "_round", one_round)
     monkeypatch.setattr(swing_compete, "freed", lambda swing, theta: swing)
+    monkeypatch.setattr(swing_compete, "swings_free", lambda swing: False)
     monkeypatch.setattr(swing_compete, "_exchanged", lambda stages, taken, fit: (taken, fit))
     monkeypatch.setattr(
         swing_compete,
@@ -413,9 +418,13 @@ def test_what_made_up_for_a_later_effect_leaves_the_variant(
     taken = both, Variant("stribeck_friction", "", {"static_excess": 0.0})
     theta = np.zeros(len(PARAMETERS))
     monkeypatch.setattr(swing_compete, "variants", lambda swing: (both, lateral))
-    monkeypatch.setattr(swing_compete, "free_declared", lambda swing: ("inertia",))
     monkeypatch.setattr(
-        swing_compete, "fit_stages", lambda stages, tasks, most: [Fitted(t.start, cost, 1, len(t.free)) for t in tasks]
+        swing_compete, "asked", lambda swing, some: ("inertia", *dict.fromkeys(n for v in some for n in v.start))
+    )
+    monkeypatch.setattr(
+        swing_compete,
+        "fit_stages",
+        lambda stages, tasks, most: [Fitted(np.ones(len(PARAMETERS)), cost, 1, len(t.free)) for t in tasks],
     )
     kept, _ = swing_compete._exchanged([SimpleNamespace(train=lambda: np.arange(16))], taken, Fitted(theta, 1.0, 1, 4))
     assert [v.name for v in kept] == [name, ""]
