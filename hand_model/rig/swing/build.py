@@ -14,6 +14,7 @@ from ..model import RigModel, RigTrial
 from ..overrides import compile_model
 from ..states import fill_gaps, recorded_states
 from ..supply import supply_deviation
+from .free import swings_free
 from .simulation import STEP_S, Lane, Swing
 
 # A trial is fitted in stretches (multiple shooting, Bock 1981), in periods of the free swing: short ones where a drive
@@ -99,9 +100,16 @@ def build_swing(rig: RigModel, fit: DeclaredFit, step_s: float = STEP_S, longest
     if drive is not None:
         initial["gain"] = drive.gain
         initial["back_emf"] = next((c.value for c in fit.columns if c.kind == "back_emf"), 0.0)
-    lanes = tuple(lane for t in rig.trials for lane in _stretches(rig, t, step_s, longest_s))
     leapfrog_s = 0.0 if model.opt.integrator == RUNGE_KUTTA else float(model.opt.timestep)
-    return Swing(lanes, sine, cosine, initial, drive is not None, step_s, free_period_s(rig), leapfrog_s)
+
+    def built(step_s: float, sampled: bool) -> Swing:
+        lanes = tuple(lane for t in rig.trials for lane in _stretches(rig, t, step_s, longest_s, sampled))
+        return Swing(lanes, sine, cosine, initial, drive is not None, step_s, free_period_s(rig), leapfrog_s)
+
+    if drive is None:
+        swing = built(step_s, True)
+        return swing if swings_free(swing) else built(0.5 * step_s, False)  # stepped, that takes finer steps
+    return built(step_s, False)
 
 
 def _rigid(model: Any) -> tuple[float, float, float]:
@@ -113,7 +121,7 @@ def _rigid(model: Any) -> tuple[float, float, float]:
     return sine, cosine, float(np.sum(inertial_columns(model, zero, zero, zero + 1, 0 * gravity)[0, 0] * theta))
 
 
-def _stretches(rig: RigModel, trial: RigTrial, step_s: float, longest_s: float) -> list[Lane]:
+def _stretches(rig: RigModel, trial: RigTrial, step_s: float, longest_s: float, sampled: bool) -> list[Lane]:
     joint = rig.joints[0]
     if not _lane_known(rig, trial):
         return []
@@ -121,8 +129,7 @@ def _stretches(rig: RigModel, trial: RigTrial, step_s: float, longest_s: float) 
     declared, own = compile_model(rig), compile_model(rig, trial)
     rigid, nominal = _rigid(own), _rigid(declared)
     recorded, used = fill_gaps(trial.time_s, trial.position[joint]), np.isfinite(trial.position[joint])
-    free = rig.drive(joint) is None and any(rigid[:2])
-    if free:  # simulated at the instants of its samples: a line between two of them would cut the arc short
+    if sampled:  # simulated at the instants of its samples: a line between two of them would cut the arc short
         every = max(1, round(step_s / float(np.median(np.diff(trial.time_s)))))
         fine, position, used = trial.time_s[::every], recorded[::every], used[::every].astype(float)
     else:
@@ -141,7 +148,7 @@ def _stretches(rig: RigModel, trial: RigTrial, step_s: float, longest_s: float) 
     for k in range(pieces):
         s = slice(k * size, (k + 1) * size if k < pieces - 1 else len(fine))
         start = (float(np.interp(fine[s.start], grid, smooth)), float(np.interp(fine[s.start], grid, velocity)))
-        instants = fine[s] - fine[s.start] if free else None
+        instants = fine[s] - fine[s.start] if sampled else None
         out.append(Lane(trial.name, trial.validate, drive[s], live, position[s], start, supply[s], used[s], level,
                         rigid[2] - nominal[2], rigid[:2], time_s=instants))  # fmt: skip
     return out

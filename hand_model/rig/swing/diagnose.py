@@ -21,6 +21,7 @@ from ..words import alternatives, shares, statement
 from .build import build_swing, last_step_s, search_step_s, thinned, windows_s
 from .compete import LEAST_GAIN, Round, compete_swing, fit_apart, fit_stages
 from .fit import Fitted, Task
+from .free import swings_free
 from .interval import intervals
 from .patch import write_swing
 from .simulation import INDEX, NEUTRAL, PARAMETERS, STEP_S, Swing, parameter_units, vector
@@ -44,11 +45,14 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
         declared = fit_stages(stages, [Task(free, declared.theta, ())], 15)[0]
     floor, held = _resolution(rig), bool(rig.select(True))  # without validation recordings the training ones measure
     whole = build_swing(rig, fit, step)
-    # Last, at the step of the replay; a free swing over whole recordings, for its phase is known well enough by now.
-    # What
-    # a coarse step there does to the period (4e-4 of it at most, with a hundred steps in each) the last steps take
-    # back.
-    last_stages = [(STEP_S, windows[-1], 8)] if stages[0].driven else [(last_step_s(rig), np.inf, 20)]
+    # Last, as the replay has it: a free swing over whole recordings, for its phase is known well enough by now. Where it
+    # is stepped, the last steps take back what a coarse step does to the period.
+    if stages[0].driven:
+        last_stages = [(STEP_S, windows[-1], 8)]
+    elif swings_free(whole):
+        last_stages = [(last_step_s(rig), np.inf, 20)]
+    else:
+        last_stages = [(2 * step, windows[-1], 8), (2 * step, np.inf, 12), (2 * STEP_S, np.inf, 3)]
     fine = [(build_swing(rig, fit, step_s, window_s), most) for step_s, window_s, most in last_stages]
     known: dict[tuple[str, ...], Link] = {}
 
