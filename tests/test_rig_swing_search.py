@@ -174,6 +174,7 @@ def test_what_one_effect_hides_is_sought_beside_another(
 
     monkeypatch.setattr(swing_compete, "_round", two_rounds)
     monkeypatch.setattr(swing_compete, "freed", lambda swing, theta: swing)
+    monkeypatch.setattr(swing_compete, "swings_free", lambda swing: False)
     monkeypatch.setattr(swing_compete, "_exchanged", lambda stages, taken, fit: (taken, fit))
     monkeypatch.setattr(
         swing_compete,
@@ -204,6 +205,7 @@ def test_a_fit_within_the_noise_is_held_to_what_it_predicts(
 
     monkeypatch.setattr(swing_compete, "_round", one_round)
     monkeypatch.setattr(swing_compete, "freed", lambda swing, theta: swing)
+    monkeypatch.setattr(swing_compete, "swings_free", lambda swing: False)
     monkeypatch.setattr(swing_compete, "_exchanged", lambda stages, taken, fit: (taken, fit))
     monkeypatch.setattr(
         swing_compete,
@@ -226,9 +228,13 @@ def test_what_made_up_for_a_later_effect_leaves_the_variant(
     taken = both, Variant("stribeck_friction", "", {"static_excess": 0.0})
     theta = np.zeros(len(PARAMETERS))
     monkeypatch.setattr(swing_compete, "variants", lambda swing: (both, lateral))
-    monkeypatch.setattr(swing_compete, "free_declared", lambda swing: ("inertia",))
     monkeypatch.setattr(
-        swing_compete, "fit_stages", lambda stages, tasks, most: [Fitted(t.start, cost, 1, len(t.free)) for t in tasks]
+        swing_compete, "asked", lambda swing, some: ("inertia", *dict.fromkeys(n for v in some for n in v.start))
+    )
+    monkeypatch.setattr(
+        swing_compete,
+        "fit_stages",
+        lambda stages, tasks, most: [Fitted(np.ones(len(PARAMETERS)), cost, 1, len(t.free)) for t in tasks],
     )
     kept, _ = swing_compete._exchanged([SimpleNamespace(train=lambda: np.arange(16))], taken, Fitted(theta, 1.0, 1, 4))
     assert [v.name for v in kept] == [name, ""]

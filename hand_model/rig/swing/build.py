@@ -14,12 +14,14 @@ from ..model import RigModel, RigTrial
 from ..overrides import compile_model
 from ..states import fill_gaps, recorded_states
 from ..supply import supply_deviation
+from .free import swings_free
 from .simulation import STEP_S, Lane, Swing
 
 # A trial is fitted in stretches (multiple shooting, Bock 1981), in periods of the free swing: short ones where a drive
 # keeps the motion going, for then the cost is smooth; longer ones where damping is all there is to see.
 DRIVEN_PERIODS, FREE_PERIODS = (1.3,), (2.5, 10.0)
-DRIVEN_STEP_S, STEPS_A_PERIOD = 4e-3, 200
+DRIVEN_STEP_S, SAMPLES_A_PERIOD, MOST_SAMPLES = 4e-3, 100, 400
+RUNGE_KUTTA = 1  # of MuJoCo's integrators; the others are leapfrogs
 LEAST_STRETCHES = 4  # some to fit, some to leave out
 ENOUGH_STEPS = 12_500  # simulated at once: with more, effects are chosen on some of the stretches and fitted to all
 
@@ -41,8 +43,13 @@ def windows_s(rig: RigModel) -> tuple[float, ...]:
 
 def search_step_s(rig: RigModel) -> float:
     """Step [s] that is fine enough to choose by: a recorded drive is followed, a free swing has a period to be
-    resolved."""
-    return DRIVEN_STEP_S if rig.drive(rig.joints[0]) is not None else free_period_s(rig) / STEPS_A_PERIOD
+    resolved (by samples: its simulation has no step)."""
+    return DRIVEN_STEP_S if rig.drive(rig.joints[0]) is not None else free_period_s(rig) / SAMPLES_A_PERIOD
+
+
+def last_step_s(rig: RigModel) -> float:
+    """Step [s] for the last fit: of a free swing every sample counts against the encoder's noise."""
+    return STEP_S if rig.drive(rig.joints[0]) is not None else free_period_s(rig) / MOST_SAMPLES
 
 
 def thinned(swing: Swing) -> Swing:
@@ -93,8 +100,16 @@ def build_swing(rig: RigModel, fit: DeclaredFit, step_s: float = STEP_S, longest
     if drive is not None:
         initial["gain"] = drive.gain
         initial["back_emf"] = next((c.value for c in fit.columns if c.kind == "back_emf"), 0.0)
-    lanes = tuple(lane for t in rig.trials for lane in _stretches(rig, t, step_s, longest_s))
-    return Swing(lanes, sine, cosine, initial, drive is not None, step_s, free_period_s(rig))
+    leapfrog_s = 0.0 if model.opt.integrator == RUNGE_KUTTA else float(model.opt.timestep)
+
+    def built(step_s: float, sampled: bool) -> Swing:
+        lanes = tuple(lane for t in rig.trials for lane in _stretches(rig, t, step_s, longest_s, sampled))
+        return Swing(lanes, sine, cosine, initial, drive is not None, step_s, free_period_s(rig), leapfrog_s)
+
+    if drive is None:
+        swing = built(step_s, True)
+        return swing if swings_free(swing) else built(0.5 * step_s, False)  # stepped, that takes finer steps
+    return built(step_s, False)
 
 
 def _rigid(model: Any) -> tuple[float, float, float]:
@@ -106,20 +121,25 @@ def _rigid(model: Any) -> tuple[float, float, float]:
     return sine, cosine, float(np.sum(inertial_columns(model, zero, zero, zero + 1, 0 * gravity)[0, 0] * theta))
 
 
-def _stretches(rig: RigModel, trial: RigTrial, step_s: float, longest_s: float) -> list[Lane]:
+def _stretches(rig: RigModel, trial: RigTrial, step_s: float, longest_s: float, sampled: bool) -> list[Lane]:
     joint = rig.joints[0]
     if not _lane_known(rig, trial):
         return []
     grid, smooth, velocity = recorded_states(trial.time_s, trial.position[joint])
-    fine = np.arange(0.0, grid[-1], step_s)
-    position = np.interp(fine, trial.time_s, fill_gaps(trial.time_s, trial.position[joint]))
+    declared, own = compile_model(rig), compile_model(rig, trial)
+    rigid, nominal = _rigid(own), _rigid(declared)
+    recorded, used = fill_gaps(trial.time_s, trial.position[joint]), np.isfinite(trial.position[joint])
+    if sampled:  # simulated at the instants of its samples: a line between two of them would cut the arc short
+        every = max(1, round(step_s / float(np.median(np.diff(trial.time_s)))))
+        fine, position, used = trial.time_s[::every], recorded[::every], used[::every].astype(float)
+    else:
+        fine = np.arange(0.0, grid[-1], step_s)
+        position, used = np.interp(fine, trial.time_s, recorded), np.ones(len(fine))
     voltage = trial.voltage.get(joint)
     drive = np.zeros(len(fine)) if voltage is None else np.interp(fine, trial.time_s, fill_gaps(trial.time_s, voltage))
     supply = np.interp(fine, trial.time_s, supply_deviation(rig, trial))
     pieces = max(1, int(np.ceil(fine[-1] / longest_s)))
     size = len(fine) // pieces
-    declared, own = compile_model(rig), compile_model(rig, trial)
-    rigid, nominal = _rigid(own), _rigid(declared)
     live = 1.0 if joint in trial.live else 0.0
     if live and (drive_ := rig.drive(joint)) is not None and drive_.gear:
         live = float(own.actuator(drive_.name).gear[0]) / drive_.gear
@@ -128,6 +148,7 @@ def _stretches(rig: RigModel, trial: RigTrial, step_s: float, longest_s: float) 
     for k in range(pieces):
         s = slice(k * size, (k + 1) * size if k < pieces - 1 else len(fine))
         start = (float(np.interp(fine[s.start], grid, smooth)), float(np.interp(fine[s.start], grid, velocity)))
-        out.append(Lane(trial.name, trial.validate, drive[s], live, position[s], start, supply[s],
-                        np.ones(len(position[s])), level, rigid[2] - nominal[2], rigid[:2]))  # fmt: skip
+        instants = fine[s] - fine[s.start] if sampled else None
+        out.append(Lane(trial.name, trial.validate, drive[s], live, position[s], start, supply[s], used[s], level,
+                        rigid[2] - nominal[2], rigid[:2], time_s=instants))  # fmt: skip
     return out

@@ -6,7 +6,7 @@ only the error on those decides. All fits of a round run in one batch of lanes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,8 +15,10 @@ from numpy.typing import NDArray
 from ...background import Background
 from ..evidence import BEYOND_DOUBT, ONE_STANDARD_ERROR, weigh
 from .fit import Fitted, Task, fit_together
-from .simulation import DECLARED, INDEX, LOW_SPEED, Swing, errors, vector
+from .free import free_errors, swings_free
+from .simulation import INDEX, LOW_SPEED, PARAMETERS, Swing, errors, vector
 from .start import freed, started
+from .variants import ZERO, Variant, acts, all_free, asked, begun, variants
 
 Array = NDArray[np.float64]
 FOLDS, MOST_FOLDS, SHORTLIST, ALIKE = 4, 10, 6, 3
@@ -24,20 +26,6 @@ LEAST_GAIN, MOST_TERMS, MOST_OF_FEW = 0.025, 5, 3  # of few recordings what is l
 BETTER = 1.01  # an exchange of variants has to pay
 FEW_RUNS = 500
 PARTS = 4  # a recording's error is resampled in so many parts
-
-
-@dataclass(frozen=True)
-class Variant:
-    """One way an effect can act: starting values of the parameters it frees (fractions of the declared scale)."""
-
-    effect: str
-    name: str
-    start: Mapping[str, float]
-
-    @property
-    def key(self) -> str:
-        """effect, with the variant where there is one."""
-        return self.effect + (f"/{self.name}" if self.name else "")
 
 
 @dataclass(frozen=True)
@@ -63,70 +51,13 @@ class _Rival:
     error: Array
 
 
-def variants(swing: Swing) -> tuple[Variant, ...]:
-    """What may be missing at a joint driven by a voltage (or by nothing)."""
-    speed = (
-        float(np.percentile(np.concatenate([np.abs(np.diff(lane.position)) for lane in swing.lanes]), 97))
-        / swing.step_s
-    )
-    out = [
-        Variant("stribeck_friction", f"{k:g}", {"static_excess": 0.0, "stribeck_speed": k * speed})
-        for k in (0.05, 0.2, 0.8)
-    ]
-    out += [
-        Variant("asymmetric_friction", "", {"offset": 0.0}),
-        Variant("asymmetric_viscous_friction", "", {"damping_asymmetry": 0.0}),
-        Variant("quadratic_damping", "", {"drag": 0.0}),
-    ]
-    if not swing.sine and not swing.cosine:  # beside a weight of unknown scale a spring cannot be told
-        out.append(Variant("nonlinear_spring", "", {"stiffness": 0.0}))
-    if swing.sine or swing.cosine:
-        out += [
-            Variant("load_dependent_friction", "external", {"load_external": 0.0}),
-            Variant("load_dependent_friction", "low speed", {"load_external_low": 0.0, "stribeck_speed": 0.2 * speed}),
-            Variant("gravity_load", "centre of mass off its axis", {"lateral": 0.0}),
-            Variant("gravity_load", "off its axis, and offset", {"lateral": 0.0, "offset": 0.0}),
-        ]
-    if swing.driven:
-        out += [
-            Variant("load_dependent_friction", "with speed", {"load_speed": 0.0}),
-            Variant("load_dependent_friction", "gear", {"load_gear": 0.0}),
-            Variant("load_dependent_friction", "motor", {"load_motor": 0.0}),
-            Variant("load_dependent_friction", "directional", {"load_motor": 0.0, "load_external": 0.0}),
-            Variant(
-                "load_dependent_friction", "gear, low speed", {"load_gear_low": 0.0, "stribeck_speed": 0.2 * speed}
-            ),
-            Variant(
-                "load_dependent_friction",
-                "driven load squared, low speed",
-                {"external_squared": 0.0, "stribeck_speed": speed},
-            ),
-            Variant(
-                "load_dependent_friction",
-                "load squared, low speed",
-                {"motor_squared": 0.0, "external_squared": 0.0, "stribeck_speed": speed},
-            ),
-            Variant("drive_sag", "", {"sag": 0.0}),
-            Variant("command_delay", "", {"delay": 0.005}),
-        ]
-        if any(np.any(lane.supply) for lane in swing.lanes):
-            out.append(Variant("drive_sag", "supply", {"supply": 0.0}))
-    return tuple(out)
-
-
-def free_declared(swing: Swing) -> tuple[str, ...]:
-    """The declared parameters of this joint; the scale (the weight) is not among them."""
-    return tuple(
-        n for n in DECLARED if n in swing.initial and (n != "inertia" or swing.sine or swing.cosine or swing.driven)
-    )
-
-
 def _blocks(swing: Swing, theta: Array, lanes: Sequence[int]) -> Array:
     """Root mean square error (runs, PARTS) of every part of every stretch lanes[k] from the start that theta[k] asks
     for, (runs, len(PARAMETERS)):
     one part in which the joint sticks when it should not would outweigh all others if squares were added."""
     own = started(replace(swing, lanes=tuple(swing.lanes[i] for i in lanes)), theta)
-    residual = errors(own, theta, np.arange(len(lanes)))
+    run = free_errors if swings_free(own) else errors
+    residual = run(own, theta, np.arange(len(lanes)))
     parts = [np.array_split(residual[: len(lane.position), run], PARTS) for run, lane in enumerate(own.lanes)]
     return np.array([[float(np.sqrt(np.mean(p**2))) for p in run] for run in parts])
 
@@ -152,7 +83,9 @@ def fit_stages(stages: Sequence[Swing], tasks: Sequence[Task], iterations: int =
     for k, swing in enumerate(stages):
         train = tuple(int(i) for i in swing.train())
         start = [t.start for t in tasks] if k == 0 else [f.theta for f in fits]
-        fits = fit_apart(swing, [Task(t.free, s, train) for t, s in zip(tasks, start, strict=True)], iterations)
+        fits = fit_apart(
+            swing, [replace(t, start=s, stretches=train) for t, s in zip(tasks, start, strict=True)], iterations
+        )
     return fits
 
 
@@ -171,6 +104,8 @@ def compete_swing(
     without: effects that are not asked."""
     train = tuple(int(i) for i in stages[-1].train())
     test, folds = _folds(stages[-1], train, whole)
+    if swings_free(stages[-1]):
+        current = fit_stages(stages, [Task(asked(stages[-1], [v for v, _ in begin]), current.theta, ())])[0]
     taken, rounds = tuple(v for v, _ in begin), [r for _, r in begin]
     most = MOST_TERMS if len({stages[-1].lanes[i].trial for i in train}) >= FOLDS else MOST_OF_FEW
     while len(taken) < most:
@@ -194,7 +129,22 @@ def compete_swing(
         won = rivals[found[0]]
         taken, current = _exchanged(stages, (*taken, won.variant), won.fit)
         rounds.append(replace(found[1], fit=current, taken=taken))
+    zero = None if ZERO in taken or not swings_free(stages[-1]) else _zero(stages, taken, current, test, folds, floor)
+    if zero is not None:
+        taken, rounds = (*taken, ZERO), [*rounds, zero]
     return list(zip(taken, rounds, strict=True))
+
+
+def _zero(stages: Sequence[Swing], taken: tuple[Variant, ...], current: Fitted, test: Swing, folds: list,
+          floor: float) -> Round | None:  # fmt: skip
+    """Whether an encoder's zero that is off is borne out beside all that was taken (current: with it)."""
+    train = tuple(int(i) for i in stages[-1].train())
+    task = Task(all_free(stages[-1], taken), np.where(np.isin(PARAMETERS, list(ZERO.start)), 0.0, current.theta), train)
+    without = fit_apart(freed(stages[-1], current.theta), [task], 10)[0]
+    with_ = Task(asked(stages[-1], taken), current.theta, train)
+    none, (error,) = _left_out(stages[-1], test, folds, (task, without), [(with_, current)])
+    found = _judged(without, none, [_Rival(ZERO, current, error)], test, folds, floor)
+    return None if found is None else replace(found[1], fit=current, taken=(*taken, ZERO))
 
 
 def _round(stages: Sequence[Swing], taken: tuple[Variant, ...], current: Fitted, test: Swing, folds: list,
@@ -202,9 +152,9 @@ def _round(stages: Sequence[Swing], taken: tuple[Variant, ...], current: Fitted,
     """The fit of all taken so far, its errors (blocks,) of what is left out, and the best of those that might be
     added."""
     swing, train = stages[-1], tuple(int(i) for i in stages[-1].train())
-    free = all_free(swing, taken)
+    free = asked(swing, taken)
     others = [v for v in variants(swing) if not set(v.start) <= set(free) and v.effect not in without]
-    tasks = [Task(all_free(swing, (*taken, v)), begun(current.theta, v), ()) for v in others]
+    tasks = [Task(asked(swing, (*taken, v)), begun(current.theta, v), (), True) for v in others]
     fits = fit_stages(stages, tasks, 8)
     order = _shortlist(others, fits)
     # nothing more has the same starts as they have, or they would win by theirs
@@ -268,13 +218,15 @@ def _exchanged(
             theta[INDEX[name]] = vector({})[INDEX[name]]
         for v in group:
             theta = begun(theta, v) if v not in taken else theta
-        tasks.append(Task(all_free(swing, group), theta, ()))
+        tasks.append(Task(asked(swing, group), theta, (), True))
     fits = fit_stages(stages, tasks, 12)
     size = len(swing.train())
-    best = min(range(len(sets)), key=lambda k: _bic(fits[k], size))
-    pays = _bic(fits[best], size) + size * np.log(BETTER) < _bic(
-        replace(current, free=len(all_free(swing, taken))), size
-    )
+    # one that has shrunk to nothing is no other form of what was taken
+    able = [k for k, group in enumerate(sets) if all(acts(v, fits[k].theta) for v in group)]
+    if not able:
+        return taken, current
+    best = min(able, key=lambda k: _bic(fits[k], size))
+    pays = _bic(fits[best], size) + size * np.log(BETTER) < _bic(replace(current, free=len(asked(swing, taken))), size)
     return (sets[best], fits[best]) if pays else (taken, current)
 
 
@@ -285,7 +237,7 @@ def _bic(fit: Fitted, stretches: int) -> float:
 
 def _several(swing: Swing, tasks: Sequence[Task], starts: int = 2, iterations: int = 8) -> list[Fitted]:
     """Every task from several starts around its own, in one batch; the best of each."""
-    more = []
+    more, starts = [], 1 if swings_free(swing) else starts  # of these fits nothing hangs on the start
     for task in tasks:
         random = np.random.default_rng(2)
         free = [INDEX[n] for n in task.free]
@@ -324,27 +276,12 @@ def _parted(train: Sequence[int], fold: Sequence[int], test: Sequence[int], apar
     )
 
 
-def all_free(swing: Swing, taken: Sequence[Variant]) -> tuple[str, ...]:
-    """Names of the declared parameters and of those that the variants taken free."""
-    names = list(free_declared(swing)) + [name for v in taken for name in v.start]
-    return tuple(dict.fromkeys(names))
-
-
-def begun(theta: Array, variant: Variant) -> Array:
-    """Parameters with what the variant frees where it begins."""
-    out = theta.copy()
-    for name, value in variant.start.items():
-        if name != "stribeck_speed" or out[INDEX[name]] == 1.0:
-            out[INDEX[name]] = value
-    return out
-
-
 def _left_out(
     swing: Swing, test: Swing, folds: list, none: tuple[Task, Fitted], rivals: list[tuple[Task, Fitted]]
 ) -> tuple[Array, list[Array]]:
     """Block errors of "none" and of each rival on what is left out of `test`."""
     everyone = [none, *rivals]
-    tasks = [replace(task, start=fit.theta, stretches=kept) for task, fit in everyone for kept, _ in folds]
+    tasks = [replace(task, start=fit.theta, stretches=kept, wide=False) for task, fit in everyone for kept, _ in folds]
     fits = fit_apart(swing, tasks, 3)
     apart = [left for _ in everyone for _, left in folds]
     theta = np.concatenate([np.repeat(fit.theta[None], len(left), 0) for fit, left in zip(fits, apart, strict=True)])

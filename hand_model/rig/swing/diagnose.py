@@ -18,13 +18,15 @@ from ..model import RigModel, load_rig
 from ..replay import RigResiduals, replay_rig
 from ..states import fill_gaps, noise_std
 from ..words import alternatives, shares, statement
-from .build import build_swing, search_step_s, thinned, windows_s
-from .compete import LEAST_GAIN, Round, Variant, all_free, begun, compete_swing, fit_apart, fit_stages, free_declared
+from .build import build_swing, last_step_s, search_step_s, thinned, windows_s
+from .compete import LEAST_GAIN, Round, compete_swing, fit_apart, fit_stages
 from .fit import Fitted, Task
+from .free import swings_free
 from .interval import intervals
 from .patch import write_swing
 from .simulation import INDEX, NEUTRAL, PARAMETERS, STEP_S, Swing, parameter_units, vector
 from .start import freed, started_each
+from .variants import Variant, all_free, begun, free_declared
 
 RESAMPLES = 500
 MOST_SEARCHES = 2
@@ -39,19 +41,18 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
     free = free_declared(stages[0])
     declared = fit_stages(stages, [Task(free, vector(stages[0].initial), ())], 15)[0]
     if not stages[0].driven:
-        stages = [freed(swing, declared.theta) for swing in stages]
+        stages = [freed(stages[-1], declared.theta)]
         declared = fit_stages(stages, [Task(free, declared.theta, ())], 15)[0]
     floor, held = _resolution(rig), bool(rig.select(True))  # without validation recordings the training ones measure
     whole = build_swing(rig, fit, step)
-    # Last, at the step of the replay; a free swing over whole recordings, for its phase is known well enough by now.
-    # What
-    # a coarse step there does to the period (4e-4 of it at most, with a hundred steps in each) the last steps take
-    # back.
-    last_stages = (
-        [(STEP_S, windows[-1], 8)]
-        if stages[0].driven
-        else [(2 * step, windows[-1], 8), (2 * step, np.inf, 12), (STEP_S, np.inf, 3)]
-    )
+    # Last, as the replay has it: a free swing over whole recordings, for its phase is known well enough by now. Where it
+    # is stepped, the last steps take back what a coarse step does to the period.
+    if stages[0].driven:
+        last_stages = [(STEP_S, windows[-1], 8)]
+    elif swings_free(whole):
+        last_stages = [(last_step_s(rig), np.inf, 20)]
+    else:
+        last_stages = [(2 * step, windows[-1], 8), (2 * step, np.inf, 12), (2 * STEP_S, np.inf, 3)]
     fine = [(build_swing(rig, fit, step_s, window_s), most) for step_s, window_s, most in last_stages]
     known: dict[tuple[str, ...], Link] = {}
 
@@ -63,7 +64,11 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
         return links_of([some[:k] for k in range(len(some) + 1)])
 
     def ends_of(link: Link) -> Ends:
-        return intervals(freed(build_swing(rig, fit, STEP_S, windows[-1]), link.fit.theta), link.free, link.fit.theta)
+        return intervals(
+            freed(build_swing(rig, fit, STEP_S if stages[0].driven else step, windows[-1]), link.fit.theta),
+            link.free,
+            link.fit.theta,
+        )
 
     def search(kept: list[Taken], without: frozenset[str]) -> list[Taken]:
         taken = compete_swing(stages, kept[-1][1].fit if kept else declared, floor, whole, kept, without)
@@ -215,7 +220,7 @@ def _links(rig: RigModel, session: Session, held: bool, stages: Sequence[tuple[S
     for stage, most in stages if new else ():
         swing, stretches = started_each(stage, [start for _, start in tries])
         fits = fit_apart(
-            swing, [Task(free[k], start, some) for (k, start), some in zip(tries, stretches, strict=True)], most
+            swing, [Task(free[k], start, some, True) for (k, start), some in zip(tries, stretches, strict=True)], most
         )
         best = [
             min((f for (i, _), f in zip(tries, fits, strict=True) if i == k), key=lambda f: f.cost)

@@ -12,18 +12,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from .free import swings_free
+from .free_fit import Task, descend, linearised, profiled, without_starts
 from .simulation import INDEX, PARAMETERS, Swing, errors, vector
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Task:
-    """One fit among many that run together. free: names; start: all parameters; stretches: which may be fitted."""
-
-    free: tuple[str, ...]
-    start: Array
-    stretches: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -38,6 +31,7 @@ class Fitted:
 
 
 FEW_LANES = 1000
+THINNED = 3
 LOW = {"inertia": 1e-9, "stribeck_speed": 1e-3, "stribeck_exponent": 0.3, "asymmetry": -np.inf, "damping_asymmetry": -np.inf, "offset": -np.inf,
        "lateral": -np.inf, "stiffness": -np.inf, "supply": 0.0, "delay": 0.0, "load_speed": 0.0}  # fmt: skip
 
@@ -66,6 +60,16 @@ def fit_together(swing: Swing, tasks: Sequence[Task], iterations: int = 14) -> l
     the lanes are few, they cost little: then the Jacobian of every damped step is simulated with the step itself."""
     unit = typical(swing)
     low = np.array([LOW.get(name, 0.0) for name in PARAMETERS])
+    size = [sum(swing.lanes[i].used.sum() for i in t.stretches) for t in tasks]
+    if swings_free(swing):
+        wide = [t.wide and "stribeck_speed" in t.free for t in tasks]
+        plain, bent = (iter(run(swing, [t for t, w in zip(tasks, wide, strict=True) if w == w_], unit, low, iterations))
+                       for w_, run in ((False, descend), (True, profiled)))  # fmt: skip
+        ends = [next(bent if w else plain) for w in wide]
+        return [
+            Fitted(d.theta, d.cost / max(s, 1), d.evaluations, len(t.free))
+            for t, d, s in zip(tasks, ends, size, strict=True)
+        ]
     theta = [t.start.copy() for t in tasks]
     damping = np.full(len(tasks), 1e-2)
     cost = np.full(len(tasks), np.inf)
@@ -101,7 +105,6 @@ def fit_together(swing: Swing, tasks: Sequence[Task], iterations: int = 14) -> l
             else:
                 damping[k] *= 300.0
                 active[k] = damping[k] < 1e6
-    size = [sum(swing.lanes[i].used.sum() for i in t.stretches) for t in tasks]
     return [
         Fitted(th, c / max(s, 1), int(n), len(t.free))
         for t, th, c, s, n in zip(tasks, theta, cost, size, count, strict=True)
@@ -150,6 +153,9 @@ def _costs(swing: Swing, pairs: Sequence[tuple[Task, Array]]) -> Array:
 
 def jacobian(swing: Swing, task: Task, theta: Array) -> tuple[Array, Array]:
     """Residuals (n,) of a task at theta, stretch after stretch, and their slopes (n, free) in units of `typical`."""
+    if swings_free(swing):
+        own = np.array([swing.lanes[i].start for i in task.stretches])
+        return without_starts(*linearised(swing, [(task.free, task.stretches, theta, own)], typical(swing))[0])[:2]
     low = np.array([LOW.get(name, 0.0) for name in PARAMETERS])
     return _jacobians(swing, [(task, theta)], typical(swing), low)[0][:2]
 
@@ -174,11 +180,11 @@ def _jacobians(
     out, at = [], 0
     for task, _ in pairs:
         n = len(task.stretches)
-        r = residual[::3, at : at + n].T.ravel() * np.sqrt(3.0)
+        r = residual[::THINNED, at : at + n].T.ravel() * np.sqrt(THINNED)
         columns = []
         for j, name in enumerate(task.free):
             b = at + n * (j + 1)
-            columns.append((residual[::3, b : b + n].T.ravel() * np.sqrt(3.0) - r) / _difference(name))
+            columns.append((residual[::THINNED, b : b + n].T.ravel() * np.sqrt(THINNED) - r) / _difference(name))
         out.append((r, np.stack(columns, 1), float(np.sum(residual[:, at : at + n] ** 2))))
         at += n * (len(task.free) + 1)
     return out

@@ -23,7 +23,11 @@ def intervals(swing: Swing, free: tuple[str, ...], theta: Array) -> dict[str, tu
     residual, slopes = jacobian(swing, Task(free, theta, stretches), theta)
     per = slopes.reshape(len(stretches), -1, len(free))
     gradient = np.einsum("snp,sn->sp", per, residual.reshape(len(stretches), -1))
-    bread = np.linalg.pinv(slopes.T @ slopes, hermitian=True, rcond=1e-10)
+    # what a bound holds does not move with the data, and the others do not make up for it
+    loose = np.array([theta[INDEX[n]] > LOW.get(n, 0.0) for n in free])
+    bread = np.zeros((len(free), len(free)))
+    own = slopes[:, loose]
+    bread[np.ix_(loose, loose)] = np.linalg.pinv(own.T @ own, hermitian=True, rcond=1e-10)
     few = len(stretches) / max(len(stretches) - len(free), 1)  # each stretch has bent the fit towards itself
     spread = np.sqrt(np.maximum(np.diag(bread @ (gradient.T @ gradient) @ bread), 0.0) * few)
     unit = typical(swing)

@@ -13,6 +13,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from .friction import dry_friction, wet_friction
+
 Array = NDArray[np.float64]
 STEP_S = 2e-3
 
@@ -54,7 +56,8 @@ def parameter_units(angle: str, effort: str) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Lane:
-    """One stretch of one trial to be simulated: drive and measured position on an even grid of the swing's step_s.
+    """One stretch of one trial to be simulated: drive and measured position on an even grid of the swing's step_s, or at
+    the instants time_s (n,) [s] from its start (of a joint that nothing drives).
 
     drive (n,): recorded voltage, or effort, or zeros; live: the trial's gear over the declared one (zero:
     disconnected);
@@ -76,12 +79,14 @@ class Lane:
     more_inertia: float = 0.0
     weight: tuple[float, float] | None = None
     give: Array | None = None
+    time_s: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Swing:
     """All stretches of a session, the joint's weight: gravity effort = sine sin q + cosine cos q (what holds it), and
-    the period period_s [s] of its small swings."""
+    the period period_s [s] of its small swings. leapfrog_s: step [s] of the leapfrog that has to move as recorded (of a
+    free swing under its weight; zero: the law itself has to)."""
 
     lanes: tuple[Lane, ...]
     sine: float
@@ -90,10 +95,22 @@ class Swing:
     driven: bool
     step_s: float = STEP_S
     period_s: float = 1.0
+    leapfrog_s: float = 0.0
 
     def train(self) -> Array:
         """Indices of stretches that may be fitted."""
         return np.array([i for i, lane in enumerate(self.lanes) if not lane.validate])
+
+
+def instants(swing: Swing, lane: Lane) -> Array:
+    """Times (n,) [s] of a stretch's samples from its start."""
+    return swing.step_s * np.arange(len(lane.position)) if lane.time_s is None else lane.time_s
+
+
+def usual_speed(swing: Swing) -> float:
+    """Speed [rad/s or m/s] that is hardly ever exceeded."""
+    speeds = [np.abs(np.diff(lane.position)) / np.diff(instants(swing, lane)) for lane in swing.lanes]
+    return float(np.percentile(np.concatenate(speeds), 97))
 
 
 def vector(values: Mapping[str, float]) -> Array:
@@ -155,7 +172,7 @@ def _chunks(swing: Swing, theta: Array, lanes: Array, residual: bool) -> Array:
 
 def _run(swing: Swing, theta: Array, lanes: Array, steps: int, residual: bool) -> Array:
     """Positions, or residuals, (steps, L); an effect that no run has costs nothing."""
-    p, has = _constants(swing, theta, lanes)
+    p, has = constants(swing, theta, lanes)
     q, v = np.array([swing.lanes[i].start for i in lanes]).T.copy()
     h = swing.step_s
     drive = _drive(swing, theta, lanes, has, steps) if swing.driven else None
@@ -178,7 +195,7 @@ def _run(swing: Swing, theta: Array, lanes: Array, steps: int, residual: bool) -
     return out
 
 
-def _constants(swing: Swing, theta: Array, lanes: Array) -> tuple[dict[str, Array], dict[str, bool]]:
+def constants(swing: Swing, theta: Array, lanes: Array) -> tuple[dict[str, Array], dict[str, bool]]:
     """Parameters of every run (L,) with what follows from them and from its stretch, and which effects any run has.
 
     hi: step over inertia; weight, phase: gravity's effort weight sin(q + phase); wet, share: damping with the motor's
@@ -218,57 +235,14 @@ def _next_speed(
     if has["offset"]:
         effort = effort + p["offset"]
     if has["wet"]:
-        share = 1.0 / (1.0 + p["hi"] * _wet(p, has, v, external))
+        share = 1.0 / (1.0 + p["hi"] * wet_friction(p, has, v, external))
         shove = p["hi"] * share
     if has["dry"]:
-        stop = shove * _dry(p, has, v, external, motor)
+        stop = shove * dry_friction(p, has, v, external, motor)
     elif has["wet"]:
         stop = shove * p["coulomb"]
     free = v * share + shove * effort
     return free - np.minimum(np.maximum(free, -stop), stop)
-
-
-def _dry(p: Mapping[str, Array], has: Mapping[str, bool], v: Array, external: Array, motor: Array | None) -> Array:
-    """Dry friction's bound (L,)."""
-    friction = p["coulomb"]
-    shaft = 0.0 if motor is None else motor - p["emf"] * v
-    if has["load_gear"]:
-        friction = friction + p["load_gear"] * np.abs(external - shaft)
-    if has["load_motor"] or has["load_external"]:
-        friction = friction + np.abs(p["load_external"] * external - p["load_motor"] * shaft)
-    if has["low"]:
-        ratio = v * p["inverse"]
-        decay = np.exp(-(np.abs(ratio) ** p["stribeck_exponent"] if has["exponent"] else ratio * ratio))
-        friction = friction + _low_speed(p, has, external, shaft) * decay
-    if has["asymmetry"]:
-        friction = np.maximum(friction + p["asymmetry"] * np.sign(v), 0.0)
-    return friction
-
-
-def _wet(p: Mapping[str, Array], has: Mapping[str, bool], v: Array, external: Array) -> Array:
-    """Viscous damping (L,), the motor's own included."""
-    b = p["wet"]
-    if has["load_speed"]:
-        b = b + p["load_speed"] * np.abs(external)
-    if has["drag"]:
-        b = b + p["drag"] * np.abs(v)
-    if has["damping_asymmetry"]:
-        b = b + p["damping_asymmetry"] * np.sign(v)
-    return b
-
-
-def _low_speed(p: Mapping[str, Array], has: Mapping[str, bool], external: Array, shaft: Array | float) -> Array:
-    """Dry friction (L,) that standing still adds (Stribeck), by load."""
-    level = p["static_excess"]
-    if has["load_gear_low"]:
-        level = level + p["load_gear_low"] * np.abs(external - shaft)
-    if has["load_motor_low"] or has["load_external_low"]:
-        level = level + np.abs(p["load_external_low"] * external - p["load_motor_low"] * shaft)
-    if has["motor_squared"] or has["external_squared"]:
-        drives = np.abs(shaft) > np.abs(external)
-        square = np.where(drives, p["external_squared"] * external**2, p["motor_squared"] * shaft**2)
-        level = level + square * (external * shaft < 0)
-    return level
 
 
 def _drive(swing: Swing, theta: Array, lanes: Array, has: Mapping[str, bool], steps: int) -> Array:

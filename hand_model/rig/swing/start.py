@@ -15,7 +15,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .simulation import Lane, Swing, errors
+from .free import free_errors, swings_free
+from .simulation import Lane, Swing, errors, instants
 
 Array = NDArray[np.float64]
 STEPS = 3  # of Gauss and Newton: the motion is smooth in its start
@@ -28,11 +29,9 @@ def started(swing: Swing, theta: Array) -> Swing:
     period."""
     if swing.driven:
         return swing
-    steps = max(LEAST_STEPS, round(swing.period_s / swing.step_s))
     lanes = [replace(lane, give=None) for lane in swing.lanes]
     for _ in range(STEPS):
-        short = [replace(lane, position=lane.position[:steps], drive=lane.drive[:steps], supply=lane.supply[:steps],
-                         used=lane.used[:steps]) for lane in lanes]  # fmt: skip
+        short = [_first(swing, lane) for lane in lanes]
         left, slopes = _slopes(swing, short, theta)
         lanes = [_moved(lane, -np.linalg.lstsq(slopes[:, i], left[:, i])[0]) for i, lane in enumerate(lanes)]
     return replace(swing, lanes=tuple(lanes))
@@ -44,6 +43,8 @@ def freed(swing: Swing, theta: Array) -> Swing:
     if swing.driven:
         return swing
     swing = started(swing, theta)
+    if swings_free(swing):  # their fits move the starts
+        return swing
     slopes = _slopes(swing, swing.lanes, theta)[1]
     give = [np.linalg.qr(slopes[: len(lane.position), i])[0] for i, lane in enumerate(swing.lanes)]
     return replace(swing, lanes=tuple(replace(lane, give=g) for lane, g in zip(swing.lanes, give, strict=True)))
@@ -58,6 +59,14 @@ def started_each(swing: Swing, thetas: Sequence[Array]) -> tuple[Swing, list[tup
     return replace(swing, lanes=lanes), [tuple(k * size + i for i in train) for k in range(len(thetas))]
 
 
+def _first(swing: Swing, lane: Lane) -> Lane:
+    """The first period of a stretch."""
+    times = instants(swing, lane)
+    n = max(LEAST_STEPS, int(np.searchsorted(times, swing.period_s)))
+    return replace(lane, position=lane.position[:n], drive=lane.drive[:n], supply=lane.supply[:n], used=lane.used[:n],
+                   time_s=times[:n])  # fmt: skip
+
+
 def _slopes(swing: Swing, lanes: Sequence[Lane], theta: Array) -> tuple[Array, Array]:
     """Residuals (steps, lanes) at parameters theta, and their slopes (steps, lanes, 2) by angle and speed of the
     start."""
@@ -67,7 +76,8 @@ def _slopes(swing: Swing, lanes: Sequence[Lane], theta: Array) -> tuple[Array, A
 
 
 def _errors(swing: Swing, lanes: Sequence[Lane], theta: Array) -> Array:
-    return errors(
+    run = free_errors if swings_free(swing) else errors
+    return run(
         replace(swing, lanes=tuple(lanes)), np.broadcast_to(theta, (len(lanes), theta.shape[-1])), np.arange(len(lanes))
     )
 
