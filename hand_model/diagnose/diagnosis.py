@@ -391,7 +391,8 @@ def _delays_apart(drives: dict[str, tuple[DriveState, ...]]) -> dict[str, bool]:
         if actuator not in late:
             return abs(x) > bound
         if (told_to := least_delay(drives[actuator])) < bound:
-            return abs(float(late[actuator][0])) > told_to
+            told = float(late[actuator][0])  # and to the side to which the balance would shift it
+            return abs(told) > told_to and told * best[actuator] >= 0
         if late[actuator][0] < -max(bound, EARLY * late[actuator][1]):
             return True
         if x >= -bound:

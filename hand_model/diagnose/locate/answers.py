@@ -87,14 +87,16 @@ def lateness(answers: Mapping[str, Answers]) -> dict[str, Lateness]:
             and np.mean(late) > LATE * x.step_s
             and np.mean(late > x.step_s) > MOSTLY
         )
-        others = [y.rise_s for a, y in told.items() if a != actuator]
-        drive = (plain or (not alone and _both_late(x, total, behind))) and _shift(x.rise_s, others) > SHIFTED * total
-        channel = max(total - np.nan_to_num(behind, nan=total), 0.0) if drive else total
+        shift = _shift(x.rise_s, [y.rise_s for a, y in told.items() if a != actuator])
+        slow = total > 0 and shift <= SHIFTED * total
+        drive = not slow and (plain or (not alone and _both_late(x, total, behind)))
+        channel = max(total - np.nan_to_num(behind, nan=total), 0.0) if drive else max(shift, 0.0) if slow else total
         # Neither clearly the one nor the other: the motion's own scatter decides between the two.
         torn = total > LATE * x.step_s and UNCLEAR * total < behind < (1 - UNCLEAR) * total
         between = min(behind, total - behind) if torn else 0.0
         unlike = (1.0 if alone else UNLIKE) * x.step_s
-        doubt = float(np.hypot(unlike + between, np.std(x.current_s) / np.sqrt(len(x.current_s))))
+        unsure = total - channel if slow else 0.0
+        doubt = float(np.hypot(unlike + between + unsure, np.std(x.current_s) / np.sqrt(len(x.current_s))))
         out[actuator] = Lateness(late if drive else np.zeros(0), channel, doubt)
     return out
 
@@ -106,7 +108,7 @@ def _shift(rise_s: Array, others: Sequence[Array]) -> float:
     for other in (o for o in others if np.isfinite(o + rise_s).all()):
         # slower than the other, or as fast: a late drive that is faster would seem later still
         stretch = float(np.clip(np.ptp(rise_s) / max(float(np.ptp(other)), 1e-9), 1.0, SLOWER))
-        shifts.append(float(np.mean(rise_s - stretch * other)))
+        shifts.append(float(np.min(rise_s - stretch * other)))
     return min(shifts, default=np.inf)
 
 

@@ -252,8 +252,8 @@ def judged(
             break
         left = tuple(e for e in left if e.name not in fallen)
         other = Station(signal, finger, actuator, joint, name_effects(states, left, typical=typical))
-        if other.weight <= station.weight:
-            break
+        if other.weight <= station.weight and lost <= MAIN:
+            break  # else what fell had held the better part: what it left over stands on nothing
         station = other
     untold = not station.believed or elsewhere and station.naming.after.p < ALPHA
     hopeless = station.naming.overwhelmed and not elsewhere  # in the training recordings already
