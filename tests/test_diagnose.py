@@ -90,6 +90,29 @@ PLANTED = [
 ]
 
 
+@pytest.mark.parametrize("told", [False, True])
+def test_a_logged_temperature_explains_a_drift_where_it_follows_it_and_only_there(told: bool) -> None:
+    """A sensor on the housing has a time constant of its own, and noise; another one sits where the friction is."""
+    rng = np.random.default_rng(8)
+
+    def housing(state: DriveState) -> np.ndarray:
+        warming = 1 - np.exp(-state.elapsed_s / 15.0) if not told else np.sin(state.elapsed_s / 30.0) ** 2
+        return np.round(24.0 + 6.0 * warming, 1)
+
+    def friction(state: DriveState) -> np.ndarray:
+        cold = (30.0 - housing(state)) / 6.0 if told else np.exp(-state.elapsed_s / 90.0)
+        return 12.0 * state.direction * cold
+
+    states = tuple(
+        replace(s, extra={**s.extra, "temperature": housing(s) + rng.normal(0, 0.05, len(s.time_s))})
+        for s in drive(3, friction)
+    )
+    (found,) = name_effects(states, catalogue("drive")).found
+    assert found.term.effect.name == "thermal_friction_drift"
+    assert (found.term.shape["form"] == 2.0) == told
+    assert found.amplitudes["cold_excess"] == pytest.approx(12.0, rel=0.15)
+
+
 @pytest.mark.parametrize(("name", "shape", "amplitude"), PLANTED, ids=[p[0] for p in PLANTED])
 def test_planted_effect_is_named_alone_with_its_parameters(name, shape, amplitude) -> None:
     naming = name_effects(drive(3, planted(name, shape, amplitude)), catalogue("drive"))

@@ -12,12 +12,14 @@ import numpy as np
 from .base import Amplitude, Array, DriveState, Effect, Shape, figure
 from .law import Law, Moment
 
+ELAPSED, WORKED, LOGGED = 0.0, 1.0, 2.0  # forms
 MOVING = 1.0  # %/s: below, a drive is at rest
 
 
 class ThermalFrictionDrift(Effect):
     """F = sign(v) A (1 - h): the change still to come. h rises to 1 with the time since the session began (form 0), or
-    with the time in motion, and falls back at rest between recordings (form 1).
+    with the time in motion, and falls back at rest between recordings (form 1), or with the logged temperature, whose
+    sensor need not sit where the friction is (form 2).
     """
 
     name = "thermal_friction_drift"
@@ -26,29 +28,34 @@ class ThermalFrictionDrift(Effect):
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """Warm-up time between 5 s and four times the session, cooling time at rest, form."""
         total = max(max(float(s.elapsed_s[-1]) for s in states), 10.0)
-        forms = (0.0, 1.0) if all("moving" in s.extra for s in states) else (0.0,)
+        forms = (ELAPSED, WORKED) if all("moving" in s.extra for s in states) else (ELAPSED,)
+        forms += (LOGGED,) if _warming(states) else ()
         return (
-            Shape("form", "1", 0.0, 1.0, forms),
+            Shape("form", "1", ELAPSED, LOGGED, forms),
             Shape("warm_up_time", "s", 5.0, 4 * total, tuple(np.geomspace(max(5.0, 0.04 * total), 2 * total, 7))),
             Shape("cooling_time", "s", 2.0, 40 * total, (5.0, 25.0, 60.0, 120.0, 400.0)),
         )
 
     def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
-        """Nothing cools in form 0."""
+        """Nothing cools in form 0, and a logged temperature knows no times; the range of temperatures goes with each
+        point."""
         points = super().grid(states)
-        return [p for p in points if p["form"] > 0.5 or p["cooling_time"] == points[0]["cooling_time"]]
+        first = points[0]
+        return [
+            {**p, **_warming(states)}
+            for p in points
+            if p["form"] == WORKED
+            or p["cooling_time"] == first["cooling_time"]
+            and (p["form"] != LOGGED or p["warm_up_time"] == first["warm_up_time"])
+        ]
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Friction above the final value when cold; lubricants thin out, yet either sign is allowed."""
         return (("cold_excess", "effort", -np.inf, np.inf),)
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """sign(v) (1 - h), or sign(v) times temperature where that is logged, (n, 1)."""
-        if "temperature" in state.extra:
-            return (state.direction * state.extra["temperature"])[:, None]
-        if shape["form"] < 0.5:
-            return (state.direction * np.exp(-state.elapsed_s / shape["warm_up_time"]))[:, None]
-        return (state.direction * _cold(state, shape["warm_up_time"], shape["cooling_time"]))[:, None]
+        """sign(v) (1 - h), (n, 1)."""
+        return (state.direction * _share(state, shape))[:, None]
 
     def parameters(
         self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]
@@ -60,8 +67,12 @@ class ThermalFrictionDrift(Effect):
         """By how much cold friction differs, and how it fades."""
         excess, warm_up = parameters["cold_excess"], figure(parameters["warm_up_time"])
         cold = f"friction is {figure(abs(excess))} raw {'higher' if excess > 0 else 'lower'} cold than warm and"
-        if parameters["form"] < 0.5:
+        if parameters["form"] == ELAPSED:
             return f"{cold} settles with a time constant of {warm_up} s from the session's first sample on"
+        if parameters["form"] == LOGGED:
+            return (
+                f"{cold} follows the logged temperature from {parameters['coldest']:.1f} to {parameters['warmest']:.1f}"
+            )
         cooling = figure(parameters["cooling_time"])
         return (
             f"{cold} settles with a time constant of {warm_up} s in motion; at rest it returns with one of {cooling} s"
@@ -69,8 +80,10 @@ class ThermalFrictionDrift(Effect):
 
     def started(self, state: DriveState, parameters: Mapping[str, float]) -> dict[str, float]:
         """Share of the excess that is left when a recording begins."""
-        if parameters.get("form", 0.0) < 0.5:
+        if parameters.get("form", ELAPSED) == ELAPSED:
             return {"cold": math.exp(-float(state.elapsed_s[0]) / parameters["warm_up_time"])}
+        if parameters["form"] == LOGGED:
+            return {"cold": float(np.mean(_share(state, parameters)))}
         return {"cold": _before(state, parameters["warm_up_time"], parameters["cooling_time"])}
 
     def log_prior(self, parameters: Mapping[str, float]) -> float:
@@ -79,17 +92,38 @@ class ThermalFrictionDrift(Effect):
         return -2.0 * max(0.0, min(ratio, 6.0) - 1.0) ** 2
 
     def law(self, parameters: Mapping[str, float]) -> Law:
-        """Friction that fades while time passes (form 0) or while the drive moves (form 1); cold to begin with."""
+        """Friction that fades while time passes (form 0) or while the drive moves (form 1), cold to begin with; of a
+        logged temperature (form 2) it stays as a recording's was."""
         cold = [parameters.get("cold", 1.0)]
 
         def load(now: Moment) -> float:
-            if parameters.get("form", 0.0) < 0.5 or abs(now.velocity) > MOVING:
+            if parameters.get("form") == LOGGED:
+                pass
+            elif parameters.get("form", ELAPSED) < 0.5 or abs(now.velocity) > MOVING:
                 cold[0] *= math.exp(-now.step_s / parameters["warm_up_time"])
             else:
                 cold[0] = _rested(cold[0], now.step_s, parameters["cooling_time"])
             return parameters["cold_excess"] * now.direction * cold[0]
 
         return load
+
+
+def _warming(states: tuple[DriveState, ...]) -> dict[str, float]:
+    """Coldest and warmest logged temperature; none where it is not logged all along, or does not change."""
+    if not all("temperature" in s.extra for s in states):
+        return {}
+    every = np.concatenate([s.extra["temperature"] for s in states])
+    low, high = float(np.min(every)), float(np.max(every))
+    return {"coldest": low, "warmest": high} if high > low else {}
+
+
+def _share(state: DriveState, shape: Mapping[str, float]) -> Array:
+    """Share (n,) of the change that is still to come."""
+    if shape["form"] == LOGGED:
+        return (shape["warmest"] - state.extra["temperature"]) / (shape["warmest"] - shape["coldest"])
+    if shape["form"] == WORKED:
+        return _cold(state, shape["warm_up_time"], shape["cooling_time"])
+    return np.exp(-state.elapsed_s / shape["warm_up_time"])
 
 
 def _rested(cold: float, rest_s: float, cooling_time_s: float) -> float:
