@@ -19,6 +19,7 @@ from .angles import FingerAngles, refitted
 from .blocks import Blocks, blocks_of, project
 from .displacement import NO_HINGE, MarkerEffect, candidates_of, creeping
 from .stepwise import HINGE, Stepwise
+from .wobble import possible
 
 Array = NDArray[np.float64]
 
@@ -86,9 +87,17 @@ def named_in(blocks: Blocks) -> MarkerNaming:
     done = []
     for effect in found:
         own = slice(start, start + effect.everywhere.shape[-1])
-        done.append(replace(effect, coefficients=coefficients[own], covariance=covariance[own, own]))
+        effect = replace(effect, coefficients=coefficients[own], covariance=covariance[own, own])
+        done.append(effect if _possible(blocks, effect) else replace(effect, effect=NO_HINGE))
         start = own.stop
     return MarkerNaming(blocks, tuple(done), sigma, p_before, p, excess_before, excess, refused)
+
+
+def _possible(blocks: Blocks, effect: MarkerEffect) -> bool:
+    """Whether an effect is of a size that a finger's joint can have; what is farther is no way that is known."""
+    if effect.effect not in HINGE:
+        return True
+    return possible(blocks, effect.body, (effect.columns @ effect.coefficients).reshape(len(blocks.residual), -1, 3))
 
 
 def _selected(search: Stepwise) -> tuple[list[MarkerEffect], MarkerEffect | None]:

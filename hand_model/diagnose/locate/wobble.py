@@ -43,6 +43,14 @@ def centre_travel(blocks: Blocks, body: int, shift: Array) -> float:
     return float(np.linalg.norm(left[best][1] @ np.array(forms[best](at)), axis=0).max())
 
 
+def possible(blocks: Blocks, body: int, shift: Array) -> bool:
+    """Whether a joint may travel and tilt so far: less than its markers are away from it, and than half a right angle.
+    Arguments as in `wobble_amplitude`."""
+    arm = blocks.position[:, blocks.body == body].mean(1) - blocks.centres[:, body - 1]
+    reach = float(np.median(np.linalg.norm(arm, axis=1)))
+    return centre_travel(blocks, body, shift) < reach and wobble_amplitude(blocks, body, shift) < np.pi / 4
+
+
 def side_to_side(blocks: Blocks, body: int, shift: Array, tilts: bool) -> float:
     """Half of the tilt [rad], or of the travel of the centre [m], by which a joint's play changes sides with the way of
     motion. Arguments as in `wobble_amplitude`."""
