@@ -62,7 +62,8 @@ def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]
             # Of two either may be odd: the odds are those of the sizes, where a usual preload may have any scale
             # (Jeffreys 1946).
             larger = own / (own + usual) if len(others) == 1 and own > usual else 1.0
-            out.append(_finding(station, own - usual, error, spread * usual, (1 - p) * larger))
+            shape, scale = spread
+            out.append(_finding(station, own - usual, error, scale / shape * usual, (1 - p) * larger))
     return out
 
 
@@ -89,28 +90,28 @@ def _settled(station: Station) -> bool:
     return abs(named - plain) < SPREAD * max(abs(named), abs(plain))
 
 
-def _spread(drives: Sequence[Mapping[str, float]]) -> float:
-    """Mean absolute deviation of the logarithm of a preload among these drives: what is known of hands, and how alike
-    the drives of this one are in everything else (mean of an inverse gamma prior and the drives' coefficients; of two
+def _spread(drives: Sequence[Mapping[str, float]]) -> tuple[float, float]:
+    """Shape and scale of what is known (inverse gamma) of the mean absolute deviation of the logarithm of a preload
+    among these drives: of hands in general, and of how alike the drives of this one are in everything else (of two
     Laplace ones a pair differs by 1.5)."""
-    known, weight = HANDS * SPREAD, HANDS
+    scale, shape = HANDS * SPREAD, HANDS
     for name in LIKE:
         values = np.array([d[name] for d in drives if d.get(name, 0.0) > 0])
         if len(values) > 1:
             apart = np.abs(np.subtract.outer(np.log(values), np.log(values)))[np.triu_indices(len(values), 1)]
-            known += (len(values) - 1) * float(np.mean(apart)) / 1.5
-            weight += len(values) - 1
-    return known / weight
+            scale += (len(values) - 1) * float(np.mean(apart)) / 1.5
+            shape += len(values) - 1
+    return shape, scale
 
 
-def _by_chance(own: float, error: float, usual: float, spread: float) -> float:
+def _by_chance(own: float, error: float, usual: float, spread: tuple[float, float]) -> float:
     """Probability of two healthy preloads so far apart (logarithms by Laplace), at the nearer end of the standard
-    error."""
+    error: the mean over all deviations that `spread` (shape, scale) grants, for few drives tell little of it."""
     if usual <= 0:
         return 0.0
     nearer = own + np.sign(usual - own) * min(2 * error, abs(usual - own))
-    x = abs(np.log(max(nearer, 1e-3 * usual) / usual))
-    return float((1 + x / (2 * spread)) * np.exp(-x / spread))
+    x, (shape, scale) = abs(np.log(max(nearer, 1e-3 * usual) / usual)), spread
+    return float((scale / (scale + x)) ** shape * (1 + 0.5 * x * shape / (scale + x)))
 
 
 def _standard_error(station: Station) -> float:
