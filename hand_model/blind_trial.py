@@ -144,14 +144,17 @@ def _diagnose(root: Path, name: str) -> str:
 
 
 def score_case(name: str, answer: Mapping[str, Any], findings: Mapping[str, Any]) -> dict[str, Any]:
-    """One case: what was hidden, what was named, whether name and place agree and nothing else is named."""
+    """One case: what was hidden, what was named, whether name and place agree and nothing else is named. What was
+    hidden at no finger (a clock, a marker on the palm) agrees with every place."""
     hidden = [e for e in answer["effects"] if e["effect"] != "none"]
     truth = [e["effect"] for e in hidden]
     named = [f["effect"] for f in findings["findings"]]
     places = {f["effect"]: f["where"].get("finger") for f in findings["findings"]}
     classes = {f["effect"]: f.get("class", []) for f in findings["findings"]}
     kind = answer["case"]
-    placed = all(places.get(e["effect"]) in (e.get("finger"), None) for e in hidden if e["effect"] in places)
+    placed = all(
+        e.get("finger") is None or places[e["effect"]] in (e["finger"], None) for e in hidden if e["effect"] in places
+    )
     if kind == "none":
         right = findings["verdict"] == "consistent"
     elif kind == "outside":

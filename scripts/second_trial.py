@@ -1,11 +1,11 @@
-"""A blind trial on a second recorder's sessions, which shares no code with the twin nor with the diagnosis
-(`second_recorder/`).
+"""A blind trial on sessions of a second recorder, or a third, that share no code with each other, the twin or the
+diagnosis (`second_recorder/`, `third_recorder/`).
 
-    python scripts/second_trial.py FOLDER [--seed 1] [--single 36] [--none 4] [--pair 10] [--weak 10] [--messy 10]
-    [--outside 10] [--anywhere]
+    python scripts/second_trial.py FOLDER [--recorder {second,third}] [--seed 1] [--single 36] [--none 4] [--pair 10]
+    [--weak 10] [--messy 10] [--outside 10] [--anywhere]
 
 FOLDER must be new. It gets sessions, answers.json (its SHA-256 is printed before any diagnosis starts), findings; the
-score is printed.
+score is printed, and, of the second recorder's sessions, what was read of its parameters.
 """
 
 from __future__ import annotations
@@ -19,8 +19,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from second_recorder.compose import make_set
+from second_recorder.compose import make_set as make_second
 from second_recorder.hand import COUNTS as RANGES
+from third_recorder.compose import make_set as make_third
+from third_recorder.motor import CompilerError
 
 from hand_model.blind_trial import judged
 
@@ -87,22 +89,51 @@ def parameters(folder: Path, made: list[dict[str, Any]]) -> list[tuple[str, floa
     return out
 
 
-def main() -> None:
-    """Record, diagnose, score."""
+def print_parameters(figures: list[tuple[str, float, float, list[float] | None]]) -> None:
+    """How many figures were read well, and those that were not."""
+    right = [
+        abs(value - truth) <= 0.1 * abs(truth) or bool(ci and ci[0] <= truth <= ci[1])
+        for _, truth, value, ci in figures
+    ]
+    print(f"parameters within 10 % or inside the interval: {sum(right)} of {len(right)}")
+    for name, truth, value, ci in (f for f, good in zip(figures, right, strict=True) if not good):
+        print(f"  {name}: {value:.4g} {'' if ci is None else [float(f'{c:.4g}') for c in ci]} for {truth:.4g}")
+
+
+def options_of_command() -> argparse.Namespace:
+    """The command line; ends the process where it makes no sense."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("folder", type=Path)
+    parser.add_argument("--recorder", choices=("second", "third"), default="second")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2, help="sessions at a time")
     for kind, count in COUNTS.items():
         parser.add_argument(f"--{kind}", type=int, default=count, help=f"number of {kind} sessions")
     parser.add_argument(
-        "--anywhere", action="store_true", help="each session in a laboratory of its own: rates, noise, speeds"
+        "--anywhere",
+        action="store_true",
+        help="each session in a laboratory of its own: rates, noise, speeds (second recorder; the third always does so)",
     )
     options = parser.parse_args()
+    if options.anywhere and options.recorder != "second":
+        sys.exit("--anywhere is an option of the second recorder alone")
     if options.folder.exists():
         sys.exit(f"{options.folder} exists; a new folder is needed")
+    return options
+
+
+def main() -> None:
+    """Record, diagnose, score."""
+    options = options_of_command()
     sessions = options.folder / "sessions"
-    make_set(sessions, options.seed, {kind: getattr(options, kind) for kind in COUNTS}, None, options.anywhere)
+    counts = {kind: getattr(options, kind) for kind in COUNTS}
+    if options.recorder == "second":
+        make_second(sessions, options.seed, counts, None, options.anywhere)
+    else:
+        try:
+            make_third(sessions, options.seed, counts)
+        except CompilerError as error:
+            sys.exit(str(error))
     apart = sessions.with_name("sessions.answers")
     made = json.loads((apart / "answers.json").read_text())
     answers = {a["case"]: {"case": a["kind"], "effects": a["effects"], "settings": a["settings"]} for a in made}
@@ -114,14 +145,8 @@ def main() -> None:
                 f"{row['case']} {row['kind']}: {', '.join(row['truth'][:2])} -> {', '.join(row['named'][:4]) or row['verdict']}"
             )
     print(trial.table())
-    figures = parameters(options.folder, made)
-    right = [
-        abs(value - truth) <= 0.1 * abs(truth) or bool(ci and ci[0] <= truth <= ci[1])
-        for _, truth, value, ci in figures
-    ]
-    print(f"parameters within 10 % or inside the interval: {sum(right)} of {len(right)}")
-    for name, truth, value, ci in (f for f, good in zip(figures, right, strict=True) if not good):
-        print(f"  {name}: {value:.4g} {'' if ci is None else [float(f'{c:.4g}') for c in ci]} for {truth:.4g}")
+    if options.recorder == "second":
+        print_parameters(parameters(options.folder, made))
 
 
 if __name__ == "__main__":
