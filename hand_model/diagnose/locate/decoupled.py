@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ...effects.base import DriveState
 from ...effects.spring_decoupling import spans
+from ...errors import IdentificationError
 from ...identify.clock import align
 from .angles import FingerAngles
 
@@ -53,7 +54,13 @@ def without_excursions(
         if state.trial in found and state.trial in records:
             record, flexed = records[state.trial], records[state.trial].angle_rad[:, 0]
             good = np.isfinite(flexed)
-            clock = align(record.mocap.time_s[good], flexed[good], state.time_s, state.position, state.trial)
+            try:
+                clock = align(record.mocap.time_s[good], flexed[good], state.time_s, state.position, state.trial)
+            except (
+                IdentificationError
+            ):  # seen only once its markers were put right: the whiles have no place in the log
+                out.append(state)
+                continue
             free = _during(state.time_s, [clock.log_time(np.array(span)) for span in spans(found[state.trial])])
             state = replace(state, effort=np.where(free, np.nan, state.effort))
         out.append(state)
