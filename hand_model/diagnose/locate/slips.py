@@ -120,8 +120,10 @@ def _finding(
     else:
         travel, interval = _amount(naming, main)
         parameters["travel"] = {"value": travel, "unit": "m", "ci95": interval}
-        how = "and back when the motion turns round" if main.sides else "as the angle grows"
-        text = f"{angles.finger.name} {joint}: the centre of rotation travels by up to {1e3 * travel:.2f} mm {how}."
+        text = (
+            f"{angles.finger.name} {joint}: the centre of rotation travels by up to {1e3 * travel:.2f} mm "
+            "as the angle grows."
+        )
     share = sum(e.gain for e in members) / max(sum(e.gain for e in naming.found), 1e-9)
     where = {
         "finger": angles.finger.name,
@@ -219,7 +221,7 @@ def _amount(naming: MarkerNaming, effect: MarkerEffect) -> tuple[float, list[flo
     def amount(coefficients: Array) -> float:
         shift = (effect.columns @ coefficients).reshape(len(blocks.residual), -1, 3)
         if effect.sides:
-            return side_to_side(blocks, effect.body, shift, tilts)
+            return side_to_side(blocks, effect.body, shift)
         return (wobble_amplitude if tilts else centre_travel)(blocks, effect.body, shift)
 
     rng = np.random.default_rng(0)

@@ -51,11 +51,11 @@ def possible(blocks: Blocks, body: int, shift: Array) -> bool:
     return centre_travel(blocks, body, shift) < reach and wobble_amplitude(blocks, body, shift) < np.pi / 4
 
 
-def side_to_side(blocks: Blocks, body: int, shift: Array, tilts: bool) -> float:
-    """Half of the tilt [rad], or of the travel of the centre [m], by which a joint's play changes sides with the way of
-    motion. Arguments as in `wobble_amplitude`."""
-    across = _tilt(blocks, body, shift) if tilts else _across(blocks, body, shift[:, blocks.body == body].mean(1))
-    _, along = _course(across, blocks.angle[:, body - 1], [way_of_motion(blocks, body - 1)], False)
+def side_to_side(blocks: Blocks, body: int, shift: Array) -> float:
+    """Half of the tilt [rad] by which a joint's play changes sides with the way of motion. Arguments as in
+    `wobble_amplitude`."""
+    way = way_of_motion(blocks, body - 1)
+    _, along = _course(_tilt(blocks, body, shift), blocks.angle[:, body - 1], [way], False)
     return float(np.linalg.norm(along))
 
 
