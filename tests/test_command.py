@@ -219,15 +219,17 @@ def test_a_delay_of_a_sample_is_told_by_current_and_motion_together() -> None:
 
 
 def test_a_soft_controller_is_slow_and_not_late() -> None:
-    """Its current rises twice as slowly from the command on, beside one that answers at once; a shifted rise is late."""
+    """Its current rises twice as slowly from the command on, beside one that answers at once; a shifted rise is late,
+    also where the current still settles, by a fifth of the rise, while the command comes."""
 
-    def rising(delay_s: float, rise_s: float, seed: int) -> tuple[DriveState, np.ndarray]:
+    def rising(delay_s: float, rise_s: float, seed: int, settling: float = 0.0) -> tuple[DriveState, np.ndarray]:
         state, _ = answering(0.0, seed)
         t, setpoint = state.time_s, state.extra["setpoint"]
         rng = np.random.default_rng(seed)
         told = np.flatnonzero(np.diff(setpoint)) + 1
         since = t - np.maximum.accumulate(np.where(np.isin(np.arange(len(t)), told), t, -9.0)) - delay_s
         current = np.where(setpoint > 0, 60.0, -60.0) * np.clip(since / rise_s, 0, 1) * (since < 0.4)
+        current += settling * np.sign(setpoint) * np.clip(since / 0.3 + 1, 0, 1) * (since < 0)
         moved = np.interp(t, np.repeat(t[told], 2) + np.tile([delay_s + rise_s, delay_s + rise_s + 0.2], len(told)),
                           np.tile([0.0, 100.0, 100.0, 0.0], len(told))[: 2 * len(told)])  # fmt: skip
         return replace(state, position=moved), current + rng.normal(0, 4, len(t))
@@ -238,6 +240,7 @@ def test_a_soft_controller_is_slow_and_not_late() -> None:
 
     assert late(index=rising(0.0, 0.25, 1), ring=rising(0.0, 0.1, 2)) == set()
     assert late(index=rising(0.08, 0.1, 1), ring=rising(0.0, 0.1, 2)) == {"index"}
+    assert late(index=rising(0.2, 0.02, 1, settling=12.0), ring=rising(0.0, 0.02, 2)) == {"index"}
 
 
 def test_answers_too_few_say_nothing() -> None:

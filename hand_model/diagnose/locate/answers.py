@@ -8,11 +8,12 @@ once.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import isotonic_regression
 
 from ...effects.base import DriveState, sample_interval
 
@@ -125,16 +126,37 @@ def _rise(states: Sequence[DriveState], currents: Sequence[Array]) -> Array:
                 since.append(t[after] - t[k])
                 risen.append(np.sign(setpoint[k] - setpoint[k - 1]) * (current[after] - np.median(current[before])))
     since_s, rise = np.concatenate(since), np.concatenate(risen)
-    cell = np.floor(since_s / BIN_S).astype(int)
-    known, at = np.unique(cell[cell >= 0], return_inverse=True)
-    if len(since) <= LEAST_ANSWERS or len(known) < 2:
+    cells, at, count = np.unique(np.floor(since_s / BIN_S).astype(int), return_inverse=True, return_counts=True)
+    told = cells >= 0
+    if len(since) <= LEAST_ANSWERS or told.sum() < 2:
         return np.full(len(SHARES), np.nan)
-    mean = np.maximum.accumulate(np.bincount(at, rise[cell >= 0]) / np.bincount(at))
-    return (
-        np.interp(np.array(SHARES) * mean[-1], mean, BIN_S * (known + 0.5))
-        if mean[-1] > 0
-        else np.full(len(SHARES), np.nan)
-    )
+    middle, mean = BIN_S * (cells + 0.5), np.bincount(at, rise) / count
+    half_s = _reached(middle[told], mean[told], count[told])[-1]
+    settling = _course(*(x[middle <= half_s] for x in (middle, mean, count)))
+    return _reached(middle[told], (mean - settling(middle))[told], count[told])
+
+
+def _reached(time_s: Array, mean: Array, count: Array) -> Array:
+    """Times (len(SHARES),) [s] at which means (n,) of so many readings, made to rise by least squares (Barlow 1972),
+    have reached SHARES of their most; nan where they do not rise."""
+    rising = isotonic_regression(mean, weights=count).x
+    if rising[-1] <= max(rising[0], 0.0):
+        return np.full(len(SHARES), np.nan) if rising[-1] <= 0 else np.full(len(SHARES), time_s[0])
+    return np.interp(np.array(SHARES) * rising[-1], rising, time_s)
+
+
+def _course(time_s: Array, mean: Array, count: Array) -> Callable[[Array], Array]:
+    """The straight course that means (n,) of so many readings leave to rise (Hinkley 1969), and its level from there
+    on: what still settles while the command comes is no answer to it."""
+    root, best, found = np.sqrt(count), np.inf, (0.0, 0.0, 0.0)
+    for start in time_s[time_s >= 0]:
+        design = np.stack([np.ones(len(time_s)), np.minimum(time_s, start), np.maximum(time_s - start, 0.0)], axis=1)
+        own = np.linalg.lstsq(design * root[:, None], mean * root, rcond=None)[0]
+        cost = float(np.sum(((mean - design @ own) * root) ** 2))
+        if cost < best:
+            best, found = cost, (float(start), float(own[0]), float(own[1]))
+    start, level, slope = found
+    return lambda t: level + slope * np.minimum(t, start)
 
 
 def _both_late(x: Answers, current_s: float, motion_s: float) -> bool:
