@@ -22,10 +22,11 @@ import numpy as np
 from hand_model.rig import diagnose_rig, load_rig, replay_rig
 from hand_model.rig.declared import fit_declared
 from hand_model.rig.swing.build import build_swing, windows_s
-from hand_model.rig.swing.compete import fit_stages, free_declared
+from hand_model.rig.swing.compete import fit_stages
 from hand_model.rig.swing.fit import Task, fit_together, typical
 from hand_model.rig.swing.patch import write_swing
 from hand_model.rig.swing.simulation import INDEX, vector
+from hand_model.rig.swing.variants import free_declared
 from hand_model.session import read_session
 
 STRIBECK = ("static_excess", "stribeck_speed", "stribeck_exponent")
