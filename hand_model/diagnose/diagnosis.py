@@ -254,7 +254,7 @@ def _timed(
 ) -> tuple[dict[str, tuple[DriveState, ...]], dict[str, bool]]:
     """The drives with what is known of their current's lateness, and whether each may be late."""
     timed = with_lateness(drives, facts, simulated)
-    late = _delays_apart(timed)
+    late = _delays_apart(drives, timed)
     in_time = [a for a in drives if not late[a]]
     if 0 < len(in_time) < len(drives):  # at a reversal a late current looks like a give, an early one like none
         timed = with_lateness(with_gives(drives, in_time), facts, simulated)
@@ -370,12 +370,15 @@ def _periodic(period: float, sine: float, cosine: float, further: Callable[[Any]
     return correct
 
 
-def _delays_apart(drives: dict[str, tuple[DriveState, ...]]) -> dict[str, bool]:
+def _delays_apart(
+    drives: dict[str, tuple[DriveState, ...]], timed: dict[str, tuple[DriveState, ...]]
+) -> dict[str, bool]:
     """Whether each drive's current may be delayed: a delay that all drives of a session share is how the log is read.
-    Answers to commands tell a late or an early current better than the balance does, and must bear it out."""
+    Answers to commands tell a late or an early current better than the balance does, and must bear it out. timed: the
+    drives with what these answers tell, which says nothing yet to the balance."""
     best: dict[str, float] = {}
     for actuator, states in drives.items():
-        balance = Balance(tuple(replace(s, extra={k: v for k, v in s.extra.items() if k != "late"}) for s in states))
+        balance = Balance(states)
         delay = next(e for e in catalogue("drive") if e.warps)
         fit = scan(balance, delay, ())
         polished = None if fit is None else polish(balance, fit, 0)
@@ -384,13 +387,13 @@ def _delays_apart(drives: dict[str, tuple[DriveState, ...]]) -> dict[str, bool]:
     step = {a: float(np.median(np.diff(s[0].time_s))) for a, s in drives.items()}
     # a lone drive cannot tell how the log is read from what its own channel does: twice as much is asked of it
     common, least = (min(best.values(), key=abs), 0.75) if len(best) > 1 else (0.0, 2.0)
-    late = {a: s[0].extra["late"] for a, s in drives.items() if "late" in s[0].extra}
+    late = {a: s[0].extra["late"] for a, s in timed.items() if "late" in s[0].extra}
 
     def borne_out(actuator: str) -> bool:
         x, bound = best[actuator] - common, least * step[actuator]
         if actuator not in late:
             return abs(x) > bound
-        if (told_to := least_delay(drives[actuator])) < bound:
+        if (told_to := least_delay(timed[actuator])) < bound:
             told = float(late[actuator][0])  # and to the side to which the balance would shift it
             return abs(told) > told_to and told * best[actuator] >= 0
         if late[actuator][0] < -max(bound, EARLY * late[actuator][1]):
