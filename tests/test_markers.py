@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from hand_model.diagnose.locate import markers
 from hand_model.diagnose.locate.blocks import _assembled
 from hand_model.diagnose.locate.displacement import CREEP, NO_HINGE
 from hand_model.diagnose.locate.markers import MarkerNaming, named_in
@@ -140,3 +142,22 @@ def test_a_second_axis_may_swing_more_than_once_over_the_range(waves: float) -> 
     naming = seen(tilting(lambda u, way: 0.012 * np.sin(2 * np.pi * waves * u + 0.7)), body=2)
     assert naming.believed and places(naming) == {("joint_wobble", None)} and naming.p_after > 0.003
     assert not naming.found[0].sides
+
+
+def test_what_no_finger_can_do_is_said_where_nothing_else_explains_the_markers(monkeypatch) -> None:
+    """Whatever is found first is held to go beyond what a joint can: a slip is found without, a tilting joint is not."""
+    found = markers._named
+    tried: list[int] = []
+
+    def beyond(blocks, candidates, search, before):
+        tried.append(len(candidates))
+        naming = found(blocks, candidates, search, before)
+        if len(tried) > 1:
+            return naming
+        return replace(naming, found=tuple(replace(e, effect=NO_HINGE) for e in naming.found))
+
+    monkeypatch.setattr(markers, "_named", beyond)
+    assert places(seen(slipping(0.4))) == {("marker_slip", "M4")}
+    assert len(tried) == 2 and tried[1] < tried[0]
+    tried.clear()
+    assert places(seen(tilting(lambda share, way: 0.01 * np.sin(2 * np.pi * share)), body=2)) == {(NO_HINGE, None)}

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ...effects.outside.outsider import UNLIKELY
 from .angles import FingerAngles, refitted
 from .blocks import Blocks, blocks_of, project
-from .displacement import NO_HINGE, MarkerEffect, candidates_of, creeping
+from .displacement import NO_HINGE, Candidate, MarkerEffect, candidates_of, creeping
 from .stepwise import HINGE, Stepwise
 from .wobble import possible
 
@@ -69,7 +69,21 @@ def named_in(blocks: Blocks) -> MarkerNaming:
     if p_before > SKIP_P:
         return MarkerNaming(blocks, (), sigma, p_before, p_before, excess_before, excess_before)
     candidates = candidates_of(blocks)
-    search = Stepwise(blocks, candidates, y, shared, sigma)
+    naming = _named(blocks, candidates, Stepwise(blocks, candidates, y, shared, sigma), (p_before, excess_before))
+    beyond = {e.body for e in naming.found if e.effect == NO_HINGE}
+    if not beyond:
+        return naming
+    candidates = [c for c in candidates if c.effect not in UNHINGED or c.body not in beyond]
+    other = _named(blocks, candidates, Stepwise(blocks, candidates, y, shared, sigma), (p_before, excess_before))
+    explained = bool(other.found) and other.p_after >= ALPHA
+    return other if explained and all(e.effect != NO_HINGE for e in other.found) else naming
+
+
+def _named(
+    blocks: Blocks, candidates: Sequence[Candidate], search: Stepwise, before: tuple[float, float]
+) -> MarkerNaming:
+    """The naming among these candidates. before: lack of fit and excess without any."""
+    y, shared, sigma = search.y, search.shared, search.sigma
     found, refused = _selected(search)
     for place in dict.fromkeys((e.body, e.label) for e in found if e.begin is not None):
         others = [e for e in found if e.begin is None or (e.body, e.label) != place]
@@ -90,7 +104,7 @@ def named_in(blocks: Blocks) -> MarkerNaming:
         effect = replace(effect, coefficients=coefficients[own], covariance=covariance[own, own])
         done.append(effect if _possible(blocks, effect) else replace(effect, effect=NO_HINGE))
         start = own.stop
-    return MarkerNaming(blocks, tuple(done), sigma, p_before, p, excess_before, excess, refused)
+    return MarkerNaming(blocks, tuple(done), sigma, before[0], p, before[1], excess, refused)
 
 
 def _possible(blocks: Blocks, effect: MarkerEffect) -> bool:

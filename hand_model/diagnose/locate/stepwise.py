@@ -201,6 +201,8 @@ class Stepwise:
         for c in candidates:
             self.place[id(c.base)] = slice(start, start + c.base.shape[-1])
             start += c.base.shape[-1]
+        if not candidates:
+            return np.zeros((*self.y.shape[:2], 0))
         return project(self.blocks, np.concatenate([c.base for c in candidates], axis=-1))
 
     def _row_of(self, columns: Array) -> _Row:
@@ -336,7 +338,7 @@ class Stepwise:
 
 
 def _flat(columns: Array) -> Array:
-    return np.ascontiguousarray(columns).reshape(-1, columns.shape[-1])
+    return np.ascontiguousarray(columns).reshape(int(np.prod(columns.shape[:-1])), columns.shape[-1])
 
 
 def _cells(record: NDArray[np.int64]) -> NDArray[np.int64]:
