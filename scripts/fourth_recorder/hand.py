@@ -98,6 +98,7 @@ def draw_motor(rng: np.random.Generator, spread: float) -> Motor:
     """A healthy motor."""
 
     def near(value: float) -> float:
+        """By about 10 % off."""
         return float(value * np.clip(rng.normal(1, 0.10 * spread), 0.6, 1.5))
 
     mass, viscous, coulomb, stiffness, preload = (near(value) for value in (0.0122, 0.145, 34, 0.228, 9.4))
