@@ -1,8 +1,8 @@
-"""A blind trial on sessions of a second recorder, or a third, that share no code with each other, the twin or the
-diagnosis (`second_recorder/`, `third_recorder/`).
+"""A blind trial on sessions of a second recorder, a third or a fourth, that share no code with each other, the twin or
+the diagnosis (`second_recorder/`, `third_recorder/`, `fourth_recorder/`).
 
-    python scripts/second_trial.py FOLDER [--recorder {second,third}] [--seed 1] [--single 36] [--none 4] [--pair 10]
-    [--weak 10] [--messy 10] [--outside 10] [--anywhere]
+    python scripts/second_trial.py FOLDER [--recorder {second,third,fourth}] [--seed 1] [--single 36] [--none 4]
+    [--pair 10] [--weak 10] [--messy 10] [--outside 10] [--anywhere]
 
 FOLDER must be new. It gets sessions, answers.json (its SHA-256 is printed before any diagnosis starts), findings; the
 score is printed, and, of the second recorder's sessions, what was read of its parameters.
@@ -19,10 +19,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from fourth_recorder.compose import make_set as make_fourth
+from fourth_recorder.motor import CompilerError as FourthCompilerError
 from second_recorder.compose import make_set as make_second
 from second_recorder.hand import COUNTS as RANGES
 from third_recorder.compose import make_set as make_third
-from third_recorder.motor import CompilerError
+from third_recorder.motor import CompilerError as ThirdCompilerError
 
 from hand_model.blind_trial import judged
 
@@ -104,7 +106,7 @@ def options_of_command() -> argparse.Namespace:
     """The command line; ends the process where it makes no sense."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--recorder", choices=("second", "third"), default="second")
+    parser.add_argument("--recorder", choices=("second", "third", "fourth"), default="second")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2, help="sessions at a time")
     for kind, count in COUNTS.items():
@@ -112,7 +114,7 @@ def options_of_command() -> argparse.Namespace:
     parser.add_argument(
         "--anywhere",
         action="store_true",
-        help="each session in a laboratory of its own: rates, noise, speeds (second recorder; the third always does so)",
+        help="each session in a laboratory of its own: rates, noise, speeds (second recorder; the third always does so, the fourth in half of its sessions)",
     )
     options = parser.parse_args()
     if options.anywhere and options.recorder != "second":
@@ -131,8 +133,8 @@ def main() -> None:
         make_second(sessions, options.seed, counts, None, options.anywhere)
     else:
         try:
-            make_third(sessions, options.seed, counts)
-        except CompilerError as error:
+            {"third": make_third, "fourth": make_fourth}[options.recorder](sessions, options.seed, counts)
+        except (ThirdCompilerError, FourthCompilerError) as error:
             sys.exit(str(error))
     apart = sessions.with_name("sessions.answers")
     made = json.loads((apart / "answers.json").read_text())
