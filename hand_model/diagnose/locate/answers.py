@@ -140,8 +140,8 @@ def _reached(time_s: Array, mean: Array, count: Array) -> Array:
     """Times (len(SHARES),) [s] at which means (n,) of so many readings, made to rise by least squares (Barlow 1972),
     have reached SHARES of their most; nan where they do not rise."""
     rising = isotonic_regression(mean, weights=count).x
-    if rising[-1] <= max(rising[0], 0.0):
-        return np.full(len(SHARES), np.nan) if rising[-1] <= 0 else np.full(len(SHARES), time_s[0])
+    if rising[-1] <= 0:
+        return np.full(len(SHARES), np.nan)
     return np.interp(np.array(SHARES) * rising[-1], rising, time_s)
 
 

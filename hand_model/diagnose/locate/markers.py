@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ...effects.outside.outsider import UNLIKELY
 from .angles import FingerAngles, refitted
 from .blocks import Blocks, blocks_of, project
-from .displacement import NO_HINGE, Candidate, MarkerEffect, candidates_of, creeping
+from .displacement import NO_HINGE, MarkerEffect, candidates_of, creeping
 from .stepwise import HINGE, Stepwise
 from .wobble import possible
 
@@ -61,29 +61,29 @@ def name_markers(angles: FingerAngles) -> MarkerNaming:
 
 
 def named_in(blocks: Blocks) -> MarkerNaming:
-    """The same of its blocks of frames. Slips of one place are a creep where an even motion says as much."""
+    """The same of its blocks of frames. A way of a joint that no finger can go is what stays where nothing else
+    explains the markers."""
     y = project(blocks, blocks.residual.reshape(len(blocks.residual), -1, 1))
     shared = project(blocks, blocks.chain_columns)
     sigma = _noise(y, blocks)
     p_before, excess_before = _lack(_solve(shared, y)[1], blocks)
     if p_before > SKIP_P:
         return MarkerNaming(blocks, (), sigma, p_before, p_before, excess_before, excess_before)
-    candidates = candidates_of(blocks)
-    naming = _named(blocks, candidates, Stepwise(blocks, candidates, y, shared, sigma), (p_before, excess_before))
+    candidates, before = candidates_of(blocks), (p_before, excess_before)
+    naming = _named(Stepwise(blocks, candidates, y, shared, sigma), before)
     beyond = {e.body for e in naming.found if e.effect == NO_HINGE}
     if not beyond:
         return naming
     candidates = [c for c in candidates if c.effect not in UNHINGED or c.body not in beyond]
-    other = _named(blocks, candidates, Stepwise(blocks, candidates, y, shared, sigma), (p_before, excess_before))
+    other = _named(Stepwise(blocks, candidates, y, shared, sigma), before)
     explained = bool(other.found) and other.p_after >= ALPHA
     return other if explained and all(e.effect != NO_HINGE for e in other.found) else naming
 
 
-def _named(
-    blocks: Blocks, candidates: Sequence[Candidate], search: Stepwise, before: tuple[float, float]
-) -> MarkerNaming:
-    """The naming among these candidates. before: lack of fit and excess without any."""
-    y, shared, sigma = search.y, search.shared, search.sigma
+def _named(search: Stepwise, before: tuple[float, float]) -> MarkerNaming:
+    """The naming among the candidates of a search; slips of one place are a creep where an even motion says as much.
+    before: lack of fit and excess without any."""
+    blocks, candidates, y, shared, sigma = search.blocks, search.candidates, search.y, search.shared, search.sigma
     found, refused = _selected(search)
     for place in dict.fromkeys((e.body, e.label) for e in found if e.begin is not None):
         others = [e for e in found if e.begin is None or (e.body, e.label) != place]
