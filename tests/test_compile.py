@@ -6,6 +6,7 @@ import json
 import mujoco
 import numpy as np
 import pytest
+from folder_contents import contents
 from lxml import etree
 from synthetic_hand import synthetic_hand
 
@@ -21,14 +22,10 @@ from hand_model.hand import Finger as HandFinger
 from hand_model.hand import Hand, Joint, load_hand
 
 
-def _bytes(folder):
-    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
-
-
 def test_folder_of_a_hand_with_both_thumbs(tmp_path):
     hand = synthetic_hand(1)
     description = compile(hand, tmp_path / "out")
-    files = _bytes(description.folder)
+    files = contents(description.folder)
     for name in (
         "README.md",
         "LICENSE",
@@ -56,7 +53,7 @@ def test_same_hand_gives_same_bytes_and_replaces_whole(tmp_path):
     compile(hand, tmp_path / "a")
     compile(synthetic_hand(3), tmp_path / "b")
     compile(hand, tmp_path / "b")
-    assert _bytes(tmp_path / "a") == _bytes(tmp_path / "b")
+    assert contents(tmp_path / "a") == contents(tmp_path / "b")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a", "b"]  # no staging folder is left
 
 
@@ -65,11 +62,11 @@ def test_nothing_is_written_where_compiling_fails(tmp_path, monkeypatch):
         raise RuntimeError("disk full")
 
     compile(synthetic_hand(2), tmp_path / "out")
-    before = _bytes(tmp_path / "out")
+    before = contents(tmp_path / "out")
     monkeypatch.setattr("hand_model.compile.folder.readme", broken)
     with pytest.raises(RuntimeError):
         compile(synthetic_hand(3), tmp_path / "out")
-    assert _bytes(tmp_path / "out") == before
+    assert contents(tmp_path / "out") == before
     assert [p.name for p in tmp_path.iterdir()] == ["out"]
 
 

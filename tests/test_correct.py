@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from folder_contents import contents
 
 from hand_model.diagnose.findings import Finding
 from hand_model.diagnose.prove.correct import corrected_markers, refuse_output, write_corrected, write_csv, write_tsv
@@ -22,10 +23,6 @@ from hand_model.session.qtm_tsv import read_qtm_tsv
 def finding(effect: str, trials: list[str], **more) -> Finding:
     where = {"finger": None, "actuator": "index", "trials": trials, **more.pop("where", {})}
     return Finding(effect, (effect,), 1.0, (), where, "", more, {}, None, "put right")
-
-
-def digests(folder: Path) -> dict[str, bytes]:
-    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
 def test_markers_and_logs_are_read_back_as_written(tmp_path: Path) -> None:
@@ -57,13 +54,13 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_clock_and_counts_are_put_right_in_a_copy(session: Path, tmp_path: Path) -> None:
     read = read_session(session)
-    before = digests(session)
+    before = contents(session)
     trial = next(t for t in read.trials if t.kind == "flexion")
     drift = finding("clock_drift", [trial.name], rate_minus_one={"value": 0.002, "unit": "1"})
     actuator = read.finger(trial.finger).actuator
     periodic = finding("encoder_periodic_error", [trial.name], where={"actuator": actuator})
     copy = write_corrected(read, [drift, periodic], {actuator: lambda counts: counts + 5.0}, tmp_path)
-    assert digests(session) == before
+    assert contents(session) == before
     again = read_session(copy)
     for old, new in zip(read.trials, again.trials, strict=True):
         if old.log_path is None:
@@ -88,7 +85,7 @@ def test_a_copy_that_cannot_be_written_leaves_the_earlier_one(
     read = read_session(session)
     trial = next(t for t in read.trials if t.kind == "flexion")
     drift = finding("clock_drift", [trial.name], rate_minus_one={"value": 0.002, "unit": "1"})
-    before = digests(write_corrected(read, [drift], {}, tmp_path))
+    before = contents(write_corrected(read, [drift], {}, tmp_path))
 
     def full(*_: object) -> None:
         raise OSError("no space left")
@@ -97,7 +94,7 @@ def test_a_copy_that_cannot_be_written_leaves_the_earlier_one(
     with pytest.raises(OSError, match="no space"):
         write_corrected(read, [drift], {}, tmp_path)
     assert [f.name for f in tmp_path.iterdir()] == ["corrected"]
-    assert digests(tmp_path / "corrected") == before
+    assert contents(tmp_path / "corrected") == before
 
 
 def test_the_copy_names_its_files_however_the_manifest_spells_them_and_may_lie_in_the_session(

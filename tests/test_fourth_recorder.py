@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from folder_contents import contents
 
 from hand_model.session import check_session, read_session
 
@@ -21,11 +22,6 @@ needs_compiler = pytest.mark.skipif(
     shutil.which("cc") is None, reason="the fourth recorder's motor is C, and there is no compiler named cc"
 )
 SEED = 11
-
-
-def contents(folder: Path) -> dict[str, bytes]:
-    """Every file below a folder."""
-    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
 
 
 @pytest.fixture(scope="module")

@@ -8,25 +8,20 @@ import sys
 from pathlib import Path
 
 import pytest
+from folder_contents import contents
 
 from hand_model.session import check_session, read_session
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
-from third_recorder.compose import Case, make_case, make_set
+from third_recorder.compose import KINDS, Case, make_case, make_set
 from third_recorder.effects import EFFECTS, OUTSIDE
 from third_recorder.motor import CompilerError, library
 
 needs_compiler = pytest.mark.skipif(
     shutil.which("cc") is None, reason="the third recorder's motor is C, and there is no compiler named cc"
 )
-KINDS = ("single", "none", "pair", "weak", "messy", "outside")
 SEED = [11, 0, 31]
-
-
-def contents(folder: Path) -> dict[str, bytes]:
-    """Every file below a folder."""
-    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
 
 
 @pytest.fixture(scope="module")

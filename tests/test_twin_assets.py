@@ -9,14 +9,11 @@ from importlib import resources
 from pathlib import Path
 
 import pytest
+from folder_contents import contents
 
 from hand_model.session import read_session
 
 ROOT = Path(__file__).resolve().parents[1]
-
-
-def files(folder: Path) -> dict[str, bytes]:
-    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
 def flat(tree, path=()):
@@ -35,7 +32,7 @@ def test_embedded_sessions_are_reached_from_the_package():
             assert session.side == name and len(session.fingers) == fingers
             assert any(f.name.startswith("thumb") for f in session.fingers)
             assert any(t.validate for t in session.select("flexion"))
-            assert sum(len(content) for content in files(path).values()) < 3_000_000
+            assert sum(len(content) for content in contents(path).values()) < 3_000_000
 
 
 def test_the_script_remakes_them_byte_by_byte(tmp_path):
@@ -45,7 +42,7 @@ def test_the_script_remakes_them_byte_by_byte(tmp_path):
     script.make(tmp_path)
     want = ROOT / "assets" / "sessions"
     for name in ("left", "right"):
-        assert files(tmp_path / name) == files(want / name)
+        assert contents(tmp_path / name) == contents(want / name)
         # The truth has more digits than a session's files: another processor rounds the last of them otherwise.
         made, kept = (flat(json.loads((f / f"{name}.answer.json").read_text())) for f in (tmp_path, want))
         assert made.keys() == kept.keys()

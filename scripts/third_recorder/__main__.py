@@ -5,10 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from .compose import make_set
+from .compose import KINDS, make_set
 from .motor import CompilerError
-
-KINDS = ("single", "none", "pair", "weak", "messy", "outside")
 
 
 def main() -> None:

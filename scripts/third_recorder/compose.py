@@ -19,6 +19,7 @@ from .moves import draw_protocol
 from .record import record
 from .trial import Trial, set_clipping_levels
 
+KINDS = ("single", "none", "pair", "weak", "messy", "outside")
 HANDS = ["bebionic", "hand_a", "lab_hand", "unit7"]
 UNSCALABLE = ("command_as_measurement", "asymmetric_friction")  # not made weak nor paired
 # Effects of a real hand, of which a messy session has a trace each.
