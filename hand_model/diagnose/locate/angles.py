@@ -24,7 +24,8 @@ from ..name.naming import Naming
 from .drive import count_range
 from .excursions import with_excursions
 from .ghosts import ghosts
-from .motion import Motion, estimate_motion, local_quadratic, position_at, sure_acceleration
+from .load import transmitted_load
+from .motion import estimate_motion, least_error, position_at, sure_acceleration
 
 Array = NDArray[np.float64]
 
@@ -32,8 +33,6 @@ LEARN_FRAMES = 1500  # of each recording, evenly spaced: enough for a chain, all
 FIRST_SAMPLES, BEGUN = 5, 0.05  # of a recording, and the share of the range from which lost motion is closed
 FARTHEST_M = 6e-3  # a residual beyond is a ghost or a wrong label, no slip
 MOMENT_S = 0.2  # within which a step's moment is known
-LOAD_S = 0.05  # bandwidth of a smoothed current
-DEPARTURES_S = (0.1, 0.25, 0.6, 1.5)  # bandwidths of what a joint departs from its encoder's map
 
 
 @dataclass(frozen=True)
@@ -270,18 +269,9 @@ def _at_frames(record: FlexionAngles, time_s: Array, drifting: bool = True) -> _
     load = None
     if current is not None and np.isfinite(current[seen]).sum() > 20:
         known = np.isfinite(current[seen])
-        load = np.interp(then, at, _transmitted(at, np.interp(at, at[known], current[seen][known]), motion))
+        load = np.interp(then, at, transmitted_load(at, np.interp(at, at[known], current[seen][known]), motion))
     v, a = (np.interp(then, at, y) for y in (motion.velocity, sure_acceleration(motion, at)))
     return _Log(position_at(motion, at, then), v, a, load, (then > at[0]) & (then < at[-1]))
-
-
-def _transmitted(time_s: Array, current: Array, motion: Motion) -> Array:
-    """Load (n,) [raw] that a motor passes on: its smoothed current without what accelerates it (least squares while it
-    moves)."""
-    v, use = motion.velocity, motion.moving
-    columns = np.stack([motion.acceleration, v, np.sign(v), motion.position, np.ones_like(v)], axis=-1)
-    inertia = max(float(np.linalg.lstsq(columns[use], current[use], rcond=1e-12)[0][0]), 0.0) if use.sum() > 50 else 0.0
-    return local_quadratic(time_s, current - inertia * motion.acceleration, LOAD_S)[0]
 
 
 def expected_angles(naming: Naming) -> dict[str, tuple[Array, Array]]:
@@ -315,27 +305,8 @@ def _smoothed(
     if expected is not None:
         at, foreseen = expected
         base = base + np.interp(time_s, at, foreseen - np.interp(at, time_s, base))
-    departure, rate = _least_error(time_s, angle - base)
+    departure, rate = least_error(time_s, angle - base)
     return base + departure, slope * log.speed + rate, slope * log.acceleration, use
-
-
-def _least_error(time_s: Array, values: Array) -> tuple[Array, Array]:
-    """Values smoothed over time and their rate (n,), at the bandwidth with the least leave-one-out error (Stone
-    1974)."""
-    step = float(np.median(np.diff(time_s)))
-    tried = []
-    for bandwidth in DEPARTURES_S:
-        count = max(1, int(bandwidth / step / 6))  # samples averaged first: six to a bandwidth lose nothing
-        block = np.arange(len(values)) // count
-        size = np.bincount(block)
-        t, y = np.bincount(block, time_s) / size, np.bincount(block, values) / size
-        impulse = np.zeros(len(y))
-        impulse[len(y) // 2] = 1 / count
-        own = float(local_quadratic(t, impulse, bandwidth)[0][len(y) // 2])
-        smooth, rate = (np.interp(time_s, t, x) for x in local_quadratic(t, y, bandwidth)[:2])
-        tried.append((float(np.mean((values - smooth) ** 2)) / (1 - own) ** 2, smooth, rate))
-    _, smooth, rate = min(tried, key=lambda x: x[0])
-    return smooth, rate
 
 
 def _stepped(record: int, time_s: Array, steps: Sequence[tuple[int, float]]) -> tuple[Array, tuple[str, ...]]:

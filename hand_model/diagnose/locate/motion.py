@@ -16,6 +16,7 @@ from ...effects.path import runs
 Array = NDArray[np.float64]
 
 SURE = 3.0  # standard deviations
+DEPARTURES_S = (0.1, 0.25, 0.6, 1.5)  # bandwidths of what departs from a known course
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,25 @@ def estimate_motion(time_s: Array, position: Array, bandwidth_s: float | None = 
     moving = np.abs(v) > max(5 * velocity_noise, 0.03 * fastest)
     moving = _drop_short(moving, 3)
     return Motion(x, v, a, noise, h, moving, *since_rest(time_s, moving))
+
+
+def least_error(time_s: Array, values: Array) -> tuple[Array, Array]:
+    """Values smoothed over time and their rate (n,), at the bandwidth with the least leave-one-out error (Stone
+    1974)."""
+    step = float(np.median(np.diff(time_s)))
+    tried = []
+    for bandwidth in DEPARTURES_S:
+        count = max(1, int(bandwidth / step / 6))  # samples averaged first: six to a bandwidth lose nothing
+        block = np.arange(len(values)) // count
+        size = np.bincount(block)
+        t, y = np.bincount(block, time_s) / size, np.bincount(block, values) / size
+        impulse = np.zeros(len(y))
+        impulse[len(y) // 2] = 1 / count
+        own = float(local_quadratic(t, impulse, bandwidth)[0][len(y) // 2])
+        smooth, rate = (np.interp(time_s, t, x) for x in local_quadratic(t, y, bandwidth)[:2])
+        tried.append((float(np.mean((values - smooth) ** 2)) / (1 - own) ** 2, smooth, rate))
+    _, smooth, rate = min(tried, key=lambda x: x[0])
+    return smooth, rate
 
 
 def position_at(motion: Motion, time_s: Array, then: Array) -> Array:
