@@ -46,6 +46,7 @@ from .page import write_page
 from .prove.correct import refuse_output, write_corrected
 from .prove.improve import read_model, refuse_other, write_improved
 from .prove.replays import Replay
+from .weight import with_weights
 
 REASON = 0.5  # of the size at which friction by load is plain: a soft controller falls behind by so much
 EARLY = 3.0  # standard deviations by which answers that come before the command say so for sure
@@ -220,6 +221,7 @@ class _Heard:
             self.step()
             self.stations.append(station)
             self.tell(station.line())
+        self.stations = with_weights(self.session, self.fingers, self.stations, calls)
         odd = preload_findings(self.stations)
         for _, finding in odd:
             self.tell(finding.statement)

@@ -11,6 +11,8 @@ import numpy as np
 from .base import Amplitude, Array, DriveState, Effect, Shape, figure
 from .law import Law, Moment
 
+NEAR = 0.2  # share by which the angle that matters may differ: the map to the joint is no line
+
 
 class GravityLoad(Effect):
     """Torque of a weight at a constant lever in the plane of the finger, turned by the joint angle."""
@@ -18,9 +20,13 @@ class GravityLoad(Effect):
     name = "gravity_load"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """Angle swept over the range of positions, [rad]; with a recorded pose only."""
+        """Angle swept over the range of positions, [rad], near the one that the markers show; with a recorded pose
+        only."""
         if not any("gravity_along" in s.extra for s in states):
             return ()
+        seen = [float(s.extra["sweep"][0]) for s in states if "sweep" in s.extra and len(s.time_s)]
+        if seen:
+            return (Shape("sweep", "rad", (1 - NEAR) * seen[0], (1 + NEAR) * seen[0], (seen[0],)),)
         return (Shape("sweep", "rad", 0.5, 2.5, (0.8, 1.4, 2.0)),)
 
     def amplitudes(self) -> tuple[Amplitude, ...]:

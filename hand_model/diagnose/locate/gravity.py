@@ -27,23 +27,17 @@ def with_gravity(
     session: Session, fingers: Mapping[str, FingerAngles], states: tuple[DriveState, ...]
 ) -> tuple[DriveState, ...]:
     """The states with `gravity_along` and `gravity_across` [m/s^2] in `extra`: gravity along the open finger and across
-    it.
+    it, and `sweep` [rad], the angle that the finger's first joint turns over the range, where a flexion shows it.
 
     fingers: by name. Recordings with markers have `pose_seen`; those without get `pose_unseen` instead. Unchanged where
     the session names no gravity, where no recording shows the palm, or where it never turned.
     """
-    if session.gravity_world is None:
-        return states
-    trials = {t.name: t for t in session.trials}
-    seen = {s.trial: found for s in states if (found := _in_finger(session, fingers, trials[s.trial], s)) is not None}
-    if not seen:
-        return states
-    everything = np.concatenate(list(seen.values()))
-    if float(np.linalg.norm(everything.std(0))) < TURNED * float(np.linalg.norm(session.gravity_world)):
+    seen, sweep = _seen(session, fingers, states)
+    if not _turned(session, seen):
         return states
     out = []
     for state in states:
-        extra: dict[str, Array] = dict(state.extra)
+        extra: dict[str, Array] = {**state.extra, **_swept(state, sweep)}
         if state.trial in seen:
             extra["gravity_along"], extra["gravity_across"] = seen[state.trial].T
         extra["pose_seen" if state.trial in seen else "pose_unseen"] = np.ones(len(state.time_s))
@@ -51,9 +45,53 @@ def with_gravity(
     return tuple(out)
 
 
-def _in_finger(session: Session, fingers: Mapping[str, FingerAngles], trial: Trial, state: DriveState) -> Array | None:
-    """Gravity (n, 2) in the finger's plane at the state's samples; None without markers or with clocks that do not
-    align."""
+def in_one_pose(
+    session: Session, fingers: Mapping[str, FingerAngles], states: tuple[DriveState, ...]
+) -> tuple[DriveState, ...] | None:
+    """The states with gravity as `with_gravity` has it, the same in all recordings; None where the palm was never seen,
+    or turned."""
+    seen, sweep = _seen(session, fingers, states)
+    if not seen or _turned(session, seen):
+        return None
+    along, across = np.concatenate(list(seen.values())).mean(0)
+
+    def posed(state: DriveState) -> DriveState:
+        one = np.ones(len(state.time_s))
+        gravity = {"gravity_along": along * one, "gravity_across": across * one, "pose_seen": one}
+        return replace(state, extra={**state.extra, **gravity, **_swept(state, sweep)})
+
+    return tuple(posed(s) for s in states)
+
+
+def _seen(
+    session: Session, fingers: Mapping[str, FingerAngles], states: tuple[DriveState, ...]
+) -> tuple[dict[str, Array], float | None]:
+    """Trial -> gravity (n, 2) in the finger's plane, of the recordings that show the palm, and the angle [rad] over the
+    range of positions."""
+    if session.gravity_world is None:
+        return {}, None
+    trials = {t.name: t for t in session.trials}
+    found = {s.trial: f for s in states if (f := _in_finger(session, fingers, trials[s.trial], s)) is not None}
+    sweeps = [sweep for _, sweep in found.values() if sweep is not None]
+    return {trial: gravity for trial, (gravity, _) in found.items()}, float(np.median(sweeps)) if sweeps else None
+
+
+def _swept(state: DriveState, sweep: float | None) -> dict[str, Array]:
+    return {} if sweep is None else {"sweep": np.full(len(state.time_s), sweep)}
+
+
+def _turned(session: Session, seen: Mapping[str, Array]) -> bool:
+    if not seen:
+        return False
+    everything = np.concatenate(list(seen.values()))
+    return float(np.linalg.norm(everything.std(0))) >= TURNED * float(np.linalg.norm(session.gravity_world))
+
+
+def _in_finger(
+    session: Session, fingers: Mapping[str, FingerAngles], trial: Trial, state: DriveState
+) -> tuple[Array, float | None] | None:
+    """Gravity (n, 2) in the finger's plane at the state's samples, and the angle [rad] over the range of positions where
+    the finger flexed; None without markers or with clocks that do not align."""
     if trial.mocap_path is None or trial.finger not in fingers:
         return None
     angles = fingers[trial.finger]
@@ -81,7 +119,11 @@ def _in_finger(session: Session, fingers: Mapping[str, FingerAngles], trial: Tri
         [local_quadratic(mocap.time_s, g, SMOOTH_S)[0] for g in (gravity_palm @ plane(chain).T).T], axis=-1
     )
     at = clock.log_time(mocap.time_s)
-    return np.stack([np.interp(state.time_s, at, g) for g in smooth.T], axis=-1)
+    gravity = np.stack([np.interp(state.time_s, at, g) for g in smooth.T], axis=-1)
+    if record is None:
+        return gravity, None
+    position = np.interp(clock.log_time(time_s[good]), state.time_s, state.position)
+    return gravity, 100 * float(np.polyfit(position, flexed[good], 1)[0])
 
 
 def plane(chain: Chain) -> Array:
