@@ -57,6 +57,11 @@ class StribeckFriction(Effect):
             "static_excess": amplitude["static_excess"],
         }
 
+    def possible(self, states: tuple[DriveState, ...], parameters: Mapping[str, float]) -> bool:
+        """Whether the drive could break loose: with no more than the most that was ever asked of it."""
+        largest = max((float(np.nanmax(np.abs(s.effort), initial=0.0)) for s in states if len(s.effort)), default=0.0)
+        return parameters["static_excess"] <= largest
+
     def log_prior(self, parameters: Mapping[str, float]) -> float:
         """Static friction is seldom more than three times the Coulomb friction; an exponent of 1 is more common than
         2."""

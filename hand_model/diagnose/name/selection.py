@@ -279,7 +279,10 @@ def _weight(balance: Balance, candidate: tuple[Fit, bool], fit: Fit, scale: floa
 
 
 def _possible(balance: Balance, fit: Fit) -> bool:
-    return _resolved(balance, fit.terms[-1]) and fit.declared.get(fit.terms[-1].effect.needs, 1.0) > 0
+    term, amplitudes = fit.terms[-1], fit.amplitudes[-1]
+    if not _resolved(balance, term) or fit.declared.get(term.effect.needs, 1.0) <= 0:
+        return False
+    return bool(term.effect.possible(balance.states, term.effect.parameters(term.shape, amplitudes, fit.declared)))
 
 
 def settle(pair: Pair, effects: tuple[Any, ...], terms: tuple[Term, ...]) -> tuple[tuple[Term, ...], Fit]:

@@ -67,7 +67,8 @@ def _project(balance: Balance, grid: Grid, terms: tuple[Term, ...], least: float
 
 
 def polish(balance: Balance, fit: Fit, which: int) -> Fit:
-    """Optimise the shape of one term (Nelder-Mead within its bounds), everything linear refitted at each step."""
+    """Optimise the shape of one term (Nelder-Mead within its bounds), everything linear refitted at each step; as it was
+    where no machine could be like the optimum."""
     term = fit.terms[which]
     shapes = [s for s in term.effect.shapes(balance.states) if s.name not in DISCRETE]
     if not shapes:
@@ -104,7 +105,7 @@ def polish(balance: Balance, fit: Fit, which: int) -> Fit:
         and np.mean(balance.unclipped_by(best) != balance.unclipped_by(fit)) > CLIPPED_ANEW
     ):
         best = optimum(balance.error_beside(others, term.effect))
-    return best if best.rss < fit.rss else fit
+    return likeliest(balance, (fit, best), which)
 
 
 def refit(balance: Balance, fit: Fit, rounds: int = 2) -> Fit:
