@@ -29,6 +29,7 @@ TRIFLE = 0.01  # of the square of the heaviest weight
 # of that magnitude: less, where the lack-of-fit test sees nothing, is left to the imperfections of reading angles and
 # speeds
 MINUTE = 0.15
+UNSEEN = 0.05  # probability from which the test sees nothing
 SIGNALS = {"drive": "current", "motors": "current", "command": "current", "encoder": "encoder", "linkage": "markers"}
 SHOWN_IN = {e.name: SIGNALS[e.station] for e in catalogue() if e.station in SIGNALS}
 NAMES = {e.name for e in catalogue()}
@@ -53,7 +54,7 @@ def assemble(
         if stands:
             unexplained += [outsider_of(station, f) for f in station.outsiders]
             for weight, finding in (finding_of(station, *merged) for merged in _merged(station.kept)):
-                if station.naming.before.p >= ALPHA and _magnitude(finding, stations) < MINUTE:
+                if station.naming.before.p >= UNSEEN and _magnitude(finding, stations) < MINUTE:
                     rejected.append(
                         {
                             "effect": finding.effect,

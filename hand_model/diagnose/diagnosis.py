@@ -33,7 +33,6 @@ from .locate.drive import (
 )
 from .locate.gravity import with_gravity
 from .locate.measurement import echoes_command, is_measured, rests_on_command
-from .locate.preload import preload_findings
 from .locate.simulated import SimulatedDrive, delays_apart, simulated_drive
 from .locate.stamps import Stamps, stamps
 from .magnitude import magnitude
@@ -221,8 +220,7 @@ class _Heard:
             self.step()
             self.stations.append(station)
             self.tell(station.line())
-        self.stations = with_weights(self.session, self.fingers, self.stations, calls)
-        odd = preload_findings(self.stations)
+        self.stations, odd = with_weights(self.session, self.fingers, self.stations, calls)
         for _, finding in odd:
             self.tell(finding.statement)
         self.found = _without_settled_sags([*self.found, *odd], self.stations)

@@ -3,44 +3,171 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ..effects import effect
+from ..effects.base import DriveState
 from ..session import Session
+from .findings import Finding
 from .locate.angles import FingerAngles
 from .locate.gravity import in_one_pose
-from .locate.preload import preload_findings
+from .locate.preload import expected, preload_findings
+from .name.balance import Balance
 from .name.naming import Named
 from .name.selection import EVIDENCE_LEAST
 from .name.station import Station, judged
+from .name.term import Term
+
+Array = NDArray[np.float64]
 
 BENT, WEIGHT = "nonlinear_spring", "gravity_load"
+ALONG, ACROSS = "weight_along", "weight_across"  # declared columns of a weight that is known to be there
+FLAT = 1e3  # standard deviations of the effort: of a coefficient of which nothing is known
 
 
 def with_weights(
     session: Session, fingers: Mapping[str, FingerAngles], stations: Sequence[Station], calls: Sequence[tuple[Any, ...]]
-) -> list[Station]:
-    """The stations, those of drives on which a weight pulls judged anew.
+) -> tuple[list[Station], list[tuple[float, Finding]]]:
+    """The stations, those of drives on which a weight pulls judged anew, and odd preloads (with their weight), those
+    that are a weight's named so.
 
     calls: what `judged` was given for each drive's current. Two effects in one drive must together be likelier than the
     one that explains both by as much as any further effect must bring.
     """
-    out = list(stations)
-    for actuator in [f.where["actuator"] for _, f in preload_findings(stations)]:
+    out, weights, pulled = list(stations), list[tuple[float, Finding]](), set[str]()
+    for size, odd in preload_findings(stations):
+        actuator = odd.where["actuator"]
         at = next(i for i, s in enumerate(out) if s.signal == "current" and s.actuator == actuator)
-        bent = _kept(out[at], BENT)
-        signal, finger, _, joint, states, effects, typical = next(c for c in calls if c[2] == actuator)
-        states = in_one_pose(session, fingers, states) if bent is not None else None
-        if bent is None or states is None:
+        call = next(c for c in calls if c[2] == actuator)
+        states = in_one_pose(session, fingers, call[4])
+        if states is None or "sweep" not in states[0].extra:
             continue
-        left = [e for e in effects if e.name != BENT]
-        other = judged(signal, finger, actuator, joint, states, left, typical)
-        weight = _kept(other, WEIGHT)
-        changed = [*out[:at], other, *out[at + 1 :]]
-        odd = {f.where["actuator"] for _, f in preload_findings(changed)}
-        if weight is not None and weight.evidence > bent.evidence - EVIDENCE_LEAST and actuator not in odd:
-            out = changed
-    return out
+        pull = _pulled(out, out[at], states)
+        if pull is None:
+            continue
+        pulled.add(actuator)
+        other = _named(call, states, out[at])
+        if other is None:
+            other = judged(*call[:4], tuple(_declaring(s) for s in states), *call[5:])
+            weights.append((size, _finding(odd, *pull, float(states[0].extra["sweep"][0]))))
+        out[at] = other
+    odd_preloads = [item for item in preload_findings(out) if item[1].where["actuator"] not in pulled]
+    return out, [*weights, *odd_preloads]
+
+
+def _named(call: tuple[Any, ...], states: tuple[DriveState, ...], station: Station) -> Station | None:
+    """The drive with a weight named in place of its bent spring; None where that does not stand."""
+    bent = _kept(station, BENT)
+    if bent is None:
+        return None
+    other = judged(*call[:4], states, [e for e in call[5] if e.name != BENT], *call[6:])
+    weight = _kept(other, WEIGHT)
+    return other if weight is not None and weight.evidence > bent.evidence - EVIDENCE_LEAST else None
 
 
 def _kept(station: Station, name: str) -> Named | None:
     return next((f for f in station.kept if f.term.effect.name == name), None) if station.believed else None
+
+
+def _pulled(
+    stations: Sequence[Station], station: Station, states: tuple[DriveState, ...]
+) -> tuple[Array, Array, float] | None:
+    """Weight along the finger and across it (2,), its covariance (2, 2) and its probability, where a weight beside a
+    usual preload is likelier than any preload (and what bends the spring, if that was named); None else.
+
+    Marginal likelihoods of linear models with normal priors, where the preload and the spring of the weighed drive are
+    those of the hand's others: an odd preload alone says nothing of the spring's shape, a weight foretells it.
+    """
+    usual = {name: known for name in ("preload", "spring") if (known := expected(stations, station, name)) is not None}
+    if len(usual) < 2:
+        return None
+    balance = station.naming.balance
+    effort = float(np.std(balance.effort[balance.train]))
+    terms = station.naming.fit.terms
+    posed = dict(zip((s.trial for s in states), states, strict=True))
+    weights = balance.gather(lambda s: _weight(posed[s.trial]))
+    plain = tuple(t for t in terms if t.effect.name != BENT)
+    odd = _Model(balance, terms, {"spring": usual["spring"], "preload": (0.0, effort)}, effort)
+    weighed = _Model(balance, plain, usual, effort, weights)
+    likelier = weighed.log_evidence - odd.log_evidence + (EVIDENCE_LEAST if len(plain) < len(terms) else 0.0)
+    if likelier <= 0:
+        return None
+    return weighed.mean[-2:], weighed.covariance[-2:, -2:], float(1 / (1 + np.exp(-likelier)))
+
+
+class _Model:
+    """Declared columns and terms of a balance, and further columns (n, k), as a linear model with normal priors.
+
+    priors: coefficient -> mean and standard deviation; of the others nothing is known, the further ones and the terms
+    have some `effort`. mean, covariance: of the coefficients (m,), (m, m).
+    """
+
+    def __init__(
+        self,
+        balance: Balance,
+        terms: tuple[Term, ...],
+        priors: Mapping[str, tuple[float, float]],
+        effort: float,
+        further: Array | None = None,
+    ) -> None:
+        matrix = balance.design(terms)[0]
+        if further is not None:
+            matrix = np.c_[matrix, further]
+        size = np.maximum(np.sqrt(np.mean(matrix**2, axis=0)), 1e-12)
+        mean, deviation = np.zeros(len(size)), effort / size
+        deviation[: len(balance.names)] *= FLAT
+        for name, (value, doubt) in priors.items():
+            at = balance.names.index(name)
+            mean[at], deviation[at] = value, doubt
+        w = balance.weights(terms) * balance.train
+        columns, left = (
+            balance.whiten(v, w) / np.sqrt(balance.inflation) for v in (matrix * w[:, None], balance.effort * w)
+        )
+        # in units of the priors' standard deviations, about their means
+        columns, left = columns * deviation, left - columns @ mean
+        precision = columns.T @ columns + np.eye(len(size))
+        found = np.linalg.solve(precision, columns.T @ left)
+        self.log_evidence = float(0.5 * (columns.T @ left) @ found - 0.5 * left @ left) - 0.5 * float(
+            np.linalg.slogdet(precision)[1]
+        )
+        self.mean = mean + deviation * found
+        self.covariance = np.linalg.inv(precision) * np.outer(deviation, deviation)
+
+
+def _weight(state: DriveState) -> Array:
+    """What a unit weight along the finger and across it does, (n, 2)."""
+    return effect(WEIGHT).columns(state, {"sweep": float(state.extra["sweep"][0])})[:, :2]
+
+
+def _declaring(state: DriveState) -> DriveState:
+    """The state with a weight among what is declared."""
+    return replace(
+        state,
+        declared=np.c_[state.declared, _weight(state)],
+        declared_names=(*state.declared_names, ALONG, ACROSS),
+    )
+
+
+def _finding(odd: Finding, weight: Array, covariance: Array, probability: float, sweep: float) -> Finding:
+    """The finding of an odd preload, as a weight's."""
+    doubt = 1.96 * np.sqrt(np.diag(covariance))
+    unit = odd.parameters["half_difference"]["unit"]
+    parameters = {
+        name: {"value": float(value), "unit": unit, "ci95": [float(value - d), float(value + d)]}
+        for name, value, d in zip(("along", "across"), weight, doubt, strict=True)
+    }
+    parameters["sweep"] = {"value": sweep, "unit": "rad", "ci95": None}
+    text = effect(WEIGHT).statement(odd.where, {name: entry["value"] for name, entry in parameters.items()})
+    members = (WEIGHT, *odd.members) if probability < 0.95 else (WEIGHT,)
+    return replace(
+        odd,
+        effect=WEIGHT,
+        members=members,
+        probability=probability * odd.probability,
+        parameters=parameters,
+        statement=text,
+    )

@@ -34,18 +34,13 @@ def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]
     drive pulls at its preload. A drive of which something else is missing must be unlike the others both with and
     without its name.
     """
-    pulled = {s.actuator for s in stations if _pulls(s)}
-    drives = [
-        s
-        for s in stations
-        if s.signal == "current" and s.actuator not in pulled and "preload" in s.naming.fit.declared and _tells(s)
-    ]
+    drives = _drives(stations)
     healthy = [s for s in drives if not s.missing]
     spread = _spread([s.naming.fit.declared for s in healthy])
     out = []
     for station in drives:
-        rest = [s for s in drives if s is not station and (_settled(s) or s in healthy)]
-        if all(s.missing for s in rest):  # a drive of which something is missing accuses no other
+        rest = _others(drives, station)
+        if not rest:
             continue
         others = [float(s.naming.fit.declared["preload"]) for s in rest]
         usual = float(np.median(others))
@@ -65,6 +60,32 @@ def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]
             shape, scale = spread
             out.append(_finding(station, own - usual, error, scale / shape * usual, (1 - p) * larger))
     return out
+
+
+def expected(stations: Sequence[Station], station: Station, name: str) -> tuple[float, float] | None:
+    """What the hand's other drives let expect of a positive coefficient of one drive, and how sure that is (standard
+    deviation); None where they say nothing."""
+    drives = _drives(stations)
+    values = [float(s.naming.fit.declared[name]) for s in _others(drives, station)]
+    usual = float(np.median(values)) if values else 0.0
+    shape, scale = _spread([s.naming.fit.declared for s in drives if not s.missing])
+    return (usual, np.sqrt(2) * scale / shape * usual) if usual > 0 else None
+
+
+def _drives(stations: Sequence[Station]) -> list[Station]:
+    """Those whose preload can be spoken of."""
+    pulled = {s.actuator for s in stations if _pulls(s)}
+    return [
+        s
+        for s in stations
+        if s.signal == "current" and s.actuator not in pulled and "preload" in s.naming.fit.declared and _tells(s)
+    ]
+
+
+def _others(drives: Sequence[Station], station: Station) -> list[Station]:
+    """The drives that say what is usual; none where something is missing of all: such a drive accuses no other."""
+    rest = [s for s in drives if s is not station and (_settled(s) or not s.missing)]
+    return [] if all(s.missing for s in rest) else rest
 
 
 def _pulls(station: Station) -> bool:
