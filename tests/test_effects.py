@@ -163,3 +163,12 @@ def test_what_is_there_all_along_in_every_recording_is_no_obstacle(trial: float,
         s, {"trial": trial, "form": 0.0, "since": 0.0, "until": until, "begin": float(np.median(s.position))}
     )
     assert bool(columns.any()) is acts
+
+
+def test_static_friction_that_no_recorded_effort_could_overcome_is_impossible() -> None:
+    s = state()
+    largest = float(np.abs(s.effort).max())
+    stribeck = effect("stribeck_friction")
+    assert stribeck.possible((s,), {"static_excess": 0.9 * largest})
+    assert not stribeck.possible((s,), {"static_excess": 1.1 * largest})
+    assert not stribeck.possible((), {"static_excess": 1.1 * largest})

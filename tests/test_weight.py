@@ -1,0 +1,65 @@
+"""A weight on a hand that never turns, told from lopsided friction and a bent spring."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from test_diagnose import drive
+
+from hand_model.diagnose import weight
+from hand_model.diagnose.name.station import judged
+from hand_model.effects import effect
+
+SWEEP = 1.4
+EFFECTS = [effect(name) for name in ("nonlinear_spring", "torque_ripple", "gravity_load")]
+
+
+def posed(states: tuple[Any, ...]) -> tuple[Any, ...]:
+    """The states with gravity along the finger and across it, and the angle that its joint turns through."""
+
+    def one(state: Any) -> Any:
+        n = np.ones(len(state.time_s))
+        gravity = {"gravity_along": -3.0 * n, "gravity_across": 9.0 * n, "pose_seen": n, "sweep": SWEEP * n}
+        return replace(state, extra={**state.extra, **gravity})
+
+    return tuple(one(s) for s in states)
+
+
+def heard(monkeypatch: pytest.MonkeyPatch, load: Any) -> tuple[list[Any], list[Any]]:
+    """Stations and findings of two drives, the second one loaded."""
+    monkeypatch.setattr(weight, "in_one_pose", lambda session, fingers, states: posed(states))
+    calls = [
+        ("current", f"finger_{i}", f"motor_{i}", None, drive(11 + i, added), EFFECTS, None)
+        for i, added in enumerate((lambda s: np.zeros(len(s.time_s)), load))
+    ]
+    stations = [judged(*call) for call in calls]
+    return weight.with_weights(SimpleNamespace(), {}, stations, calls)
+
+
+@pytest.mark.parametrize("size", [-14.0, -45.0])
+def test_a_weight_explains_an_odd_preload_and_the_bend_that_it_foretells(
+    monkeypatch: pytest.MonkeyPatch, size: float
+) -> None:
+    stations, findings = heard(monkeypatch, lambda s: size * np.sin(1.7 + SWEEP * s.position / 100))
+    named = {f.term.effect.name for s in stations if s.believed for f in s.kept}
+    assert {f.effect for _, f in findings} | named == {"gravity_load"}
+    for _, finding in findings:
+        assert finding.where["finger"] == "finger_1"
+        largest = np.hypot(*(finding.parameters[k]["value"] for k in ("along", "across")))
+        assert 9.5 / 9.81 * largest == pytest.approx(abs(size), rel=0.3)
+
+
+def test_lopsided_friction_foretells_no_bend_and_stays_what_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    stations, findings = heard(monkeypatch, lambda s: np.full(len(s.time_s), 25.0))
+    assert [f.effect for _, f in findings] == ["asymmetric_friction"]
+    assert not any(s.kept for s in stations)
+
+
+def test_a_bent_spring_beside_a_usual_preload_stays_what_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    stations, findings = heard(monkeypatch, lambda s: 30 * (s.position / 100) ** 2)
+    assert not findings
+    assert [f.term.effect.name for s in stations for f in s.kept] == ["nonlinear_spring"]
