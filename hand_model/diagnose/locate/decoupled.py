@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...effects.base import DriveState
+from ...effects.base import DriveState, position_range
 from ...effects.spring_decoupling import spans
 from ...errors import IdentificationError
 from ...identify.clock import align
@@ -17,12 +17,15 @@ from .angles import FingerAngles
 Array = NDArray[np.float64]
 
 BESIDE, MOST_S = 0.4, 1.0  # of an excursion's length, at most, on either side: it is seen from where it stands out
+CORNER = 0.2  # of the way on which the finger stays behind, beyond its end
 
 
 def while_driven(states: Sequence[DriveState], below: float) -> tuple[DriveState, ...]:
-    """A drive's states without the current where the finger does not follow it open, below that position [%]: the
-    spring is not on it there."""
-    return tuple(replace(s, effort=np.where(s.position < below, np.nan, s.effort)) for s in states)
+    """A drive's states without the current where the finger does not follow it open, below that position [%] or a
+    little beyond: the spring is not on it there, and no corner is sharp."""
+    low, _ = position_range(tuple(states))
+    driven_from = below + CORNER * max(below - low, 0.0)
+    return tuple(replace(s, effort=np.where(s.position < driven_from, np.nan, s.effort)) for s in states)
 
 
 def beside_excursions(states: Sequence[DriveState], ahead: Sequence[DriveState]) -> tuple[DriveState, ...]:
