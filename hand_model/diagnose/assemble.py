@@ -29,7 +29,7 @@ TRIFLE = 0.01  # of the square of the heaviest weight
 # of that magnitude: less, where the lack-of-fit test sees nothing, is left to the imperfections of reading angles and
 # speeds
 MINUTE = 0.15
-UNSEEN = 0.05  # probability from which the test sees nothing
+UNSEEN = 0.01  # probability from which the test sees nothing
 SIGNALS = {"drive": "current", "motors": "current", "command": "current", "encoder": "encoder", "linkage": "markers"}
 SHOWN_IN = {e.name: SIGNALS[e.station] for e in catalogue() if e.station in SIGNALS}
 NAMES = {e.name for e in catalogue()}
