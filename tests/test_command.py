@@ -81,7 +81,7 @@ def test_a_drive_at_its_limit_in_part_of_its_strokes_is_seen(seed: int) -> None:
     state, current = strokes(limited, seed)
     facts = command_facts((state,), (current,))
     assert facts.ceiling == pytest.approx(LIMIT, rel=0.06)
-    ((_, finding),) = command_findings({"index": facts}, {"index": "index"})
+    ((_, finding),) = command_findings({"index": facts}, {"index": "index"}, {})
     assert finding.parameters["share_cut"]["value"] == facts.share_cut and 0 < facts.share_cut < 0.5
 
 
@@ -97,7 +97,7 @@ def sags(**profiles) -> set[str | None]:
     for seed, (name, profile) in enumerate(profiles.items()):
         state, current = strokes(profile, seed, noise=1.0)
         facts[name] = command_facts((state,), (current,))
-    found = command_findings(facts, {name: name for name in facts})
+    found = command_findings(facts, {name: name for name in facts}, {})
     return {f.where["actuator"] for _, f in found if f.effect == "drive_sag"}
 
 
@@ -146,7 +146,7 @@ def test_a_late_drive_is_told_by_how_much_beside_a_prompt_one() -> None:
         name: command_facts((s,), (c,))
         for name, (s, c) in {"index": answering(0.09, 1), "ring": answering(0.0, 2)}.items()
     }
-    found = command_findings(facts, {"index": "index", "ring": "ring"})
+    found = command_findings(facts, {"index": "index", "ring": "ring"}, {})
     assert [(f.effect, f.where["finger"]) for _, f in found] == [("command_delay", "index")]
     low, high = found[0][1].parameters["delay"]["ci95"]
     assert low < 0.09 < high and high - low < 2 * STEP_S
@@ -157,7 +157,7 @@ def test_two_prompt_drives_have_no_delay() -> None:
         name: command_facts((s,), (c,))
         for name, (s, c) in {"index": answering(0.0, 3), "ring": answering(0.0, 4)}.items()
     }
-    assert not command_findings(facts, {"index": "index", "ring": "ring"})
+    assert not command_findings(facts, {"index": "index", "ring": "ring"}, {})
 
 
 def test_slow_references_of_all_drives_are_no_delay_of_the_one_that_friction_holds_longer() -> None:
@@ -175,7 +175,7 @@ def test_a_current_ahead_of_its_time_is_early_and_the_prompt_drive_beside_it_is_
     facts = {"index": command_facts((early,), (ahead,)), "ring": command_facts((prompt,), (other,))}
     told = lateness({name: f.answers for name, f in facts.items()})
     assert told["index"].channel_s == pytest.approx(-0.1, abs=STEP_S) and abs(told["ring"].channel_s) < 0.5 * STEP_S
-    assert not command_findings(facts, {"index": "index", "ring": "ring"})
+    assert not command_findings(facts, {"index": "index", "ring": "ring"}, {})
 
 
 def late_answers(current: float, motion: float, seed: int) -> Answers:

@@ -99,7 +99,7 @@ def diagnose(
     simulated = delays_apart({d.actuator: d for d in told[: len(read)] if d is not None})
     drives = heard.drives(simulated)
     facts = _command(session, drives)
-    heard.found += command_findings(facts, {a: _finger_of(session, a) for a in facts})
+    heard.found += command_findings(facts, {a: _finger_of(session, a) for a in facts}, simulated)
     for _, finding in heard.found:
         tell(finding.statement)
     heard.listen_to_drives(*_timed(drives, facts, simulated))

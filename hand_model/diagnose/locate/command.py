@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...effects.base import DriveState
+from ...effects.base import DriveState, figure
 from ..findings import UNWRITTEN, Finding, weighed
 from .answers import Answers, answers_of, lateness
+from .ceiling import Ceiling
 from .simulated import SimulatedDrive
 from .strokes import LEAST_LOSS, ceiling, sag, settled_sag, strokes_of
 
@@ -18,6 +20,8 @@ Array = NDArray[np.float64]
 
 SAG_T, SETTLED_T = 10.0, 4.0
 ALIKE = 2.0  # times the loss of speed of the session's least sagging drive: drives of one kind may differ by as much
+# log likelihood of a limit: for an effect, for the limits that are tried, and for as many names of as many channels
+BEYOND_CHANCE = 15.0
 REACTION_S = 0.15  # a person's quickest: a delay counts beside it
 UNLIKE = 0.1  # of a delay by which answers may miss it: controllers of other gains rise otherwise
 
@@ -61,15 +65,20 @@ def command_facts(states: tuple[DriveState, ...], currents: tuple[Array, ...]) -
     )
 
 
-def command_findings(facts: dict[str, CommandFacts], fingers: dict[str, str | None]) -> list[tuple[float, Finding]]:
-    """Delays and sags of the session's drives; the least delayed, and the least sagging one, show what a healthy one
-    does."""
+def command_findings(
+    facts: dict[str, CommandFacts], fingers: dict[str, str | None], simulated: Mapping[str, SimulatedDrive]
+) -> list[tuple[float, Finding]]:
+    """Delays, sags and limits of the session's drives; the least delayed, and the least sagging one, show what a
+    healthy one does."""
     out = []
+    asked = {a: d.ceiling for a, d in simulated.items() if d.ceiling is not None and d.ceiling.likelier > BEYOND_CHANCE}
     late = lateness({a: f.answers for a, f in facts.items()})
     for actuator, fact in facts.items():
         if actuator in late and len(late[actuator].drive_s):
             out.append(_delay(actuator, fingers.get(actuator), fact, late[actuator].drive_s))
-        if np.isfinite(fact.ceiling):
+        if actuator in asked:
+            out.append(_limit_finding(actuator, fingers.get(actuator), fact, asked[actuator]))
+        elif np.isfinite(fact.ceiling):
             out.append(_ceiling_finding(actuator, fingers.get(actuator), fact))
         elif _sags(fact, [f for a, f in facts.items() if a != actuator]):
             out.append(_sag_finding(actuator, fingers.get(actuator), fact))
@@ -116,31 +125,46 @@ def _lasting(state: DriveState, late_s: float) -> Array:
 
 
 def _ceiling_finding(actuator: str, finger: str | None, fact: CommandFacts) -> tuple[float, Finding]:
+    text = (
+        f"The {actuator} motor is at its limit of {fact.ceiling:.0f} raw in its fastest strokes: the current stays, and speed falls "
+        "as the load rises."
+    )
+    parameters = {"limit": {"value": fact.ceiling, "unit": "raw"}, "share_cut": {"value": fact.share_cut, "unit": "1"}}
+    return fact.cut, _saturation(actuator, finger, fact, text, parameters, "speed_loss", "strokes")
+
+
+def _limit_finding(actuator: str, finger: str | None, fact: CommandFacts, ceiling: Ceiling) -> tuple[float, Finding]:
+    text = f"The {actuator} motor's current does not exceed {figure(ceiling.limit)} raw, where its controller asks for more."
+    parameters = {
+        "limit": {"value": ceiling.limit, "unit": "raw", "ci95": list(ceiling.ci95)},
+        "share_cut": {"value": ceiling.share, "unit": "1"},
+    }
+    finding = _saturation(actuator, finger, fact, text, parameters, "current_rmse", "controller of the motor")
+    return ceiling.lost, finding
+
+
+def _saturation(
+    actuator: str,
+    finger: str | None,
+    fact: CommandFacts,
+    text: str,
+    parameters: Mapping[str, Mapping[str, Any]],
+    metric: str,
+    engine: str,
+) -> Finding:
     fit = {
-        "metric": "speed_loss",
-        "unit": "1",
+        "metric": metric,
+        "unit": "1" if metric == "speed_loss" else "raw",
         "before": None,
         "after": None,
         "noise_floor": None,
         "ci95_reduction": None,
         "held_out": [],
-        "engine": "strokes",
+        "engine": engine,
     }
     where = {**_where(actuator, finger), "signal": "current", "trials": list(fact.trials)}
-    text = (
-        f"The {actuator} motor is at its limit of {fact.ceiling:.0f} raw in its fastest strokes: the current stays, and speed falls "
-        "as the load rises."
-    )
-    return fact.cut, Finding(
-        "current_saturation",
-        ("current_saturation",),
-        0.999,
-        (),
-        where,
-        text,
-        {"limit": {"value": fact.ceiling, "unit": "raw"}, "share_cut": {"value": fact.share_cut, "unit": "1"}},
-        fit,
-        dict(UNWRITTEN),
+    return Finding(
+        "current_saturation", ("current_saturation",), 0.999, (), where, text, parameters, fit, dict(UNWRITTEN)
     )
 
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ...effects.path import runs
 from ...errors import HandModelError
 from ...session import Log, Session
+from .ceiling import Ceiling, Run, ceiling_of
 from .motion import Motion, local_quadratic, since_rest
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ SLOW_S, SLOW_SAMPLES = 0.1, 4.0  # width of the kernel, at least, by which the r
 FEWEST = 8  # samples in a row of which something slow can be told
 COVERED = 0.9  # of the samples in motion that the simulated moves must hold
 MOVES = 0.01  # of the fastest speed
+IN_TIME = 3.0  # standard deviations by which a current may be late that is held against what is asked for
 SAME_S = 1e-5  # times of one row of a log agree to this, whatever the clock counts from
 DIFFERENCE_S = 2e-3  # half width of the differences that make velocity and acceleration of a simulated position
 
@@ -39,12 +41,14 @@ DIFFERENCE_S = 2e-3  # half width of the differences that make velocity and acce
 class SimulatedDrive:
     """delay_s: by how much the current of `actuator` is late, negative where its position is; doubt_s: standard
     deviation, infinite where the current is not explained. motions: trial -> time (n,) [s], position, velocity and
-    acceleration (n,) [% and per second], nan between moves; none where the simulation lacks something."""
+    acceleration (n,) [% and per second], nan between moves; none where the simulation lacks something. ceiling: a limit
+    of the current beyond which the controller asks for more, where it shows one."""
 
     actuator: str
     delay_s: float
     doubt_s: float
     motions: Mapping[str, tuple[Array, Array, Array, Array]] = field(default_factory=dict)
+    ceiling: Ceiling | None = None
 
 
 def simulated_drive(session: Session, actuator: str) -> SimulatedDrive | None:
@@ -60,18 +64,19 @@ def simulated_drive(session: Session, actuator: str) -> SimulatedDrive | None:
             return None
         delay_s, doubt_s = channel_delay(fit.output_error, BOUNDS) if fit.predictive else (0.0, np.inf)
         logs = {t.name: t.log() for t in drive_trials(session)[actuator]}
-        motions = {name: _motion(fit, name, log) for name, log in logs.items()}
+        runs_ = {name: _along(fit, name, log) for name, log in logs.items()}
+        motions = {name: None if run is None else _motion(run, fit) for name, run in runs_.items()}
+        in_time = abs(delay_s) <= IN_TIME * doubt_s + DIFFERENCE_S
+        ceiling = _ceiling(fit, [run for run in runs_.values() if run is not None]) if in_time else None
     except (HandModelError, np.linalg.LinAlgError):  # a drive that cannot be simulated is judged by its recorded motion
         return None
     told = {name: m for name, m in motions.items() if m is not None}
     # one kind of state in one balance
-    return SimulatedDrive(actuator, delay_s, doubt_s, told if len(told) == len(motions) else {})
+    return SimulatedDrive(actuator, delay_s, doubt_s, told if len(told) == len(motions) else {}, ceiling)
 
 
-def _motion(fit: MotorFit, name: str, log: Log) -> tuple[Array, Array, Array, Array] | None:
-    """Time, position, velocity and acceleration of a log's simulated moves; None where they are farther from the
-    recorded ones than noise."""
-    from ...identify.motor.noise import white_noise
+def _along(fit: MotorFit, name: str, log: Log) -> Run | None:
+    """A log's moves simulated; None where none starts from rest."""
     from ...identify.motor.predict import aligned_moves
     from ...identify.motor.recording import motor_trial
     from ...identify.motor.residuals import simulate_states
@@ -83,14 +88,37 @@ def _motion(fit: MotorFit, name: str, log: Log) -> tuple[Array, Array, Array, Ar
     state = np.full((3, len(trial.time_s)), np.nan)
     for m, rows in zip(data, simulate_states(data, found.values, own, found.controller, DIFFERENCE_S), strict=True):
         state[:, m.index + 1 : m.index + 1 + len(m.time_s)] = rows.T
-    slow = _slow(trial.time_s, trial.position - state[0])
-    noise = max(white_noise(trial.position, trial.time_s), 0.3 / fit.scale.counts_per_percent)
-    if np.sqrt(np.nanmean((trial.position - state[0] - slow[0]) ** 2)) > TRUE_TO * noise:
-        return None
     first = log.time_s[
         np.isfinite(log.time_s) & np.isfinite(log.columns["position"]) & np.isfinite(log.columns["current"])
     ][0]
-    return (trial.time_s + first, *(state + slow))
+    return Run(trial, float(first), tuple(data), own, state, _slow(trial.time_s, trial.position - state[0]))
+
+
+def _motion(run: Run, fit: MotorFit) -> tuple[Array, Array, Array, Array] | None:
+    """Time, position, velocity and acceleration of a log's simulated moves; None where they are farther from the
+    recorded ones than noise."""
+    trial = run.trial
+    away = trial.position - run.simulated[0] - run.slow[0]
+    if np.sqrt(np.nanmean(away**2)) > TRUE_TO * _encoder_noise(run, fit):
+        return None
+    return (trial.time_s + run.first_s, *(run.simulated + run.slow))
+
+
+def _encoder_noise(run: Run, fit: MotorFit) -> float:
+    from ...identify.motor.noise import white_noise
+
+    return float(max(white_noise(run.trial.position, run.trial.time_s), 0.3 / fit.scale.counts_per_percent))
+
+
+def _ceiling(fit: MotorFit, runs_: list[Run]) -> Ceiling | None:
+    """The limit of the current, where the controller's asking shows one."""
+    from ...identify.motor.noise import white_noise
+
+    if not runs_ or fit.output_error is None:
+        return None
+    sensed = float(np.mean([white_noise(run.trial.current, run.trial.time_s) for run in runs_]))
+    asked = fit.output_error.values["gain"] * float(np.mean([_encoder_noise(run, fit) for run in runs_]))
+    return ceiling_of(fit, runs_, float(np.hypot(sensed, asked)))
 
 
 def _slow(time_s: Array, rest: Array) -> Array:

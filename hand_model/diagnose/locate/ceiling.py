@@ -1,0 +1,204 @@
+"""Ceiling of a drive: its controller asks for more current than flows.
+
+Where a controller is known, what it asks for follows from what it sees: gain times the way and damping times the speed
+by which the drive is behind the reference (a disturbance observer reads the load so: Ohnishi 1996). No model of the
+drive is in it: whatever friction or load there is, the controller has to bring it up, and where the current stays
+behind, something limits it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from ...identify.motor import MotorFit
+    from ...identify.motor.moves import MoveData
+    from ...identify.motor.recording import MotorTrial
+
+Array = NDArray[np.float64]
+
+MOVES = 0.03  # of the fastest speed: slower, a drive may rest
+INSTANT = 2  # column of what a command's instant changes
+CHANGE = 1e-3  # of a parameter, by which the reference's derivatives are taken
+LOUDER = 1.1  # times the noise of both readings: what they differ by at most, where nothing but a limit is between them
+FEWEST = 200  # samples in motion
+LEVELS, LEAST_QUANTILE = 24, 0.6  # limits tried, and the share of the currents that is below the lowest
+ROUNDS = 3  # of telling apart what is limited and what is not
+SURE = 1.92  # fall of a log likelihood at the ends of a 95 % interval (Wilks 1938)
+
+
+@dataclass(frozen=True)
+class Ceiling:
+    """limit [raw] and its 95 % interval; share: of the samples in motion for which more is asked; lost: of what is
+    asked, over the noise (root mean square); likelier: log likelihood that it brings."""
+
+    limit: float
+    ci95: tuple[float, float]
+    share: float
+    lost: float
+    likelier: float
+
+
+@dataclass(frozen=True)
+class Run:
+    """One recording simulated along its moves. first_s: of its log [s]. simulated, slow: (3, n) position [%] and its
+    derivatives as simulated, and what is slow of the recorded less these."""
+
+    trial: MotorTrial
+    first_s: float
+    data: tuple[MoveData, ...]
+    own: Array
+    simulated: Array
+    slow: Array
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Samples in motion of all recordings. sensed, asked: (n,) [raw]; columns (n, k): what parameters of the controller
+    change of `asked`; speed (n,): what a move's own does; move (n,): numbers."""
+
+    sensed: Array
+    asked: Array
+    columns: Array
+    speed: Array
+    move: NDArray[np.int64]
+
+
+def ceiling_of(fit: MotorFit, runs: Sequence[Run], noise: float) -> Ceiling | None:
+    """The limit of a drive's current; None where the controller's reference is not known beforehand, where what it asks
+    and the current differ by more than a limit and noise, or where no limit is likelier than none.
+
+    noise: of the current and of what is asked together [raw], white. Parameters of the controller are fitted to the
+    current, and of each move its instant, and its speed as far as moves differ by more than noise.
+    """
+    if fit.output_error is None or fit.output_error.controller != "profile":
+        return None
+    return limit_of(_stacked([_behind_reference(fit, run) for run in runs]), noise)
+
+
+def limit_of(asked: Asked, noise: float) -> Ceiling | None:
+    """The likeliest limit between what is asked and what flows; None where these differ by more than that and noise
+    [raw], or samples are too few."""
+    if len(asked.sensed) < FEWEST:
+        return None
+    free = _corrected(asked, np.ones(len(asked.sensed), bool))
+    plain = float(np.sum((asked.sensed - free) ** 2))
+    size = np.abs(free)
+    levels = np.linspace(np.quantile(size, LEAST_QUANTILE), np.max(size), LEVELS + 1)[:-1]
+    tried = [(*_limited(asked, free, level), level) for level in levels]
+    error, share, limit = min(tried)
+    step = float(levels[1] - levels[0])
+    for _ in range(5):
+        step /= 2
+        near = [(*_limited(asked, free, level), level) for level in (limit - step, limit + step)]
+        tried += near
+        error, share, limit = min([(error, share, limit), *near])
+    if np.sqrt(error / len(asked.sensed)) > LOUDER * noise:
+        return None
+    near_best = [level for e, _, level in tried if e - error < 2 * SURE * noise**2]
+    interval = float(min(near_best)) - step, float(max(near_best)) + step
+    lost = np.sqrt(max(plain - error, 0.0) / len(asked.sensed)) / noise
+    return Ceiling(float(limit), interval, share, float(lost), (plain - error) / (2 * noise**2))
+
+
+def _limited(asked: Asked, start: Array, limit: float) -> tuple[float, float]:
+    """Squared error with a limit, and the share of samples beyond it: the controller's parameters are learned where it
+    is not reached."""
+    current = start
+    for _ in range(ROUNDS):
+        within = np.abs(current) < limit
+        if within.sum() < FEWEST:
+            return np.inf, 1.0
+        current = _corrected(asked, within)
+    error = float(np.sum((asked.sensed - np.clip(current, -limit, limit)) ** 2))
+    return error, float(np.mean(np.abs(current) > limit))
+
+
+def _corrected(asked: Asked, use: NDArray[np.bool_]) -> Array:
+    """What is asked for (n,), with the controller's parameters as the current has them in the samples `use`."""
+    apart, scale = asked.sensed - asked.asked, np.linalg.norm(asked.columns[use], axis=0) + 1e-300
+    rest = apart - asked.columns @ (np.linalg.lstsq((asked.columns / scale)[use], apart[use], rcond=1e-6)[0] / scale)
+    rest = rest - _of_each(rest, asked.columns[:, INSTANT], asked.move, use)
+    return asked.sensed - (rest - _shrunk_of_each(rest, asked.speed, asked.move, use))
+
+
+def _of_each(rest: Array, column: Array, move: NDArray[np.int64], use: NDArray[np.bool_]) -> Array:
+    """What a column (n,) of its own for each move takes of the rest (n,)."""
+    size = np.maximum(np.bincount(move, column**2 * use), 1e-12)
+    return (np.bincount(move, rest * column * use) / size)[move] * column
+
+
+def _shrunk_of_each(rest: Array, column: Array, move: NDArray[np.int64], use: NDArray[np.bool_]) -> Array:
+    """The same with coefficients shrunk to what they differ by beyond noise (James & Stein 1961)."""
+    size = np.maximum(np.bincount(move, column**2 * use), 1e-12)
+    mean, chance = np.bincount(move, rest * column * use) / size, float(np.var(rest[use])) / size
+    spread = max(float(np.average(mean**2 - chance, weights=1 / chance)), 0.0)
+    return (mean * spread / (spread + chance))[move] * column
+
+
+def _stacked(parts: Sequence[tuple[Mapping[str, Array], Array]]) -> Asked:
+    """All recordings' samples in motion of which everything is known; a speed that was told is a column of its own."""
+    joined = {name: np.concatenate([p[name] for p, _ in parts]) for name in parts[0][0]}
+    record = np.concatenate([np.full(len(p["sensed"]), i) for i, (p, _) in enumerate(parts)])
+    columns = np.concatenate([c for _, c in parts])
+    known = np.isfinite(columns).all(1) & np.all([np.isfinite(x) for x in joined.values()], axis=0)
+    speed = np.abs(joined["velocity"])
+    use = known & (speed > MOVES * np.max(speed[known], initial=0.0))
+    told = np.stack([joined["speed"] * (joined["logged"] == x) for x in np.unique(joined["logged"][use])], axis=1)
+    _, move = np.unique(np.stack([record, joined["move"]])[:, use], axis=1, return_inverse=True)
+    return Asked(
+        joined["sensed"][use],
+        joined["asked"][use],
+        np.c_[columns, told][use],
+        joined["speed"][use],
+        move.ravel(),
+    )
+
+
+def _behind_reference(fit: MotorFit, run: Run) -> tuple[dict[str, Array], Array]:
+    """What the controller asks along one recording, and what changes it (n, 7): the simulated current, and what gain and
+    damping make of the recorded motion's being elsewhere; nan between moves."""
+    from ...identify.motor.residuals import simulate_moves
+
+    found, trial = fit.output_error, run.trial
+    q, n = found.values, len(trial.time_s)
+    asked, speed, logged, move = np.full((4, n), np.nan)
+    columns = np.full((n, 7), np.nan)
+    damping = q["damping"] - q["gain"] * q["delay"]
+    velocity = run.simulated[1] + run.slow[1]
+    for j, (m, y) in enumerate(zip(run.data, simulate_moves(run.data, q, run.own, found.controller), strict=True)):
+        rows = slice(m.index + 1, m.index + 1 + len(m.time_s))
+        asked[rows], move[rows], logged[rows] = y[:, 1], j, m.logged
+        changed = _derivatives(m, run.own[j], q, trial.position[rows], velocity[rows])
+        *controller, speed[rows] = changed
+        columns[rows] = np.stack(controller, axis=1)
+    asked -= q["gain"] * (trial.position - run.simulated[0]) + damping * run.slow[1]
+    parts = {"sensed": trial.current, "asked": asked, "speed": speed, "logged": logged, "move": move}
+    return {**parts, "velocity": velocity}, columns
+
+
+def _derivatives(m: MoveData, own: Array, q: Mapping[str, float], position: Array, velocity: Array) -> Iterator[Array]:
+    """Of what is asked in one move by gain, damping, the instant, a zero, speed, rise and fall, and by the move's own
+    speed, (n,) each."""
+    r, w = _reference(m, own, q)
+    base = q["gain"] * r + q["damping"] * w
+    yield from (r - position, w - velocity, w, np.ones(len(r)))
+    others = [({**q, name: q[name] * (1 + CHANGE)}, 1.0) for name in ("speed_full", "rise", "fall")]
+    for values, faster in (*others, (q, 1 + CHANGE)):
+        other_r, other_w = _reference(m, own, values, faster)
+        yield (q["gain"] * other_r + q["damping"] * other_w - base) / CHANGE
+
+
+def _reference(m: MoveData, own: Array, values: Mapping[str, float], faster: float = 1.0) -> tuple[Array, Array]:
+    from ...identify.motor.batch import Moves
+    from ...identify.motor.profile import profile
+
+    one = np.ones(1)
+    moves = Moves(own[:1], m.origin * one, m.target * one, faster * own[2:3], one * m.limit, one * own[1], 0 * one, one)
+    r, w = profile(m.time_s, moves, {k: v * one for k, v in values.items()})
+    return r[:, 0], w[:, 0]
