@@ -32,7 +32,7 @@ def asked(seed: int, flows: Callable[[Array], Array] = lambda i: i, moves: int =
     load, behind, velocity, move = np.concatenate(parts, axis=1)
     columns = np.stack([behind, velocity, velocity, np.ones(len(load))], axis=1)
     sensed = flows(load) + rng.normal(0, SENSED, len(load))
-    return Asked(sensed, GAIN * behind, columns, 0 * load, move.astype(int))
+    return Asked(sensed, GAIN * behind, columns, 0 * load, 0 * load, move.astype(int))
 
 
 @pytest.mark.parametrize("seed", range(5))

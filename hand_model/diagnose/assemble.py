@@ -17,10 +17,19 @@ from .magnitude import SLIGHT, channel_figures, magnitude, sure_magnitude
 from .name.distinguishability import protocol_pairs
 from .name.interval import variance_ratio
 from .name.naming import ALPHA, Named
-from .name.station import UNREST, Station, channel_of, finding_of, outsider_of, unexplained_of, unrepeated_of
+from .name.station import (
+    SAME_PERIOD,
+    UNREST,
+    Station,
+    channel_of,
+    finding_of,
+    outsider_of,
+    unexplained_of,
+    unrepeated_of,
+)
 
 UNLIKE_OTHERS = 2.0  # times the wander of the calmest finger
-HARMONICS, SAME_PERIOD = 4, 0.02
+HARMONICS = 4
 SHADOW = 0.5  # of an encoder error's size: less, in the current of the same motor, may be what is left of it
 TILT = 0.2  # the same, of a wobble's or a travelling centre's, in the angles of the finger
 ANGULAR = {e.name for station in ("encoder", "linkage") for e in catalogue(station)} - {"clock_drift"}

@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 
 MOVES = 0.03  # of the fastest speed: slower, a drive may rest
 INSTANT = 2  # column of what a command's instant changes
+TICK_S = 4e-3  # to which a reference's changes, and the drive's beside them, are known in time
 CHANGE = 1e-3  # of a parameter, by which the reference's derivatives are taken
 LOUDER = 1.1  # times the noise of both readings: what they differ by at most, where nothing but a limit is between them
 FEWEST = 200  # samples in motion
@@ -60,12 +61,14 @@ class Run:
 @dataclass(frozen=True)
 class Asked:
     """Samples in motion of all recordings. sensed, asked: (n,) [raw]; columns (n, k): what parameters of the controller
-    change of `asked`; speed (n,): what a move's own does; move (n,): numbers."""
+    change of `asked`; speed (n,): what a move's own does; doubt (n,) [raw]: what an instant that is known to a tick
+    means for it while the reference's speed changes; move (n,): numbers."""
 
     sensed: Array
     asked: Array
     columns: Array
     speed: Array
+    doubt: Array
     move: NDArray[np.int64]
 
 
@@ -87,27 +90,28 @@ def limit_of(asked: Asked, noise: float) -> Ceiling | None:
     if len(asked.sensed) < FEWEST:
         return None
     free = _corrected(asked, np.ones(len(asked.sensed), bool))
-    plain = float(np.sum((asked.sensed - free) ** 2))
+    sigma = np.hypot(noise, asked.doubt)
+    plain = float(np.sum(((asked.sensed - free) / sigma) ** 2))
     size = np.abs(free)
     levels = np.linspace(np.quantile(size, LEAST_QUANTILE), np.max(size), LEVELS + 1)[:-1]
-    tried = [(*_limited(asked, free, level), level) for level in levels]
+    tried = [(*_limited(asked, free, level, sigma), level) for level in levels]
     error, share, limit = min(tried)
     step = float(levels[1] - levels[0])
     for _ in range(5):
         step /= 2
-        near = [(*_limited(asked, free, level), level) for level in (limit - step, limit + step)]
+        near = [(*_limited(asked, free, level, sigma), level) for level in (limit - step, limit + step)]
         tried += near
         error, share, limit = min([(error, share, limit), *near])
-    if np.sqrt(error / len(asked.sensed)) > LOUDER * noise:
+    if np.sqrt(error / len(asked.sensed)) > LOUDER:
         return None
-    near_best = [level for e, _, level in tried if e - error < 2 * SURE * noise**2]
+    near_best = [level for e, _, level in tried if e - error < 2 * SURE]
     interval = float(min(near_best)) - step, float(max(near_best)) + step
-    lost = np.sqrt(max(plain - error, 0.0) / len(asked.sensed)) / noise
-    return Ceiling(float(limit), interval, share, float(lost), (plain - error) / (2 * noise**2))
+    lost = np.sqrt(max(plain - error, 0.0) / len(asked.sensed))
+    return Ceiling(float(limit), interval, share, float(lost), (plain - error) / 2)
 
 
-def _limited(asked: Asked, start: Array, limit: float) -> tuple[float, float]:
-    """Squared error with a limit, and the share of samples beyond it: the controller's parameters are learned where it
+def _limited(asked: Asked, start: Array, limit: float, sigma: Array) -> tuple[float, float]:
+    """Weighted squared error with a limit, and the share of samples beyond it: the controller's parameters are learned where it
     is not reached."""
     current = start
     for _ in range(ROUNDS):
@@ -115,7 +119,7 @@ def _limited(asked: Asked, start: Array, limit: float) -> tuple[float, float]:
         if within.sum() < FEWEST:
             return np.inf, 1.0
         current = _corrected(asked, within)
-    error = float(np.sum((asked.sensed - np.clip(current, -limit, limit)) ** 2))
+    error = float(np.sum(((asked.sensed - np.clip(current, -limit, limit)) / sigma) ** 2))
     return error, float(np.mean(np.abs(current) > limit))
 
 
@@ -156,6 +160,7 @@ def _stacked(parts: Sequence[tuple[Mapping[str, Array], Array]]) -> Asked:
         joined["asked"][use],
         np.c_[columns, told][use],
         joined["speed"][use],
+        joined["doubt"][use],
         move.ravel(),
     )
 
@@ -167,7 +172,7 @@ def _behind_reference(fit: MotorFit, run: Run) -> tuple[dict[str, Array], Array]
 
     found, trial = fit.output_error, run.trial
     q, n = found.values, len(trial.time_s)
-    asked, speed, logged, move = np.full((4, n), np.nan)
+    asked, speed, logged, move, doubt = np.full((5, n), np.nan)
     columns = np.full((n, 7), np.nan)
     damping = q["damping"] - q["gain"] * q["delay"]
     velocity = run.simulated[1] + run.slow[1]
@@ -177,9 +182,15 @@ def _behind_reference(fit: MotorFit, run: Run) -> tuple[dict[str, Array], Array]
         changed = _derivatives(m, run.own[j], q, trial.position[rows], velocity[rows])
         *controller, speed[rows] = changed
         columns[rows] = np.stack(controller, axis=1)
+        doubt[rows] = q["damping"] * TICK_S * _beside(np.abs(np.gradient(columns[rows, INSTANT], m.time_s)))
     asked -= q["gain"] * (trial.position - run.simulated[0]) + damping * run.slow[1]
-    parts = {"sensed": trial.current, "asked": asked, "speed": speed, "logged": logged, "move": move}
+    parts = {"sensed": trial.current, "asked": asked, "speed": speed, "logged": logged, "move": move, "doubt": doubt}
     return {**parts, "velocity": velocity}, columns
+
+
+def _beside(values: Array) -> Array:
+    """The largest of each value (n,) and its neighbours."""
+    return np.max(np.stack([values, np.r_[values[1:], values[-1]], np.r_[values[0], values[:-1]]]), axis=0)
 
 
 def _derivatives(m: MoveData, own: Array, q: Mapping[str, float], position: Array, velocity: Array) -> Iterator[Array]:

@@ -28,6 +28,8 @@ UNREST = 0.3  # of the noise: wander that every machine is granted; more is no e
 WORSE = 1.5  # times the mean square of training recordings
 # times the noise of recordings kept out, and the share of what is above it that true names take
 KEPT_OUT, EXPLAINED_MOST = 1.05, 2 / 3
+SAME_PERIOD = 0.02  # by which a harmonic's may differ
+PATCHES = 2  # periods beside the first that are none of its harmonics: more than a second gear
 MAIN = 0.5  # of what names explain together: what one of them must hold where they do not do
 PLAINLY = 1 / 3  # of the mean square of recordings kept out before, at most, is noise
 # of a mismatch that the lack-of-fit test sees: below, they are not what is missing, whatever is left to see
@@ -90,10 +92,12 @@ class Station:
         """Whether the names stand: the final model passes the test, or takes most of the mismatch away, or all that
         recordings kept out show. Names that take little of a plain mismatch away do not, however little is left to see,
         nor names of nothing where more than the noise does not repeat, nor as many as may be, none of them the main
-        one, beside which the test fails."""
+        one, beside which the test fails, nor what is left beside something larger that does not stand, nor many
+        periods that have nothing in common."""
         idle = self.explained < (EXPLAINED_SOME if self.naming.before.p < ALPHA else SMALL if self.wander > 1 else 0.0)
         most = self.naming.after.p >= ALPHA or self.explained >= EXPLAINED_LEAST or self._predicted
-        return bool(self.proven) and not idle and not self._short and not self._scattered and most
+        pieces = self._scattered or self._left_over or self._patched
+        return bool(self.proven) and not idle and not self._short and not pieces and most
 
     @property
     def _scattered(self) -> bool:
@@ -104,6 +108,24 @@ class Station:
             and len(self.naming.found) >= MOST_TERMS
             and max(f.share for f in self.naming.found) < MAIN
         )
+
+    @property
+    def _left_over(self) -> bool:
+        """Whether the better part of what the names explain is of some that do not stand: the others may describe what
+        is left of it."""
+        return sum(f.share for f in self.proven) < MAIN
+
+    @property
+    def _patched(self) -> bool:
+        """Whether a periodic effect has more than two periods that are no harmonics of its longest: they describe a
+        shape that repeats in none of them."""
+        of = [f.term for f in self.proven if f.term.effect.repeats and "period" in f.term.shape]
+        for name in {t.effect.name for t in of}:
+            periods = np.array([t.shape["period"] for t in of if t.effect.name == name])
+            order = periods.max() / periods
+            if np.sum(np.abs(order / np.round(order) - 1) > SAME_PERIOD) >= PATCHES:
+                return True
+        return False
 
     @property
     def _predicted(self) -> bool:
