@@ -331,3 +331,13 @@ def test_what_follows_a_lifted_joint_is_not_judged_while_it_is_lifted() -> None:
         np.isfinite(state.effort[(state.time_s < 7.0) | (state.time_s > 12.0)]).all()
         and np.isfinite(other.effort).all()
     )
+
+
+def test_a_drive_is_judged_from_a_little_beyond_where_its_finger_stays_behind() -> None:
+    from drive_motion import state
+
+    from hand_model.diagnose.locate.decoupled import while_driven
+
+    (left,) = while_driven([state()], 20.0)
+    kept = left.position[np.isfinite(left.effort)]
+    assert 22.0 < kept.min() < 26.0

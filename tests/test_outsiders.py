@@ -40,7 +40,14 @@ def tooth(state: DriveState) -> np.ndarray:
     return BY_NAME["cycle_memory"].columns(state, shape)[:, 0] * 30.0
 
 
-@pytest.mark.parametrize(("name", "add"), [("gain_change", gain), ("friction_jump", jump), ("cycle_memory", tooth)])
+def grease(state: DriveState) -> np.ndarray:
+    return BY_NAME["thixotropy"].columns(state, {"thinning_speed": 18.0, "while": 4.0})[:, 0] * 0.5
+
+
+@pytest.mark.parametrize(
+    ("name", "add"),
+    [("gain_change", gain), ("friction_jump", jump), ("cycle_memory", tooth), ("thixotropy", grease)],
+)
 def test_an_outsider_is_unexplained_and_said(name: str, add) -> None:
     station = heard(drive(3, add))
     assert not station.kept and [f.term.effect.name for f in station.outsiders] == [name]
@@ -105,6 +112,25 @@ def test_many_pieces_that_do_not_do_are_no_explanation(shares: tuple[float, ...]
     station = object.__new__(Station)
     station.naming = SimpleNamespace(after=SimpleNamespace(p=p), found=[SimpleNamespace(share=s) for s in shares])
     assert station._scattered is scattered
+
+
+@pytest.mark.parametrize(("standing", "left_over"), [((0.9, 0.05), False), ((0.05, 0.05), True)])
+def test_what_is_left_beside_something_larger_that_does_not_stand_is_no_explanation(
+    standing: tuple[float, ...], left_over: bool
+) -> None:
+    station = object.__new__(Station)
+    station.proven = tuple(SimpleNamespace(share=s) for s in standing)
+    assert station._left_over is left_over
+
+
+@pytest.mark.parametrize(
+    ("periods", "patched"),
+    [((30.0,), False), ((30.0, 15.05, 10.0), False), ((30.0, 21.0), False), ((30.0, 26.0, 21.0, 15.0), True)],
+)
+def test_many_periods_that_have_nothing_in_common_are_no_explanation(periods: tuple[float, ...], patched: bool) -> None:
+    station, error = object.__new__(Station), effect("encoder_periodic_error")
+    station.proven = tuple(SimpleNamespace(term=SimpleNamespace(effect=error, shape={"period": p})) for p in periods)
+    assert station._patched is patched
 
 
 def test_the_share_that_a_ceiling_cuts_is_what_the_motion_requires_beyond_it() -> None:
