@@ -77,7 +77,7 @@ def ceiling_of(fit: MotorFit, runs: Sequence[Run], noise: float) -> Ceiling | No
     and the current differ by more than a limit and noise, or where no limit is likelier than none.
 
     noise: of the current and of what is asked together [raw], white. Parameters of the controller are fitted to the
-    current, and of each move its instant, and its speed as far as moves differ by more than noise.
+    current, and of each move its instant and its speed.
     """
     if fit.output_error is None or fit.output_error.controller != "profile":
         return None
@@ -128,21 +128,13 @@ def _corrected(asked: Asked, use: NDArray[np.bool_]) -> Array:
     apart, scale = asked.sensed - asked.asked, np.linalg.norm(asked.columns[use], axis=0) + 1e-300
     rest = apart - asked.columns @ (np.linalg.lstsq((asked.columns / scale)[use], apart[use], rcond=1e-6)[0] / scale)
     rest = rest - _of_each(rest, asked.columns[:, INSTANT], asked.move, use)
-    return asked.sensed - (rest - _shrunk_of_each(rest, asked.speed, asked.move, use))
+    return asked.sensed - (rest - _of_each(rest, asked.speed, asked.move, use))
 
 
 def _of_each(rest: Array, column: Array, move: NDArray[np.int64], use: NDArray[np.bool_]) -> Array:
     """What a column (n,) of its own for each move takes of the rest (n,)."""
     size = np.maximum(np.bincount(move, column**2 * use), 1e-12)
     return (np.bincount(move, rest * column * use) / size)[move] * column
-
-
-def _shrunk_of_each(rest: Array, column: Array, move: NDArray[np.int64], use: NDArray[np.bool_]) -> Array:
-    """The same with coefficients shrunk to what they differ by beyond noise (James & Stein 1961)."""
-    size = np.maximum(np.bincount(move, column**2 * use), 1e-12)
-    mean, chance = np.bincount(move, rest * column * use) / size, float(np.var(rest[use])) / size
-    spread = max(float(np.average(mean**2 - chance, weights=1 / chance)), 0.0)
-    return (mean * spread / (spread + chance))[move] * column
 
 
 def _stacked(parts: Sequence[tuple[Mapping[str, Array], Array]]) -> Asked:
@@ -158,11 +150,17 @@ def _stacked(parts: Sequence[tuple[Mapping[str, Array], Array]]) -> Asked:
     return Asked(
         joined["sensed"][use],
         joined["asked"][use],
-        np.c_[columns, told][use],
+        np.c_[columns, told, *_bent(joined["asked"])][use],
         joined["speed"][use],
         joined["doubt"][use],
         move.ravel(),
     )
+
+
+def _bent(asked: Array) -> tuple[Array, Array]:
+    """Squares (n,) of what is asked for [100 raw^2], without and with its sign: what a controller that is slightly
+    another asks for otherwise, and no limit."""
+    return 1e-2 * asked**2, 1e-2 * asked * np.abs(asked)
 
 
 def _behind_reference(fit: MotorFit, run: Run) -> tuple[dict[str, Array], Array]:
