@@ -14,8 +14,8 @@ from hand_model.diagnose.assemble import (
     _without_tilts,
     assemble,
 )
-from hand_model.diagnose.diagnosis import _without_settled_sags
 from hand_model.diagnose.findings import Finding, weighed
+from hand_model.diagnose.hearing import _without_settled_sags
 from hand_model.diagnose.locate.displacement import NO_HINGE
 from hand_model.effects import effect
 

@@ -12,7 +12,7 @@ import pytest
 from session_writers import write_log, write_session
 
 from hand_model.diagnose import diagnose
-from hand_model.diagnose.diagnosis import _current_at, _no_measurement
+from hand_model.diagnose.hearing import _current_at, _no_measurement
 from hand_model.diagnose.locate.drive import _held, count_range, drive_states, opposes, too_short
 from hand_model.errors import HandFileError, SessionError
 from hand_model.identify.clock import align

@@ -1,0 +1,206 @@
+"""What a session has said so far: its fingers first, then its commands, then its drives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..background import Background
+from ..effects import catalogue, outsiders
+from ..effects.base import DriveState
+from ..errors import SessionError
+from ..session import Log, Session, check_session, moves
+from .findings import Finding
+from .finger import FingerReading, finger_calls
+from .locate.angles import FingerAngles
+from .locate.command import CommandFacts, command_facts, command_findings, refused
+from .locate.course import FingerCourses
+from .locate.decoupled import while_driven, without_excursions
+from .locate.drive import drive_states, drive_trials, opposes, too_short
+from .locate.encoder_error import encoder_corrections
+from .locate.gravity import with_gravity
+from .locate.measurement import echoes_command, is_measured, rests_on_command
+from .locate.simulated import SimulatedDrive
+from .locate.stamps import Stamps, stamps
+from .magnitude import magnitude
+from .name.balance import Balance
+from .name.evidence import typical_coefficients
+from .name.station import Station, judged
+from .weight import with_weights
+
+REASON = 0.5  # of the size at which friction by load is plain: a soft controller falls behind by so much
+
+
+class Heard:
+    """What a session has said so far. found: findings with their weight. tell: called with a line per result; step:
+    with nothing, after each."""
+
+    def __init__(self, session: Session, tell: Callable[[str], None], step: Callable[[], None]) -> None:
+        self.session, self.tell, self.step = session, tell, step
+        self.notes = [*check_session(session, dead=True), *too_short(session)]
+        self.fingers: dict[str, FingerAngles] = {}
+        self.courses: dict[str, FingerCourses] = {}
+        self.stations: list[Station] = []
+        distrusted = _distrusted(session)
+        self.unexplained = [_false_stamps(session, a, s) for a, s in distrusted.items()]
+        unmeasured = {
+            a: why for a, trials in drive_trials(session).items() if (why := _no_measurement([t.log() for t in trials]))
+        }
+        self.found: list[tuple[float, Finding]] = [
+            refused(a, _finger_of(session, a), tuple(t.name for t in drive_trials(session)[a]), "position", why)
+            for a, why in unmeasured.items()
+        ]
+        self.unread = (*distrusted, *unmeasured)  # actuators whose log is not believed
+
+    def listen_to_fingers(self, beside: tuple[Callable[[], Any], ...] = ()) -> list[Any]:
+        """What the cameras say of each finger. beside: further calls, made where a core is free meanwhile; what they
+        return."""
+        calls, done = finger_calls(self.session, self.unread), []
+        for reading in Background(_made, [(call,) for call in (*calls, *beside)]).results():
+            if not isinstance(reading, FingerReading):
+                done.append(reading)
+                continue
+            self.step()
+            for line in reading.lines:
+                self.tell(line)
+            self.stations += reading.stations
+            self.found += reading.found
+            self.unexplained += reading.unexplained
+            self.notes += reading.notes
+            if reading.angles is not None:
+                self.fingers[reading.finger] = reading.angles
+            if reading.courses is not None:
+                self.courses[reading.finger] = reading.courses
+        return done
+
+    def drives(self, simulated: dict[str, SimulatedDrive]) -> dict[str, tuple[DriveState, ...]]:
+        """The drives' balances while they carry their fingers, encoders put right; those whose current is no
+        measurement are refused.
+
+        Raises SessionError where a drive's signs contradict each other.
+        """
+        session = self.session
+        drives = {
+            a: with_gravity(session, self.fingers, states)
+            for a, states in drive_states(session, encoder_corrections(self.stations), self.unread, simulated).items()
+        }
+        for station in (s for s in self.stations if s.believed and s.actuator in drives):
+            for term in (f.term for f in station.kept if f.term.effect.name == "spring_decoupling"):
+                states = drives[station.actuator]
+                drives[station.actuator] = (
+                    while_driven(states, term.shape["below"])
+                    if term.shape["form"] > 0.5
+                    else without_excursions(states, station.naming.balance.states, self.fingers[station.finger])
+                )
+        for actuator in [a for a, states in drives.items() if not is_measured(states)]:
+            self.found.append(
+                refused(actuator, _finger_of(session, actuator), tuple(s.trial for s in drives.pop(actuator)))
+            )
+        for actuator in (a for a, states in drives.items() if opposes(states)):
+            raise SessionError(
+                f'{session.path}: actuator "{actuator}": friction would drive the motion; `position` must increase with flexion and '
+                "positive `current` drive flexion, and one of them has the other sign"
+            )
+        return drives
+
+    def listen_to_commands(
+        self, drives: Mapping[str, tuple[DriveState, ...]], simulated: Mapping[str, SimulatedDrive]
+    ) -> dict[str, CommandFacts]:
+        """What the drives did of what they were told."""
+        facts = _command(self.session, drives)
+        self.found += command_findings(facts, {a: _finger_of(self.session, a) for a in facts}, simulated)
+        for _, finding in self.found:
+            self.tell(finding.statement)
+        return facts
+
+    def listen_to_drives(self, drives: dict[str, tuple[DriveState, ...]], late: dict[str, bool]) -> None:
+        """What the motors' currents say. late: whether each drive's current may be."""
+        alone = {a: Balance(states).fit() for a, states in drives.items()}
+        calls = []
+        for actuator, states in drives.items():
+            effects = [*(e for e in catalogue("drive") if not e.warps or late[actuator]), *outsiders("drive")]
+            typical = typical_coefficients([fit for a, fit in alone.items() if a != actuator])
+            calls.append(("current", _finger_of(self.session, actuator), actuator, None, states, effects, typical))
+        for station in Background(judged, calls).results():
+            self.step()
+            self.stations.append(station)
+            self.tell(station.line())
+        self.stations, odd = with_weights(self.session, self.fingers, self.stations, calls)
+        for _, finding in odd:
+            self.tell(finding.statement)
+        self.found = _without_settled_sags([*self.found, *odd], self.stations)
+
+
+def _without_settled_sags(
+    found: list[tuple[float, Finding]], stations: Sequence[Station]
+) -> list[tuple[float, Finding]]:
+    """Without losses of speed of drives whose current settles the matter: a reading that clips says little of the load
+    on which such a sag is judged, one that the current shows, too, is named there, with a law to write, and friction
+    that plainly grows with the load is a reason for a soft controller to fall behind."""
+    settled = {
+        s.actuator
+        for s in stations
+        if s.believed
+        for which, f in ((s.naming.fit.terms.index(f.term), f) for f in s.kept)
+        if f.term.effect.clips
+        or f.term.effect.name == "drive_sag"
+        or f.term.effect.name == "load_dependent_friction"
+        and magnitude("load_dependent_friction", _values(s.parameters[which])) > REASON
+    }
+    return [i for i in found if i[1].effect != "drive_sag" or i[1].where["actuator"] not in settled]
+
+
+def _values(parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, float]:
+    return {name: entry["value"] for name, entry in parameters.items()}
+
+
+def _no_measurement(logs: list[Log]) -> str:
+    """Why the position of a drive's logs is no measurement, "" where it is one."""
+    if echoes_command(logs):
+        return "it is at every new setpoint at once"
+    if rests_on_command(logs):
+        return "it rests on every setpoint to the count"
+    return "" if any(moves(log.column("position")) for log in logs) else "it never moves"
+
+
+def _distrusted(session: Session) -> dict[str, Stamps]:
+    """Actuators whose logs' time stamps do not belong to their rows: no dynamics can be read from them."""
+    judged = {a: stamps([t.log() for t in trials]) for a, trials in drive_trials(session).items()}
+    return {a: s for a, s in judged.items() if s is not None and not s.believed}
+
+
+def _false_stamps(session: Session, actuator: str, judged: Stamps) -> dict[str, Any]:
+    where = {"finger": _finger_of(session, actuator), "joint": None, "actuator": actuator, "signal": "log"}
+    return {
+        "where": where,
+        "share_of_mismatch": 1.0,
+        "shape": f"the rows' time stamps do not follow the motion (off by some {1e3 * judged.wrong_s:.0f} ms, as if given in "
+        "packets): speed, current and encoder against time were not judged",
+    }
+
+
+def _made(call: Callable[[], Any]) -> Any:
+    return call()
+
+
+def _command(session: Session, drives: Mapping[str, tuple[DriveState, ...]]) -> dict[str, CommandFacts]:
+    facts = {}
+    for actuator, trials in drive_trials(session).items():
+        logs = {t.name: t.log() for t in trials}
+        states = drives.get(actuator, ())
+        currents = tuple(_current_at(s.time_s, logs[s.trial]) for s in states)
+        if states:
+            facts[actuator] = command_facts(states, currents)
+    return facts
+
+
+def _current_at(time_s: Any, log: Log) -> Any:
+    """Current (n,) at times (n,), lost samples bridged."""
+    seen = np.isfinite(log.column("current"))
+    return np.interp(time_s, log.time_s[seen], log.column("current")[seen]) if seen.any() else np.zeros(len(time_s))
+
+
+def _finger_of(session: Session, actuator: str) -> str | None:
+    return next((f.name for f in session.fingers if f.actuator == actuator), None)

@@ -1,0 +1,64 @@
+"""Late current: which drives' currents are logged late, by answers to commands, by simulation and by the balance."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...effects import catalogue
+from ...effects.base import DriveState, least_delay
+from ..name.balance import Balance
+from ..name.evidence import gain
+from ..name.shapes import polish, scan
+from .command import CommandFacts, with_lateness
+from .drive import with_gives
+from .simulated import SimulatedDrive
+
+EARLY = 3.0  # standard deviations by which answers that come before the command say so for sure
+# log likelihood that a shift of a drive's current must bring: less, and its drive tells none (two standard deviations)
+DELAY_TOLD = 2.0
+
+
+def timed_drives(
+    drives: dict[str, tuple[DriveState, ...]], facts: dict[str, CommandFacts], simulated: dict[str, SimulatedDrive]
+) -> tuple[dict[str, tuple[DriveState, ...]], dict[str, bool]]:
+    """The drives with what is known of their current's lateness, and whether each may be late."""
+    timed = with_lateness(drives, facts, simulated)
+    late = _late(drives, timed)
+    in_time = [a for a in drives if not late[a]]
+    if 0 < len(in_time) < len(drives):  # at a reversal a late current looks like a give, an early one like none
+        timed = with_lateness(with_gives(drives, in_time), facts, simulated)
+    return timed, late
+
+
+def _late(drives: dict[str, tuple[DriveState, ...]], timed: dict[str, tuple[DriveState, ...]]) -> dict[str, bool]:
+    """Whether each drive's current may be delayed: a delay that all drives of a session share is how the log is read.
+    Answers to commands tell a late or an early current better than the balance does, and must bear it out. timed: the
+    drives with what these answers tell, which says nothing yet to the balance."""
+    best: dict[str, float] = {}
+    for actuator, states in drives.items():
+        balance = Balance(states)
+        delay = next(e for e in catalogue("drive") if e.warps)
+        fit = scan(balance, delay, ())
+        polished = None if fit is None else polish(balance, fit, 0)
+        told = polished is not None and gain(balance, polished, balance.fit()) > DELAY_TOLD
+        best[actuator] = polished.terms[0].shape["delay"] if told else 0.0
+    step = {a: float(np.median(np.diff(s[0].time_s))) for a, s in drives.items()}
+    # a lone drive cannot tell how the log is read from what its own channel does: twice as much is asked of it
+    common, least = (min(best.values(), key=abs), 0.75) if len(best) > 1 else (0.0, 2.0)
+    late = {a: s[0].extra["late"] for a, s in timed.items() if "late" in s[0].extra}
+
+    def borne_out(actuator: str) -> bool:
+        x, bound = best[actuator] - common, least * step[actuator]
+        if actuator not in late:
+            return abs(x) > bound
+        if (told_to := least_delay(timed[actuator])) < bound:
+            told = float(late[actuator][0])  # and to the side to which the balance would shift it
+            return abs(told) > told_to and told * best[actuator] >= 0
+        if late[actuator][0] < -max(bound, EARLY * late[actuator][1]):
+            return True
+        if x >= -bound:
+            return float(late[actuator][0]) > bound
+        others = [float(np.sum(value)) for a, value in late.items() if a != actuator]
+        return not others or max(others) - late[actuator][0] > bound  # who is early answers before the others
+
+    return {a: borne_out(a) for a in best}
