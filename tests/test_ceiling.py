@@ -39,7 +39,7 @@ def asked(seed: int, flows: Callable[[Array], Array] = lambda i: i, moves: int =
 def test_a_drive_that_gets_what_it_asks_for_has_no_limit(seed: int) -> None:
     for late_s in (0.0, 2e-3):
         found = limit_of(asked(seed, late_s=late_s), NOISE)
-        assert found is not None and found.likelier < BEYOND_CHANCE
+        assert found is None or found.likelier < BEYOND_CHANCE
 
 
 @pytest.mark.parametrize("limit", [55.0, 66.0])
@@ -52,6 +52,8 @@ def test_where_a_controller_asks_for_more_the_limit_is_told(limit: float) -> Non
 
 def test_a_sensor_that_errs_otherwise_tells_no_limit() -> None:
     assert limit_of(asked(3, lambda i: i + 8 * np.sin(i / 8)), NOISE) is None
+    # what still lets half of it pass is a controller, or a motion, that is read a little wrong
+    assert limit_of(asked(3, lambda i: i - 0.5 * np.maximum(i - 50, 0)), NOISE) is None
     assert limit_of(asked(3, moves=2), NOISE) is None
 
 

@@ -29,7 +29,9 @@ CHANGE = 1e-3  # of a parameter, by which the reference's derivatives are taken
 LOUDER = 1.1  # times the noise of both readings: what they differ by at most, where nothing but a limit is between them
 FEWEST = 200  # samples in motion
 LEVELS, LEAST_QUANTILE = 24, 0.6  # limits tried, and the share of the currents that is below the lowest
+PASSING = (1 / 3, 2 / 3)  # of what is beyond a limit: where that is as likely, there is none
 ROUNDS = 3  # of telling apart what is limited and what is not
+FINER = 5  # times the way between limits is halved
 SURE = 1.92  # fall of a log likelihood at the ends of a 95 % interval (Wilks 1938)
 
 
@@ -74,7 +76,7 @@ class Asked:
 
 def ceiling_of(fit: MotorFit, runs: Sequence[Run], noise: float) -> Ceiling | None:
     """The limit of a drive's current; None where the controller's reference is not known beforehand, where what it asks
-    and the current differ by more than a limit and noise, or where no limit is likelier than none.
+    and the current differ by more than a limit and noise, or where a limit that leaks is as likely.
 
     noise: of the current and of what is asked together [raw], white. Parameters of the controller are fitted to the
     current, and of each move its instant and its speed.
@@ -94,32 +96,42 @@ def limit_of(asked: Asked, noise: float) -> Ceiling | None:
     plain = float(np.sum(((asked.sensed - free) / sigma) ** 2))
     size = np.abs(free)
     levels = np.linspace(np.quantile(size, LEAST_QUANTILE), np.max(size), LEVELS + 1)[:-1]
-    tried = [(*_limited(asked, free, level, sigma), level) for level in levels]
-    error, share, limit = min(tried)
-    step = float(levels[1] - levels[0])
-    for _ in range(5):
-        step /= 2
-        near = [(*_limited(asked, free, level, sigma), level) for level in (limit - step, limit + step)]
-        tried += near
-        error, share, limit = min([(error, share, limit), *near])
+
+    def fitted(passing: float) -> list[tuple[float, float, float]]:
+        """Error, share beyond and limit of all limits tried, finer about the best; best first."""
+        tried = [(*_limited(asked, free, level, sigma, passing), level) for level in levels]
+        step = float(levels[1] - levels[0])
+        for _ in range(FINER):
+            step /= 2
+            limit = min(tried)[2]
+            tried += [(*_limited(asked, free, level, sigma, passing), level) for level in (limit - step, limit + step)]
+        return sorted(tried)
+
+    tried = fitted(0.0)
+    error, share, limit = tried[0]
+    likelier = (plain - error) / 2
     if np.sqrt(error / len(asked.sensed)) > LOUDER:
         return None
-    near_best = [level for e, _, level in tried if e - error < 2 * SURE]
-    interval = float(min(near_best)) - step, float(max(near_best)) + step
+    if likelier > SURE and min(fitted(passing)[0][0] for passing in PASSING) < error + 2 * SURE:
+        return None
+    near = [level for e, _, level in tried if e < error + 2 * SURE]
+    step = float(levels[1] - levels[0]) / 2**FINER
     lost = np.sqrt(max(plain - error, 0.0) / len(asked.sensed))
-    return Ceiling(float(limit), interval, share, float(lost), (plain - error) / 2)
+    return Ceiling(float(limit), (float(min(near)) - step, float(max(near)) + step), share, float(lost), likelier)
 
 
-def _limited(asked: Asked, start: Array, limit: float, sigma: Array) -> tuple[float, float]:
-    """Weighted squared error with a limit, and the share of samples beyond it: the controller's parameters are learned where it
-    is not reached."""
+def _limited(asked: Asked, start: Array, limit: float, sigma: Array, passing: float = 0.0) -> tuple[float, float]:
+    """Weighted squared error with a limit beyond which a share is still `passing`, and the share of samples beyond it:
+    the controller's parameters are learned where it is not reached."""
     current = start
     for _ in range(ROUNDS):
         within = np.abs(current) < limit
         if within.sum() < FEWEST:
             return np.inf, 1.0
         current = _corrected(asked, within)
-    error = float(np.sum(((asked.sensed - np.clip(current, -limit, limit)) / sigma) ** 2))
+    within_limit = np.clip(current, -limit, limit)
+    flows = within_limit + passing * (current - within_limit)
+    error = float(np.sum(((asked.sensed - flows) / sigma) ** 2))
     return error, float(np.mean(np.abs(current) > limit))
 
 
