@@ -47,7 +47,6 @@ def test_where_a_controller_asks_for_more_the_limit_is_told(limit: float) -> Non
     found = limit_of(asked(7, lambda i: np.clip(i, -limit, limit)), NOISE)
     assert found is not None and found.likelier > BEYOND_CHANCE
     assert found.limit == pytest.approx(limit, rel=0.03)
-    assert found.ci95[0] < found.limit < found.ci95[1]
 
 
 def test_a_sensor_that_errs_otherwise_tells_no_limit() -> None:
@@ -62,6 +61,6 @@ def test_a_likely_limit_is_a_finding_of_its_motor_and_an_unlikely_one_none() -> 
 
     facts = CommandFacts(Answers(np.zeros(0), np.zeros(0), 0.018), *[float("nan")] * 5)
     for likelier, count in ((BEYOND_CHANCE + 1, 1), (BEYOND_CHANCE - 1, 0)):
-        drive = SimulatedDrive("ring", 0.0, 1e-3, ceiling=Ceiling(70.0, (69.0, 71.0), 0.02, 0.3, likelier))
+        drive = SimulatedDrive("ring", 0.0, 1e-3, ceiling=Ceiling(70.0, 0.02, 0.3, likelier))
         found = command_findings({"ring": facts}, {"ring": "ring"}, {"ring": drive})
         assert [(f.effect, f.where["actuator"]) for _, f in found] == [("current_saturation", "ring")] * count

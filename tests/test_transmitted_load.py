@@ -6,7 +6,7 @@ import numpy as np
 from drive_motion import state
 
 from hand_model.diagnose.locate.load import transmitted_load
-from hand_model.diagnose.locate.motion import estimate_motion
+from hand_model.diagnose.locate.motion import estimate_motion, least_error
 from hand_model.effects.path import dahl
 
 NOISE = 5.0
@@ -22,6 +22,26 @@ def test_load_is_the_current_without_what_accelerates_the_motor_and_without_most
     # a reversal within one sample interval is known no better than that
     steady = np.abs(s.velocity) > 5.0
     assert np.sqrt(np.mean((found - load)[steady] ** 2)) < 0.3 * NOISE
+
+
+def test_what_a_controller_does_at_rest_says_nothing_of_the_load() -> None:
+    t = np.arange(2400) * 0.018
+    phase = np.clip(np.mod(t, 3.0) - 1.0, 0.0, 1.0)  # a second's move, two seconds' rest
+    x = 10 + 80 * np.abs(np.mod(np.floor(t / 3.0), 2) - phase)
+    motion = estimate_motion(t, x + np.random.default_rng(2).normal(0, 0.02, len(t)))
+    load = 0.2 * x + 9.0 + 35.0 * dahl(x, 0.7) + 0.15 * np.gradient(x, t)
+    moving = np.abs(np.gradient(x, t)) > 1.0
+    noise = np.random.default_rng(4).normal(0, NOISE, len(t))
+    inside = moving & np.roll(moving, 3) & np.roll(moving, -3)
+    for at_rest in (1.0, 0.0):
+        found = transmitted_load(t, np.where(moving, load, at_rest * load) + noise, motion)
+        assert np.sqrt(np.mean((found - load)[inside] ** 2)) < 0.5 * NOISE
+
+
+def test_rows_that_are_stamped_in_packets_are_smoothed_all_the_same() -> None:
+    t = np.repeat(np.arange(100) * 0.14, 8) + np.tile(np.arange(8) * 2e-5, 100)
+    smooth, _ = least_error(t, np.sin(t) + np.random.default_rng(0).normal(0, 0.3, len(t)))
+    assert np.isfinite(smooth).all() and np.sqrt(np.mean((smooth - np.sin(t)) ** 2)) < 0.3
 
 
 def test_a_motor_that_never_moved_passes_its_current_on() -> None:

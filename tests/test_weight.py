@@ -23,7 +23,12 @@ def posed(states: tuple[Any, ...]) -> tuple[Any, ...]:
 
     def one(state: Any) -> Any:
         n = np.ones(len(state.time_s))
-        gravity = {"gravity_along": -3.0 * n, "gravity_across": 9.0 * n, "pose_seen": n, "sweep": SWEEP * n}
+        gravity = {
+            "gravity_along": -3.0 * n,
+            "gravity_across": 9.0 * n,
+            "pose_seen": n,
+            "sweep": np.stack([SWEEP * n, 1.6 * SWEEP * n], axis=1),
+        }
         return replace(state, extra={**state.extra, **gravity})
 
     return tuple(one(s) for s in states)

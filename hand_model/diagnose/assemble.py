@@ -294,6 +294,7 @@ EXPERIMENTS = {
     frozenset(("drive_backlash", "series_elasticity")): "the same flexion with a known weight at the tip",
     frozenset(("linkage_backlash", "linkage_compliance")): "the same flexion with a known weight at the tip",
     frozenset(("nonlinear_spring", "gravity_load")): "the same flexion with the palm turned over",
+    frozenset(("gravity_load", "asymmetric_friction")): "the same flexion with the palm turned over",
     frozenset(("detent_load", "end_stop_contact")): "slow moves that end at three places short of the end of the range",
 }
 

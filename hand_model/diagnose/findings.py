@@ -35,6 +35,11 @@ class Finding:
     model: Mapping[str, Any] | None = None
     correction: str | None = None
 
+    @property
+    def held(self) -> str | None:
+        """What of the declared model holds it already, so that no file gets it; None where nothing does."""
+        return None if self.model is None else self.model.get("note")
+
     def to_dict(self) -> dict[str, Any]:
         """The finding as the format has it."""
         out: dict[str, Any] = {

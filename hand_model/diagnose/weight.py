@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..effects import effect
 from ..effects.base import DriveState
 from ..session import Session
-from .findings import Finding
+from .findings import UNWRITTEN, Finding
 from .locate.angles import FingerAngles
 from .locate.gravity import in_one_pose
 from .locate.preload import expected, preload_findings
@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 
 BENT, WEIGHT = "nonlinear_spring", "gravity_load"
 ALONG, ACROSS = "weight_along", "weight_across"  # declared columns of a weight that is known to be there
+HELD = "the declared preload and spring hold what these recordings show of it: the hand never turned"
 FLAT = 1e3  # standard deviations of the effort: of a coefficient of which nothing is known
 
 
@@ -46,17 +47,17 @@ def with_weights(
         states = in_one_pose(session, fingers, call[4])
         if states is None or "sweep" not in states[0].extra:
             continue
-        pull = _pulled(out, out[at], states)
+        pull = _pulled([s for s in out if s.actuator not in pulled], out[at], states)
         if pull is None:
             continue
         pulled.add(actuator)
         other = _named(call, states, out[at])
         if other is None:
             other = judged(*call[:4], tuple(_declaring(s) for s in states), *call[5:])
-            weights.append((size, _finding(odd, *pull, float(states[0].extra["sweep"][0]))))
+            weights.append((size, _finding(odd, *pull, float(states[0].extra["sweep"][0, 0]))))
         out[at] = other
-    odd_preloads = [item for item in preload_findings(out) if item[1].where["actuator"] not in pulled]
-    return out, [*weights, *odd_preloads]
+    # what a weight leaves of a drive's preload says nothing of the others'
+    return out, [*weights, *preload_findings([s for s in out if s.actuator not in pulled])]
 
 
 def _named(call: tuple[Any, ...], states: tuple[DriveState, ...], station: Station) -> Station | None:
@@ -140,7 +141,7 @@ class _Model:
 
 def _weight(state: DriveState) -> Array:
     """What a unit weight along the finger and across it does, (n, 2)."""
-    return effect(WEIGHT).columns(state, {"sweep": float(state.extra["sweep"][0])})[:, :2]
+    return effect(WEIGHT).columns(state, {"sweep": float(state.extra["sweep"][0, 0])})[:, :2]
 
 
 def _declaring(state: DriveState) -> DriveState:
@@ -166,6 +167,7 @@ def _finding(odd: Finding, weight: Array, covariance: Array, probability: float,
     return replace(
         odd,
         effect=WEIGHT,
+        model={**UNWRITTEN, "note": HELD},
         members=members,
         probability=probability * odd.probability,
         parameters=parameters,

@@ -20,13 +20,15 @@ class GravityLoad(Effect):
     name = "gravity_load"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """Angle swept over the range of positions, [rad], near the one that the markers show; with a recorded pose
-        only."""
+        """Angle swept over the range of positions, [rad], between those of the first joint and of all as the markers
+        show them; with a recorded pose only."""
         if not any("gravity_along" in s.extra for s in states):
             return ()
-        seen = [float(s.extra["sweep"][0]) for s in states if "sweep" in s.extra and len(s.time_s)]
-        if seen:
-            return (Shape("sweep", "rad", (1 - NEAR) * seen[0], (1 + NEAR) * seen[0], (seen[0],)),)
+        seen = next((s.extra["sweep"][0] for s in states if "sweep" in s.extra and len(s.time_s)), None)
+        if seen is not None:
+            first, last = sorted(float(angle) for angle in seen)
+            starts = tuple(np.unique([first, 0.5 * (first + last), last]).tolist())
+            return (Shape("sweep", "rad", (1 - NEAR) * first, (1 + NEAR) * last, starts),)
         return (Shape("sweep", "rad", 0.5, 2.5, (0.8, 1.4, 2.0)),)
 
     def amplitudes(self) -> tuple[Amplitude, ...]:

@@ -27,21 +27,21 @@ INSTANT = 2  # column of what a command's instant changes
 TICK_S = 4e-3  # to which a reference's changes, and the drive's beside them, are known in time
 CHANGE = 1e-3  # of a parameter, by which the reference's derivatives are taken
 LOUDER = 1.1  # times the noise of both readings: what they differ by at most, where nothing but a limit is between them
+COMMANDED = 0.9  # of a limit that the log tells
 FEWEST = 200  # samples in motion
 LEVELS, LEAST_QUANTILE = 24, 0.6  # limits tried, and the share of the currents that is below the lowest
 PASSING = (1 / 3, 2 / 3)  # of what is beyond a limit: where that is as likely, there is none
 ROUNDS = 3  # of telling apart what is limited and what is not
 FINER = 5  # times the way between limits is halved
-SURE = 1.92  # fall of a log likelihood at the ends of a 95 % interval (Wilks 1938)
+SURE = 1.92  # of log likelihood: what 95 % of chance does not bring (Wilks 1938)
 
 
 @dataclass(frozen=True)
 class Ceiling:
-    """limit [raw] and its 95 % interval; share: of the samples in motion for which more is asked; lost: of what is
+    """limit [raw]; share: of the samples in motion for which more is asked; lost: of what is
     asked, over the noise (root mean square); likelier: log likelihood that it brings."""
 
     limit: float
-    ci95: tuple[float, float]
     share: float
     lost: float
     likelier: float
@@ -83,7 +83,8 @@ def ceiling_of(fit: MotorFit, runs: Sequence[Run], noise: float) -> Ceiling | No
     """
     if fit.output_error is None or fit.output_error.controller != "profile":
         return None
-    return limit_of(_stacked([_behind_reference(fit, run) for run in runs]), noise)
+    asked = _stacked([_behind_reference(fit, run) for run in runs])
+    return None if asked is None else limit_of(asked, noise)
 
 
 def limit_of(asked: Asked, noise: float) -> Ceiling | None:
@@ -114,10 +115,8 @@ def limit_of(asked: Asked, noise: float) -> Ceiling | None:
         return None
     if likelier > SURE and min(fitted(passing)[0][0] for passing in PASSING) < error + 2 * SURE:
         return None
-    near = [level for e, _, level in tried if e < error + 2 * SURE]
-    step = float(levels[1] - levels[0]) / 2**FINER
     lost = np.sqrt(max(plain - error, 0.0) / len(asked.sensed))
-    return Ceiling(float(limit), (float(min(near)) - step, float(max(near)) + step), share, float(lost), likelier)
+    return Ceiling(float(limit), share, float(lost), likelier)
 
 
 def _limited(asked: Asked, start: Array, limit: float, sigma: Array, passing: float = 0.0) -> tuple[float, float]:
@@ -149,14 +148,17 @@ def _of_each(rest: Array, column: Array, move: NDArray[np.int64], use: NDArray[n
     return (np.bincount(move, rest * column * use) / size)[move] * column
 
 
-def _stacked(parts: Sequence[tuple[Mapping[str, Array], Array]]) -> Asked:
-    """All recordings' samples in motion of which everything is known; a speed that was told is a column of its own."""
+def _stacked(parts: Sequence[tuple[Mapping[str, Array], Array]]) -> Asked | None:
+    """All recordings' samples in motion of which everything is known; a speed that was told is a column of its own. None where they
+    are too few."""
     joined = {name: np.concatenate([p[name] for p, _ in parts]) for name in parts[0][0]}
     record = np.concatenate([np.full(len(p["sensed"]), i) for i, (p, _) in enumerate(parts)])
     columns = np.concatenate([c for _, c in parts])
     known = np.isfinite(columns).all(1) & np.all([np.isfinite(x) for x in joined.values()], axis=0)
     speed = np.abs(joined["velocity"])
-    use = known & (speed > MOVES * np.max(speed[known], initial=0.0))
+    use = known & (speed > MOVES * np.max(speed, where=known, initial=0.0))
+    if use.sum() < FEWEST:
+        return None
     told = np.stack([joined["speed"] * (joined["logged"] == x) for x in np.unique(joined["logged"][use])], axis=1)
     _, move = np.unique(np.stack([record, joined["move"]])[:, use], axis=1, return_inverse=True)
     return Asked(
@@ -188,7 +190,8 @@ def _behind_reference(fit: MotorFit, run: Run) -> tuple[dict[str, Array], Array]
     velocity = run.simulated[1] + run.slow[1]
     for j, (m, y) in enumerate(zip(run.data, simulate_moves(run.data, q, run.own, found.controller), strict=True)):
         rows = slice(m.index + 1, m.index + 1 + len(m.time_s))
-        asked[rows], move[rows], logged[rows] = y[:, 1], j, m.logged
+        commanded = np.abs(y[:, 1]) > COMMANDED * m.limit  # a limit that was asked for is none of the drive's
+        asked[rows], move[rows], logged[rows] = np.where(commanded, np.nan, y[:, 1]), j, m.logged
         changed = _derivatives(m, run.own[j], q, trial.position[rows], velocity[rows])
         *controller, speed[rows] = changed
         columns[rows] = np.stack(controller, axis=1)

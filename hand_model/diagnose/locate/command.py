@@ -137,7 +137,7 @@ def _ceiling_finding(actuator: str, finger: str | None, fact: CommandFacts) -> t
 def _limit_finding(actuator: str, finger: str | None, fact: CommandFacts, ceiling: Ceiling) -> tuple[float, Finding]:
     text = f"The {actuator} motor's current does not exceed {figure(ceiling.limit)} raw, where its controller asks for more."
     parameters = {
-        "limit": {"value": ceiling.limit, "unit": "raw", "ci95": list(ceiling.ci95)},
+        "limit": {"value": ceiling.limit, "unit": "raw"},
         "share_cut": {"value": ceiling.share, "unit": "1"},
     }
     finding = _saturation(actuator, finger, fact, text, parameters, "current_rmse", "controller of the motor")

@@ -27,7 +27,8 @@ def with_gravity(
     session: Session, fingers: Mapping[str, FingerAngles], states: tuple[DriveState, ...]
 ) -> tuple[DriveState, ...]:
     """The states with `gravity_along` and `gravity_across` [m/s^2] in `extra`: gravity along the open finger and across
-    it, and `sweep` [rad], the angle that the finger's first joint turns over the range, where a flexion shows it.
+    it, and `sweep` [rad], the angles that the finger's first joint and all together turn through over the range,
+    where a flexion shows them.
 
     fingers: by name. Recordings with markers have `pose_seen`; those without get `pose_unseen` instead. Unchanged where
     the session names no gravity, where no recording shows the palm, or where it never turned.
@@ -48,8 +49,8 @@ def with_gravity(
 def in_one_pose(
     session: Session, fingers: Mapping[str, FingerAngles], states: tuple[DriveState, ...]
 ) -> tuple[DriveState, ...] | None:
-    """The states with gravity as `with_gravity` has it, the same in all recordings; None where the palm was never seen,
-    or turned."""
+    """The states with gravity as `with_gravity` has it, taken to be the same in all recordings, those without markers
+    too; None where the palm was never seen, or turned."""
     seen, sweep = _seen(session, fingers, states)
     if not seen or _turned(session, seen):
         return None
@@ -65,19 +66,19 @@ def in_one_pose(
 
 def _seen(
     session: Session, fingers: Mapping[str, FingerAngles], states: tuple[DriveState, ...]
-) -> tuple[dict[str, Array], float | None]:
-    """Trial -> gravity (n, 2) in the finger's plane, of the recordings that show the palm, and the angle [rad] over the
-    range of positions."""
+) -> tuple[dict[str, Array], Array | None]:
+    """Trial -> gravity (n, 2) in the finger's plane, of the recordings that show the palm, and the angles (2,) [rad] over
+    the range of positions, of the first joint and of all."""
     if session.gravity_world is None:
         return {}, None
     trials = {t.name: t for t in session.trials}
     found = {s.trial: f for s in states if (f := _in_finger(session, fingers, trials[s.trial], s)) is not None}
     sweeps = [sweep for _, sweep in found.values() if sweep is not None]
-    return {trial: gravity for trial, (gravity, _) in found.items()}, float(np.median(sweeps)) if sweeps else None
+    return {trial: gravity for trial, (gravity, _) in found.items()}, np.median(sweeps, axis=0) if sweeps else None
 
 
-def _swept(state: DriveState, sweep: float | None) -> dict[str, Array]:
-    return {} if sweep is None else {"sweep": np.full(len(state.time_s), sweep)}
+def _swept(state: DriveState, sweep: Array | None) -> dict[str, Array]:
+    return {} if sweep is None else {"sweep": np.tile(sweep, (len(state.time_s), 1))}
 
 
 def _turned(session: Session, seen: Mapping[str, Array]) -> bool:
@@ -89,9 +90,9 @@ def _turned(session: Session, seen: Mapping[str, Array]) -> bool:
 
 def _in_finger(
     session: Session, fingers: Mapping[str, FingerAngles], trial: Trial, state: DriveState
-) -> tuple[Array, float | None] | None:
-    """Gravity (n, 2) in the finger's plane at the state's samples, and the angle [rad] over the range of positions where
-    the finger flexed; None without markers or with clocks that do not align."""
+) -> tuple[Array, Array | None] | None:
+    """Gravity (n, 2) in the finger's plane at the state's samples, and the angles (2,) [rad] over the range of positions
+    where the finger flexed; None without markers or with clocks that do not align."""
     if trial.mocap_path is None or trial.finger not in fingers:
         return None
     angles = fingers[trial.finger]
@@ -123,7 +124,9 @@ def _in_finger(
     if record is None:
         return gravity, None
     position = np.interp(clock.log_time(time_s[good]), state.time_s, state.position)
-    return gravity, 100 * float(np.polyfit(position, flexed[good], 1)[0])
+    turned = np.stack([flexed, record.angle_rad.sum(1)], axis=-1)[good]
+    known = np.isfinite(turned).all(1)
+    return gravity, 100 * np.polyfit(position[known], turned[known], 1)[0] if known.any() else None
 
 
 def plane(chain: Chain) -> Array:

@@ -11,6 +11,8 @@ from .motion import Motion, least_error
 Array = NDArray[np.float64]
 
 REACHES = np.geomspace(0.001, 0.05, 12)  # of the range, over which friction builds up after a reversal
+FEWEST = 50  # samples in motion
+LETS_GO = 1.2  # times the variance of what motion leaves unexplained
 ORDER = 4  # of the load over the position
 
 
@@ -19,19 +21,33 @@ def transmitted_load(time_s: Array, current: Array, motion: Motion) -> Array:
 
     A current's noise would be an error of a regressor, and smoothing it rounds what happens at a reversal, which is
     what tells a give from a play. Speed, friction that builds up after reversals (Dahl's or Jenkins's, whichever the
-    current prefers) and position explain nearly all of it; of the rest, what a smoothing with least error leaves.
+    current prefers) and position explain nearly all of it; of the rest, what a smoothing with least error leaves. A
+    controller that lets go of the load at rest is told by how much worse rests make the motion fit: they are bridged.
     """
-    moved = np.stack([motion.acceleration, motion.velocity, np.ones_like(time_s)], axis=-1)
-    span = float(np.ptp(motion.position))
-    if span == 0:
+    span, moving = float(np.ptp(motion.position)), motion.moving
+    if span == 0 or moving.sum() < FEWEST:
         return least_error(time_s, current)[0]
+    everywhere = _explained(current, motion, np.ones(len(current), bool))
+    in_motion = _explained(current, motion, moving)
+    lets_go = np.var((current - everywhere[0])[moving]) > LETS_GO * np.var((current - in_motion[0])[moving])
+    explained, inertia = in_motion if lets_go else everywhere
+    rest = current - explained
+    if lets_go:
+        rest = np.interp(time_s, time_s[moving], rest[moving])
+    return explained + least_error(time_s, rest)[0] - max(inertia, 0.0) * motion.acceleration
+
+
+def _explained(current: Array, motion: Motion, use: NDArray[np.bool_]) -> tuple[Array, float]:
+    """What motion explains of the current (n,), learned from some samples, and the inertia."""
+    moved = np.stack([motion.acceleration, motion.velocity, np.ones(len(current))], axis=-1)
+    span = float(np.ptp(motion.position))
     powers = ((motion.position - motion.position.min()) / span)[:, None] ** np.arange(1, ORDER + 1)
-    best, explained, inertia = np.inf, current, 0.0
+    best, out = np.inf, (current, 0.0)
     for rise in (dahl, jenkins):
         for reach in REACHES * span:
             columns = np.c_[moved, rise(motion.position, reach), powers]
-            fitted = np.linalg.lstsq(columns, current, rcond=1e-12)[0]
-            error = float(np.sum((current - columns @ fitted) ** 2))
+            fitted = np.linalg.lstsq(columns[use], current[use], rcond=1e-12)[0]
+            error = float(np.sum((current - columns @ fitted)[use] ** 2))
             if error < best:
-                best, explained, inertia = error, columns @ fitted, float(fitted[0])
-    return explained + least_error(time_s, current - explained)[0] - max(inertia, 0.0) * motion.acceleration
+                best, out = error, (columns @ fitted, float(fitted[0]))
+    return out

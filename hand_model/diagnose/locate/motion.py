@@ -16,6 +16,7 @@ from ...effects.path import runs
 Array = NDArray[np.float64]
 
 SURE = 3.0  # standard deviations
+FEWEST_BLOCKS = 12  # that a smoothing is made of
 DEPARTURES_S = (0.1, 0.25, 0.6, 1.5)  # bandwidths of what departs from a known course
 
 
@@ -78,10 +79,11 @@ def estimate_motion(time_s: Array, position: Array, bandwidth_s: float | None = 
 def least_error(time_s: Array, values: Array) -> tuple[Array, Array]:
     """Values smoothed over time and their rate (n,), at the bandwidth with the least leave-one-out error (Stone
     1974)."""
-    step = float(np.median(np.diff(time_s)))
+    step = max(float(np.median(np.diff(time_s))), 1e-9)
     tried = []
     for bandwidth in DEPARTURES_S:
-        count = max(1, int(bandwidth / step / 6))  # samples averaged first: six to a bandwidth lose nothing
+        # samples averaged first: six to a bandwidth lose nothing; stamps in packets have next to no step
+        count = max(1, min(int(bandwidth / step / 6), len(values) // FEWEST_BLOCKS))
         block = np.arange(len(values)) // count
         size = np.bincount(block)
         t, y = np.bincount(block, time_s) / size, np.bincount(block, values) / size

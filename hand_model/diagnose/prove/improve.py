@@ -163,7 +163,7 @@ def with_effects(hand: Hand, findings: Sequence[Finding]) -> Hand:
     effects = tuple(
         Effect(f.effect, dict(f.where), {k: _estimate(v) for k, v in f.parameters.items() if np.isfinite(v["value"])})
         for f in physics
-        if effect(f.effect).of_the_hand
+        if effect(f.effect).of_the_hand and f.held is None
     )
     return replace(hand, effects=(*hand.effects, *effects))
 
@@ -186,8 +186,9 @@ def written(before: Path, after: Path, finding: Finding, fingers: Collection[str
     values = {k: v["value"] for k, v in finding.parameters.items()}
     kind = effect(finding.effect)
     urdf = "not expressible: kept in hand.json"
-    if not kind.of_the_hand:
-        return {"native": False, "mjcf": None, "urdf": "not expressible", "callback": None, "note": kind.unwritten}
+    if not kind.of_the_hand or finding.held is not None:
+        note = finding.held or kind.unwritten
+        return {"native": False, "mjcf": None, "urdf": "not expressible", "callback": None, "note": note}
     if kind.law(values) is not None:
         call = "hand_model.effects_on(model, folder)"
         return {"native": False, "mjcf": None, "urdf": urdf, "callback": call}
