@@ -92,8 +92,9 @@ def _pulled(
     posed = dict(zip((s.trial for s in states), states, strict=True))
     weights = balance.gather(lambda s: _weight(posed[s.trial]))
     plain = tuple(t for t in terms if t.effect.name != BENT)
-    odd = _Model(balance, terms, {"spring": usual["spring"], "preload": (0.0, effort)}, effort)
-    weighed = _Model(balance, plain, usual, effort, weights)
+    inside = balance.unclipped(terms)
+    odd = _Model(balance, terms, inside, {"spring": usual["spring"], "preload": (0.0, effort)}, effort)
+    weighed = _Model(balance, plain, inside, usual, effort, weights)
     likelier = weighed.log_evidence - odd.log_evidence + (EVIDENCE_LEAST if len(plain) < len(terms) else 0.0)
     if likelier <= 0:
         return None
@@ -101,7 +102,8 @@ def _pulled(
 
 
 class _Model:
-    """Declared columns and terms of a balance, and further columns (n, k), as a linear model with normal priors.
+    """Declared columns and terms of a balance, and further columns (n, k), as a linear model with normal priors, of the
+    samples `inside`.
 
     priors: coefficient -> mean and standard deviation; of the others nothing is known, the further ones and the terms
     have some `effort`. mean, covariance: of the coefficients (m,), (m, m).
@@ -111,6 +113,7 @@ class _Model:
         self,
         balance: Balance,
         terms: tuple[Term, ...],
+        inside: NDArray[np.bool_],
         priors: Mapping[str, tuple[float, float]],
         effort: float,
         further: Array | None = None,
@@ -124,7 +127,7 @@ class _Model:
         for name, (value, doubt) in priors.items():
             at = balance.names.index(name)
             mean[at], deviation[at] = value, doubt
-        w = balance.weights(terms) * balance.train
+        w = balance.weights(terms) * balance.train * inside
         columns, left = (
             balance.whiten(v, w) / np.sqrt(balance.inflation) for v in (matrix * w[:, None], balance.effort * w)
         )
