@@ -17,7 +17,7 @@ from .locate.angles import FingerAngles
 from .locate.gravity import in_one_pose
 from .locate.preload import expected, preload_findings
 from .name.balance import Balance
-from .name.naming import Named
+from .name.naming import CLASS_WIDTH, Named
 from .name.selection import EVIDENCE_LEAST
 from .name.station import Station, judged
 from .name.term import Term
@@ -40,21 +40,23 @@ def with_weights(
     one that explains both by as much as any further effect must bring.
     """
     out, weights, pulled = list(stations), list[tuple[float, Finding]](), set[str]()
-    for size, odd in preload_findings(stations):
-        actuator = odd.where["actuator"]
+    odd = {f.where["actuator"]: (size, f) for size, f in preload_findings(stations)}
+    bent = [s.actuator for s in stations if s.signal == "current" and _kept(s, BENT) is not None]
+    for actuator in dict.fromkeys([*odd, *bent]):
         at = next(i for i, s in enumerate(out) if s.signal == "current" and s.actuator == actuator)
         call = next(c for c in calls if c[2] == actuator)
         states = in_one_pose(session, fingers, call[4])
         if states is None or "sweep" not in states[0].extra:
             continue
-        pull = _pulled([s for s in out if s.actuator not in pulled], out[at], states)
-        if pull is None:
+        pull = _pulled([s for s in out if s.actuator not in pulled], out[at], states, actuator in odd)
+        other = None if pull is None else _named(call, states, out[at])
+        if pull is None or other is None and actuator not in odd:
             continue
         pulled.add(actuator)
-        other = _named(call, states, out[at])
         if other is None:
             other = judged(*call[:4], tuple(_declaring(s) for s in states), *call[5:])
-            weights.append((size, _finding(odd, *pull, float(states[0].extra["sweep"][0, 0]))))
+            size, finding = odd[actuator]
+            weights.append((size, _finding(finding, *pull, float(states[0].extra["sweep"][0, 0]))))
         out[at] = other
     # what a weight leaves of a drive's preload says nothing of the others'
     return out, [*weights, *preload_findings([s for s in out if s.actuator not in pulled])]
@@ -75,10 +77,11 @@ def _kept(station: Station, name: str) -> Named | None:
 
 
 def _pulled(
-    stations: Sequence[Station], station: Station, states: tuple[DriveState, ...]
+    stations: Sequence[Station], station: Station, states: tuple[DriveState, ...], odd_preload: bool
 ) -> tuple[Array, Array, float] | None:
     """Weight along the finger and across it (2,), its covariance (2, 2) and its probability, where a weight beside a
-    usual preload is likelier than any preload (and what bends the spring, if that was named); None else.
+    usual preload is likelier than an odd one (and what bends the spring, if that was named), or, where no preload is
+    odd, plainly likelier than what bends the spring; None else.
 
     Marginal likelihoods of linear models with normal priors, where the preload and the spring of the weighed drive are
     those of the hand's others: an odd preload alone says nothing of the spring's shape, a weight foretells it.
@@ -93,9 +96,11 @@ def _pulled(
     weights = balance.gather(lambda s: _weight(posed[s.trial]))
     plain = tuple(t for t in terms if t.effect.name != BENT)
     inside = balance.unclipped(terms)
-    odd = _Model(balance, terms, inside, {"spring": usual["spring"], "preload": (0.0, effort)}, effort)
+    others = {"spring": usual["spring"], "preload": (0.0, effort)} if odd_preload else usual
+    odd = _Model(balance, terms, inside, others, effort)
     weighed = _Model(balance, plain, inside, usual, effort, weights)
-    likelier = weighed.log_evidence - odd.log_evidence + (EVIDENCE_LEAST if len(plain) < len(terms) else 0.0)
+    spared = EVIDENCE_LEAST if len(plain) < len(terms) else 0.0  # one effect for two
+    likelier = weighed.log_evidence - odd.log_evidence + (spared if odd_preload else -CLASS_WIDTH)
     if likelier <= 0:
         return None
     return weighed.mean[-2:], weighed.covariance[-2:, -2:], float(1 / (1 + np.exp(-likelier)))
