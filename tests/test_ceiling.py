@@ -54,6 +54,10 @@ def test_a_sensor_that_errs_otherwise_tells_no_limit() -> None:
     # what still lets half of it pass is a controller, or a motion, that is read a little wrong
     assert limit_of(asked(3, lambda i: i - 0.5 * np.maximum(i - 50, 0)), NOISE) is None
     assert limit_of(asked(3, moves=2), NOISE) is None
+    # nor is there a limit where more than that was seen to flow
+    sensed = asked(3, lambda i: np.minimum(i, 55.0))
+    sensed.sensed[:20] = 110.0
+    assert limit_of(sensed, NOISE) is None
 
 
 def test_a_likely_limit_is_a_finding_of_its_motor_and_an_unlikely_one_none() -> None:

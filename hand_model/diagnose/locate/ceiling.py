@@ -29,6 +29,9 @@ CHANGE = 1e-3  # of a parameter, by which the reference's derivatives are taken
 LOUDER = 1.1  # times the noise of both readings: what they differ by at most, where nothing but a limit is between them
 COMMANDED = 0.9  # of a limit that the log tells
 FEWEST = 200  # samples in motion
+WRONG = 4.0  # standard deviations, from which a row goes wrong
+GLITCHES = 5e-4  # share of rows that may: where more flows than a limit lets through, there is none
+FREE, COLOURED = 0.8, 0.1  # of the limit, below which nothing is limited; autocorrelation of the rest there, at most
 LEVELS, LEAST_QUANTILE = 24, 0.6  # limits tried, and the share of the currents that is below the lowest
 PASSING = (1 / 3, 2 / 3)  # of what is beyond a limit: where that is as likely, there is none
 ROUNDS = 3  # of telling apart what is limited and what is not
@@ -92,26 +95,35 @@ def limit_of(asked: Asked, noise: float) -> Ceiling | None:
     [raw], or samples are too few."""
     if len(asked.sensed) < FEWEST:
         return None
-    free = _corrected(asked, np.ones(len(asked.sensed), bool))
-    sigma = np.hypot(noise, asked.doubt)
-    plain = float(np.sum(((asked.sensed - free) / sigma) ** 2))
+    sigma, sound = np.hypot(noise, asked.doubt), np.ones(len(asked.sensed), bool)
+    for _ in range(ROUNDS):
+        free = _corrected(asked, sound)
+        sound = np.abs(asked.sensed - free) < WRONG * sigma
+        if sound.sum() < FEWEST:
+            return None
+    plain = _squares((asked.sensed - free) / sigma)
     size = np.abs(free)
     levels = np.linspace(np.quantile(size, LEAST_QUANTILE), np.max(size), LEVELS + 1)[:-1]
 
     def fitted(passing: float) -> list[tuple[float, float, float]]:
         """Error, share beyond and limit of all limits tried, finer about the best; best first."""
-        tried = [(*_limited(asked, free, level, sigma, passing), level) for level in levels]
+        tried = [(*_limited(asked, free, sound, level, sigma, passing), level) for level in levels]
         step = float(levels[1] - levels[0])
         for _ in range(FINER):
             step /= 2
             limit = min(tried)[2]
-            tried += [(*_limited(asked, free, level, sigma, passing), level) for level in (limit - step, limit + step)]
+            tried += [
+                (*_limited(asked, free, sound, level, sigma, passing), level) for level in (limit - step, limit + step)
+            ]
         return sorted(tried)
 
     tried = fitted(0.0)
     error, share, limit = tried[0]
     likelier = (plain - error) / 2
-    if np.sqrt(error / len(asked.sensed)) > LOUDER:
+    beyond = np.mean(np.abs(asked.sensed) > limit + WRONG * noise)
+    if np.sqrt(error / len(asked.sensed)) > LOUDER or beyond > GLITCHES:
+        return None
+    if _coloured(asked, _corrected(asked, sound & (np.abs(free) < limit)), limit):
         return None
     if likelier > SURE and min(fitted(passing)[0][0] for passing in PASSING) < error + 2 * SURE:
         return None
@@ -119,19 +131,38 @@ def limit_of(asked: Asked, noise: float) -> Ceiling | None:
     return Ceiling(float(limit), share, float(lost), likelier)
 
 
-def _limited(asked: Asked, start: Array, limit: float, sigma: Array, passing: float = 0.0) -> tuple[float, float]:
+def _limited(
+    asked: Asked, start: Array, sound: NDArray[np.bool_], limit: float, sigma: Array, passing: float
+) -> tuple[float, float]:
     """Weighted squared error with a limit beyond which a share is still `passing`, and the share of samples beyond it:
-    the controller's parameters are learned where it is not reached."""
+    the controller's parameters are learned where it is not reached, from rows that are `sound`."""
     current = start
     for _ in range(ROUNDS):
-        within = np.abs(current) < limit
+        within = sound & (np.abs(current) < limit)
         if within.sum() < FEWEST:
             return np.inf, 1.0
         current = _corrected(asked, within)
     within_limit = np.clip(current, -limit, limit)
     flows = within_limit + passing * (current - within_limit)
-    error = float(np.sum(((asked.sensed - flows) / sigma) ** 2))
+    error = _squares((asked.sensed - flows) / sigma)
     return error, float(np.mean(np.abs(current) > limit))
+
+
+def _coloured(asked: Asked, current: Array, limit: float) -> bool:
+    """Whether what is asked and what flows differ by more than white noise where no limit is near: another controller
+    asks then."""
+    rest, near = asked.sensed - current, (asked.move[1:] == asked.move[:-1]) & (np.abs(current[1:]) < FREE * limit)
+    bound = WRONG * np.median(np.abs(rest)) / 0.6745
+    rest = np.clip(rest, -bound, bound)
+    if near.sum() < FEWEST:
+        return True
+    return float(np.mean((rest[1:] * rest[:-1])[near])) > COLOURED * float(np.var(rest[1:][near]))
+
+
+def _squares(rest: Array) -> float:
+    """Sum of squares of what is left over its deviation (n,), rows that go wrong bounded: one of them must not be what a
+    limit explains."""
+    return float(np.sum(np.minimum(rest**2, WRONG**2)))
 
 
 def _corrected(asked: Asked, use: NDArray[np.bool_]) -> Array:
