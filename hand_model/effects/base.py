@@ -39,7 +39,8 @@ class DriveState:
     effort: (n,) measured left side, raw or SI, nan where it is not to be compared. declared: (n, k) columns of the
     declared model, declared_names: their names ("inertia", "viscous", "coulomb", "spring", "preload", ...).
     extra: further channels by name, (n,) each: "elapsed" [s] since the first sample of the session, "load", "setpoint",
-    "speed" (commanded), "temperature", "supply", "gravity_along|across" in the finger's plane, "sigma" (standard
+    "speed" (commanded), "temperature", "supply", "gravity_along|across" in the finger's plane, "sweep" (n, 2)
+    [rad] that its first joint and all turn through over the range, "sigma" (standard
     deviation, in effort units, of what the state estimate cannot know, beside the noise).
     """
 
