@@ -78,14 +78,12 @@ class Asked:
 
 
 def ceiling_of(fit: MotorFit, runs: Sequence[Run], noise: float) -> Ceiling | None:
-    """The limit of a drive's current; None where the controller's reference is not known beforehand, where what it asks
-    and the current differ by more than a limit and noise, or where a limit that leaks is as likely.
+    """The limit of the current of a drive whose reference is known beforehand; None where what its controller asks and
+    the current differ by more than a limit and noise, or where a limit that leaks is as likely.
 
     noise: of the current and of what is asked together [raw], white. Parameters of the controller are fitted to the
     current, and of each move its instant and its speed.
     """
-    if fit.output_error is None or fit.output_error.controller != "profile":
-        return None
     asked = _stacked([_behind_reference(fit, run) for run in runs])
     return None if asked is None else limit_of(asked, noise)
 

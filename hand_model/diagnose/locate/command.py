@@ -153,20 +153,17 @@ def _saturation(
     metric: str,
     engine: str,
 ) -> Finding:
-    fit = {
-        "metric": metric,
-        "unit": "1" if metric == "speed_loss" else "raw",
-        "before": None,
-        "after": None,
-        "noise_floor": None,
-        "ci95_reduction": None,
-        "held_out": [],
-        "engine": engine,
-    }
+    fit = _unfitted(metric, "1" if metric == "speed_loss" else "raw", engine)
     where = {**_where(actuator, finger), "signal": "current", "trials": list(fact.trials)}
     return Finding(
         "current_saturation", ("current_saturation",), 0.999, (), where, text, parameters, fit, dict(UNWRITTEN)
     )
+
+
+def _unfitted(metric: str, unit: str, engine: str | None) -> dict[str, Any]:
+    """`fit` of a finding that no fit told."""
+    figures = dict.fromkeys(("before", "after", "noise_floor", "ci95_reduction"))
+    return {"metric": metric, "unit": unit, **figures, "held_out": [], "engine": engine}
 
 
 def refused(
@@ -177,16 +174,7 @@ def refused(
     why: str = "it does not follow the motion",
 ) -> tuple[float, Finding]:
     """The finding of a current (or position) channel that is no measurement."""
-    fit = {
-        "metric": f"{signal}_rmse",
-        "unit": "raw",
-        "before": None,
-        "after": None,
-        "noise_floor": None,
-        "ci95_reduction": None,
-        "held_out": [],
-        "engine": None,
-    }
+    fit = _unfitted(f"{signal}_rmse", "raw", None)
     where = {**_where(actuator, finger), "signal": signal, "trials": list(trials)}
     text = f"The {signal} of {actuator} is no measurement: {why}; nothing is fitted to it."
     return 1e9, Finding(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,8 +29,9 @@ def transmitted_load(time_s: Array, current: Array, motion: Motion) -> Array:
     span, moving = float(np.ptp(motion.position)), motion.moving
     if span == 0 or moving.sum() < FEWEST:
         return least_error(time_s, current)[0]
-    everywhere = _explained(current, motion, np.ones(len(current), bool))
-    in_motion = _explained(current, motion, moving)
+    designs = _designs(motion)
+    everywhere = _explained(current, designs, np.ones(len(current), bool))
+    in_motion = _explained(current, designs, moving)
     lets_go = np.var((current - everywhere[0])[moving]) > LETS_GO * np.var((current - in_motion[0])[moving])
     explained, inertia = in_motion if lets_go else everywhere
     rest = current - explained
@@ -37,17 +40,21 @@ def transmitted_load(time_s: Array, current: Array, motion: Motion) -> Array:
     return explained + least_error(time_s, rest)[0] - max(inertia, 0.0) * motion.acceleration
 
 
-def _explained(current: Array, motion: Motion, use: NDArray[np.bool_]) -> tuple[Array, float]:
-    """What motion explains of the current (n,), learned from some samples, and the inertia."""
-    moved = np.stack([motion.acceleration, motion.velocity, np.ones(len(current))], axis=-1)
-    span = float(np.ptp(motion.position))
-    powers = ((motion.position - motion.position.min()) / span)[:, None] ** np.arange(1, ORDER + 1)
+def _designs(motion: Motion) -> list[Array]:
+    """What may explain a current, (n, k) each: one for every way in which friction builds up; inertia comes first."""
+    position = motion.position
+    span = float(np.ptp(position))
+    moved = np.stack([motion.acceleration, motion.velocity, np.ones(len(position))], axis=-1)
+    powers = ((position - position.min()) / span)[:, None] ** np.arange(1, ORDER + 1)
+    return [np.c_[moved, rise(position, reach), powers] for rise in (dahl, jenkins) for reach in REACHES * span]
+
+
+def _explained(current: Array, designs: Sequence[Array], use: NDArray[np.bool_]) -> tuple[Array, float]:
+    """What the best design explains of the current (n,), learned from some samples, and the inertia."""
     best, out = np.inf, (current, 0.0)
-    for rise in (dahl, jenkins):
-        for reach in REACHES * span:
-            columns = np.c_[moved, rise(motion.position, reach), powers]
-            fitted = np.linalg.lstsq(columns[use], current[use], rcond=1e-12)[0]
-            error = float(np.sum((current - columns @ fitted)[use] ** 2))
-            if error < best:
-                best, out = error, (columns @ fitted, float(fitted[0]))
+    for columns in designs:
+        fitted = np.linalg.lstsq(columns[use], current[use], rcond=1e-12)[0]
+        error = float(np.sum((current - columns @ fitted)[use] ** 2))
+        if error < best:
+            best, out = error, (columns @ fitted, float(fitted[0]))
     return out

@@ -114,10 +114,11 @@ def _ceiling(fit: MotorFit, runs_: list[Run]) -> Ceiling | None:
     """The limit of the current, where the controller's asking shows one."""
     from ...identify.motor.noise import white_noise
 
-    if not runs_ or fit.output_error is None:
+    found = fit.output_error
+    if not runs_ or found is None or found.controller != "profile":  # else no reference is known beforehand
         return None
     sensed = float(np.mean([white_noise(run.trial.current, run.trial.time_s) for run in runs_]))
-    asked = fit.output_error.values["gain"] * float(np.mean([_encoder_noise(run, fit) for run in runs_]))
+    asked = found.values["gain"] * float(np.mean([_encoder_noise(run, fit) for run in runs_]))
     return ceiling_of(fit, runs_, float(np.hypot(sensed, asked)))
 
 
