@@ -8,7 +8,7 @@ from session_refusal import edit, refusal
 from session_writers import FINGERS, PALM, PROBE, rigid_markers, write_c3d, write_log, write_session
 
 from hand_model.session import check_session, read_session
-from hand_model.session.check import flatness, missing_direction, moves
+from hand_model.session.check import flatness, missing_direction, moves, on_a_line
 
 
 @pytest.fixture
@@ -181,6 +181,16 @@ def test_flatness_of_known_triangles():
         size = np.linalg.svd(corners - corners.mean(axis=0), compute_uv=False)
         assert flatness(moving) == pytest.approx(size[1] / size[0], abs=1e-6)
         assert flatness(moving + rng.normal(0, 3e-4, moving.shape)) == pytest.approx(size[1] / size[0], abs=0.025)
+
+
+def test_markers_on_a_line_are_told_by_their_noise():
+    rng = np.random.default_rng(0)
+    noise = rng.normal(size=(1500, 3, 3))
+    flat, line = (np.array([[0, 0, 0], [0.033, 0, 0], [0.015, height, 0]]) for height in (0.0014, 0.0))
+    slipped = flat + 1e-4 * noise
+    slipped[800:, 1] += [0.004, 0.002, 0.0]
+    assert not on_a_line(flat + 1e-4 * noise) and not on_a_line(slipped)
+    assert on_a_line(flat + 5e-4 * noise) and on_a_line(line + 1e-4 * noise) and on_a_line(line + 0 * noise)
 
 
 def test_motion_stands_out_of_noise():

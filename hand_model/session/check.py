@@ -21,8 +21,10 @@ EXTENT_M = (0.005, 3.0)
 # Lengths that must agree (a palm in two files, a probe and its declaration) and do not by this ratio are in other
 # units.
 UNIT_RATIO = 1.5
-# A rigid body whose markers are nearer to a line than this share of its length does not show its turns about the line.
-FLATNESS = 0.03
+# A rigid body does not show its turns about a line that its markers are this near to: a share of its length, or the
+# noise of a coordinate this many times over, for then a frame's turn is known to a third of a radian.
+FLATNESS = 0.01
+OFF_LINE_OVER_NOISE = 3.0
 # Fewer frames than this show no flexion.
 FLEXION_FRAMES = 10
 # The longest sampling interval [s] of a log whose `time` can be in seconds.
@@ -98,7 +100,7 @@ def check_mocap(session: Session, trial: Trial, mocap: Mocap) -> list[str]:
             )
         if (
             len(labels) >= 3
-            and flatness(position) < FLATNESS
+            and on_a_line(position)
             and not (body == "probe" and session.probe.position_probe is not None)
         ):
             raise SessionError(
@@ -141,39 +143,55 @@ def check_extent(mocap: Mocap, labels: Sequence[str]) -> float:
     return extent_m
 
 
-def _distances(position: Array) -> Array:
-    """Distances (k, k) [m] between markers (n, k, 3), as far as they are rigid, free of the bias by the noise.
+def _distances(position: Array) -> tuple[Array, Array]:
+    """Distances (k, k) [m] between markers (n, k, 3), as far as they are rigid, free of the bias by the noise, and the
+    noise (k, k) [m] of a coordinate that each shows.
 
     A distance measured with noise is too long: E[d]^2 - d0^2 = 4 s^2 and var d = 2 s^2 for noise s in each coordinate.
+    The noise is what changes from frame to frame: a marker that slips or is swapped makes no noise.
     """
     k = position.shape[1]
-    distances = np.zeros((k, k))
+    distances, noise = np.zeros((k, k)), np.zeros((k, k))
     for i, j in combinations(range(k), 2):
         length = np.linalg.norm(position[:, i] - position[:, j], axis=1)
         length = length[np.isfinite(length)]
         middle = np.median(length) if len(length) else np.nan
-        spread = 1.4826 * np.median(np.abs(length - middle)) if len(length) else np.nan
-        distances[i, j] = distances[j, i] = np.sqrt(max(middle**2 - 2.0 * spread**2, 0.0)) if len(length) else np.nan
-    return distances
+        step = np.median(np.abs(np.diff(length))) if len(length) > 1 else 0.0
+        noise[i, j] = noise[j, i] = 1.4826 * step / 2.0
+        distances[i, j] = distances[j, i] = np.sqrt(max(middle**2 - 4.0 * noise[i, j] ** 2, 0.0))
+    return distances, noise
 
 
 def flatness(position: Array) -> float:
-    """Second over first principal length [-] of a rigid body with markers (n, k, 3): 0 for markers on one line.
+    """Second over first principal length [-] of a rigid body with markers (n, k, 3): 0 for markers on one line;
+    infinite where two of the markers are never seen together."""
+    first, second, _ = _principal(position)
+    return second / first if first > 0 else 0.0
+
+
+def on_a_line(position: Array) -> bool:
+    """Whether markers (n, k, 3) [m] of a rigid body lie on one line, as far as a frame of them shows."""
+    first, second, noise = _principal(position)
+    return second <= max(FLATNESS * first, OFF_LINE_OVER_NOISE * noise)
+
+
+def _principal(position: Array) -> tuple[float, float, float]:
+    """First and second principal length [m] of a rigid body with markers (n, k, 3), and a coordinate's noise [m].
 
     From the distances between its markers (classical scaling, Torgerson 1952), so that it holds while the body moves;
-    infinite where two of the markers are never seen together.
+    the second is infinite where two of the markers are never seen together.
     """
-    squared = _distances(position) ** 2
-    if not np.isfinite(squared).all():
-        return float("inf")
-    centre = np.eye(len(squared)) - 1.0 / len(squared)
-    lengths = np.sqrt(np.clip(np.linalg.eigvalsh(-0.5 * centre @ squared @ centre)[::-1], 0.0, None))
-    return float(lengths[1] / lengths[0]) if lengths[0] > 0 else 0.0
+    distances, noise = _distances(position)
+    if not np.isfinite(distances).all():
+        return 1.0, float("inf"), 0.0
+    centre = np.eye(len(distances)) - 1.0 / len(distances)
+    lengths = np.sqrt(np.clip(np.linalg.eigvalsh(-0.5 * centre @ distances**2 @ centre)[::-1], 0.0, None))
+    return float(lengths[0]), float(lengths[1]), float(np.median(noise[np.triu_indices(len(noise), 1)]))
 
 
 def _size(position: Array) -> float:
     """Mean distance [m] between the markers of a rigid body, whichever labels are exchanged."""
-    distances = _distances(position)
+    distances, _ = _distances(position)
     return float(np.mean(distances[np.triu_indices(len(distances), 1)]))
 
 
