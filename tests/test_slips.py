@@ -57,7 +57,11 @@ def test_a_turn_is_whole_with_what_a_small_slip_and_the_angle_took_of_it() -> No
     )
     small = MarkerEffect("marker_slip", 1, "P3", 20, 60, slipped.reshape(60, 15, 1), 15.0, 20.0, np.ones(1))
     blocks = SimpleNamespace(
-        body=body, position=position, axes=np.broadcast_to(axis, (60, 1, 3)), record=np.zeros(60, int)
+        body=body,
+        position=position,
+        axes=np.broadcast_to(axis, (60, 1, 3)),
+        record=np.zeros(60, int),
+        residual=np.zeros((60, 5, 3)),
     )
     naming = SimpleNamespace(blocks=blocks, found=(main, small), believed=True)
     finger = SimpleNamespace(segments=[SimpleNamespace(name="proximal")])

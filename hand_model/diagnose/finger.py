@@ -90,7 +90,7 @@ def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, f
         found = tuple((w, replace(f, fit=fit) if f.effect in HINGE else f) for w, f in found)
     names = ", ".join(f.effect for _, f in found) or "consistent"
     lines = [f"{finger.name} markers: {names} (p {markers.p_before:.2g} -> {markers.p_after:.2g})"]
-    angles, moments = corrected_angles(seen, markers), steps(seen, markers)
+    angles, moments = corrected_angles(seen, markers), steps(markers)
     stations: list[Station] = []
     states = encoder_states(angles, *counts[finger.actuator], moments) if finger.actuator in counts else ()
     if states:

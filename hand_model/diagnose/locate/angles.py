@@ -36,6 +36,15 @@ MOMENT_S = 0.2  # within which a step's moment is known
 
 
 @dataclass(frozen=True)
+class Step:
+    """From time_s [s] of a record on, to the end of record `last`, an angle reads another value."""
+
+    record: int
+    time_s: float
+    last: int
+
+
+@dataclass(frozen=True)
 class FlexionAngles:
     """One flexion recording of one finger. angle_rad: (n, k), nan in frames that do not tell. swaps: labels put right.
     data: markers as recorded, labels put right. pose: of every frame, by the identified chain. ghost: (n,) frames in
@@ -138,7 +147,7 @@ def _poses(markers: ChainData, chain: Chain, noise_m: float) -> tuple[Pose, NDAr
 def linkage_states(
     angles: FingerAngles,
     joint: int = 1,
-    steps: Sequence[tuple[int, float]] = (),
+    steps: Sequence[Step] = (),
     expected: Mapping[str, tuple[Array, Array]] | None = None,
     logged: bool = True,
 ) -> tuple[DriveState, ...]:
@@ -190,7 +199,7 @@ def linkage_states(
 
 
 def encoder_states(
-    angles: FingerAngles, low: float, high: float, steps: Sequence[tuple[int, float]] = ()
+    angles: FingerAngles, low: float, high: float, steps: Sequence[Step] = ()
 ) -> tuple[DriveState, ...]:
     """Balance of the encoder: proximal angle [deg] against a cubic of position [%], at the mocap's frames.
 
@@ -309,10 +318,13 @@ def _smoothed(
     return base + departure, slope * log.speed + rate, slope * log.acceleration, use
 
 
-def _stepped(record: int, time_s: Array, steps: Sequence[tuple[int, float]]) -> tuple[Array, tuple[str, ...]]:
-    """Columns (n, s) that are one from a moment of a record on, in the records after it too, and their names."""
+def _stepped(record: int, time_s: Array, steps: Sequence[Step]) -> tuple[Array, tuple[str, ...]]:
+    """Columns (n, s) that are one while a step lasts, and their names."""
     columns = [
-        np.full(len(time_s), float(record > r)) if record != r else (time_s >= at).astype(float) for r, at in steps
+        (time_s >= step.time_s).astype(float)
+        if record == step.record
+        else np.full(len(time_s), float(step.record < record <= step.last))
+        for step in steps
     ]
     names = tuple(f"step_{i}" for i in range(len(steps)))
     return np.stack(columns, axis=-1) if columns else np.zeros((len(time_s), 0)), names
@@ -325,9 +337,9 @@ def _begun(driver: Array) -> NDArray[np.bool_]:
     return np.maximum.accumulate(moved)
 
 
-def _near(record: int, time_s: Array, steps: Sequence[tuple[int, float]]) -> NDArray[np.bool_]:
+def _near(record: int, time_s: Array, steps: Sequence[Step]) -> NDArray[np.bool_]:
     """Samples (n,) too close to a step for its moment to be known."""
-    close = [np.abs(time_s - at) < MOMENT_S for r, at in steps if r == record]
+    close = [np.abs(time_s - step.time_s) < MOMENT_S for step in steps if step.record == record]
     return np.any(close, axis=0) if close else np.zeros(len(time_s), bool)
 
 

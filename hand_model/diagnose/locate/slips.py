@@ -13,7 +13,7 @@ from ...identify.chain import propagate
 from ...identify.likelihood import OUTLIER_LIMIT
 from ...rotation import kabsch
 from ..findings import UNWRITTEN, Finding, weighed
-from .angles import FingerAngles
+from .angles import FingerAngles, Step
 from .blocks import Blocks
 from .displacement import NO_HINGE, NOT_RIGID, UNNAMED, MarkerEffect
 from .markers import ALPHA, UNHINGED, MarkerNaming
@@ -200,9 +200,13 @@ def _whole_turn(naming: MarkerNaming, body: int, stepped_deg: Mapping[str, float
         for e in naming.found
         if e.body == body and (e.effect == "support_slip" or e.effect == "marker_slip" and e.gain < least)
     ]
-    step = sum(stepped_deg.get(f"step_{i}", 0.0) for i, e in enumerate(_stepping(naming))
-               if e.body == body and blocks.record[e.begin] == blocks.record[main.begin])  # fmt: skip
-    along = np.deg2rad(step) * blocks.axes[main.begin : main.end, body - 1]
+    index = np.arange(len(blocks.residual))
+    step_deg = sum(
+        stepped_deg.get(f"step_{i}", 0.0) * ((index >= e.begin) & (index < e.end))
+        for i, e in enumerate(_stepping(naming))
+        if e.body == body
+    )
+    along = (np.deg2rad(step_deg)[:, None] * blocks.axes[:, body - 1])[main.begin : main.end]
     return float(np.median(np.linalg.norm(_turned(blocks, acting, main) + along, axis=1)))
 
 
@@ -324,10 +328,11 @@ def _displaced(angles: FingerAngles, labels: list[str], lasting_s: float) -> flo
     return weighed(float(size), float(size / max(lost, 1e-9)))
 
 
-def steps(angles: FingerAngles, naming: MarkerNaming) -> list[tuple[int, float]]:
-    """(record, time [s]) of every slip: a support that turns about its joint's own axis steps the angle, which markers
-    alone cannot tell from motion; encoder and linkage balances let the angle step there."""
-    return [(int(naming.blocks.record[e.begin]), float(naming.blocks.time_s[e.begin])) for e in _stepping(naming)]
+def steps(naming: MarkerNaming) -> list[Step]:
+    """Every slip: a support that turns about its joint's own axis steps the angle, which markers alone cannot tell from
+    motion; encoder and linkage balances let the angle step there."""
+    record, time_s = naming.blocks.record, naming.blocks.time_s
+    return [Step(int(record[e.begin]), float(time_s[e.begin]), int(record[e.end - 1])) for e in _stepping(naming)]
 
 
 def _stepping(naming: MarkerNaming) -> list[MarkerEffect]:
