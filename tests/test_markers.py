@@ -121,27 +121,56 @@ def tilting(amount):
     return shift
 
 
-def wobble_of(naming: MarkerNaming) -> float:
+def travelling(way):
+    """The second joint's centre travels by way(share of range) (n, 2) [m] across its axis, carried by the first
+    segment."""
+
+    def shift(share, turn, arm):
+        x, z = way(0.5 * (1 - np.cos(2 * np.pi * 4 * share))).T
+        return np.broadcast_to(np.einsum("bij,bj->bi", turn, np.stack([x, 0 * x, z], axis=1))[:, None], (len(x), 4, 3))
+
+    return shift
+
+
+def amount_of(naming: MarkerNaming, name: str = "amplitude") -> tuple[float, list[float]]:
     angles = SimpleNamespace(
         finger=SimpleNamespace(name="index", segments=[SimpleNamespace(name=n) for n in ("proximal", "distal")]),
         records=[SimpleNamespace(trial=SimpleNamespace(name=f"log/{k}.csv")) for k in range(RECORDS)],
     )
     first, found = naming.found[0], list(naming.found)
-    return _finding(angles, naming, first.effect, first.body, first.label, found).parameters["amplitude"]["value"]
+    told = _finding(angles, naming, first.effect, first.body, first.label, found).parameters[name]
+    return told["value"], told["ci95"]
 
 
 def test_a_joint_with_play_tilts_to_the_side_that_its_motion_takes_it() -> None:
     naming = seen(tilting(lambda u, way: 0.012 * way), body=2)
     assert naming.believed and places(naming) == {("joint_wobble", None)} and naming.p_after > 0.003
     assert naming.found[0].sides
-    assert wobble_of(naming) == pytest.approx(0.012, rel=0.1)
+    assert amount_of(naming)[0] == pytest.approx(0.012, rel=0.1)
 
 
-@pytest.mark.parametrize("waves", [1.0, 1.4, 1.7])
+@pytest.mark.parametrize("waves", [0.65, 1.0, 1.4, 1.7])
 def test_a_second_axis_may_swing_more_than_once_over_the_range(waves: float) -> None:
     naming = seen(tilting(lambda u, way: 0.012 * np.sin(2 * np.pi * waves * u + 0.7)), body=2)
     assert naming.believed and places(naming) == {("joint_wobble", None)} and naming.p_after > 0.003
     assert not naming.found[0].sides
+    value, (low, high) = amount_of(naming)
+    assert value == pytest.approx(0.012, rel=0.1 if waves >= 1 else 0.25) and low < 0.012 < high
+
+
+@pytest.mark.parametrize(
+    "way",
+    [
+        lambda u: np.stack([3e-3 * u, 0 * u], axis=1),
+        lambda u: np.stack([0.5e-3 * np.sin(np.pi * u), 3e-3 * u], axis=1),
+        lambda u: 1.5e-3 * np.stack([np.sin(np.pi * u), 1 - np.cos(np.pi * u)], axis=1),
+    ],
+)
+def test_how_far_a_centre_travels_is_told_with_how_surely(way) -> None:
+    naming = seen(travelling(way), body=2)
+    assert naming.believed and places(naming) == {("moving_centre", None)}
+    value, (low, high) = amount_of(naming, "travel")
+    assert low <= 3e-3 <= high and value == pytest.approx(3e-3, rel=0.5)
 
 
 def test_what_no_finger_can_do_is_said_where_nothing_else_explains_the_markers(monkeypatch) -> None:

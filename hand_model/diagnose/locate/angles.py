@@ -198,9 +198,7 @@ def linkage_states(
     return tuple(states)
 
 
-def encoder_states(
-    angles: FingerAngles, low: float, high: float, steps: Sequence[Step] = ()
-) -> tuple[DriveState, ...]:
+def encoder_states(angles: FingerAngles, low: float, high: float, steps: Sequence[Step] = ()) -> tuple[DriveState, ...]:
     """Balance of the encoder: proximal angle [deg] against a cubic of position [%], at the mocap's frames.
 
     low, high: counts at 0 and 100 %. Each recording has its own clock offset, as a column of the velocity; the clocks'

@@ -15,9 +15,10 @@ from ...rotation import kabsch
 from ..findings import UNWRITTEN, Finding, weighed
 from .angles import FingerAngles, Step
 from .blocks import Blocks
+from .course_amount import course_amount
 from .displacement import NO_HINGE, NOT_RIGID, UNNAMED, MarkerEffect
 from .markers import ALPHA, UNHINGED, MarkerNaming
-from .wobble import centre_travel, side_to_side, wobble_amplitude
+from .wobble import side_to_side
 
 Array = NDArray[np.float64]
 
@@ -218,15 +219,14 @@ def _shift(members: Sequence[MarkerEffect], main: MarkerEffect) -> Array:
 
 def _amount(naming: MarkerNaming, effect: MarkerEffect) -> tuple[float, list[float]]:
     """Amplitude of a joint's second rotation [rad], or the largest travel of its centre [m], over the recorded angles,
-    with its 95 % interval: of what the fitted coefficients' covariance lets it be (parametric bootstrap, Efron &
-    Tibshirani 1993, ch. 6)."""
-    blocks, tilts = naming.blocks, effect.effect == "joint_wobble"
+    with its 95 % interval; of a play that changes sides, what the fitted coefficients' covariance lets it be
+    (parametric bootstrap, Efron & Tibshirani 1993, ch. 6)."""
+    if not effect.sides:
+        return course_amount(naming, effect)
+    blocks = naming.blocks
 
     def amount(coefficients: Array) -> float:
-        shift = (effect.columns @ coefficients).reshape(len(blocks.residual), -1, 3)
-        if effect.sides:
-            return side_to_side(blocks, effect.body, shift)
-        return (wobble_amplitude if tilts else centre_travel)(blocks, effect.body, shift)
+        return side_to_side(blocks, effect.body, (effect.columns @ coefficients).reshape(len(blocks.residual), -1, 3))
 
     rng = np.random.default_rng(0)
     drawn = rng.multivariate_normal(effect.coefficients, effect.covariance, DRAWS, method="eigh")

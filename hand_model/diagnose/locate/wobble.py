@@ -1,5 +1,5 @@
 """How far a joint's second rotation swings and its centre travels, read from the displacements that were fitted to its
-markers.
+markers; how far in the readings, and how surely: `course_amount.py`.
 
 Another axis of the hinge and other places of the markers on their segment explain part of any displacement: what they
 could explain is free, and a course over the range is read beside it: half or full waves of a tilt; of a centre an even
