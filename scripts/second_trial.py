@@ -5,7 +5,7 @@ the diagnosis (`second_recorder/`, `third_recorder/`, `fourth_recorder/`).
     [--pair 10] [--weak 10] [--messy 10] [--outside 10] [--anywhere]
 
 FOLDER must be new. It gets sessions, answers.json (its SHA-256 is printed before any diagnosis starts), findings; the
-score is printed, and, of the second recorder's sessions, what was read of its parameters.
+score is printed, and, of the second and the fourth recorder's sessions, what was read of their parameters.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from fourth_recorder.compose import make_set as make_fourth
 from fourth_recorder.motor import CompilerError as FourthCompilerError
+from fourth_recorder.readings import truth as truth_of_fourth
 from second_recorder.compose import make_set as make_second
 from second_recorder.hand import COUNTS as RANGES
 from third_recorder.compose import make_set as make_third
@@ -62,7 +63,19 @@ READINGS: dict[str, Callable[[dict[str, Any], dict[str, float]], dict[str, float
 COUNTS = {"single": 36, "none": 4, "pair": 10, "weak": 10, "messy": 10, "outside": 10}
 
 
-def parameters(folder: Path, made: list[dict[str, Any]]) -> list[tuple[str, float, float, list[float] | None]]:
+def truth_of_second(hidden: dict[str, Any], answer: dict[str, Any]) -> dict[str, float]:
+    """What a finding of an effect that the second recorder hid should read; empty where they share nothing."""
+    if hidden["effect"] not in READINGS:
+        return {}
+    settings = {k: v for group in answer["settings_by_finger"][hidden["finger"]].values() for k, v in group.items()}
+    open_counts, full_counts = RANGES[hidden["finger"]]
+    motor = {**answer["motor"][hidden["finger"]], "counts": full_counts - open_counts}
+    return READINGS[hidden["effect"]](settings, motor)
+
+
+def parameters(
+    folder: Path, made: list[dict[str, Any]], truth_of: Callable[[dict[str, Any], dict[str, Any]], dict[str, float]]
+) -> list[tuple[str, float, float, list[float] | None]]:
     """Effect and name, truth, value and interval of every figure that recorder and finding both have; messy sessions
     left out."""
     out = []
@@ -70,14 +83,8 @@ def parameters(folder: Path, made: list[dict[str, Any]]) -> list[tuple[str, floa
         if answer["kind"] not in ("single", "weak", "pair"):
             continue
         findings = json.loads((folder / "findings" / answer["case"] / "findings.json").read_text())["findings"]
-        for hidden in (e for e in answer["effects"] if e["effect"] in READINGS):
-            settings = {
-                k: v for group in answer["settings_by_finger"][hidden["finger"]].values() for k, v in group.items()
-            }
-            open_counts, full_counts = RANGES[hidden["finger"]]
-            truth = READINGS[hidden["effect"]](
-                settings, {**answer["motor"][hidden["finger"]], "counts": full_counts - open_counts}
-            )
+        for hidden in answer["effects"]:
+            truth = truth_of(hidden, answer)
             for found in (
                 f
                 for f in findings
@@ -147,8 +154,9 @@ def main() -> None:
                 f"{row['case']} {row['kind']}: {', '.join(row['truth'][:2])} -> {', '.join(row['named'][:4]) or row['verdict']}"
             )
     print(trial.table())
-    if options.recorder == "second":
-        print_parameters(parameters(options.folder, made))
+    truths = {"second": truth_of_second, "fourth": truth_of_fourth}
+    if options.recorder in truths:
+        print_parameters(parameters(options.folder, made, truths[options.recorder]))
 
 
 if __name__ == "__main__":

@@ -159,6 +159,16 @@ def test_deadband_and_stop_are_told_apart_and_placed() -> None:
     assert stop["distal_stop"]["from"] == pytest.approx(88.0, abs=0.7)
 
 
+@pytest.mark.parametrize("passing", [0.0, 0.2])
+def test_a_stop_says_where_the_segment_stands_that_it_stops(passing: float) -> None:
+    states = joint(3, move=lambda x: np.where(x > 80.0, 80.0 + passing * (x - 80.0), x))
+    told = {"from": {"value": 80.0, "ci95": [79.5, 80.5]}, "passing": {"value": passing}}
+    stops_at = effect("distal_stop").further(states, told)["stops_at"]
+    assert stops_at["value"] == pytest.approx(float(np.polynomial.Polynomial(MAP)(0.8)), abs=0.6)
+    assert stops_at["ci95"][0] < stops_at["value"] < stops_at["ci95"][1]
+    assert effect("distal_stop").further(states, {**told, "from": {"value": 200.0}}) == {}
+
+
 def test_a_lifted_finger_is_decoupled_and_its_whiles_are_found() -> None:
     begins = np.array([2.3, 8.1, 14.2])
 
