@@ -42,10 +42,10 @@ class DriveSag(Effect):
         return super().grid(states) if all("required" in s.extra for s in states) else []
 
     def possible(self, states: tuple[DriveState, ...], parameters: Mapping[str, float]) -> bool:
-        """Whether the drive still had more to give where most was asked of it: no controller holds a speed beyond."""
-        most = max(
-            (float(np.nanquantile(np.abs(s.effort), 0.99)) for s in states if np.isfinite(s.effort).any()), default=0.0
-        )
+        """Whether the drive still had more to give where most was asked of it: no controller holds a speed beyond. What
+        was asked goes without the readings' noise where it is known."""
+        asked = [np.abs(s.extra.get("required", s.effort)[np.isfinite(s.effort)]) for s in states]
+        most = max((float(np.nanquantile(a, 0.99)) for a in asked if len(a)), default=0.0)
         return bool(_rise(most, parameters) > LEAST_RISE)
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:

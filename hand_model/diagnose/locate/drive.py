@@ -26,6 +26,7 @@ SETTLE_SAMPLES = (14, 13)  # after a start and before a stop: where acceleration
 
 UNFOLLOWED = 0.25  # of the range: commands that end farther than this from where the motion does are not its own
 TOLD_S = 2e-3  # to which the instants of a simulated motion are known
+ROUNDS = 4  # in which the effort required and its square settle
 SETTLE_TRAVEL = 4.0  # [%] some six bristle lengths of a healthy drive
 
 
@@ -242,11 +243,21 @@ def with_timing(state: DriveState) -> DriveState:
 
 
 def with_required(states: tuple[DriveState, ...]) -> tuple[DriveState, ...]:
-    """The states with the effort "required" (n,) by the declared model fitted to all of them."""
+    """The states with the effort "required" (n,) by the declared model fitted to all of them, and by what a drive that
+    sags asks for beyond: the square of that effort, as far as it helps."""
     seen = [np.isfinite(s.effort) for s in states]
-    matrix = np.concatenate([s.declared[k] for s, k in zip(states, seen, strict=True)])
-    beta = coefficients(matrix, np.concatenate([s.effort[k] for s, k in zip(states, seen, strict=True)]))
-    return tuple(replace(s, extra={**s.extra, "required": s.declared @ beta}) for s in states)
+    ends = np.cumsum([len(s.effort) for s in states])[:-1]
+    declared, told = np.concatenate([s.declared for s in states]), np.concatenate(seen)
+    effort = np.concatenate([s.effort for s in states])[told]
+    required = declared @ coefficients(declared[told], effort)
+    for _ in range(ROUNDS):
+        columns = np.column_stack([declared, required * np.abs(required)])
+        beta = coefficients(columns[told], effort)
+        if beta[-1] <= 0:
+            break
+        required = columns @ beta
+    parts = np.split(required, ends)
+    return tuple(replace(s, extra={**s.extra, "required": own}) for s, own in zip(states, parts, strict=True))
 
 
 def gives(prepared: Mapping[str, Sequence[DriveState]]) -> tuple[dict[str, float], float]:

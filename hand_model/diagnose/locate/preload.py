@@ -35,7 +35,7 @@ def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]
     without its name.
     """
     drives = _drives(stations)
-    healthy = [s for s in drives if not s.missing]
+    healthy = [s for s in drives if not _lacks(s)]
     spread = _spread([s.naming.fit.declared for s in healthy])
     out = []
     for station in drives:
@@ -68,7 +68,7 @@ def expected(stations: Sequence[Station], station: Station, name: str) -> tuple[
     drives = _drives(stations)
     values = [float(s.naming.fit.declared[name]) for s in _others(drives, station)]
     usual = float(np.median(values)) if values else 0.0
-    shape, scale = _spread([s.naming.fit.declared for s in drives if not s.missing])
+    shape, scale = _spread([s.naming.fit.declared for s in drives if not _lacks(s)])
     return (usual, np.sqrt(2) * scale / shape * usual) if usual > 0 else None
 
 
@@ -84,8 +84,13 @@ def _drives(stations: Sequence[Station]) -> list[Station]:
 
 def _others(drives: Sequence[Station], station: Station) -> list[Station]:
     """The drives that say what is usual; none where something is missing of all: such a drive accuses no other."""
-    rest = [s for s in drives if s is not station and (_settled(s) or not s.missing)]
-    return [] if all(s.missing for s in rest) else rest
+    rest = [s for s in drives if s is not station and (_settled(s) or not _lacks(s))]
+    return [] if all(_lacks(s) for s in rest) else rest
+
+
+def _lacks(station: Station) -> bool:
+    """Whether something is missing of the drive itself: what happened in one recording is not."""
+    return station.missing and not (station.believed and not any(f.term.effect.of_the_hand for f in station.kept))
 
 
 def _pulls(station: Station) -> bool:

@@ -277,8 +277,14 @@ def judged(
         if other.weight <= station.weight and lost <= MAIN:
             break  # else what fell had held the better part: what it left over stands on nothing
         station = other
-    untold = not station.believed or elsewhere and station.naming.after.p < ALPHA
     hopeless = station.naming.overwhelmed and not elsewhere  # in the training recordings already
+    if station.missing and not station.believed and not hopeless and _eventful(station.naming):
+        # events of one recording foretell nothing of those kept out: theirs are learned from all
+        told = tuple(replace(s, validate=False) for s in states)
+        other = Station(signal, finger, actuator, joint, name_effects(told, every, typical=typical))
+        known = {f.term.effect.name for f in station.naming.found}
+        station = other if other.believed and {f.term.effect.name for f in other.kept} <= known else station
+    untold = not station.believed or elsewhere and station.naming.after.p < ALPHA
     if (station.missing and untold and not hopeless or not station.proven and _altered(station.naming)) and any(
         s.validate for s in states
     ):
@@ -295,12 +301,6 @@ def judged(
         # another pose is plain to see, whatever small is left
         seen = other.naming.after.p >= ALPHA or _altered(station.naming)
         station = other if seen and other.believed and other.wander <= max(station.wander, UNREST) else station
-    if station.missing and not station.believed and not hopeless and _eventful(station.naming):
-        # events of one recording foretell nothing of those kept out: theirs are learned from all
-        told = tuple(replace(s, validate=False) for s in states)
-        other = Station(signal, finger, actuator, joint, name_effects(told, every, typical=typical))
-        known = {f.term.effect.name for f in station.naming.found}
-        station = other if other.believed and {f.term.effect.name for f in other.kept} <= known else station
     if station.forms:
         left = tuple(e for e in left if e.name not in {f.term.effect.name for f in station.forms})
         other = Station(signal, finger, actuator, joint, name_effects(states, left, typical=typical))
