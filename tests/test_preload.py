@@ -95,6 +95,14 @@ def test_a_motor_of_which_something_is_missing_accuses_no_other() -> None:
     assert preload_findings(hand(25.0, 0.0)) and not preload_findings([*hand(25.0), one])
 
 
+def test_a_motor_that_met_an_obstacle_once_says_what_is_usual() -> None:
+    contact = effect("external_contact")
+    shape = {"trial": 1.0, "form": 0.0, "since": 0.3, "until": 0.8, "begin": 55.0}
+    one = judged("current", "ring", "ring", None, drive(9, lambda s: contact.columns(s, shape)[:, 0]), [contact])
+    assert one.missing and one.believed
+    assert [f.where["finger"] for _, f in preload_findings([*hand(25.0), one])] == ["finger_0"]
+
+
 @pytest.mark.parametrize(("below", "accused"), [(4.0, ["finger_0"]), (40.0, [])])
 def test_only_a_finger_that_is_plainly_pulled_off_its_drive_keeps_its_drive_from_being_compared(
     below: float, accused: list[str]

@@ -116,14 +116,17 @@ def test_where_lost_motion_lay_before_the_first_motion_is_not_asked() -> None:
 
 
 def test_a_sag_is_read_from_what_is_asked_beside_it() -> None:
-    """The first estimate of what is asked is the declared model's, which bends less than a drive that sags by a
-    third."""
+    """What is asked bends as the drive that sags by a third makes it: from the beginning, though no effect is known
+    then."""
     from hand_model.diagnose.locate.drive import with_required
+
+    truly = []
 
     def sagging(state):
         truth = state.declared @ np.array([0.012, 0.1, 38.0, 0.2, 9.0])
         # u (1 - 0.3 |u| / 100) = truth
         asked = (1 - np.sqrt(1 - 4 * 0.3 / 100 * np.abs(truth))) / (2 * 0.3 / 100) * np.sign(truth)
+        truly.append(asked)
         return replace(
             state,
             effort=np.where(
@@ -132,6 +135,8 @@ def test_a_sag_is_read_from_what_is_asked_beside_it() -> None:
         )
 
     states = with_required(tuple(sagging(s) for s in drive(6)))
+    for state, asked in zip(states, truly, strict=True):
+        np.testing.assert_allclose(state.extra["required"], asked, atol=3.0)
     station = judged("current", "index", "index", None, states, catalogue("drive"))
     assert [f.term.effect.name for f in station.kept] == ["drive_sag"]
     (found,), _ = reread((finding_of(station, station.kept[0], 1.0, 1.0)[1],), [station])

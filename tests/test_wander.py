@@ -14,6 +14,7 @@ from hand_model.diagnose.locate.measurement import echoes_command, is_measured, 
 from hand_model.diagnose.locate.stamps import stamps
 from hand_model.diagnose.name.balance import Balance
 from hand_model.diagnose.name.selection import name_effects
+from hand_model.diagnose.name.station import judged
 from hand_model.diagnose.name.wander import Wander, estimate_wander
 from hand_model.effects import catalogue, effect, outsiders
 from hand_model.session import Log
@@ -70,6 +71,20 @@ def test_an_obstacle_in_one_trial_is_still_named_beside_its_rival_chance():
     naming = name_effects(drive(7, contact), catalogue("drive"))
     assert [f.term.effect.name for f in naming.found] == ["external_contact"]
     assert naming.found[0].amplitudes["stiffness"] == pytest.approx(0.6, rel=0.15)
+
+
+def test_an_obstacle_in_recordings_that_others_do_not_foretell_is_no_spring():
+    """It is there in two of those that teach and in the one kept out, each time for another while."""
+    spans = {0.0: (0.1, 0.8), 2.0: (0.3, 0.7), 3.0: (0.05, 0.65)}
+
+    def contact(state):
+        trial = float(state.extra["trial_index"][0])
+        since, until = spans.get(trial, (2.0, 3.0))
+        share = (state.time_s - state.time_s[0]) / np.ptp(state.time_s)
+        return 1.2 * np.maximum(state.position - 70.0, 0.0) * ((share >= since) & (share <= until))
+
+    station = judged("current", "index", "index", None, drive(7, contact), catalogue("drive"))
+    assert station.believed and {f.term.effect.name for f in station.kept} == {"external_contact"}
 
 
 def test_physics_is_found_through_a_wandering_zero():
