@@ -13,6 +13,7 @@ from ..effects.base import sample_interval
 from .findings import Finding, Findings
 from .locate.displacement import NO_HINGE, NOT_RIGID
 from .locate.markers import HINGE, SLIPS
+from .locate.preload import COMPARISON
 from .magnitude import SLIGHT, channel_figures, magnitude, sure_magnitude
 from .name.distinguishability import protocol_pairs
 from .name.interval import variance_ratio
@@ -38,6 +39,9 @@ TRIFLE = 0.01  # of the square of the heaviest weight
 # of that magnitude: less, where the lack-of-fit test sees nothing, is left to the imperfections of reading angles and
 # speeds
 MINUTE = 0.15
+# of a weight counts where the declared model takes up what is named, so that nothing of the mismatch is its: only the
+# hand's other motors speak for it
+COMPARED = 0.1
 UNSEEN = 0.01  # probability from which the test sees nothing
 SIGNALS = {"drive": "current", "motors": "current", "command": "current", "encoder": "encoder", "linkage": "markers"}
 SHOWN_IN = {e.name: SIGNALS[e.station] for e in catalogue() if e.station in SIGNALS}
@@ -86,7 +90,10 @@ def assemble(
     ranked = _without_tilts(_without_shadows(_one_clock(_of_hinges(ranked, unexplained))))
     # how far a hinge that is none moves is told only beside what another hinge would explain: that it is none is sure
     # all the same
-    sized = [(_magnitude(f, stations, sure=f.effect not in HINGE), weight, f) for weight, f in ranked]
+    sized = [
+        (_magnitude(f, stations, sure=f.effect not in HINGE), weight * (COMPARED if _compared(f) else 1.0), f)
+        for weight, f in ranked
+    ]
     ranked = sorted(((float((m**3 * weight) ** 0.25), f) for m, weight, f in sized), key=lambda item: -item[0])
     ranked = _heaviest(ranked, _same_place)
     trifles = _trifles(ranked, {id(f): m for m, _, f in sized})
@@ -115,6 +122,10 @@ def assemble(
         tuple(channel_of(s) for s in stations),
         tuple(notes),
     )
+
+
+def _compared(finding: Finding) -> bool:
+    return finding.fit.get("engine") == COMPARISON
 
 
 def _leave_something(station: Station, stations: Sequence[Station]) -> bool:

@@ -25,6 +25,7 @@ LOST = 0.2  # of the other's preload: less, or the wrong sign, and there is none
 SURE_LEAST = 0.1  # of a half difference counts in the ranking, however uncertain the rest is
 RESTLESS = 0.5  # of the noise
 CLASS = ("asymmetric_friction", "spring_preload")
+COMPARISON = "comparison of the hand's motors"  # what speaks for it, where others are proved by an engine
 
 
 def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]:
@@ -179,7 +180,7 @@ def _finding(
         "noise_floor": station.naming.balance.sigma,
         "ci95_reduction": None,
         "held_out": [],
-        "engine": "comparison of the hand's motors",
+        "engine": COMPARISON,
     }
     sure = max(abs(half_difference) - doubt, SURE_LEAST * abs(half_difference))
     return weighed(sure / station.naming.balance.sigma, station.contrast), Finding(
