@@ -12,7 +12,7 @@ from hand_model.diagnose.locate.excursions import with_excursions
 from hand_model.diagnose.locate.slips import _swaps
 from hand_model.diagnose.name.selection import name_effects
 from hand_model.diagnose.name.station import Station, judged
-from hand_model.effects import catalogue, effect
+from hand_model.effects import catalogue, effect, outsiders
 from hand_model.effects.base import DriveState
 from hand_model.effects.driven import driven, play, soft_play
 from hand_model.identify.chain import ChainData
@@ -351,3 +351,25 @@ def test_a_drive_is_judged_from_a_little_beyond_where_its_finger_stays_behind() 
     (left,) = while_driven([state()], 20.0)
     kept = left.position[np.isfinite(left.effort)]
     assert 22.0 < kept.min() < 26.0
+
+
+@pytest.mark.parametrize("met", [True, False])
+def test_a_segment_held_back_for_a_while_gives_no_more_than_others(met: bool) -> None:
+    """An obstacle bends the linkage while it is there: no compliance, and where the current shows it nothing else."""
+    from hand_model.diagnose.assemble import assemble
+    from hand_model.diagnose.findings import Finding
+
+    def held_back(t, x, v):
+        share = (t - t[0]) / np.ptp(t)
+        return -0.1 * np.maximum(x - 50.0, 0.0) * ((share > 0.2) & (share < 0.8))
+
+    effects = [*catalogue("linkage"), *outsiders("linkage")]
+    station = judged("markers", "index", "index", "distal", joint(5, add=held_back), effects)
+    assert station.believed and not station.kept
+    assert {f.term.effect.name for f in station.outsiders} == {"obstructed"}
+    where = dict.fromkeys(("joint", "actuator", "marker"), None) | {"finger": "index", "signal": "current"}
+    where |= {"share_of_mismatch": 1.0, "trials": []}
+    contact = Finding("external_contact", ("external_contact",), 1.0, (), where, "", {}, {}, None)
+    findings = assemble([station], [(1.0, contact)] if met else [], [])
+    assert [f.effect for f in findings.findings] == ["external_contact"] * met
+    assert any("holds the distal segment back" in e["shape"] for e in findings.unexplained) is not met

@@ -58,14 +58,14 @@ def assemble(
     three times as much, by how large it is for its kind (weighted geometric mean). unexplained: of the markers."""
     ranked: list[tuple[float, Finding]] = _heaviest(marker_findings, _palm_marker)
     rejected: list[dict[str, str]] = []
-    unexplained = list(unexplained)
+    unexplained, strange = list(unexplained), list[tuple[Station, Named]]()
     loose = {
         entry["where"]["finger"] for entry in unexplained if entry["shape"] == NOT_RIGID or NO_HINGE in entry["shape"]
     }
     for station in stations:
         stands = station.believed and not (station.finger in loose and _leave_something(station, stations))
         if stands:
-            unexplained += [outsider_of(station, f) for f in station.outsiders]
+            strange += [(station, f) for f in station.outsiders]
             for weight, finding in (finding_of(station, *merged) for merged in _merged(station.kept)):
                 if station.naming.before.p >= UNSEEN and _magnitude(finding, stations) < MINUTE:
                     rejected.append(
@@ -86,6 +86,8 @@ def assemble(
             for name, value in station.naming.rejected[:4]
             if name in NAMES
         ]
+    named = {(f.effect, f.where["finger"]) for _, f in ranked}
+    unexplained += [outsider_of(s, f) for s, f in strange if (f.term.effect.part_of, s.finger) not in named]
     unexplained += [unrepeated_of(s) for s in stations if _wanders(s, stations)]
     ranked = _without_tilts(_without_shadows(_one_clock(_of_hinges(ranked, unexplained))))
     # how far a hinge that is none moves is told only beside what another hinge would explain: that it is none is sure
