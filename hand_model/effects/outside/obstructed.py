@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..base import Array, DriveState
-from ..external_contact import ExternalContact
+from ..external_contact import LASTING, ExternalContact
 from .outsider import Outsider
 
 
@@ -17,10 +17,15 @@ class Obstructed(Outsider, ExternalContact):
     name = "obstructed"
     station = "linkage"
     part_of = "external_contact"
+    repeats = False  # whiles that follow each other would be a stop
+
+    def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
+        """Whiles of trials, never a whole one: what is there all along is a stop or the linkage itself."""
+        return [point for point in super().grid(states) if _for_a_while(point)]
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """How far it is pressed, taken from the angle; (n, 1 + MOST_VALIDATION)."""
-        return -super().columns(state, shape)
+        return -super().columns(state, shape) * _for_a_while(shape)
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """From which angle of the driver on."""
@@ -28,6 +33,10 @@ class Obstructed(Outsider, ExternalContact):
             f"something holds the {where.get('joint') or 'distal'} segment back for a while, "
             f"once the joint before it is at {parameters['begin']:.1f} deg"
         )
+
+
+def _for_a_while(shape: Mapping[str, float]) -> bool:
+    return shape["until"] - shape["since"] <= LASTING
 
 
 EFFECT = Obstructed()
