@@ -9,7 +9,7 @@ import pytest
 from drive_motion import state
 
 from hand_model.diagnose.locate.drive import bouts
-from hand_model.effects import catalogue, effect
+from hand_model.effects import catalogue, effect, outsiders
 from hand_model.effects.base import DriveState
 from hand_model.errors import DescriptionError
 
@@ -172,3 +172,16 @@ def test_static_friction_that_no_recorded_effort_could_overcome_is_impossible() 
     assert stribeck.possible((s,), {"static_excess": 0.9 * largest})
     assert not stribeck.possible((s,), {"static_excess": 1.1 * largest})
     assert not stribeck.possible((), {"static_excess": 1.1 * largest})
+
+
+def test_an_obstacle_apart_is_of_one_recording_and_what_it_leaves_in_the_angles_stays_that() -> None:
+    states = tuple(
+        replace(state(), extra={**state().extra, "trial_index": np.full(len(state().time_s), float(i))})
+        for i in range(3)
+    )
+    for kind in (effect("external_contact"), next(e for e in outsiders("linkage") if e.name == "obstructed")):
+        assert {p["trial"] for p in kind.grid(states)} >= {0.0, 1.0, 2.0, -2.0}
+        apart = kind.apart()
+        assert {p["trial"] for p in apart.grid(states)} == {0.0, 1.0, 2.0}
+        assert (apart.name, apart.station) == (kind.name, kind.station)
+    assert effect("torque_ripple").apart() is effect("torque_ripple")

@@ -187,6 +187,10 @@ class Effect:
         """All columns as they are."""
         return columns
 
+    def apart(self) -> Effect:
+        """The effect, where it may be of one recording or of several as one, as that of one alone; itself."""
+        return self
+
     def told_by(self, state: DriveState) -> bool:
         """Whether a recording says what the effect depends on, so that it can bear the effect out: every one."""
         return True

@@ -30,13 +30,23 @@ class ExternalContact(Effect):
     recorded = True
     unwritten = "an obstacle of one recording is no part of the hand"
 
+    def __init__(self, several: bool = True) -> None:
+        """several: whether one while of every recording, or of the session, may have it, beside those of one alone."""
+        self.several = several
+
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """Which trial (index into the states; ALL of them as one, EACH of them), from and until which share of it,
         form, and where the contact begins."""
         low, high = position_range(states)
         span = high - low
         trials = tuple(float(i) for i, s in enumerate(states) if not s.validate)
-        every = () if len(trials) < 2 else (EACH, ALL) if all("session_s" in s.extra for s in states) else (EACH,)
+        every = (
+            ()
+            if len(trials) < 2 or not self.several
+            else (EACH, ALL)
+            if all("session_s" in s.extra for s in states)
+            else (EACH,)
+        )
         return (
             Shape("trial", "1", EACH, len(states) - 1.0, (*trials, *every)),
             Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),
@@ -50,6 +60,10 @@ class ExternalContact(Effect):
                 tuple(low + span * np.linspace(0.1, 0.9, 9)),
             ),
         )
+
+    def apart(self) -> ExternalContact:
+        """The same, each of one recording: some may have it and others not."""
+        return type(self)(several=False)
 
     def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
         """Every start of trial, form and place, in some whiles of the trial."""

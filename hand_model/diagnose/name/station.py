@@ -279,11 +279,15 @@ def judged(
         station = other
     hopeless = station.naming.overwhelmed and not elsewhere  # in the training recordings already
     if station.missing and not station.believed and not hopeless and _eventful(station.naming):
-        # events of one recording foretell nothing of those kept out: theirs are learned from all
+        # events of one recording foretell nothing of those kept out: theirs are learned from all, where not all that
+        # they have in common need be in each
         told = tuple(replace(s, validate=False) for s in states)
-        other = Station(signal, finger, actuator, joint, name_effects(told, every, typical=typical))
         known = {f.term.effect.name for f in station.naming.found}
-        station = other if other.believed and {f.term.effect.name for f in other.kept} <= known else station
+        for among in (every, tuple(e.apart() for e in every)):
+            other = Station(signal, finger, actuator, joint, name_effects(told, among, typical=typical))
+            if other.believed and {f.term.effect.name for f in other.kept} <= known:
+                station = other
+                break
     untold = not station.believed or elsewhere and station.naming.after.p < ALPHA
     if (station.missing and untold and not hopeless or not station.proven and _altered(station.naming)) and any(
         s.validate for s in states
