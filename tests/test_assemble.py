@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -17,6 +18,7 @@ from hand_model.diagnose.assemble import (
 from hand_model.diagnose.findings import Finding, weighed
 from hand_model.diagnose.hearing import _without_settled_sags
 from hand_model.diagnose.locate.displacement import NO_HINGE
+from hand_model.diagnose.locate.preload import COMPARISON
 from hand_model.effects import effect
 
 
@@ -234,3 +236,13 @@ def test_a_session_without_a_balance_claims_no_figures() -> None:
     assert found.verdict == "consistent"
     assert found.lack_of_fit == {"before": None, "after": None, "limit": None}
     assert found.protocol == {"repeats": 0, "rate_hz": None, "speeds": 0, "isolable": [], "not_isolable": []}
+
+
+@pytest.mark.parametrize(("engine", "first"), [(COMPARISON, "marker_slip"), ("another", "asymmetric_friction")])
+def test_what_only_other_motors_tell_ranks_behind_what_the_recordings_show(engine: str, first: str) -> None:
+    found = [
+        (1.0, finding("asymmetric_friction", "index", "current")),
+        (0.5, finding("marker_slip", "index", "markers")),
+    ]
+    found[0] = (1.0, replace(found[0][1], fit={"engine": engine}))
+    assert assemble([], found, []).findings[0].effect == first
