@@ -92,10 +92,7 @@ def assemble(
     ranked = _without_tilts(_without_shadows(_one_clock(_of_hinges(ranked, unexplained))))
     # how far a hinge that is none moves is told only beside what another hinge would explain: that it is none is sure
     # all the same
-    sized = [
-        (_magnitude(f, stations, sure=f.effect not in HINGE), weight * (COMPARED if _compared(f) else 1.0), f)
-        for weight, f in ranked
-    ]
+    sized = [(_magnitude(f, stations, sure=f.effect not in HINGE), weight * _counted(f), f) for weight, f in ranked]
     ranked = sorted(((float((m**3 * weight) ** 0.25), f) for m, weight, f in sized), key=lambda item: -item[0])
     ranked = _heaviest(ranked, _same_place)
     trifles = _trifles(ranked, {id(f): m for m, _, f in sized})
@@ -126,8 +123,9 @@ def assemble(
     )
 
 
-def _compared(finding: Finding) -> bool:
-    return finding.fit.get("engine") == COMPARISON
+def _counted(finding: Finding) -> float:
+    """Share of a finding's weight that counts."""
+    return COMPARED if finding.fit.get("engine") == COMPARISON else 1.0
 
 
 def _leave_something(station: Station, stations: Sequence[Station]) -> bool:

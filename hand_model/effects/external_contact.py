@@ -40,13 +40,9 @@ class ExternalContact(Effect):
         low, high = position_range(states)
         span = high - low
         trials = tuple(float(i) for i, s in enumerate(states) if not s.validate)
-        every = (
-            ()
-            if len(trials) < 2 or not self.several
-            else (EACH, ALL)
-            if all("session_s" in s.extra for s in states)
-            else (EACH,)
-        )
+        every: tuple[float, ...] = (EACH, ALL) if all("session_s" in s.extra for s in states) else (EACH,)
+        if len(trials) < 2 or not self.several:
+            every = ()
         return (
             Shape("trial", "1", EACH, len(states) - 1.0, (*trials, *every)),
             Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),

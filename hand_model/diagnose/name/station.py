@@ -251,6 +251,21 @@ def _eventful(naming: Naming) -> bool:
     return not all(f.term.effect.of_the_hand for f in naming.found) and any(s.validate for s in naming.balance.states)
 
 
+def _foretold(
+    station: Station, states: tuple[Any, ...], effects: tuple[Any, ...], typical: Mapping[str, float] | None
+) -> Station | None:
+    """The station where no recording is kept out: events of one recording foretell nothing of others, so theirs are
+    learned from all, where not all that they have in common need be in each. None where that brings other names."""
+    told = tuple(replace(s, validate=False) for s in states)
+    known = {f.term.effect.name for f in station.naming.found}
+    for among in (effects, tuple(e.apart() for e in effects)):
+        naming = name_effects(told, among, typical=typical)
+        other = Station(station.signal, station.finger, station.actuator, station.joint, naming)
+        if other.believed and {f.term.effect.name for f in other.kept} <= known:
+            return other
+    return None
+
+
 def judged(
     signal: str,
     finger: str | None,
@@ -279,15 +294,7 @@ def judged(
         station = other
     hopeless = station.naming.overwhelmed and not elsewhere  # in the training recordings already
     if station.missing and not station.believed and not hopeless and _eventful(station.naming):
-        # events of one recording foretell nothing of those kept out: theirs are learned from all, where not all that
-        # they have in common need be in each
-        told = tuple(replace(s, validate=False) for s in states)
-        known = {f.term.effect.name for f in station.naming.found}
-        for among in (every, tuple(e.apart() for e in every)):
-            other = Station(signal, finger, actuator, joint, name_effects(told, among, typical=typical))
-            if other.believed and {f.term.effect.name for f in other.kept} <= known:
-                station = other
-                break
+        station = _foretold(station, states, every, typical) or station
     untold = not station.believed or elsewhere and station.naming.after.p < ALPHA
     if (station.missing and untold and not hopeless or not station.proven and _altered(station.naming)) and any(
         s.validate for s in states
