@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hand_model.diagnose.findings import Finding
+from hand_model.diagnose.locate.angles import Step, _stepped
 from hand_model.diagnose.locate.displacement import MarkerEffect
 from hand_model.diagnose.locate.slips import displacement, turn, with_steps
 from hand_model.diagnose.locate.wobble import centre_travel, wobble_amplitude
@@ -142,3 +143,11 @@ def test_a_centre_travels_as_far_as_it_does_whatever_another_hinge_would_explain
         rotation=np.concatenate([np.repeat(before[:, None], 3, 1), np.repeat(own[:, None], 3, 1)], 1),
     )
     assert centre_travel(blocks, body, shift) == pytest.approx(2e-3, rel=0.03)
+
+
+def test_a_step_lasts_as_long_as_its_slip() -> None:
+    time_s = np.linspace(0.0, 10.0, 11)
+    anew, for_good = Step(0, 4.0, 0), Step(0, 4.0, 2)
+    for record, (first, second) in enumerate([(7, 7), (0, 11), (0, 11), (0, 0)]):
+        columns, names = _stepped(record, time_s, (anew, for_good))
+        assert names == ("step_0", "step_1") and columns.sum(axis=0).tolist() == [first, second]
