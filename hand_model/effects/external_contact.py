@@ -66,7 +66,7 @@ class ExternalContact(Effect):
         return [
             point
             for point in super().grid(states)
-            if (point["since"], point["until"]) in WHILES and not _all_along(point)
+            if (point["since"], point["until"]) in WHILES and not self._all_along(point)
         ]
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
@@ -82,7 +82,7 @@ class ExternalContact(Effect):
         out = np.zeros((len(state.time_s), 1 + MOST_VALIDATION))
         index = state.extra.get("trial_index", np.zeros(len(state.time_s)))[0]
         every, mine = shape["trial"] < 0, index == round(shape["trial"])
-        if not (every or mine or state.validate) or _all_along(shape):
+        if not (every or mine or state.validate) or self._all_along(shape):
             return out
         depth = np.maximum(state.position - shape["begin"], 0.0)
         if shape["form"] > 0.5:
@@ -123,9 +123,9 @@ class ExternalContact(Effect):
             f"10 % further it takes {figure(10 * parameters['stiffness'])} raw more current"
         )
 
-
-def _all_along(shape: Mapping[str, float]) -> bool:
-    return shape["trial"] < 0 and shape["until"] - shape["since"] > LASTING
+    def _all_along(self, shape: Mapping[str, float]) -> bool:
+        """Whether it is there for so long that it is none."""
+        return shape["trial"] < 0 and shape["until"] - shape["since"] > LASTING
 
 
 EFFECT = ExternalContact()

@@ -43,6 +43,12 @@ class Step:
     time_s: float
     last: int
 
+    def acts(self, record: int, time_s: Array) -> Array:
+        """(n,) one while it lasts, at times [s] of a record, else zero."""
+        if record == self.record:
+            return (time_s >= self.time_s).astype(float)
+        return np.full(len(time_s), float(self.record < record <= self.last))
+
 
 @dataclass(frozen=True)
 class FlexionAngles:
@@ -318,12 +324,7 @@ def _smoothed(
 
 def _stepped(record: int, time_s: Array, steps: Sequence[Step]) -> tuple[Array, tuple[str, ...]]:
     """Columns (n, s) that are one while a step lasts, and their names."""
-    columns = [
-        (time_s >= step.time_s).astype(float)
-        if record == step.record
-        else np.full(len(time_s), float(step.record < record <= step.last))
-        for step in steps
-    ]
+    columns = [step.acts(record, time_s) for step in steps]
     names = tuple(f"step_{i}" for i in range(len(steps)))
     return np.stack(columns, axis=-1) if columns else np.zeros((len(time_s), 0)), names
 

@@ -103,7 +103,7 @@ class _Readings:
     """Marker readings of one finger, and what a course brings beside everything else that was found in them."""
 
     def __init__(self, naming: MarkerNaming, effect: MarkerEffect) -> None:
-        self.blocks, self.effect, self.sigma = naming.blocks, effect, naming.sigma_m
+        self.blocks, self.sigma = naming.blocks, naming.sigma_m
         blocks = naming.blocks
         others = [e.columns for e in naming.found if (e.body, e.effect) != (effect.body, effect.effect)]
         others += [effect.columns[..., list(effect.shifts)]] if effect.effect == "joint_wobble" else []

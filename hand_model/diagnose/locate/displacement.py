@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from .angles import Step
 from .blocks import Blocks, across_axis, share_of_range, way_of_motion
 
 Array = NDArray[np.float64]
@@ -66,16 +67,22 @@ class MarkerEffect:
         """(b, 3m, c) where it acts, zero elsewhere."""
         if self.begin is None:
             return self.everywhere
+        return self.everywhere * self.active[:, None, None]
+
+    @property
+    def active(self) -> NDArray[np.bool_]:
+        """(b,) where a step acts."""
         index = np.arange(len(self.everywhere))
-        return self.everywhere * ((index >= self.begin) & (index < self.end))[:, None, None]
+        return (index >= self.begin) & (index < self.end)
+
+    def step(self, blocks: Blocks) -> Step:
+        """When a step acts, in times of the recordings."""
+        first, last = int(blocks.record[self.begin]), int(blocks.record[self.end - 1])
+        return Step(first, float(blocks.time_s[self.begin]), last)
 
     def acts(self, blocks: Blocks, record: int, time_s: Array) -> Array:
         """(n,) one where it acts at times [s] of a record, else zero."""
-        if self.begin is None:
-            return np.ones(len(time_s))
-        first, last = int(blocks.record[self.begin]), int(blocks.record[self.end - 1])
-        here = np.full(len(time_s), first < record <= last, float)
-        return (time_s >= blocks.time_s[self.begin]).astype(float) if record == first else here
+        return np.ones(len(time_s)) if self.begin is None else self.step(blocks).acts(record, time_s)
 
 
 def candidates_of(blocks: Blocks) -> list[Candidate]:

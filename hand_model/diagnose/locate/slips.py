@@ -201,11 +201,8 @@ def _whole_turn(naming: MarkerNaming, body: int, stepped_deg: Mapping[str, float
         for e in naming.found
         if e.body == body and (e.effect == "support_slip" or e.effect == "marker_slip" and e.gain < least)
     ]
-    index = np.arange(len(blocks.residual))
     step_deg = sum(
-        stepped_deg.get(f"step_{i}", 0.0) * ((index >= e.begin) & (index < e.end))
-        for i, e in enumerate(_stepping(naming))
-        if e.body == body
+        stepped_deg.get(f"step_{i}", 0.0) * e.active for i, e in enumerate(_stepping(naming)) if e.body == body
     )
     along = (np.deg2rad(step_deg)[:, None] * blocks.axes[:, body - 1])[main.begin : main.end]
     return float(np.median(np.linalg.norm(_turned(blocks, acting, main) + along, axis=1)))
@@ -331,8 +328,7 @@ def _displaced(angles: FingerAngles, labels: list[str], lasting_s: float) -> flo
 def steps(naming: MarkerNaming) -> list[Step]:
     """Every slip: a support that turns about its joint's own axis steps the angle, which markers alone cannot tell from
     motion; encoder and linkage balances let the angle step there."""
-    record, time_s = naming.blocks.record, naming.blocks.time_s
-    return [Step(int(record[e.begin]), float(time_s[e.begin]), int(record[e.end - 1])) for e in _stepping(naming)]
+    return [e.step(naming.blocks) for e in _stepping(naming)]
 
 
 def _stepping(naming: MarkerNaming) -> list[MarkerEffect]:

@@ -19,13 +19,9 @@ class Obstructed(Outsider, ExternalContact):
     part_of = "external_contact"
     repeats = False  # whiles that follow each other would be a stop
 
-    def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
-        """Whiles of trials, never a whole one: what is there all along is a stop or the linkage itself."""
-        return [point for point in super().grid(states) if _for_a_while(point)]
-
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """How far it is pressed, taken from the angle; (n, 1 + MOST_VALIDATION)."""
-        return -super().columns(state, shape) * _for_a_while(shape)
+        return -super().columns(state, shape)
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """From which angle of the driver on."""
@@ -34,9 +30,9 @@ class Obstructed(Outsider, ExternalContact):
             f"once the joint before it is at {parameters['begin']:.1f} deg"
         )
 
-
-def _for_a_while(shape: Mapping[str, float]) -> bool:
-    return shape["until"] - shape["since"] <= LASTING
+    def _all_along(self, shape: Mapping[str, float]) -> bool:
+        """Of a single recording, too: what is there all along is a stop or the linkage itself."""
+        return shape["until"] - shape["since"] > LASTING
 
 
 EFFECT = Obstructed()
