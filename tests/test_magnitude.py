@@ -94,3 +94,14 @@ def test_an_obstacle_that_stiffens_counts_by_the_load_at_the_end_of_the_range() 
     assert magnitude("external_contact", bent, channel) == pytest.approx(
         magnitude("external_contact", even, channel), rel=0.05
     )
+
+
+def test_a_ceiling_counts_by_what_it_would_cut_without_the_other_effects() -> None:
+    """A tight spot that pushes the current beyond a ceiling does not make the ceiling lower."""
+    states = drive(0)
+    declared = {name: float(name == "preload") for name in states[0].declared_names}  # a drive that needs one unit
+    channel = channel_figures(states, declared)
+    high, low = ({"limit": limit, "share_cut": 0.15} for limit in (1.01, 0.99))
+    assert magnitude("current_saturation", high, channel) == LEAST
+    assert magnitude("current_saturation", low, channel) == pytest.approx(1.0)
+    assert magnitude("current_saturation", high, channel_figures(states)) == pytest.approx(1.0)  # nothing known of it

@@ -68,3 +68,14 @@ def test_a_bent_spring_beside_a_usual_preload_stays_what_it_is(monkeypatch: pyte
     stations, findings = heard(monkeypatch, lambda s: 30 * (s.position / 100) ** 2)
     assert not findings
     assert [f.term.effect.name for s in stations for f in s.kept] == ["nonlinear_spring"]
+
+
+def test_a_preload_that_pushes_is_a_weights_whatever_else_bends_the_spring(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No spring pushes, and lopsided friction takes at most the friction away; the usual preload here is 10."""
+
+    def pushed(s: Any) -> Any:
+        return -80.0 * np.sin(1.7 + SWEEP * s.position / 100) - 12 * (s.position / 100) ** 3
+
+    stations, findings = heard(monkeypatch, pushed)
+    named = {f.effect for _, f in findings} | {f.term.effect.name for s in stations if s.believed for f in s.kept}
+    assert "gravity_load" in named and named <= {"gravity_load", "nonlinear_spring"}

@@ -138,15 +138,11 @@ def _leave_something(station: Station, stations: Sequence[Station]) -> bool:
 def _magnitude(finding: Finding, stations: Sequence[Station], sure: bool = False) -> float:
     """How large a finding is for its kind, measured by the channel in which effects of its kind show; or how large it
     is for sure."""
-    states = next(
-        (
-            s.naming.balance.states
-            for s in stations
-            if s.signal == SHOWN_IN.get(finding.effect) and s.finger == finding.where["finger"]
-        ),
+    shown = next(
+        (s.naming for s in stations if s.signal == SHOWN_IN.get(finding.effect) and s.finger == finding.where["finger"]),
         None,
     )
-    channel = None if states is None else channel_figures(states)
+    channel = None if shown is None else channel_figures(shown.balance.states, shown.fit.declared)
     if sure:
         return sure_magnitude(finding.effect, finding.parameters, channel)
     return magnitude(finding.effect, {name: entry["value"] for name, entry in finding.parameters.items()}, channel)

@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from numpy.typing import NDArray
+
 from ..effects.base import DriveState, position_range, speed_range
 
 SLIGHT = 0.25  # of the size at which an effect is plain
@@ -23,7 +25,7 @@ LEAST, MOST = 1e-3, 3.0  # beyond, a figure says nothing more about its kind
 class Channel:
     """What magnitudes refer to. effort, load: standard deviations; low, high: range of positions; fastest: speed;
     ahead: farthest that a joint ran ahead of its drive; granted: length of bristles that any drive of the session may
-    have."""
+    have; plain: sizes (n,) of what the drive needs without the named effects, where known."""
 
     effort: float = 1.0
     load: float = 0.0
@@ -32,20 +34,32 @@ class Channel:
     fastest: float = 100.0
     ahead: float = 0.0
     granted: float = 0.0
+    plain: NDArray[np.float64] | None = None
 
     @property
     def span(self) -> float:
         """Range of positions."""
         return self.high - self.low
 
+    def beyond(self, limit: float) -> float:
+        """Share of what the drive needs without the named effects that is beyond a limit; one where it is unknown."""
+        return 1.0 if self.plain is None else float(np.mean(self.plain > limit))
 
-def channel_figures(states: tuple[DriveState, ...]) -> Channel:
-    """The figures of one balance's recordings."""
+
+def channel_figures(states: tuple[DriveState, ...], declared: Mapping[str, float] | None = None) -> Channel:
+    """The figures of one balance's recordings. declared: name -> coefficient, as fitted beside the named effects."""
     effort = np.concatenate([s.effort[np.isfinite(s.effort)] for s in states])
     load, ahead, granted = (
         np.concatenate([s.extra.get(name, np.zeros(1)) for s in states]) for name in ("load", "ahead", "granted")
     )
     low, high = position_range(states)
+    needed = None
+    if declared is not None:
+        needed = np.abs(
+            np.concatenate(
+                [(s.declared @ [declared[n] for n in s.declared_names])[np.isfinite(s.effort)] for s in states]
+            )
+        )
     return Channel(
         max(float(np.std(effort)), 1e-12),
         float(np.nanstd(load)),
@@ -54,6 +68,7 @@ def channel_figures(states: tuple[DriveState, ...]) -> Channel:
         speed_range(states)[1],
         float(np.nanmax(ahead)),
         float(np.max(granted)),
+        needed,
     )
 
 
@@ -138,7 +153,8 @@ PLAIN: Mapping[str, Rule] = {
     "distal_stop": lambda p, c: (c.high - p["from"]) / (0.12 * c.span),
     "encoder_periodic_error": lambda p, c: p["amplitude"] / (0.005 * c.span),
     "drive_sag": lambda p, _: p["sag"] / 0.002 if "sag" in p else p["torque_loss"] / 0.3,
-    "current_saturation": lambda p, _: p["share_cut"] / 0.15,
+    # what it would cut alone: another effect may push the current beyond it
+    "current_saturation": lambda p, c: min(p["share_cut"], c.beyond(p["limit"])) / 0.15,
     "current_channel_delay": lambda p, _: p["delay"] / 0.06,
     "command_delay": lambda p, _: p["delay"] / 0.11,
     "clock_drift": lambda p, _: p["rate_minus_one"] / 0.001,

@@ -101,9 +101,22 @@ def _pulled(
     weighed = _Model(balance, plain, inside, usual, effort, weights)
     spared = EVIDENCE_LEAST if len(plain) < len(terms) else 0.0  # one effect for two
     likelier = weighed.log_evidence - odd.log_evidence + (spared if odd_preload else -CLASS_WIDTH)
+    if odd_preload and _impossible(odd, *usual["preload"]):
+        both = _Model(balance, terms, inside, usual, effort, weights)
+        if both.log_evidence > weighed.log_evidence + spared:
+            weighed, likelier = both, both.log_evidence - odd.log_evidence
+        likelier += CLASS_WIDTH + EVIDENCE_LEAST
     if likelier <= 0:
         return None
     return weighed.mean[-2:], weighed.covariance[-2:, -2:], float(1 / (1 + np.exp(-likelier)))
+
+
+def _impossible(odd: _Model, usual: float, doubt: float) -> bool:
+    """Whether no odd preload is as low as the one found, for sure: a spring pulls, and friction that is lopsided takes
+    at most as much off a usual preload as there is of it."""
+    preload, coulomb = (odd.names.index(name) for name in ("preload", "coulomb"))
+    surely = odd.mean[preload] + 2 * np.hypot(np.sqrt(odd.covariance[preload, preload]), doubt)
+    return bool(surely < min(0.0, usual - odd.mean[coulomb]))
 
 
 class _Model:
@@ -126,6 +139,7 @@ class _Model:
         matrix = balance.design(terms)[0]
         if further is not None:
             matrix = np.c_[matrix, further]
+        self.names = balance.names
         size = np.maximum(np.sqrt(np.mean(matrix**2, axis=0)), 1e-12)
         mean, deviation = np.zeros(len(size)), effort / size
         deviation[: len(balance.names)] *= FLAT
