@@ -139,7 +139,11 @@ def _magnitude(finding: Finding, stations: Sequence[Station], sure: bool = False
     """How large a finding is for its kind, measured by the channel in which effects of its kind show; or how large it
     is for sure."""
     shown = next(
-        (s.naming for s in stations if s.signal == SHOWN_IN.get(finding.effect) and s.finger == finding.where["finger"]),
+        (
+            s.naming
+            for s in stations
+            if s.signal == SHOWN_IN.get(finding.effect) and s.finger == finding.where["finger"]
+        ),
         None,
     )
     channel = None if shown is None else channel_figures(shown.balance.states, shown.fit.declared)
