@@ -85,7 +85,8 @@ class DriveState:
 @dataclass(frozen=True)
 class Shape:
     """A nonlinear parameter of an effect: its unit, bounds, and the starting values that a multi-start fit tries. size:
-    it says how much of the effect there is, as an amplitude does."""
+    it says how much of the effect there is, as an amplitude does. edge: what it moves over matters at times only, so
+    that its likelihood has steps and is searched all along."""
 
     name: str
     unit: str
@@ -93,6 +94,7 @@ class Shape:
     high: float
     starts: tuple[float, ...]
     size: bool = False
+    edge: bool = False
 
 
 @runtime_checkable

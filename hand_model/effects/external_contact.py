@@ -9,12 +9,14 @@ import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, figure, position_range
 
-WHILES = ((0.0, 1.0), (0.2, 1.0), (0.35, 1.0), (0.5, 1.0), (0.65, 1.0), (0.8, 1.0), (0.0, 0.5), (0.2, 0.5), (0.4, 0.7))
+SINCE, UNTIL, SHORTEST = (0.0, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8), (0.35, 0.5, 0.65, 0.8, 0.9, 1.0), 0.15  # starts
 # share of each recording, or of the session: what is there for longer in all of them is a spring or a stop
 LASTING = 0.85
-# instead of the number of a trial: the while is one of the whole session; it is the same one of every trial
-ALL, EACH = -1.0, -2.0
-MOST_VALIDATION = 4  # validation recordings in which an obstacle can still be told
+# instead of the number of a trial: the while is one of the whole session; it is the same one of every trial; the same
+# one of those trials that have it, with a stiffness in each
+ALL, EACH, SOME = -1.0, -2.0, -3.0
+MOST_TRIALS = 8  # recordings in which an obstacle can still be told each on its own
+THERE = 0.1  # of the stiffest: less, and that one has none
 
 
 class ExternalContact(Effect):
@@ -43,11 +45,13 @@ class ExternalContact(Effect):
         every: tuple[float, ...] = (EACH, ALL) if all("session_s" in s.extra for s in states) else (EACH,)
         if len(trials) < 2 or not self.several:
             every = ()
+        elif 2 < len(trials) and len(states) <= MOST_TRIALS:
+            every = (*every, SOME)
         return (
-            Shape("trial", "1", EACH, len(states) - 1.0, (*trials, *every)),
+            Shape("trial", "1", SOME, len(states) - 1.0, (*trials, *every)),
             Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),
-            Shape("since", "1", 0.0, 0.9, tuple(sorted({a for a, _ in WHILES}))),
-            Shape("until", "1", 0.1, 1.0, tuple(sorted({b for _, b in WHILES}))),
+            Shape("since", "1", 0.0, 0.9, SINCE, edge=True),
+            Shape("until", "1", 0.1, 1.0, UNTIL, edge=True),
             Shape(
                 "begin",
                 states[0].position_unit,
@@ -62,26 +66,25 @@ class ExternalContact(Effect):
         return type(self)(several=False)
 
     def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
-        """Every start of trial, form and place, in some whiles of the trial."""
+        """Every start of trial and place, in the first form, in whiles that are neither short nor all of the trial."""
         return [
             point
             for point in super().grid(states)
-            if (point["since"], point["until"]) in WHILES and not self._all_along(point)
+            if point["form"] < 0.5 and point["until"] - point["since"] > SHORTEST and not self._all_along(point)
         ]
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
-        """Stiffness of the contact in that trial, and in each validation recording; never negative."""
-        return (
-            ("stiffness", "effort/position", 0.0, np.inf),
-            *((f"stiffness_validation_{i}", "effort/position", 0.0, np.inf) for i in range(MOST_VALIDATION)),
-        )
+        """Stiffness of the contact in that trial, or in all; in each validation recording, or in each of those of which
+        some have it; never negative."""
+        names = ("stiffness", *(f"stiffness_trial_{i}" for i in range(MOST_TRIALS)))
+        return tuple((name, "effort/position", 0.0, np.inf) for name in names)
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """Depth into the contact in that trial and in each validation recording, (n, 1 + MOST_VALIDATION); none of what
-        is there in all of them nearly all along."""
-        out = np.zeros((len(state.time_s), 1 + MOST_VALIDATION))
+        """Depth into the contact in that trial or in all, and in each recording of its own, (n, 1 + MOST_TRIALS); none of
+        what is there in all of them nearly all along."""
+        out = np.zeros((len(state.time_s), 1 + MOST_TRIALS))
         index = state.extra.get("trial_index", np.zeros(len(state.time_s)))[0]
-        every, mine = shape["trial"] < 0, index == round(shape["trial"])
+        every, mine, own_column = shape["trial"] < 0, index == round(shape["trial"]), 1 + int(index) % MOST_TRIALS
         if not (every or mine or state.validate) or self._all_along(shape):
             return out
         depth = np.maximum(state.position - shape["begin"], 0.0)
@@ -91,30 +94,31 @@ class ExternalContact(Effect):
         share = state.elapsed_s / state.extra["session_s"] if shape["trial"] == ALL else own
         within = depth * ((share >= shape["since"]) & (share <= shape["until"]))
         if mine or (every and not state.validate):
-            out[:, 0] = within
+            out[:, own_column if shape["trial"] == SOME else 0] = within
         if state.validate:
-            rank = int(state.extra.get("validation_index", np.zeros(1))[0])
-            out[:, 1 + rank % MOST_VALIDATION] = within if every else depth
+            out[:, own_column] = within if every else depth
         return out
 
     def parameters(
         self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]
     ) -> dict[str, float]:
         """When it is there, where it begins and how stiff it is: over the first 10 of the position's unit, of either
-        form."""
+        form; of some recordings the mean of those that have it."""
+        each = [amplitude.get(f"stiffness_trial_{i}", 0.0) for i in range(MOST_TRIALS)]
+        there = [k for k in each if k > THERE * max(each)]
         return {
             "trial": shape["trial"],
             "form": shape["form"],
             "since": shape["since"],
             "until": shape["until"],
             "begin": shape["begin"],
-            "stiffness": amplitude["stiffness"],
+            "stiffness": amplitude["stiffness"] if shape["trial"] != SOME else float(np.mean(there or [0.0])),
         }
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """When, from where on, and the load a tenth of the range further (of either form the same)."""
         trials, index = where.get("trials") or (), round(parameters["trial"])
-        several = {ALL: "the session", EACH: "every recording"}
+        several = {ALL: "the session", EACH: "every recording", SOME: "some recordings"}
         name = several.get(parameters["trial"]) or (trials[index] if 0 <= index < len(trials) else "one recording")
         since, until = (round(100 * parameters[k]) for k in ("since", "until"))
         part = "" if since <= 0 and until >= 100 else f", {since} to {until} % of the way through"

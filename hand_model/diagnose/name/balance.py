@@ -306,7 +306,8 @@ class Balance:
             names = [a[0] for a in term.effect.amplitudes()]
             amplitudes.append(dict(zip(names, coefficients[start : start + len(names)].tolist(), strict=True)))
             start += len(names)
-        size = sum(len([k for k in t.shape if k not in DISCRETE]) + len(t.effect.amplitudes()) for t in terms)
+        acting = int(np.any(weighted[:, k:-1] != 0, axis=0).sum())  # in training recordings
+        size = sum(len([k for k in t.shape if k not in DISCRETE]) for t in terms) + acting
         declared = dict(zip(self.names, coefficients[:k].tolist(), strict=True))
         return Fit(terms, declared, tuple(amplitudes), prediction, rss, size)
 

@@ -3,7 +3,7 @@ step."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -11,15 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from ...effects.base import Shape
 from .balance import Balance, Fit
 from .grid import Grid
 from .term import DISCRETE, Term, additive
 
 Array = NDArray[np.float64]
+Error = Callable[[Mapping[str, float]], float]  # of a shape
 
 ALONG = 1e-6  # of a column's length: less left beside the design, and it says nothing of its own
 # of the samples: where more are clipped that were not, or no longer, a shape is sought with whole fits
 CLIPPED_ANEW = 0.005
+EDGE_STEPS, EDGE_ROUNDS = 37, 3  # in which an edge is looked for along its bounds, and how often
+EDGE_GAIN = 1.0  # in the sum of squares, for another round
 GRAIN = 1.5  # times what the best shape of a grid brings: more no shape between is expected to
 
 
@@ -67,19 +71,40 @@ def _project(balance: Balance, grid: Grid, terms: tuple[Term, ...], least: float
 
 
 def polish(balance: Balance, fit: Fit, which: int) -> Fit:
-    """Optimise the shape of one term (Nelder-Mead within its bounds), everything linear refitted at each step; as it was
-    where no machine could be like the optimum."""
+    """Optimise the shape of one term within its bounds, everything linear refitted at each step; as it was where no
+    machine could be like the optimum."""
     term = fit.terms[which]
     shapes = [s for s in term.effect.shapes(balance.states) if s.name not in DISCRETE]
     if not shapes:
         return fit
-    span = np.array([s.high - s.low for s in shapes])
-    start = np.array([term.shape[s.name] for s in shapes])
     others = tuple(t for i, t in enumerate(fit.terms) if i != which)
+
+    def optimum(error: Error) -> Fit:
+        best = _descended(error, term.shape, shapes)
+        for _ in range(EDGE_ROUNDS if any(s.edge for s in shapes) else 0):
+            moved = _edges_moved(error, best, shapes)
+            if error(moved) > error(best) - EDGE_GAIN:
+                break
+            best = _descended(error, moved, shapes)
+        return balance.fit((*fit.terms[:which], Term(term.effect, best), *fit.terms[which + 1 :]))
+
+    best = optimum(balance.error_beside(others, term.effect, fit))
+    if (
+        any(t.effect.clips for t in others)
+        and np.mean(balance.unclipped_by(best) != balance.unclipped_by(fit)) > CLIPPED_ANEW
+    ):
+        best = optimum(balance.error_beside(others, term.effect))
+    return likeliest(balance, (fit, best), which)
+
+
+def _descended(error: Error, shape: Mapping[str, float], shapes: Sequence[Shape]) -> Mapping[str, float]:
+    """The shape in the valley of `shape` (Nelder & Mead 1965), in units of the bounds' distance."""
+    span = np.array([s.high - s.low for s in shapes])
+    start = np.array([shape[s.name] for s in shapes])
 
     def shaped(u: Array) -> dict[str, float]:
         return {
-            **term.shape,
+            **shape,
             **{s.name: float(np.clip(v, s.low, s.high)) for s, v in zip(shapes, start + u * span, strict=True)},
         }
 
@@ -89,23 +114,22 @@ def polish(balance: Balance, fit: Fit, which: int) -> Fit:
         near = [abs(v - start[i]) for v in s.starts if v != start[i]]
         corner[i] = 0.4 * (min(near) if near else 0.1 * span[i]) / span[i]
         step.append(corner)
+    result = minimize(
+        lambda u: error(shaped(u)),
+        np.zeros(len(shapes)),
+        method="Nelder-Mead",
+        options={"initial_simplex": np.array(step), "maxfev": 30 + 25 * len(shapes), "fatol": 0.02, "xatol": 1e-4},
+    )
+    return shaped(result.x)
 
-    def optimum(error: Callable[[Mapping[str, float]], float]) -> Fit:
-        result = minimize(
-            lambda u: error(shaped(u)),
-            np.zeros(len(shapes)),
-            method="Nelder-Mead",
-            options={"initial_simplex": np.array(step), "maxfev": 30 + 25 * len(shapes), "fatol": 0.02, "xatol": 1e-4},
-        )
-        return balance.fit((*fit.terms[:which], Term(term.effect, shaped(result.x)), *fit.terms[which + 1 :]))
 
-    best = optimum(balance.error_beside(others, term.effect, fit))
-    if (
-        any(t.effect.clips for t in others)
-        and np.mean(balance.unclipped_by(best) != balance.unclipped_by(fit)) > CLIPPED_ANEW
-    ):
-        best = optimum(balance.error_beside(others, term.effect))
-    return likeliest(balance, (fit, best), which)
+def _edges_moved(error: Error, shape: Mapping[str, float], shapes: Sequence[Shape]) -> Mapping[str, float]:
+    """The shape with each edge where it is best over all its bounds, one after the other."""
+    for s in shapes:
+        if s.edge:
+            tried = [shape, *({**shape, s.name: float(v)} for v in np.linspace(s.low, s.high, EDGE_STEPS))]
+            shape = min(tried, key=error)
+    return shape
 
 
 def refit(balance: Balance, fit: Fit, rounds: int = 2) -> Fit:
