@@ -53,10 +53,10 @@ def walk(seed: int, size: float, memory_s: float = 6.0):
 @pytest.mark.parametrize("seed", range(3))
 def test_a_wandering_zero_is_noise_and_not_physics(seed):
     states = drive(seed, walk(seed, 4.0))
-    naming = name_effects(states, catalogue("drive"))
-    assert naming.found == ()
-    assert naming.wander.real
-    assert 2.5 < naming.wander.deviation < 5.5
+    station = judged("current", "index", "index", None, states, catalogue("drive"))
+    assert not (station.believed and station.kept)
+    assert station.naming.wander.real
+    assert 2.5 < station.naming.wander.deviation < 5.5
 
 
 @pytest.mark.parametrize(("seed", "colour"), [(0, 0.0), (1, 0.0), (2, 0.5)])
@@ -71,6 +71,22 @@ def test_an_obstacle_in_one_trial_is_still_named_beside_its_rival_chance():
     naming = name_effects(drive(7, contact), catalogue("drive"))
     assert [f.term.effect.name for f in naming.found] == ["external_contact"]
     assert naming.found[0].amplitudes["stiffness"] == pytest.approx(0.6, rel=0.15)
+
+
+@pytest.mark.parametrize(("since", "until", "there"), [(0.06, 0.71, (0, 1, 2, 3)), (0.16, 0.58, (0, 2, 3))])
+def test_the_while_of_a_weak_obstacle_is_found_between_its_starts(since, until, there):
+    """The same while of all recordings or of some; what the finger does elsewhere says nothing of when it ends."""
+
+    def contact(state):
+        share = (state.time_s - state.time_s[0]) / np.ptp(state.time_s)
+        here = (share >= since) & (share <= until) & (state.extra["trial_index"][0] in there)
+        return 0.3 * np.maximum(state.position - 58.0, 0.0) * here
+
+    station = judged("current", "index", "index", None, drive(8, contact), catalogue("drive"))
+    assert station.believed and [f.term.effect.name for f in station.kept] == ["external_contact"]
+    figures = station.parameters[0]
+    assert figures["stiffness"]["value"] == pytest.approx(0.3, rel=0.2)
+    assert figures["begin"]["value"] == pytest.approx(58.0, abs=4.0)
 
 
 def test_an_obstacle_in_recordings_that_others_do_not_foretell_is_no_spring():

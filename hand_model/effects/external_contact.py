@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,11 @@ from .base import Amplitude, Array, DriveState, Effect, Shape, figure, position_
 SINCE, UNTIL, SHORTEST = (0.0, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8), (0.35, 0.5, 0.65, 0.8, 0.9, 1.0), 0.15  # starts
 # share of each recording, or of the session: what is there for longer in all of them is a spring or a stop
 LASTING = 0.85
-# instead of the number of a trial: the while is one of the whole session; it is the same one of every trial; the same
-# one of those trials that have it, with a stiffness in each
+# instead of the number of a trial: the while is one of the whole session; it is the same one of every trial; from SOME
+# downwards the same one of several trials, of each whose number is a bit of the difference
 ALL, EACH, SOME = -1.0, -2.0, -3.0
-MOST_TRIALS = 8  # recordings in which an obstacle can still be told each on its own
-THERE = 0.1  # of the stiffest: less, and that one has none
+MOST_SOME = 4  # trials of which any may have it
+MOST_VALIDATION = 4  # validation recordings in which an obstacle can still be told
 
 
 class ExternalContact(Effect):
@@ -45,10 +46,10 @@ class ExternalContact(Effect):
         every: tuple[float, ...] = (EACH, ALL) if all("session_s" in s.extra for s in states) else (EACH,)
         if len(trials) < 2 or not self.several:
             every = ()
-        elif 2 < len(trials) and len(states) <= MOST_TRIALS:
-            every = (*every, SOME)
+        elif len(trials) <= MOST_SOME:
+            every = (*every, *(SOME - sum(2**t for t in some) for some in _several(trials)))
         return (
-            Shape("trial", "1", SOME, len(states) - 1.0, (*trials, *every)),
+            Shape("trial", "1", min((*trials, *every)), len(states) - 1.0, (*trials, *every)),
             Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),
             Shape("since", "1", 0.0, 0.9, SINCE, edge=True),
             Shape("until", "1", 0.1, 1.0, UNTIL, edge=True),
@@ -74,18 +75,19 @@ class ExternalContact(Effect):
         ]
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
-        """Stiffness of the contact in that trial, or in all; in each validation recording, or in each of those of which
-        some have it; never negative."""
-        names = ("stiffness", *(f"stiffness_trial_{i}" for i in range(MOST_TRIALS)))
-        return tuple((name, "effort/position", 0.0, np.inf) for name in names)
+        """Stiffness of the contact in that trial, and in each validation recording; never negative."""
+        return (
+            ("stiffness", "effort/position", 0.0, np.inf),
+            *((f"stiffness_validation_{i}", "effort/position", 0.0, np.inf) for i in range(MOST_VALIDATION)),
+        )
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """Depth into the contact in that trial or in all, and in each recording of its own, (n, 1 + MOST_TRIALS); none of
-        what is there in all of them nearly all along."""
-        out = np.zeros((len(state.time_s), 1 + MOST_TRIALS))
-        index = state.extra.get("trial_index", np.zeros(len(state.time_s)))[0]
-        every, mine, own_column = shape["trial"] < 0, index == round(shape["trial"]), 1 + int(index) % MOST_TRIALS
-        if not (every or mine or state.validate) or self._all_along(shape):
+        """Depth into the contact in that trial and in each validation recording, (n, 1 + MOST_VALIDATION); none of what
+        is there in all of them nearly all along."""
+        out = np.zeros((len(state.time_s), 1 + MOST_VALIDATION))
+        index = int(state.extra.get("trial_index", np.zeros(len(state.time_s)))[0])
+        several, mine = shape["trial"] < 0, _has(shape["trial"], index)
+        if not (mine or state.validate) or self._all_along(shape):
             return out
         depth = np.maximum(state.position - shape["begin"], 0.0)
         if shape["form"] > 0.5:
@@ -93,33 +95,33 @@ class ExternalContact(Effect):
         own = (state.time_s - state.time_s[0]) / max(float(np.ptp(state.time_s)), 1e-9)
         share = state.elapsed_s / state.extra["session_s"] if shape["trial"] == ALL else own
         within = depth * ((share >= shape["since"]) & (share <= shape["until"]))
-        if mine or (every and not state.validate):
-            out[:, own_column if shape["trial"] == SOME else 0] = within
+        if mine and not (several and state.validate):
+            out[:, 0] = within
         if state.validate:
-            out[:, own_column] = within if every else depth
+            rank = int(state.extra.get("validation_index", np.zeros(1))[0])
+            out[:, 1 + rank % MOST_VALIDATION] = within if several else depth
         return out
 
     def parameters(
         self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]
     ) -> dict[str, float]:
         """When it is there, where it begins and how stiff it is: over the first 10 of the position's unit, of either
-        form; of some recordings the mean of those that have it."""
-        each = [amplitude.get(f"stiffness_trial_{i}", 0.0) for i in range(MOST_TRIALS)]
-        there = [k for k in each if k > THERE * max(each)]
+        form."""
         return {
             "trial": shape["trial"],
             "form": shape["form"],
             "since": shape["since"],
             "until": shape["until"],
             "begin": shape["begin"],
-            "stiffness": amplitude["stiffness"] if shape["trial"] != SOME else float(np.mean(there or [0.0])),
+            "stiffness": amplitude["stiffness"],
         }
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """When, from where on, and the load a tenth of the range further (of either form the same)."""
         trials, index = where.get("trials") or (), round(parameters["trial"])
-        several = {ALL: "the session", EACH: "every recording", SOME: "some recordings"}
-        name = several.get(parameters["trial"]) or (trials[index] if 0 <= index < len(trials) else "one recording")
+        several = {ALL: "the session", EACH: "every recording"}
+        some = [name for i, name in enumerate(trials) if index <= SOME and _has(index, i)]
+        name = several.get(parameters["trial"]) or ", ".join(some or trials[max(index, 0) :][:1]) or "one recording"
         since, until = (round(100 * parameters[k]) for k in ("since", "until"))
         part = "" if since <= 0 and until >= 100 else f", {since} to {until} % of the way through"
         return (
@@ -130,6 +132,18 @@ class ExternalContact(Effect):
     def _all_along(self, shape: Mapping[str, float]) -> bool:
         """Whether it is there for so long that it is none."""
         return shape["trial"] < 0 and shape["until"] - shape["since"] > LASTING
+
+
+def _several(trials: tuple[float, ...]) -> list[tuple[int, ...]]:
+    """Every choice of at least two of them and not of all."""
+    numbers = [round(t) for t in trials]
+    return [some for k in range(2, len(numbers)) for some in combinations(numbers, k)]
+
+
+def _has(trial: float, index: int) -> bool:
+    """Whether the trial of that index is among those that a shape's `trial` means."""
+    chosen = round(trial)
+    return chosen == index or chosen in (ALL, EACH) or chosen <= SOME and bool(round(SOME - trial) >> index & 1)
 
 
 EFFECT = ExternalContact()

@@ -119,6 +119,7 @@ def _prepare(
         history += bouts(time_s, motion.moving)
         end = float(time_s[-1])
         extra["trial_index"] = np.full(len(time_s), float(index))
+        extra["validation_index"] = np.full(len(time_s), float(sum(t.validate for t, _ in entries[:index])))
         effort = np.where(motion.moving, current[seen], np.nan)
         extra["bandwidth_s"] = np.full(len(time_s), motion.bandwidth_s)
         extra["position_noise"] = np.full(len(time_s), motion.noise)

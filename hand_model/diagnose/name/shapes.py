@@ -22,7 +22,7 @@ Error = Callable[[Mapping[str, float]], float]  # of a shape
 ALONG = 1e-6  # of a column's length: less left beside the design, and it says nothing of its own
 # of the samples: where more are clipped that were not, or no longer, a shape is sought with whole fits
 CLIPPED_ANEW = 0.005
-EDGE_STEPS, EDGE_ROUNDS = 37, 3  # in which an edge is looked for along its bounds, and how often
+EDGE_STEPS, EDGE_ROUNDS = (31, 9, 9), 3  # in which an edge is looked for, ever closer, and how often
 EDGE_GAIN = 1.0  # in the sum of squares, for another round
 GRAIN = 1.5  # times what the best shape of a grid brings: more no shape between is expected to
 
@@ -124,11 +124,15 @@ def _descended(error: Error, shape: Mapping[str, float], shapes: Sequence[Shape]
 
 
 def _edges_moved(error: Error, shape: Mapping[str, float], shapes: Sequence[Shape]) -> Mapping[str, float]:
-    """The shape with each edge where it is best over all its bounds, one after the other."""
-    for s in shapes:
-        if s.edge:
-            tried = [shape, *({**shape, s.name: float(v)} for v in np.linspace(s.low, s.high, EDGE_STEPS))]
-            shape = min(tried, key=error)
+    """The shape with each edge where it is best over all its bounds, then between its neighbours, one edge after the
+    other."""
+    for s in (s for s in shapes if s.edge):
+        low, high = s.low, s.high
+        for count in EDGE_STEPS:
+            places = np.linspace(low, high, count)
+            shape = min([shape, *({**shape, s.name: float(v)} for v in places)], key=error)
+            step = (high - low) / (count - 1)
+            low, high = max(shape[s.name] - step, s.low), min(shape[s.name] + step, s.high)
     return shape
 
 

@@ -39,5 +39,10 @@ def moments(states: tuple[DriveState, ...]) -> Shape:
     recorded = np.concatenate([s.elapsed_s[np.isfinite(s.effort)] for s in states])
     starts = np.quantile(recorded, np.linspace(0.04, 0.96, 24))
     return Shape(
-        "moment", "s", float(starts[0]), float(max(starts[-1], starts[0] + 1e-9)), tuple(np.unique(starts).tolist())
+        "moment",
+        "s",
+        float(starts[0]),
+        float(max(starts[-1], starts[0] + 1e-9)),
+        tuple(np.unique(starts).tolist()),
+        edge=True,
     )
