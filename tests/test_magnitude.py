@@ -20,7 +20,7 @@ RAW = {
     "position_dependent_friction": {"extra_friction": 4.0},
     "torque_ripple": {"amplitude": 2.0},
     "viscoelastic_spring": {"stiffness": 0.1},
-    "gravity_load": {"along": 3.0, "across": -2.0},
+    "gravity_load": {"largest": 3.6},
     "thermal_friction_drift": {"cold_excess": -2.0},
     "nonlinear_spring": {"bend": 4.0},
 }

@@ -95,7 +95,7 @@ def test_a_weight_is_named_where_only_the_recording_kept_out_shows_another_pose(
     station = heard(weighed(tuple(replace(s, validate=k > 2) for k, s in enumerate(states)), poses, load_raw))
     assert [f.term.effect.name for f in station.kept] == ["gravity_load"]
     size = station.parameters[station.naming.fit.terms.index(station.kept[0].term)]
-    assert set(size) == {"sweep", "along", "across"}
+    assert set(size) == {"sweep", "along", "across", "largest"}
     assert abs(np.hypot(size["along"]["value"], size["across"]["value"]) / load_raw - 1) < within
 
 

@@ -54,7 +54,8 @@ def test_a_weight_explains_an_odd_preload_and_the_bend_that_it_foretells(
     assert {f.effect for _, f in findings} | named == {"gravity_load"}
     for _, finding in findings:
         assert finding.where["finger"] == "finger_1"
-        largest = np.hypot(*(finding.parameters[k]["value"] for k in ("along", "across")))
+        largest, (low, high) = (finding.parameters["largest"][k] for k in ("value", "ci95"))
+        assert low < largest < high and high - low < 0.5 * largest
         assert 9.5 / 9.81 * largest == pytest.approx(abs(size), rel=0.3)
 
 

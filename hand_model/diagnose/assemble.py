@@ -31,7 +31,8 @@ from .name.station import (
 
 UNLIKE_OTHERS = 2.0  # times the wander of the calmest finger
 HARMONICS = 4
-SHADOW = 0.5  # of an encoder error's size: less, in the current of the same motor, may be what is left of it
+# of an encoder error's size, and of that of its kind: less, in the current of the same motor, may be what is left of it
+SHADOW = 0.5
 TILT = 0.2  # the same, of a wobble's or a travelling centre's, in the angles of the finger
 ANGULAR = {e.name for station in ("encoder", "linkage") for e in catalogue(station)} - {"clock_drift"}
 REFUSED = "command_as_measurement"  # a channel that tells nothing: no other finding is small beside it
@@ -89,7 +90,7 @@ def assemble(
     named = {(f.effect, f.where["finger"]) for _, f in ranked}
     unexplained += [outsider_of(s, f) for s, f in strange if (f.term.effect.part_of, s.finger) not in named]
     unexplained += [unrepeated_of(s) for s in stations if _wanders(s, stations)]
-    ranked = _without_tilts(_without_shadows(_one_clock(_of_hinges(ranked, unexplained))))
+    ranked = _without_tilts(_without_shadows(_one_clock(_of_hinges(ranked, unexplained)), stations))
     # how far a hinge that is none moves is told only beside what another hinge would explain: that it is none is sure
     # all the same
     sized = [(_magnitude(f, stations, sure=f.effect not in HINGE), weight * _counted(f), f) for weight, f in ranked]
@@ -224,10 +225,10 @@ def _one_clock(ranked: list[tuple[float, Finding]]) -> list[tuple[float, Finding
     return [i for i in ranked if i[1].effect != "clock_drift"] + drifts
 
 
-def _without_shadows(ranked: list[tuple[float, Finding]]) -> list[tuple[float, Finding]]:
+def _without_shadows(ranked: list[tuple[float, Finding]], stations: Sequence[Station]) -> list[tuple[float, Finding]]:
     """Without what a motor's encoder error leaves in its current after it was put right: a position that errs by a
-    percent errs by many percent in speed. Small effects there, and ripples at the error's period or a harmonic of it,
-    are no evidence."""
+    percent errs by many percent in speed. Effects that are small there and for their kind, and ripples at the error's
+    period or a harmonic of it, are no evidence."""
     wrong = {
         f.where["actuator"]: (weight, f.parameters["period"]["value"])
         for weight, f in ranked
@@ -240,7 +241,7 @@ def _without_shadows(ranked: list[tuple[float, Finding]]) -> list[tuple[float, F
         error, period = wrong[finding.where["actuator"]]
         order = period / finding.parameters["period"]["value"] if finding.effect == "torque_ripple" else np.nan
         harmonic = 0.5 < order < HARMONICS + 0.5 and abs(order / round(order) - 1) < SAME_PERIOD
-        return harmonic or weight < SHADOW * error
+        return harmonic or weight < SHADOW * error and _magnitude(finding, stations) < SHADOW
 
     return [item for item in ranked if not shadow(*item)]
 

@@ -137,7 +137,7 @@ PLAIN: Mapping[str, Rule] = {
     "thermal_friction_drift": lambda p, c: p["cold_excess"] / (0.3 * c.effort),
     "detent_load": lambda p, c: p["load"] / (0.35 * c.effort),
     "nonlinear_spring": lambda p, c: p["bend"] / (0.15 * c.effort),
-    "gravity_load": lambda p, c: float(np.hypot(p["along"], p["across"])) / (0.25 * c.effort),
+    "gravity_load": lambda p, c: p["largest"] / (0.25 * c.effort),
     "torque_ripple": lambda p, c: p["amplitude"] / (0.17 * c.effort),
     "elastoplastic_hysteresis": lambda p, c: p["yield_load"] / (0.3 * c.effort),
     "viscoelastic_spring": lambda p, c: p["stiffness"] * c.span / (0.6 * c.effort),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from typing import Any
 
@@ -16,7 +17,7 @@ from .findings import UNWRITTEN, Finding
 from .locate.angles import FingerAngles
 from .locate.gravity import in_one_pose
 from .locate.preload import expected, preload_findings
-from .name.balance import Balance
+from .name.balance import Balance, Fit
 from .name.naming import CLASS_WIDTH, Named
 from .name.selection import EVIDENCE_LEAST
 from .name.station import Station, judged
@@ -48,7 +49,8 @@ def with_weights(
         states = in_one_pose(session, fingers, call[4])
         if states is None or "sweep" not in states[0].extra:
             continue
-        pull = _pulled([s for s in out if s.actuator not in pulled], out[at], states, actuator in odd)
+        usual = _usual([s for s in out if s.actuator not in pulled], out[at])
+        pull = None if usual is None else _pulled(usual, out[at], states, actuator in odd)
         other = None if pull is None else _named(call, states, out[at])
         if pull is None or other is None and actuator not in odd:
             continue
@@ -56,7 +58,9 @@ def with_weights(
         if other is None:
             other = judged(*call[:4], tuple(_declaring(s) for s in states), *call[5:])
             size, finding = odd[actuator]
-            weights.append((size, _finding(finding, *pull, float(states[0].extra["sweep"][0, 0]))))
+            weights.append((size, _finding(finding, *pull, _sweep(states[0]))))
+        elif actuator in odd:
+            other = _beside_usual(other, usual)
         out[at] = other
     # what a weight leaves of a drive's preload says nothing of the others'
     return out, [*weights, *preload_findings([s for s in out if s.actuator not in pulled])]
@@ -76,8 +80,18 @@ def _kept(station: Station, name: str) -> Named | None:
     return next((f for f in station.kept if f.term.effect.name == name), None) if station.believed else None
 
 
+Usual = Mapping[str, tuple[float, float]]  # declared coefficient -> what to expect of it, and how surely
+
+
+def _usual(stations: Sequence[Station], station: Station) -> Usual | None:
+    """What the hand's other drives let expect of a drive's preload and spring; None where they do not say both."""
+    known = {name: expected(stations, station, name) for name in ("preload", "spring")}
+    usual = {name: value for name, value in known.items() if value is not None}
+    return usual if len(usual) == len(known) else None
+
+
 def _pulled(
-    stations: Sequence[Station], station: Station, states: tuple[DriveState, ...], odd_preload: bool
+    usual: Usual, station: Station, states: tuple[DriveState, ...], odd_preload: bool
 ) -> tuple[Array, Array, float] | None:
     """Weight along the finger and across it (2,), its covariance (2, 2) and its probability, where a weight beside a
     usual preload is likelier than an odd one (and what bends the spring, if that was named), or, where no preload is
@@ -86,9 +100,6 @@ def _pulled(
     Marginal likelihoods of linear models with normal priors, where the preload and the spring of the weighed drive are
     those of the hand's others: an odd preload alone says nothing of the spring's shape, a weight foretells it.
     """
-    usual = {name: known for name in ("preload", "spring") if (known := expected(stations, station, name)) is not None}
-    if len(usual) < 2:
-        return None
     balance = station.naming.balance
     effort = float(np.std(balance.effort[balance.train]))
     terms = station.naming.fit.terms
@@ -161,9 +172,49 @@ class _Model:
         self.covariance = np.linalg.inv(precision) * np.outer(deviation, deviation)
 
 
+def _beside_usual(station: Station, usual: Usual) -> Station:
+    """The station of a drive of which a weight is named, its sizes read where preload and spring are those of the
+    hand's other drives: alone it hardly tells a weight's part in them."""
+    balance, fit = station.reading.balance, station.reading.fit
+    at = next(i for i, t in enumerate(fit.terms) if t.effect.name == WEIGHT)
+    rest = (*fit.terms[:at], *fit.terms[at + 1 :])
+    columns, low, high = balance.design(rest)
+    weights = balance.gather(_weight)
+    effort = float(np.std(balance.effort[balance.train]))
+    model = _Model(balance, rest, balance.unclipped(rest), usual, effort, weights)
+    if np.any(model.mean[:-2] < low) or np.any(model.mean[:-2] > high):
+        return station
+    sweep, values = _sweep(balance.states[0]), iter(model.mean.tolist())
+    declared = {name: next(values) for name in balance.names}
+    amplitudes = [{name: next(values) for name in a} for i, a in enumerate(fit.amplitudes) if i != at]
+    own = dict(zip(fit.amplitudes[at], (*values, 0.0, 0.0), strict=True))
+    prediction = np.c_[columns, weights] @ model.mean
+    for term in rest:
+        prediction = term.effect.clip(prediction, term.shape) if term.effect.clips else prediction
+    w = balance.weights(rest) * balance.train
+    read = Fit(
+        (*fit.terms[:at], Term(fit.terms[at].effect, {"sweep": sweep}), *fit.terms[at + 1 :]),
+        declared,
+        (*amplitudes[:at], own, *amplitudes[at:]),
+        prediction,
+        float(np.sum(balance.whiten((balance.effort - prediction) * w, w) ** 2)),
+        fit.size,
+    )
+    out = copy(station)
+    out.reading = replace(station.reading, fit=read)
+    figures = _figures(model.mean[-2:], model.covariance[-2:, -2:], sweep, balance.states[0].effort_unit)
+    out.parameters = {**station.parameters, at: figures}
+    return out
+
+
+def _sweep(state: DriveState) -> float:
+    """Angle [rad] that the finger's first joint turns through over the range of positions."""
+    return float(state.extra["sweep"][0, 0])
+
+
 def _weight(state: DriveState) -> Array:
     """What a unit weight along the finger and across it does, (n, 2)."""
-    return effect(WEIGHT).columns(state, {"sweep": float(state.extra["sweep"][0, 0])})[:, :2]
+    return effect(WEIGHT).columns(state, {"sweep": _sweep(state)})[:, :2]
 
 
 def _declaring(state: DriveState) -> DriveState:
@@ -177,13 +228,7 @@ def _declaring(state: DriveState) -> DriveState:
 
 def _finding(odd: Finding, weight: Array, covariance: Array, probability: float, sweep: float) -> Finding:
     """The finding of an odd preload, as a weight's."""
-    doubt = 1.96 * np.sqrt(np.diag(covariance))
-    unit = odd.parameters["half_difference"]["unit"]
-    parameters = {
-        name: {"value": float(value), "unit": unit, "ci95": [float(value - d), float(value + d)]}
-        for name, value, d in zip(("along", "across"), weight, doubt, strict=True)
-    }
-    parameters["sweep"] = {"value": sweep, "unit": "rad", "ci95": None}
+    parameters = _figures(weight, covariance, sweep, odd.parameters["half_difference"]["unit"])
     text = effect(WEIGHT).statement(odd.where, {name: entry["value"] for name, entry in parameters.items()})
     members = (WEIGHT, *odd.members) if probability < 0.95 else (WEIGHT,)
     return replace(
@@ -195,3 +240,15 @@ def _finding(odd: Finding, weight: Array, covariance: Array, probability: float,
         parameters=parameters,
         statement=text,
     )
+
+
+def _figures(weight: Array, covariance: Array, sweep: float, unit: str) -> dict[str, dict[str, Any]]:
+    """A weight's parameters as a finding has them."""
+    largest = float(np.hypot(*weight))
+    gradients = np.vstack([np.eye(2), weight / max(largest, 1e-12)])
+    doubt = 1.96 * np.sqrt(np.einsum("ij,jk,ik->i", gradients, covariance, gradients))
+    parameters = {
+        name: {"value": float(value), "unit": unit, "ci95": [float(value - d), float(value + d)]}
+        for name, value, d in zip(("along", "across", "largest"), [*weight, largest], doubt, strict=True)
+    }
+    return {**parameters, "sweep": {"value": sweep, "unit": "rad", "ci95": None}}

@@ -54,8 +54,14 @@ class GravityLoad(Effect):
     def parameters(
         self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]
     ) -> dict[str, float]:
-        """The weight; not what it did in a pose that nobody knows."""
-        return {**shape, "along": amplitude["along"], "across": amplitude["across"]}
+        """The weight, and the largest load that it can be (which is known better than either part); not what it did in a
+        pose that nobody knows."""
+        along, across = amplitude["along"], amplitude["across"]
+        return {**shape, "along": along, "across": across, "largest": math.hypot(along, across)}
+
+    def units(self, shape: Mapping[str, float]) -> dict[str, str]:
+        """Of the largest load."""
+        return {"largest": "effort"}
 
     def told_by(self, state: DriveState) -> bool:
         """One in which the pose of the hand was recorded."""
@@ -63,9 +69,8 @@ class GravityLoad(Effect):
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """The largest load that the weight can be."""
-        load = figure(math.hypot(parameters["along"], parameters["across"]))
         return (
-            f"weight loads the motor with up to {load} raw, changing with the pose of the hand and "
+            f"weight loads the motor with up to {figure(parameters['largest'])} raw, changing with the pose of the hand and "
             "the angle of the finger"
         )
 
