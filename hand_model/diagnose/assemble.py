@@ -40,6 +40,7 @@ TRIFLE = 0.01  # of the square of the heaviest weight
 # of that magnitude: less, where the lack-of-fit test sees nothing, is left to the imperfections of reading angles and
 # speeds
 MINUTE = 0.15
+TINY = 0.05  # the same where that test nearly sees something, and speaks of no mismatch all the same
 # of a weight counts where the declared model takes up what is named, so that nothing of the mismatch is its: only the
 # hand's other motors speak for it
 COMPARED = 0.1
@@ -68,7 +69,7 @@ def assemble(
         if stands:
             strange += [(station, f) for f in station.outsiders]
             for weight, finding in (finding_of(station, *merged) for merged in _merged(station.kept)):
-                if station.naming.before.p >= UNSEEN and _magnitude(finding, stations) < MINUTE:
+                if _magnitude(finding, stations) < _beneath(station):
                     rejected.append(
                         {
                             "effect": finding.effect,
@@ -122,6 +123,12 @@ def assemble(
         tuple(channel_of(s) for s in stations),
         tuple(notes),
     )
+
+
+def _beneath(station: Station) -> float:
+    """Magnitude beneath which a finding of a station says nothing, since the lack-of-fit test sees no mismatch there."""
+    p = station.naming.before.p
+    return MINUTE if p >= UNSEEN else TINY if p >= ALPHA else 0.0
 
 
 def _counted(finding: Finding) -> float:
