@@ -9,25 +9,35 @@ import numpy as np
 import pytest
 from test_diagnose import drive
 
+from hand_model.diagnose.locate.known_motors import MEDIAN, PRELOAD, kinship, preload_by_chance
 from hand_model.diagnose.locate.preload import preload_findings
 from hand_model.diagnose.name.station import judged
 from hand_model.diagnose.name.term import Term
 from hand_model.effects import effect
 
+OTHER = 8.0  # times the currents of a known hand
 
-def hand(*half_difference: float):
-    """Stations of as many motors as given, each with that much more current flexing than extending [raw]."""
+
+def hand(*half_difference: float, scale: float = 1.0):
+    """Stations of as many motors as given, each with that much more current flexing than extending [raw]. scale: of
+    their currents; with one they are like those of a known hand."""
+
     return [
         judged(
             "current",
             f"finger_{i}",
             f"motor_{i}",
             None,
-            drive(11 + i, lambda s, half=half: np.full(len(s.time_s), half)),
+            scaled(drive(11 + i, lambda s, half=half: np.full(len(s.time_s), half)), scale),
             [effect("torque_ripple")],
         )
         for i, half in enumerate(half_difference)
     ]
+
+
+def scaled(states, scale: float):
+    """The states with other currents."""
+    return tuple(replace(s, effort=scale * s.effort) for s in states)
 
 
 def test_motors_alike_are_not_accused() -> None:
@@ -47,21 +57,40 @@ def test_the_lopsided_one_is_named_in_a_class_with_another_preload(half: float) 
 
 
 def test_of_two_that_differ_the_heavier_is_odd_unless_one_has_lost_its_preload() -> None:
-    assert [f.where["finger"] for _, f in preload_findings(hand(25.0, 0.0))] == ["finger_0"]
-    assert [f.where["finger"] for _, f in preload_findings(hand(-12.0, 0.0))] == ["finger_0"]
+    for scale in (1.0, OTHER):
+        assert [f.where["finger"] for _, f in preload_findings(hand(25.0, 0.0, scale=scale))] == ["finger_0"]
+        assert [f.where["finger"] for _, f in preload_findings(hand(-12.0, 0.0, scale=scale))] == ["finger_0"]
+
+
+def test_motors_of_a_known_hand_are_told_by_their_figures_and_known_by_their_preload() -> None:
+    medians = [MEDIAN] * 2
+    assert kinship(medians) > 0.99
+    assert kinship([{k: f * v for (k, v), f in zip(MEDIAN.items(), (0.9, 1.15, 0.85), strict=True)}] * 2) > 0.9
+    assert kinship([{**MEDIAN, "coulomb": OTHER * MEDIAN["coulomb"], "spring": OTHER * MEDIAN["spring"]}] * 2) < 0.01
+    assert kinship([{k: v for k, v in MEDIAN.items() if k != "spring"}]) == 0.0
+    assert preload_by_chance(1.1 * PRELOAD, 0.1) > 0.3 > 0.01 > preload_by_chance(0.4 * PRELOAD, 0.1)
+    assert preload_by_chance(-PRELOAD, 0.1) < 1e-6
+
+
+def test_of_two_motors_of_a_known_kind_the_one_unlike_those_is_odd_and_one_alone_can_be() -> None:
+    """A preload of 3 beside the usual 9: by sizes alone the other one would be odd."""
+    assert [f.where["finger"] for _, f in preload_findings(hand(-6.0, 0.0))] == ["finger_0"]
+    assert [f.where["finger"] for _, f in preload_findings(hand(-6.0, 0.0, scale=OTHER))] == ["finger_1"]
+    assert [f.where["finger"] for _, f in preload_findings(hand(10.0))] == ["finger_0"]
+    assert not preload_findings(hand(10.0, scale=OTHER))
 
 
 def test_drives_alike_in_everything_else_are_held_to_be_alike_in_their_preload_and_others_are_not() -> None:
-    assert [f.where["finger"] for _, f in preload_findings(hand(8.0, 0.0))] == ["finger_0"]
+    assert [f.where["finger"] for _, f in preload_findings(hand(8.0, 0.0, scale=OTHER))] == ["finger_0"]
     other = judged(
         "current",
         "ring",
         "ring",
         None,
-        drive(12, lambda s: 14.0 * s.direction + 0.07 * s.velocity),
+        scaled(drive(12, lambda s: 14.0 * s.direction + 0.07 * s.velocity), OTHER),
         [effect("torque_ripple")],
     )
-    assert not preload_findings([*hand(8.0), other])
+    assert not preload_findings([*hand(8.0, scale=OTHER), other])
 
 
 def test_of_two_either_may_be_the_odd_one_and_the_probability_says_so() -> None:
@@ -88,11 +117,11 @@ def test_a_motor_of_which_something_is_missing_accuses_no_other() -> None:
         "ring",
         "ring",
         None,
-        drive(9, lambda s: 25.0 * spot.columns(s, {"centre": 50.0, "width": 6.0})[:, 0]),
+        scaled(drive(9, lambda s: 25.0 * spot.columns(s, {"centre": 50.0, "width": 6.0})[:, 0]), OTHER),
         [spot],
     )
     assert one.missing and one.believed
-    assert preload_findings(hand(25.0, 0.0)) and not preload_findings([*hand(25.0), one])
+    assert preload_findings(hand(25.0, 0.0, scale=OTHER)) and not preload_findings([*hand(25.0, scale=OTHER), one])
 
 
 def test_a_motor_that_met_an_obstacle_once_says_what_is_usual() -> None:

@@ -16,6 +16,7 @@ from ...effects import effect
 from ..findings import UNWRITTEN, Finding, weighed
 from ..magnitude import SLIGHT, channel_figures, magnitude
 from ..name.station import Station
+from .known_motors import PRELOAD, kinship, preload_by_chance
 
 # mean absolute deviation of the logarithm of a drive's preload within one hand, as sure as from so many comparisons
 SPREAD, HANDS = 0.15, 3.0
@@ -25,42 +26,54 @@ LOST = 0.2  # of the other's preload: less, or the wrong sign, and there is none
 SURE_LEAST = 0.1  # of a half difference counts in the ranking, however uncertain the rest is
 RESTLESS = 0.5  # of the noise
 CLASS = ("asymmetric_friction", "spring_preload")
+KIN = 0.9  # probability that a hand's motors are of the known kind, from which these do for others of its own
 COMPARISON = "comparison of the hand's motors"  # what speaks for it, where others are proved by an engine
 
 
 def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]:
-    """Drives whose preload the others' do not let expect, with their weight.
+    """Drives whose preload neither the hand's others let expect nor, as far as the hand's motors are of their kind, those
+    of a known hand, with their weight.
 
     The other drives' median is the reference; one of which something is missing is none. What pulls a finger off its
     drive pulls at its preload. A drive of which something else is missing must be unlike the others both with and
     without its name.
     """
     drives = _drives(stations)
-    healthy = [s for s in drives if not _lacks(s)]
-    spread = _spread([s.naming.fit.declared for s in healthy])
+    spread = _spread([s.naming.fit.declared for s in drives if not _lacks(s)])
+    kin = kinship([s.naming.fit.declared for s in drives])
     out = []
     for station in drives:
         rest = _others(drives, station)
-        if not rest:
-            continue
         others = [float(s.naming.fit.declared["preload"]) for s in rest]
-        usual = float(np.median(others))
+        if not others and kin < KIN:
+            continue
+        usual = _usual(others, kin)
         own = min(
             (float(fit.declared["preload"]) for fit in (station.naming.fit, station.naming.declared)),
             key=lambda p: abs(p - usual),
         )
-        # Of two that differ the larger is odd, unless one has lost its preload altogether: springs do not push.
-        if usual <= 0 or (len(others) == 1 and usual < LOST * own):
-            continue
         error = _standard_error(station)
-        p = max(_by_chance(own, error, other, spread) for other in others)  # unlike every other
-        if p < ODD_P and (len(others) > 1 or own > usual or own < LOST * usual):
-            # Of two either may be odd: the odds are those of the sizes, where a usual preload may have any scale
-            # (Jeffreys 1946).
-            larger = own / (own + usual) if len(others) == 1 and own > usual else 1.0
+        unlike = [_by_chance(own, error, other, spread) for other in others if other > 0]  # every other
+        p = kin * preload_by_chance(own, error) + (1 - kin) * max(unlike, default=1.0)
+        odds = kin + (1 - kin) * (1.0 if len(others) > 1 else _odds(own, others))
+        if usual > 0 and p < ODD_P and odds > 0.5:
             shape, scale = spread
-            out.append(_finding(station, own - usual, error, scale / shape * usual, (1 - p) * larger))
+            out.append(_finding(station, own - usual, error, scale / shape * usual, (1 - p) * odds))
     return out
+
+
+def _usual(others: Sequence[float], kin: float) -> float:
+    """The preload to expect beside those of other drives, and of a known hand as far as these are of its kind."""
+    return kin * PRELOAD + (1 - kin) * float(np.median(others)) if others else PRELOAD
+
+
+def _odds(own: float, others: Sequence[float]) -> float:
+    """Probability that of two drives whose preloads differ this one is odd: of sizes where a usual preload may have any
+    scale (Jeffreys 1946) the larger, unless one has lost its preload altogether: springs do not push."""
+    (its,) = others or (0.0,)
+    if own < LOST * its or its < LOST * own:
+        return float(own < its)
+    return own / (own + its)
 
 
 def expected(stations: Sequence[Station], station: Station, name: str) -> tuple[float, float] | None:

@@ -1,0 +1,39 @@
+"""Motors of a hand that is known: whether a session's are of that kind, and what their preload would be.
+
+The twelve motors of six recordings of a BeBionic that are published with their answers: medians, each with a deviation of
+a tenth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+MEDIAN = {"viscous": 0.144, "coulomb": 33.9, "spring": 0.230}  # raw, %, s; slow motion tells nothing of an inertia
+PRELOAD = 9.4  # raw
+SPREAD = 0.12  # standard deviation of logarithms: as they are, and a little for another laboratory's hand
+MOTORS = 12
+ANY = np.log(3.0)  # a motor of another kind may have any figure within this factor of these, or beyond
+
+
+def kinship(motors: Sequence[Mapping[str, float]]) -> float:
+    """Probability that motors are of the known kind, from their friction and springs (declared coefficients by name, in
+    raw, % and s); as likely as not before. Zero where none has all of them."""
+    from scipy.stats import t
+
+    found = [[m[name] for name in MEDIAN] for m in motors if all(m.get(name, 0.0) > 0 for name in MEDIAN)]
+    if not found:
+        return 0.0
+    apart = np.log(np.array(found) / np.array(list(MEDIAN.values())))
+    log_odds = float(np.sum(t.logpdf(apart / SPREAD, 4) - np.log(SPREAD) + np.log(2 * ANY)))
+    return float(1 / (1 + np.exp(-np.clip(log_odds, -50, 50))))
+
+
+def preload_by_chance(own: float, error: float) -> float:
+    """Probability that a motor of the known kind has a preload [raw] as far from theirs as the nearer end of its
+    standard error."""
+    from scipy.stats import t
+
+    nearer = own + np.sign(PRELOAD - own) * min(2 * error, abs(PRELOAD - own))
+    return float(2 * t.sf(abs(np.log(max(nearer, 1e-3 * PRELOAD) / PRELOAD)) / SPREAD, MOTORS - 1))
