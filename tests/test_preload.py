@@ -68,7 +68,8 @@ def test_motors_of_a_known_hand_are_told_by_their_figures_and_known_by_their_pre
     assert kinship([{k: f * v for (k, v), f in zip(MEDIAN.items(), (0.9, 1.15, 0.85), strict=True)}] * 2) > 0.9
     assert kinship([{**MEDIAN, "coulomb": OTHER * MEDIAN["coulomb"], "spring": OTHER * MEDIAN["spring"]}] * 2) < 0.01
     assert kinship([{k: v for k, v in MEDIAN.items() if k != "spring"}]) == 0.0
-    assert preload_by_chance(1.1 * PRELOAD, 0.1) > 0.3 > 0.01 > preload_by_chance(0.4 * PRELOAD, 0.1)
+    assert preload_by_chance(1.1 * PRELOAD, 0.1) > 0.3
+    assert preload_by_chance(0.4 * PRELOAD, 0.1) < 0.01
     assert preload_by_chance(-PRELOAD, 0.1) < 1e-6
 
 
