@@ -11,8 +11,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 MEDIAN = {"viscous": 0.144, "coulomb": 33.9, "spring": 0.230}  # raw, %, s; slow motion tells nothing of an inertia
-PRELOAD = 9.4  # raw
-SPREAD = 0.12  # standard deviation of logarithms: as they are, and a little for another laboratory's hand
+PRELOAD, PRELOADS = 9.4, 0.17  # raw; standard deviation of a preload over it, with room for hands that are less alike
+SPREAD = 0.12  # standard deviation of the others' logarithms: as they are, and a little for another laboratory's hand
 MOTORS = 12
 ANY = np.log(3.0)  # a motor of another kind may have any figure within this factor of these, or beyond
 
@@ -32,8 +32,8 @@ def kinship(motors: Sequence[Mapping[str, float]]) -> float:
 
 def preload_by_chance(own: float, error: float) -> float:
     """Probability that a motor of the known kind has a preload [raw] as far from theirs as the nearer end of its
-    standard error."""
+    standard error: as so few motors tell a mean and a deviation (Student's t)."""
     from scipy.stats import t
 
-    nearer = own + np.sign(PRELOAD - own) * min(2 * error, abs(PRELOAD - own))
-    return float(2 * t.sf(abs(np.log(max(nearer, 1e-3 * PRELOAD) / PRELOAD)) / SPREAD, MOTORS - 1))
+    apart = max(abs(own - PRELOAD) - 2 * error, 0.0)
+    return float(2 * t.sf(apart / (PRELOADS * PRELOAD), MOTORS - 1))
