@@ -35,7 +35,7 @@ def test_a_ripple_at_a_harmonic_of_the_same_encoders_error_is_its_shadow(
     period: float, motor: str, stays: bool
 ) -> None:
     error, ripple = periodic("encoder_periodic_error", "index", 10.79), periodic("torque_ripple", motor, period)
-    assert _without_shadows([error, ripple]) == ([error, ripple] if stays else [error])
+    assert _without_shadows([error, ripple], []) == ([error, ripple] if stays else [error])
 
 
 def test_a_better_sensor_alone_does_not_put_an_effect_first() -> None:
@@ -46,14 +46,16 @@ def test_a_better_sensor_alone_does_not_put_an_effect_first() -> None:
 
 def test_without_an_encoder_error_every_ripple_stays() -> None:
     ripples = [periodic("torque_ripple", "index", 5.0), periodic("torque_ripple", "index", 10.0)]
-    assert _without_shadows(ripples) == ripples
+    assert _without_shadows(ripples, []) == ripples
 
 
 def test_a_small_load_beside_an_encoder_error_of_the_same_motor_is_its_shadow_and_a_large_one_is_none() -> None:
     error, (_, load) = periodic("encoder_periodic_error", "index", 15.1), periodic("detent_load", "index", 1.0)
-    assert _without_shadows([error, (0.2, load)]) == [error]
-    assert _without_shadows([error, (0.8, load)]) == [error, (0.8, load)]
-    assert _without_shadows([error, (0.08, periodic("detent_load", "ring", 1.0)[1])])[1:]
+    small, large = (replace(load, parameters={"load": {"value": value, "unit": "raw"}}) for value in (0.1, 10.0))
+    assert _without_shadows([error, (0.2, small)], []) == [error]
+    assert _without_shadows([error, (0.2, large)], []) == [error, (0.2, large)]  # for one of its kind
+    assert _without_shadows([error, (0.8, load)], []) == [error, (0.8, load)]
+    assert _without_shadows([error, (0.08, periodic("detent_load", "ring", 1.0)[1])], [])[1:]
 
 
 def test_a_trifle_in_the_angles_of_a_finger_whose_joint_wobbles_is_no_finding_and_another_finger_s_is() -> None:
