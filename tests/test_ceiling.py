@@ -49,6 +49,14 @@ def test_where_a_controller_asks_for_more_the_limit_is_told(limit: float) -> Non
     assert found.limit == pytest.approx(limit, rel=0.03)
 
 
+def test_a_reference_that_is_wrong_in_one_move_is_no_limit() -> None:
+    one = asked(3)
+    there = np.flatnonzero(one.move == 18)[-12:]  # fast, and where the load is largest
+    one.asked[there] += 40.0
+    found = limit_of(one, NOISE)
+    assert found is None or found.likelier < BEYOND_CHANCE
+
+
 def test_a_sensor_that_errs_otherwise_tells_no_limit() -> None:
     assert limit_of(asked(3, lambda i: i + 8 * np.sin(i / 8)), NOISE) is None
     # what still lets half of it pass is a controller, or a motion, that is read a little wrong

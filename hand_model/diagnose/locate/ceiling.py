@@ -99,7 +99,6 @@ def limit_of(asked: Asked, noise: float) -> Ceiling | None:
         sound = np.abs(asked.sensed - free) < WRONG * sigma
         if sound.sum() < FEWEST:
             return None
-    plain = _squares((asked.sensed - free) / sigma)
     size = np.abs(free)
     levels = np.linspace(np.quantile(size, LEAST_QUANTILE), np.max(size), LEVELS + 1)[:-1]
 
@@ -117,16 +116,28 @@ def limit_of(asked: Asked, noise: float) -> Ceiling | None:
 
     tried = fitted(0.0)
     error, share, limit = tried[0]
-    likelier = (plain - error) / 2
     beyond = np.mean(np.abs(asked.sensed) > limit + WRONG * noise)
     if np.sqrt(error / len(asked.sensed)) > LOUDER or beyond > GLITCHES:
         return None
     if _coloured(asked, _corrected(asked, sound & (np.abs(free) < limit)), limit):
         return None
+    likelier, lost = _told_by_limit(asked, free, _within(asked, free, sound, limit), limit, sigma)
     if likelier > SURE and min(fitted(passing)[0][0] for passing in PASSING) < error + 2 * SURE:
         return None
-    lost = np.sqrt(max(plain - error, 0.0) / len(asked.sensed))
-    return Ceiling(float(limit), share, float(lost), likelier)
+    return Ceiling(float(limit), share, lost, likelier)
+
+
+def _told_by_limit(asked: Asked, free: Array, within: Array, limit: float, sigma: Array) -> tuple[float, float]:
+    """Log likelihood that a limit brings but for the move that tells most of it (a reference that is wrong at one kink
+    is no limit), and what is lost beyond it, over the noise (root mean square).
+
+    Against the better of the controllers without a limit: that of all samples, and the one learned within the limit.
+    """
+    limited = _bounded((asked.sensed - np.clip(within, -limit, limit)) / sigma)
+    plain = min((_bounded((asked.sensed - current) / sigma) for current in (free, within)), key=np.sum)
+    told = np.bincount(asked.move, plain - limited) / 2
+    total = float(told.sum())
+    return total - float(max(told.max(), 0.0)), float(np.sqrt(max(2 * total, 0.0) / len(plain)))
 
 
 def _limited(
@@ -134,16 +145,24 @@ def _limited(
 ) -> tuple[float, float]:
     """Weighted squared error with a limit beyond which a share is still `passing`, and the share of samples beyond it:
     the controller's parameters are learned where it is not reached, from rows that are `sound`."""
-    current = start
-    for _ in range(ROUNDS):
-        within = sound & (np.abs(current) < limit)
-        if within.sum() < FEWEST:
-            return np.inf, 1.0
-        current = _corrected(asked, within)
+    current = _within(asked, start, sound, limit)
+    if not len(current):
+        return np.inf, 1.0
     within_limit = np.clip(current, -limit, limit)
     flows = within_limit + passing * (current - within_limit)
     error = _squares((asked.sensed - flows) / sigma)
     return error, float(np.mean(np.abs(current) > limit))
+
+
+def _within(asked: Asked, start: Array, sound: NDArray[np.bool_], limit: float) -> Array:
+    """What is asked for (n,) by a controller learned from the rows within a limit; (0,) where these are too few."""
+    current = start
+    for _ in range(ROUNDS):
+        within = sound & (np.abs(current) < limit)
+        if within.sum() < FEWEST:
+            return start[:0]
+        current = _corrected(asked, within)
+    return current
 
 
 def _coloured(asked: Asked, current: Array, limit: float) -> bool:
@@ -158,9 +177,14 @@ def _coloured(asked: Asked, current: Array, limit: float) -> bool:
 
 
 def _squares(rest: Array) -> float:
-    """Sum of squares of what is left over its deviation (n,), rows that go wrong bounded: one of them must not be what a
+    """Sum of squares of what is left over its deviation (n,), as bounded."""
+    return float(np.sum(_bounded(rest)))
+
+
+def _bounded(rest: Array) -> Array:
+    """Squares (n,) of what is left over its deviation, of rows that go wrong bounded: one of them must not be what a
     limit explains."""
-    return float(np.sum(np.minimum(rest**2, WRONG**2)))
+    return np.minimum(rest**2, WRONG**2)
 
 
 def _corrected(asked: Asked, use: NDArray[np.bool_]) -> Array:

@@ -22,7 +22,7 @@ SAG_T, SETTLED_T = 10.0, 4.0
 ALIKE = 2.0  # times the loss of speed of the session's least sagging drive: drives of one kind may differ by as much
 # log likelihood that a limit must bring: for an effect, for the limits that are tried, and for as many names of as many
 # channels
-BEYOND_CHANCE = 15.0
+BEYOND_CHANCE = 12.0
 REACTION_S = 0.15  # a person's quickest: a delay counts beside it
 UNLIKE = 0.1  # of a delay by which answers may miss it: controllers of other gains rise otherwise
 
