@@ -71,6 +71,9 @@ def test_motors_of_a_known_hand_are_told_by_their_figures_and_known_by_their_pre
     assert preload_by_chance(1.1 * PRELOAD, 0.1) > 0.3
     assert preload_by_chance(0.4 * PRELOAD, 0.1) < 0.01
     assert preload_by_chance(-PRELOAD, 0.1) < 1e-6
+    # another motor of the same hand that is unlike them, too, says that these differ more
+    assert preload_by_chance(1.5 * PRELOAD, 0.1) < 0.02 < preload_by_chance(1.5 * PRELOAD, 0.1, [0.6 * PRELOAD])
+    assert preload_by_chance(1.5 * PRELOAD, 0.1, [PRELOAD]) < 0.02
 
 
 def test_of_two_motors_of_a_known_kind_the_one_unlike_those_is_odd_and_one_alone_can_be() -> None:

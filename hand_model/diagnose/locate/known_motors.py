@@ -30,10 +30,13 @@ def kinship(motors: Sequence[Mapping[str, float]]) -> float:
     return float(1 / (1 + np.exp(-np.clip(log_odds, -50, 50))))
 
 
-def preload_by_chance(own: float, error: float) -> float:
+def preload_by_chance(own: float, error: float, others: Sequence[float] = ()) -> float:
     """Probability that a motor of the known kind has a preload [raw] as far from theirs as the nearer end of its
-    standard error: as so few motors tell a mean and a deviation (Student's t)."""
+    standard error: as so few motors tell a mean and a deviation (Student's t). others: preloads of the same hand's other
+    motors, which say how alike these are."""
     from scipy.stats import t
 
-    apart = max(abs(own - PRELOAD) - 2 * error, 0.0)
-    return float(2 * t.sf(apart / (PRELOADS * PRELOAD), MOTORS - 1))
+    apart = max(abs(own - PRELOAD) - 2 * error, 0.0) / PRELOAD
+    squares = MOTORS * PRELOADS**2 + sum((other / PRELOAD - 1) ** 2 for other in others)
+    known = MOTORS + len(others)
+    return float(2 * t.sf(apart / np.sqrt(squares / known), known - 1))

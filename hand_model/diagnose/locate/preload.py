@@ -48,18 +48,22 @@ def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]
         if not others and kin < KIN:
             continue
         usual = _usual(others, kin)
-        own = min(
-            (float(fit.declared["preload"]) for fit in (station.naming.fit, station.naming.declared)),
-            key=lambda p: abs(p - usual),
-        )
+        own = _preload_near(station, usual)
         error = _standard_error(station)
         unlike = [_by_chance(own, error, other, spread) for other in others if other > 0]  # every other
-        p = kin * preload_by_chance(own, error) + (1 - kin) * max(unlike, default=1.0)
+        alike = [_preload_near(s, PRELOAD) for s in drives if s is not station]
+        p = kin * preload_by_chance(own, error, alike) + (1 - kin) * max(unlike, default=1.0)
         odds = kin + (1 - kin) * (1.0 if len(others) > 1 else _odds(own, others))
         if usual > 0 and p < ODD_P and odds > 0.5:
             shape, scale = spread
             out.append(_finding(station, own - usual, error, scale / shape * usual, (1 - p) * odds))
     return out
+
+
+def _preload_near(station: Station, usual: float) -> float:
+    """The preload of a drive with or without its names, whichever is nearer to a usual one."""
+    preloads = (float(fit.declared["preload"]) for fit in (station.naming.fit, station.naming.declared))
+    return min(preloads, key=lambda preload: abs(preload - usual))
 
 
 def _usual(others: Sequence[float], kin: float) -> float:
