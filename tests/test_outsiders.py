@@ -35,6 +35,10 @@ def jump(state: DriveState) -> np.ndarray:
     return 12.0 * np.sign(state.velocity) * (state.elapsed_s > 52.0)
 
 
+def hung(state: DriveState) -> np.ndarray:
+    return 13.0 * (state.time_s - state.time_s[0] > 0.4 * np.ptp(state.time_s))
+
+
 def tooth(state: DriveState) -> np.ndarray:
     shape = {"form": 1.0, "centre": 45.0, "width": 4.0}
     return BY_NAME["cycle_memory"].columns(state, shape)[:, 0] * 30.0
@@ -46,7 +50,7 @@ def grease(state: DriveState) -> np.ndarray:
 
 @pytest.mark.parametrize(
     ("name", "add"),
-    [("gain_change", gain), ("friction_jump", jump), ("cycle_memory", tooth), ("thixotropy", grease)],
+    [("gain_change", gain), ("friction_jump", jump), ("load_jump", hung), ("cycle_memory", tooth), ("thixotropy", grease)],
 )
 def test_an_outsider_is_unexplained_and_said(name: str, add) -> None:
     station = heard(drive(3, add))
@@ -178,6 +182,32 @@ def test_an_encoder_whose_scale_changes_lifts_no_finger(since_s: float) -> None:
     )
     assert not station.kept and [f.term.effect.name for f in station.outsiders] == ["scale_change"]
     assert station.outsiders[0].amplitudes["change"] == pytest.approx(0.025, abs=0.005)
+
+
+@pytest.mark.parametrize("anew", [True, False])
+def test_a_segment_that_jumps_against_its_encoder_is_not_lifted(anew: bool) -> None:
+    """In each recording anew, or once for all."""
+
+    def jumps(t, x, v):
+        first = t[-1] > 25
+        return -1.4 * (t >= (14.0 if first else 0.45 * t[-1] if anew else 0.0))
+
+    station = judged(
+        "encoder", "index", "index", "proximal", joint(3, add=jumps), [*catalogue("encoder"), *outsiders("encoder")]
+    )
+    assert not station.kept and "zero_jump" in {f.term.effect.name for f in station.outsiders}
+    assert station.outsiders[0].amplitudes["jump_0"] == pytest.approx(-1.4, abs=0.15)
+
+
+@pytest.mark.parametrize("rate", [9e-5, -9e-5])
+def test_clocks_that_part_as_crystals_do_are_two_healthy_ones(rate: float) -> None:
+    def parted(t, x, v):
+        slope = np.polynomial.Polynomial(MAP).deriv()(x / 100) / 100
+        return rate * (t - t[-1] / 2) * slope * v * (t[-1] > 25)
+
+    effects = [*catalogue("encoder"), *outsiders("encoder")]
+    station = judged("encoder", "index", "index", "proximal", joint(3, add=parted, noise=0.15), effects)
+    assert "clock_wander" not in {f.term.effect.name for f in station.outsiders}
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

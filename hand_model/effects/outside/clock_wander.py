@@ -11,6 +11,7 @@ from ..base import Amplitude, Array, DriveState
 from .outsider import Outsider, of_its_record
 
 RECORDS, WHILES = 4, 8  # recordings that may be looked at, and pieces of each
+CRYSTALS = 1e-4  # by which two healthy clocks' rates may differ
 
 
 class ClockWander(Outsider):
@@ -31,6 +32,12 @@ class ClockWander(Outsider):
         share = (state.time_s - state.time_s[0]) / max(state.time_s[-1] - state.time_s[0], 1e-9)
         inside = np.minimum((WHILES * share).astype(int), WHILES - 1)[:, None] == np.arange(WHILES)
         return of_its_record(state, np.where(inside, (-state.slope * state.velocity)[:, None], 0.0), RECORDS)
+
+    def possible(self, states: tuple[DriveState, ...], parameters: Mapping[str, float]) -> bool:
+        """Whether the clocks of some recording part by more than those of two healthy crystals do over its length."""
+        lags = np.array([[parameters.get(f"lag_{i}_{k}", 0.0) for k in range(WHILES)] for i in range(RECORDS)])
+        lasting = max(float(s.time_s[-1] - s.time_s[0]) for s in states)
+        return bool(np.ptp(lags, axis=1).max() > CRYSTALS * lasting)
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """How far they part."""

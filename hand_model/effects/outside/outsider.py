@@ -34,6 +34,12 @@ def of_its_record(state: DriveState, columns: Array, records: int) -> Array:
     return out.reshape(len(columns), -1)
 
 
+def place_in_session(state: DriveState) -> Array:
+    """Where each sample lies in the session (n,): its recording's number plus the share of that which has passed."""
+    index = state.extra.get("trial_index", np.zeros(len(state.time_s)))
+    return index + np.clip((state.time_s - state.time_s[0]) / max(float(np.ptp(state.time_s)), 1e-9), 0.0, 1 - 1e-9)
+
+
 def moments(states: tuple[DriveState, ...]) -> Shape:
     """A moment of the session [s] while something is recorded, with starts all along."""
     recorded = np.concatenate([s.elapsed_s[np.isfinite(s.effort)] for s in states])

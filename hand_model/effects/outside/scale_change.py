@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..base import Amplitude, Array, DriveState, Shape, figure
-from .outsider import Outsider
+from .outsider import Outsider, place_in_session
 
 
 class ScaleChange(Outsider):
@@ -21,7 +21,7 @@ class ScaleChange(Outsider):
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """The moment, in recordings since the first began."""
-        last = 1.0 + max((_place(s)[0] for s in states), default=0.0)
+        last = 1.0 + max((place_in_session(s)[0] for s in states), default=0.0)
         return (
             Shape("since", "recordings", 0.05, float(last) - 0.05, tuple(np.arange(0.1, last - 0.05, 0.1).tolist())),
         )
@@ -32,7 +32,7 @@ class ScaleChange(Outsider):
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """How far the segment goes with what the encoder has counted, from then on, (n, 1)."""
-        return ((_place(state) >= shape["since"]) * state.slope * state.position)[:, None]
+        return ((place_in_session(state) >= shape["since"]) * state.slope * state.position)[:, None]
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """By how much."""
@@ -40,12 +40,6 @@ class ScaleChange(Outsider):
             f"the encoder's scale changes by {100 * parameters['change']:+.1f} % after "
             f"{figure(parameters['since'])} recordings"
         )
-
-
-def _place(state: DriveState) -> Array:
-    """Where each sample lies in the session (n,): its recording's number plus the share of that which has passed."""
-    index = state.extra.get("trial_index", np.zeros(len(state.time_s)))
-    return index + np.clip((state.time_s - state.time_s[0]) / max(float(np.ptp(state.time_s)), 1e-9), 0.0, 1 - 1e-9)
 
 
 EFFECT = ScaleChange()
