@@ -83,7 +83,7 @@ REFUSED = {
     "long_row": ("time,position\n0,1\n1,2,3\n", "line 3 has 3 cells; 2"),
     "one_sample": ("time,position\n0,1\n", "1 samples"),
     "backwards": (rows([*range(20)][::-1]), "go back in time"),
-    "repeated": (rows([i // 2 for i in range(40)]), "repeat the time"),
+    "repeated": (rows([i - (i % 6 == 5) for i in range(40)]), "repeat the time"),  # too few for packets
     "timeless": (rows(["" if i % 3 else i for i in range(40)]), "have no time"),
 }
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SessionError, did_you_mean
+from .packets import spread_packets
 
 Array = NDArray[np.float64]
 
@@ -46,7 +47,8 @@ def build_log(time_s: Array, columns: Mapping[str, Array], path: Path, notes: It
     """A log as every reader hands it over: rows in the order of their times, each time once.
 
     time_s: (n,) [s], as recorded. notes: what the reader has to say. Rows without a time, or that repeat one, are
-    dropped and rows out of order sorted, with a note, as long as they are few. Raises SessionError where they are many,
+    dropped and rows out of order sorted, with a note, as long as they are few; rows stamped in packets get times of their
+    own. Raises SessionError where they are many,
     or where fewer than two rows are left.
     """
     total = len(time_s)
@@ -60,6 +62,11 @@ def build_log(time_s: Array, columns: Mapping[str, Array], path: Path, notes: It
     if back:
         keep = keep[np.argsort(time_s[keep], kind="stable")]
         notes.append(f"rows were sorted by time: it went back {back} times")
+    packets = None if _copied(time_s[keep], columns, keep) else spread_packets(time_s[keep])
+    if packets is not None:
+        time_s = time_s.copy()
+        time_s[keep], rows = packets
+        notes.append(f"rows came in packets of {rows:.2g}: they were spread evenly between the packets' times")
     fresh = np.ones(len(keep), bool)
     fresh[1:] = np.diff(time_s[keep]) > 0
     repeated = int((~fresh).sum())
@@ -74,6 +81,15 @@ def build_log(time_s: Array, columns: Mapping[str, Array], path: Path, notes: It
     for array in (times, *picked.values()):
         array.setflags(write=False)
     return Log(times, picked, path, tuple(notes))
+
+
+def _copied(time_s: Array, columns: Mapping[str, Array], keep: NDArray[np.intp]) -> bool:
+    """Whether more rows than are tolerated say nothing but what the row before them said, at the same time."""
+    same = np.diff(time_s) == 0
+    for column in columns.values():
+        before, after = column[keep][:-1], column[keep][1:]
+        same = same & ((before == after) | (np.isnan(before) & np.isnan(after)))
+    return bool(same.sum() > TOLERATED_SHARE * len(keep))
 
 
 def _tolerate(rows: int, total: int, what: str, path: Path) -> None:

@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...background import Pair
-from ...effects.base import least_delay
+from ...effects.base import least_delay, position_range
 from .balance import Balance, Fit
 from .evidence import evidence, gain, rough_evidence, scale_of
 from .lack_of_fit import LackOfFit, lack_of_fit
 from .naming import ALPHA, MOST_TERMS, Named, Naming, Rival, overwhelmed
 from .shapes import polish, refit, reform, scan
-from .term import Term, additive
+from .term import Term, additive, doubled
 from .wander import Wander, estimate_wander
 
 Array = NDArray[np.float64]
@@ -177,6 +177,7 @@ def _search(
     balance = pair.state
     fit, brought, ranked = settle(pair, effects, start)[1] if start else balance.fit(), {}, list[Rival]()
     been, refused = {_names(fit)}, set[str]()
+    span = float(np.ptp(position_range(balance.states)))
     while len(fit.terms) < MOST_TERMS:
         ranked = rank(pair, effects, fit.terms, fit)
         for rival in ranked:
@@ -187,7 +188,7 @@ def _search(
         if best is None:
             break
         _, settled = settle(pair, effects, best.fit.terms)
-        if _names(settled) in been:  # it went again beside the others: round and round from here
+        if _names(settled) in been or doubled(settled.terms, span):  # round and round from here, or one wave twice
             refused.add(best.name)
             fit = min(fit, settled, key=lambda f: f.rss) if _names(settled) == _names(fit) else fit
             continue

@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 
 # shapes that choose among few cases: no continuous parameter is spent on them
 DISCRETE = ("side", "trial", "form", "end")
+CYCLES_APART = 0.5  # over the range, by which the periods of two terms of one effect must differ to be two
 COARSE = 0.15  # of a delay or a bristle's length: nearer is near enough to choose a start by
 
 
@@ -50,6 +51,16 @@ def keys(terms: tuple[Term, ...]) -> tuple[Any, ...]:
 def additive(effect: Any) -> bool:
     """Whether an effect adds its columns and leaves all others as they are."""
     return effect.replaces is None and not effect.warps and not effect.clips
+
+
+def doubled(terms: tuple[Term, ...], span: float) -> bool:
+    """Whether two terms of a periodic effect have one period, as far as a range `span` tells: together they are a wave
+    that grows along it, of any size."""
+    found: dict[str, list[float]] = {}
+    for term in terms:
+        if term.effect.repeats and "period" in term.shape:
+            found.setdefault(term.effect.name, []).append(span / term.shape["period"])
+    return any(np.any(np.diff(np.sort(cycles)) < CYCLES_APART) for cycles in found.values())
 
 
 def bending(terms: tuple[Term, ...], effect: Any) -> tuple[Term, ...]:
