@@ -17,7 +17,7 @@ from .finger import FingerReading, finger_calls
 from .locate.angles import FingerAngles
 from .locate.command import CommandFacts, command_facts, command_findings, refused
 from .locate.course import FingerCourses
-from .locate.decoupled import while_driven, without_excursions
+from .locate.decoupled import pulls, while_driven, without_excursions
 from .locate.drive import drive_states, drive_trials, opposes, too_short
 from .locate.encoder_error import encoder_corrections
 from .locate.gravity import with_gravity
@@ -89,11 +89,11 @@ class Heard:
         for station in (s for s in self.stations if s.believed and s.actuator in drives):
             for term in (f.term for f in station.kept if f.term.effect.name == "spring_decoupling"):
                 states = drives[station.actuator]
-                drives[station.actuator] = (
-                    while_driven(states, term.shape["below"])
-                    if term.shape["form"] > 0.5
-                    else without_excursions(states, station.naming.balance.states, self.fingers[station.finger])
-                )
+                if term.shape["form"] < 0.5:
+                    states = without_excursions(states, station.naming.balance.states, self.fingers[station.finger])
+                elif pulls(station):  # else the spring stays on the drive, and most of the range is worth more
+                    states = while_driven(states, term.shape["below"])
+                drives[station.actuator] = states
         for actuator in [a for a, states in drives.items() if not is_measured(states)]:
             self.found.append(
                 refused(actuator, _finger_of(session, actuator), tuple(s.trial for s in drives.pop(actuator)))

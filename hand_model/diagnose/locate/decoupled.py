@@ -12,12 +12,25 @@ from ...effects.base import DriveState, position_range
 from ...effects.spring_decoupling import spans
 from ...errors import IdentificationError
 from ...identify.clock import align
+from ..magnitude import SLIGHT, channel_figures, magnitude
+from ..name.station import Station
 from .angles import FingerAngles
 
 Array = NDArray[np.float64]
 
 BESIDE, MOST_S = 0.4, 1.0  # of an excursion's length, at most, on either side: it is seen from where it stands out
 CORNER = 0.2  # of the way on which the finger stays behind, beyond its end
+
+
+def pulls(station: Station) -> bool:
+    """Whether a finger is pulled off its drive by more than a trifle."""
+    named = (
+        next((f for f in station.kept if f.term.effect.name == "spring_decoupling"), None) if station.believed else None
+    )
+    if named is None:
+        return False
+    values = {k: v["value"] for k, v in station.parameters[station.naming.fit.terms.index(named.term)].items()}
+    return magnitude("spring_decoupling", values, channel_figures(station.naming.balance.states)) >= SLIGHT
 
 
 def while_driven(states: Sequence[DriveState], below: float) -> tuple[DriveState, ...]:

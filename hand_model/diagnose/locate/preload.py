@@ -14,8 +14,8 @@ import numpy as np
 
 from ...effects import effect
 from ..findings import UNWRITTEN, Finding, weighed
-from ..magnitude import SLIGHT, channel_figures, magnitude
 from ..name.station import Station
+from .decoupled import pulls
 from .known_motors import PRELOAD, kinship, preload_by_chance
 
 # mean absolute deviation of the logarithm of a drive's preload within one hand, as sure as from so many comparisons
@@ -92,7 +92,7 @@ def expected(stations: Sequence[Station], station: Station, name: str) -> tuple[
 
 def _drives(stations: Sequence[Station]) -> list[Station]:
     """Those whose preload can be spoken of."""
-    pulled = {s.actuator for s in stations if _pulls(s)}
+    pulled = {s.actuator for s in stations if pulls(s)}
     return [
         s
         for s in stations
@@ -109,17 +109,6 @@ def _others(drives: Sequence[Station], station: Station) -> list[Station]:
 def _lacks(station: Station) -> bool:
     """Whether something is missing of the drive itself: what happened in one recording is not."""
     return station.missing and not (station.believed and not any(f.term.effect.of_the_hand for f in station.kept))
-
-
-def _pulls(station: Station) -> bool:
-    """Whether a finger is pulled off its drive by more than a trifle."""
-    named = (
-        next((f for f in station.kept if f.term.effect.name == "spring_decoupling"), None) if station.believed else None
-    )
-    if named is None:
-        return False
-    values = {k: v["value"] for k, v in station.parameters[station.naming.fit.terms.index(named.term)].items()}
-    return magnitude("spring_decoupling", values, channel_figures(station.naming.balance.states)) >= SLIGHT
 
 
 def _tells(station: Station) -> bool:
