@@ -17,7 +17,7 @@ from hand_model.diagnose.name.least_squares import bounded_least_squares
 from hand_model.diagnose.name.selection import name_effects
 from hand_model.diagnose.name.shapes import polish
 from hand_model.diagnose.name.station import judged
-from hand_model.diagnose.name.term import Term
+from hand_model.diagnose.name.term import Term, doubled
 from hand_model.effects import catalogue, effect
 from hand_model.effects.base import DriveState
 
@@ -340,3 +340,13 @@ def test_held_out_is_empty_where_validation_took_part() -> None:
 
     everything = replace(plain, balance=Balance(plain.balance.states, everything=True))
     assert held_out(undisturbed(everything), 0)["held_out"] == []
+
+
+def test_two_waves_of_nearly_one_period_are_one() -> None:
+    ripple, spring = effect("torque_ripple"), effect("nonlinear_spring")
+
+    def waves(*periods: float) -> tuple[Term, ...]:
+        return (Term(spring, {"form": 0.0, "knee": 40.0}), *(Term(ripple, {"period": p, "unseen": 0.0}) for p in periods))
+
+    assert doubled(waves(30.277, 9.9, 30.278), 90.0) and doubled(waves(8.0, 8.1), 100.0)
+    assert not doubled(waves(30.0, 15.0, 10.0), 90.0) and not doubled(waves(8.0), 100.0)

@@ -183,6 +183,13 @@ def test_a_lifted_finger_is_decoupled_and_its_whiles_are_found() -> None:
         assert any(a < begin + 0.35 < b for a, b in spans["log/0.csv"])
 
 
+def test_a_reading_at_the_wrong_time_lifts_no_finger() -> None:
+    def late(t, x, v):
+        return 4.0 * ((t > 8.13) & (t < 8.22))
+
+    assert not any(s.extra["ahead"].any() for s in joint(4, add=late))
+
+
 def test_nothing_runs_ahead_in_noise() -> None:
     assert all((s.extra["ahead"] == 0).all() for seed in range(6) for s in joint(seed))
 

@@ -191,6 +191,26 @@ def test_a_current_of_one_value_a_stroke_is_no_measurement():
     assert not is_measured(tuple(commanded(s) for s in states))
 
 
+def test_a_current_that_the_way_to_the_target_tells_is_asked_for_and_not_measured():
+    """Moves pass one place for other targets: what flows there is the same, what a controller asks for is not."""
+    rng = np.random.default_rng(3)
+
+    def to_target(state):
+        way = np.sign(state.velocity)
+        stroke = np.cumsum(np.r_[0, np.diff(way) != 0])
+        further = rng.uniform(0, 60, stroke[-1] + 1)[stroke] * way  # some moves are stopped before their target
+        ends = np.array([state.position[stroke == k][-1] for k in range(stroke[-1] + 1)])[stroke]
+        return replace(state, extra={**state.extra, "setpoint": ends + further})
+
+    def asked(state):
+        current = 0.8 * (state.extra["setpoint"] - state.position) + rng.normal(0, 4.0, len(state.time_s))
+        return replace(state, effort=np.where(np.isfinite(state.effort), current, np.nan))
+
+    states = tuple(to_target(s) for s in drive(12))
+    assert is_measured(states)
+    assert not is_measured(tuple(asked(s) for s in states))
+
+
 def test_a_ripple_is_not_read_from_starts_and_stops():
     state = drive(5)[0]
     steady = (np.arange(len(state.time_s)) % 7 > 2).astype(float)

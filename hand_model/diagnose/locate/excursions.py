@@ -17,7 +17,8 @@ from .motion import local_quadratic
 Array = NDArray[np.float64]
 
 LONGEST_S = 12.0  # what lasts longer is no excursion
-SHORTEST_S = 0.12
+SHORTEST_S = 0.12  # of the windows that are tried
+LASTING_S = 0.2  # above half of its height: what is shorter is a reading at the wrong time, and no finger
 GROWTH = 1.3  # from one length tried to the next
 FEWEST = 50  # samples of a recording below which nothing is searched
 BEYOND = 2.0  # times as much as anything stands out below
@@ -96,14 +97,24 @@ def _course(told: _Told, least: float) -> Array:
     each."""
     left = told.residual.copy()
     inside = np.zeros(len(left), bool)
+    smooth = np.maximum(local_quadratic(told.time_s, told.residual, SMOOTH_S)[0], 0.0)
     for _ in range(len(left)):
         gain, begin, end = _best_window(left, told.sigma, told.lengths)
         if gain < least or end - begin >= told.lengths[-1]:
             break
-        inside[begin:end] = True
+        inside[begin:end] = _lasting(told.time_s, smooth, begin, end)
         left[begin:end] = 0.0
-    smooth = np.maximum(local_quadratic(told.time_s, told.residual, SMOOTH_S)[0], 0.0)
     return np.where(_to_zero(inside, smooth, int(EDGE_S / float(np.median(np.diff(told.time_s))))), smooth, 0.0)
+
+
+def _lasting(time_s: Array, smooth: Array, begin: int, end: int) -> bool:
+    """Whether a course is above half of its largest height within a window for long enough around it."""
+    top = begin + int(np.argmax(smooth[begin:end]))
+    low = np.flatnonzero(smooth < 0.5 * smooth[top])
+    first, last = np.searchsorted(low, top), len(low)
+    since = time_s[low[first - 1]] if first > 0 else time_s[0]
+    until = time_s[low[first]] if first < last else time_s[-1]
+    return bool(until - since >= LASTING_S)
 
 
 def _to_zero(inside: NDArray[np.bool_], smooth: Array, most: int) -> NDArray[np.bool_]:

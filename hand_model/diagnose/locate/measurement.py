@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,18 +17,20 @@ ECHO = 0.003  # of the range: a third of what a fast motion covers in one sample
 UNMOVED = 0.95  # of a current's standard deviation: more than this left by the motion, and it measures nothing
 FEWEST_RESTS, FINE = 10, 200  # rests that are looked at, and different readings of an encoder that is no coarse one
 LONG_STROKE = 15  # samples, over which a current changes
+PLACES, SPEEDS = 20, 8  # bins of position and of speed, each way
+COMMANDED = 0.67  # of what state leaves of a current: less left by the way to the target, and it is asked for
 
 
 def is_measured(states: tuple[DriveState, ...]) -> bool:
     """False where the current channel is dead or stays the same all along a stroke (the load of a spring or a polynomial
     of position does not, nor does noise), where the motion explains nothing of it (friction alone turns over with every
-    reversal), or where it is so free of noise beside a motion that it does not explain that it can only be a
+    reversal), where the way to the target tells it better than where and how fast the drive moves, or where it is so free of noise beside a motion that it does not explain that it can only be a
     command."""
     current = np.concatenate([s.effort[np.isfinite(s.effort)] for s in states])
     if len(current) < 50:
         return True
     spread = float(np.std(current))
-    if len(np.unique(current)) <= 3 or spread == 0 or _level(states):
+    if len(np.unique(current)) <= 3 or spread == 0 or _level(states) or _asked_for(states):
         return False
     declared = np.concatenate([s.declared[np.isfinite(s.effort)] for s in states])
     left = float(np.std(current - declared @ coefficients(declared, current)))
@@ -45,6 +47,35 @@ def _level(states: tuple[DriveState, ...]) -> bool:
             if way[part[0]] and len(part) >= LONG_STROKE:
                 alike.append(np.median(state.effort[part]) == state.effort[part])
     return len(alike) >= FEWEST_RESTS and float(np.mean(np.concatenate(alike))) > 0.9
+
+
+def _asked_for(states: tuple[DriveState, ...]) -> bool:
+    """Whether the current is a controller's output and not what the drive takes: the way to the target and the speed
+    leave less of it than any law of position, direction, speed and acceleration does. Moves that pass one place for
+    targets of different distance tell these apart."""
+    if not all("setpoint" in s.extra for s in states):
+        return False
+    seen = [np.isfinite(s.effort) for s in states]
+
+    def gathered(values: Callable[[DriveState], Array]) -> Array:
+        return np.concatenate([values(s)[u] for s, u in zip(states, seen, strict=True)])
+
+    current, declared = gathered(lambda s: s.effort), gathered(lambda s: s.declared)
+    setpoint, position, velocity = (
+        gathered(f) for f in (lambda s: s.extra["setpoint"], lambda s: s.position, lambda s: s.velocity)
+    )
+    # the setpoint's unit is the encoder's, the position's is not: their slopes are free
+    told = np.column_stack([setpoint, position, velocity, np.ones(len(current))])
+    way = velocity > 0
+    state = np.column_stack([declared, _cells(position, PLACES, way), _cells(np.abs(velocity), SPEEDS, way)])
+    by_target, by_state = (float(np.std(current - m @ coefficients(m, current))) for m in (told, state))
+    return by_target < COMMANDED * by_state
+
+
+def _cells(values: Array, count: int, way: NDArray[np.bool_]) -> Array:
+    """One column for each of `count` bins of equal occupation and each way, (n, 2 count) at most."""
+    label = 2 * np.searchsorted(np.quantile(values, np.linspace(0, 1, count + 1)[1:-1]), values) + way
+    return (label[:, None] == np.unique(label)).astype(float)
 
 
 def echoes_command(logs: Sequence[Log]) -> bool:

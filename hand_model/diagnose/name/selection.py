@@ -90,7 +90,7 @@ def _named(
     if rival is not None:
         other = balance.wandering(estimate_wander(balance, balance.fit(rival.fit.terms).prediction))
         further, more, _ = _search(paired(other.learning()), effects, progress, rival.fit.terms)
-        if rival.name in _names(further):
+        if rival.name in _names(further) and not _doubled(other, further):
             balance, brought = other.wandering(_unrepeated(other, other.fit(further.terms))), {**brought, **more}
             pair = paired(balance.learning())
             learned = refit(pair.state, pair.state.fit(further.terms))
@@ -177,7 +177,6 @@ def _search(
     balance = pair.state
     fit, brought, ranked = settle(pair, effects, start)[1] if start else balance.fit(), {}, list[Rival]()
     been, refused = {_names(fit)}, set[str]()
-    span = float(np.ptp(position_range(balance.states)))
     while len(fit.terms) < MOST_TERMS:
         ranked = rank(pair, effects, fit.terms, fit)
         for rival in ranked:
@@ -188,7 +187,10 @@ def _search(
         if best is None:
             break
         _, settled = settle(pair, effects, best.fit.terms)
-        if _names(settled) in been or doubled(settled.terms, span):  # round and round from here, or one wave twice
+        if _doubled(balance, settled):
+            refused.add(best.name)
+            continue
+        if _names(settled) in been:  # it went again beside the others: round and round from here
             refused.add(best.name)
             fit = min(fit, settled, key=lambda f: f.rss) if _names(settled) == _names(fit) else fit
             continue
@@ -279,9 +281,13 @@ def _weight(balance: Balance, candidate: tuple[Fit, bool], fit: Fit, scale: floa
     return (evidence if candidate[1] else rough_evidence)(balance, candidate[0], fit, scale=scale)
 
 
+def _doubled(balance: Balance, fit: Fit) -> bool:
+    return doubled(fit.terms, float(np.ptp(position_range(balance.states))))
+
+
 def _possible(balance: Balance, fit: Fit) -> bool:
     term, amplitudes = fit.terms[-1], fit.amplitudes[-1]
-    if not _resolved(balance, term) or fit.declared.get(term.effect.needs, 1.0) <= 0:
+    if not _resolved(balance, term) or _doubled(balance, fit) or fit.declared.get(term.effect.needs, 1.0) <= 0:
         return False
     return bool(term.effect.possible(balance.states, term.effect.parameters(term.shape, amplitudes, fit.declared)))
 
