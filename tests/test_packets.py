@@ -46,7 +46,7 @@ def test_a_log_whose_packets_share_a_stamp_is_read_and_says_so() -> None:
     read, stamped = arrivals(3, 0.0)
     log = build_log(stamped, {"position": np.arange(300.0)}, Path("log.csv"))
     np.testing.assert_allclose(log.time_s, read, atol=1e-9)
-    assert len(log.column("position")) == 300 and "packets of 3" in log.notes[0]
+    assert len(log.column("position")) == 300 and "packets of 3" in log.notes[0] and log.packet == pytest.approx(3)
 
 
 def test_rows_that_were_written_twice_are_no_packets() -> None:

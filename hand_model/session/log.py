@@ -27,7 +27,8 @@ class Log:
     """Columns of an actuator log on its own clock.
 
     time_s: (n,) [s], increasing, irregular. columns: name -> (n,), raw units as the session format states,
-    nan where a sample was lost. path: the file. notes: what was mended, one sentence each.
+    nan where a sample was lost. path: the file. notes: what was mended, one sentence each. packet: rows that came at
+    once, on average; more than one, and their times are no more than spread evenly.
     The arrays are read-only: readings are shared.
     """
 
@@ -35,6 +36,7 @@ class Log:
     columns: Mapping[str, Array]
     path: Path
     notes: tuple[str, ...] = ()
+    packet: float = 1.0
 
     def column(self, name: str) -> Array:
         """One column (n,); raises SessionError naming the file and a near name where it is missing."""
@@ -62,11 +64,12 @@ def build_log(time_s: Array, columns: Mapping[str, Array], path: Path, notes: It
     if back:
         keep = keep[np.argsort(time_s[keep], kind="stable")]
         notes.append(f"rows were sorted by time: it went back {back} times")
+    packet = 1.0
     packets = None if _copied(time_s[keep], columns, keep) else spread_packets(time_s[keep])
     if packets is not None:
         time_s = time_s.copy()
-        time_s[keep], rows = packets
-        notes.append(f"rows came in packets of {rows:.2g}: they were spread evenly between the packets' times")
+        time_s[keep], packet = packets
+        notes.append(f"rows came in packets of {packet:.2g}: they were spread evenly between the packets' times")
     fresh = np.ones(len(keep), bool)
     fresh[1:] = np.diff(time_s[keep]) > 0
     repeated = int((~fresh).sum())
@@ -80,7 +83,7 @@ def build_log(time_s: Array, columns: Mapping[str, Array], path: Path, notes: It
     times = time_s[keep]
     for array in (times, *picked.values()):
         array.setflags(write=False)
-    return Log(times, picked, path, tuple(notes))
+    return Log(times, picked, path, tuple(notes), packet)
 
 
 def _copied(time_s: Array, columns: Mapping[str, Array], keep: NDArray[np.intp]) -> bool:
