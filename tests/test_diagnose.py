@@ -346,7 +346,10 @@ def test_two_waves_of_nearly_one_period_are_one() -> None:
     ripple, spring = effect("torque_ripple"), effect("nonlinear_spring")
 
     def waves(*periods: float) -> tuple[Term, ...]:
-        return (Term(spring, {"form": 0.0, "knee": 40.0}), *(Term(ripple, {"period": p, "unseen": 0.0}) for p in periods))
+        return (
+            Term(spring, {"form": 0.0, "knee": 40.0}),
+            *(Term(ripple, {"period": p, "unseen": 0.0}) for p in periods),
+        )
 
     assert doubled(waves(30.277, 9.9, 30.278), 90.0) and doubled(waves(8.0, 8.1), 100.0)
     assert not doubled(waves(30.0, 15.0, 10.0), 90.0) and not doubled(waves(8.0), 100.0)

@@ -50,7 +50,13 @@ def grease(state: DriveState) -> np.ndarray:
 
 @pytest.mark.parametrize(
     ("name", "add"),
-    [("gain_change", gain), ("friction_jump", jump), ("load_jump", hung), ("cycle_memory", tooth), ("thixotropy", grease)],
+    [
+        ("gain_change", gain),
+        ("friction_jump", jump),
+        ("load_jump", hung),
+        ("cycle_memory", tooth),
+        ("thixotropy", grease),
+    ],
 )
 def test_an_outsider_is_unexplained_and_said(name: str, add) -> None:
     station = heard(drive(3, add))

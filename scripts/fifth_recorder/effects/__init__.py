@@ -1,0 +1,1 @@
+"""Ways to hide something in a recording, by where it acts."""
