@@ -11,9 +11,11 @@ import pytest
 from test_diagnose import PLANTED, drive, planted
 from test_kinematic_stations import MAP, joint
 
+from hand_model.diagnose import Finding
 from hand_model.diagnose.assemble import assemble
 from hand_model.diagnose.locate.drive import with_required
-from hand_model.diagnose.name.station import Station, channel_of, judged
+from hand_model.diagnose.name.entries import channel_of
+from hand_model.diagnose.name.station import Station, judged
 from hand_model.effects import catalogue, effect, outsiders
 from hand_model.effects.base import DriveState
 
@@ -122,6 +124,54 @@ def test_many_pieces_that_do_not_do_are_no_explanation(shares: tuple[float, ...]
     station = object.__new__(Station)
     station.naming = SimpleNamespace(after=SimpleNamespace(p=p), found=[SimpleNamespace(share=s) for s in shares])
     assert station._scattered is scattered
+
+
+@pytest.mark.parametrize(("slips", "named"), [(3, True), (2, False)])
+def test_pieces_stand_in_a_finger_of_which_much_else_is_missing(
+    slips: int, named: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Five names that leave something: among so many, there are more than five."""
+    station = heard(drive(3, planted(*PLANTED[0])))
+    monkeypatch.setattr(Station, "believed", False)
+    monkeypatch.setattr(Station, "believed_in_part", True)
+    where = {"finger": "index", "joint": None, "actuator": "index", "signal": "markers", "trials": []}
+    marks = [
+        Finding(
+            "marker_slip",
+            ("marker_slip",),
+            1.0,
+            (),
+            {**where, "marker": f"M{k}", "share_of_mismatch": 0.1},
+            "",
+            {},
+            {},
+            None,
+        )
+        for k in range(slips)
+    ]
+    told = assemble([station], [(0.5, f) for f in marks], [])
+    assert (PLANTED[0][0] in {f.effect for f in told.findings}) is named
+    assert bool(told.channels[0]["effects"]) is named and bool(told.unexplained) is not named
+
+
+@pytest.mark.parametrize(
+    ("count", "p", "explained", "tells", "part"),
+    [
+        (5, 1e-4, 0.6, True, True),
+        (5, 1e-4, 0.4, True, False),
+        (4, 1e-4, 0.6, True, False),
+        (5, 0.2, 0.6, True, False),
+        (5, 1e-4, 0.6, False, False),
+    ],
+)
+def test_in_part_means_as_many_names_as_may_be_of_more_than_half_of_the_mismatch(
+    count: int, p: float, explained: float, tells: bool, part: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    station = object.__new__(Station)
+    station.naming = SimpleNamespace(after=SimpleNamespace(p=p), found=[None] * count)
+    monkeypatch.setattr(Station, "explained", explained)
+    monkeypatch.setattr(Station, "_tells", tells)
+    assert station.believed_in_part is part
 
 
 @pytest.mark.parametrize(("standing", "left_over"), [((0.9, 0.05), False), ((0.05, 0.05), True)])
@@ -268,8 +318,8 @@ def test_the_only_effect_needs_no_steady_motion_where_it_is_plain_and_a_faint_on
     faint = replace(plain.naming, found=(plain.naming.found[0],) * 2)
     overlooked = Station("current", "index", "index", None, faint)
     assert not overlooked.proven
-    assert channel_of(overlooked)["effects"] == []  # what does not stand is not told
-    assert channel_of(plain)["effects"] == [PLANTED[0][0]]
+    assert channel_of(overlooked, overlooked.believed)["effects"] == []  # what does not stand is not told
+    assert channel_of(plain, plain.believed)["effects"] == [PLANTED[0][0]]
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,8 @@ from hand_model.diagnose.name.balance import Balance
 from hand_model.diagnose.name.reread import of_recording, reread
 from hand_model.diagnose.name.selection import name_effects
 from hand_model.diagnose.name.shapes import polish
-from hand_model.diagnose.name.station import finding_of, judged
+from hand_model.diagnose.name.entries import finding_of
+from hand_model.diagnose.name.station import judged
 from hand_model.diagnose.name.term import Term
 from hand_model.effects import catalogue, effect
 

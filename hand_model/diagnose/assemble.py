@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -16,18 +17,16 @@ from .locate.markers import HINGE, SLIPS
 from .locate.preload import COMPARISON
 from .magnitude import SLIGHT, channel_figures, magnitude, sure_magnitude
 from .name.distinguishability import protocol_pairs
-from .name.interval import variance_ratio
-from .name.naming import ALPHA, Named
-from .name.station import (
-    SAME_PERIOD,
-    UNREST,
-    Station,
+from .name.entries import (
     channel_of,
     finding_of,
     outsider_of,
     unexplained_of,
     unrepeated_of,
 )
+from .name.interval import variance_ratio
+from .name.naming import ALPHA, Named
+from .name.station import SAME_PERIOD, UNREST, Station
 
 UNLIKE_OTHERS = 2.0  # times the wander of the calmest finger
 HARMONICS = 4
@@ -44,6 +43,7 @@ TINY = 0.05  # the same where that test nearly sees something, and speaks of no 
 # of a weight counts where the declared model takes up what is named, so that nothing of the mismatch is its: only the
 # hand's other motors speak for it
 COMPARED = 0.1
+MANY = 3  # names of a finger, beside which a channel of it may be explained in part
 UNSEEN = 0.01  # probability from which the test sees nothing
 SIGNALS = {"drive": "current", "motors": "current", "command": "current", "encoder": "encoder", "linkage": "markers"}
 SHOWN_IN = {e.name: SIGNALS[e.station] for e in catalogue() if e.station in SIGNALS}
@@ -64,8 +64,10 @@ def assemble(
     loose = {
         entry["where"]["finger"] for entry in unexplained if entry["shape"] == NOT_RIGID or NO_HINGE in entry["shape"]
     }
-    for station in stations:
-        stands = station.believed and not (station.finger in loose and _leave_something(station, stations))
+    worn = _worn(stations, [f for _, f in ranked])
+    believed = [s.believed or s.finger in worn and s.believed_in_part for s in stations]
+    for station, stands in zip(stations, believed, strict=True):
+        stands = stands and not (station.finger in loose and _leave_something(station, stations))
         if stands:
             strange += [(station, f) for f in station.outsiders]
             for weight, finding in (finding_of(station, *merged) for merged in _merged(station.kept)):
@@ -120,9 +122,17 @@ def assemble(
         tuple(rejected),
         tuple(unexplained),
         _next(found),
-        tuple(channel_of(s) for s in stations),
+        tuple(channel_of(s, stands) for s, stands in zip(stations, believed, strict=True)),
         tuple(notes),
     )
+
+
+def _worn(stations: Sequence[Station], of_markers: Sequence[Finding]) -> set[str | None]:
+    """Fingers of which so many things are known to be missing that a channel may well lack more than are looked for."""
+    named = Counter(f.where["finger"] for f in of_markers)
+    for station in (s for s in stations if s.believed):
+        named[station.finger] += len(station.kept)
+    return {finger for finger, count in named.items() if count >= MANY}
 
 
 def _beneath(station: Station) -> float:

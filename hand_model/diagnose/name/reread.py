@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from ...effects.base import DriveState
 from ..findings import Finding
 from .balance import Balance, Fit
+from .entries import finding_of
 from .interval import Reading, parameter_intervals, undisturbed
 from .shapes import refit, reform
-from .station import Station, finding_of
+from .station import Station
 from .term import Term
 
 Array = NDArray[np.float64]

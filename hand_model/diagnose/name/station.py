@@ -9,18 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from ..findings import UNWRITTEN, Finding, weighed
-from .interval import brought_held_out, held_out, parameter_intervals, sized, undisturbed, variance_ratio
+from ..findings import Finding
+from .interval import brought_held_out, parameter_intervals, sized, undisturbed, variance_ratio
 from .naming import ALPHA, EXPLAINED_LEAST, MOST_TERMS, Named, Naming
 from .selection import EVIDENCE_LEAST, SMALL, name_effects
 
-# How before and after were computed, said in the findings: no compiled file is involved until one is replayed.
-ENGINE = {
-    "current": "inverse dynamics of the motor's balance, motion as recorded",
-    "encoder": "encoder map, motion as recorded",
-    "markers": "linkage polynomial, motion as recorded",
-}
-# and the share of what was explained from which a fallen name has displaced others
+# times the others are heard again, and the share of what was explained from which a fallen name has displaced others
 SECOND_HEARINGS, DISPLACING = 2, 0.1
 CHANCES = 20 * 25  # channels of a session, times names: what no test of a channel sees must stand against as many
 ALIKE = 1 / 3  # of the size of a larger effect of the same family: below, no finding of its own
@@ -34,6 +28,9 @@ MAIN = 0.5  # of what names explain together: what one of them must hold where t
 PLAINLY = 1 / 3  # of the mean square of recordings kept out before, at most, is noise
 # of a mismatch that the lack-of-fit test sees: below, they are not what is missing, whatever is left to see
 EXPLAINED_SOME = 1 / 3
+# of the mismatch that names must explain in a finger of which so many other things are known to be missing that more are
+# to be expected than are looked for at once
+EXPLAINED_PARTLY = 0.5
 
 
 class Station:
@@ -94,10 +91,21 @@ class Station:
         nor names of nothing where more than the noise does not repeat, nor as many as may be, none of them the main
         one, beside which the test fails, nor what is left beside something larger that does not stand, nor many
         periods that have nothing in common."""
-        idle = self.explained < (EXPLAINED_SOME if self.naming.before.p < ALPHA else SMALL if self.wander > 1 else 0.0)
         most = self.naming.after.p >= ALPHA or self.explained >= EXPLAINED_LEAST or self._predicted
-        pieces = self._scattered or self._left_over or self._patched
-        return bool(self.proven) and not idle and not self._short and not pieces and most
+        return self._tells and most and not self._short and not self._scattered
+
+    @property
+    def believed_in_part(self) -> bool:
+        """Whether the names would stand but that as many as may be leave something: in a finger of which much is missing
+        that is to be expected."""
+        many = self.naming.after.p < ALPHA and len(self.naming.found) >= MOST_TERMS
+        return self._tells and many and self.explained >= EXPLAINED_PARTLY
+
+    @property
+    def _tells(self) -> bool:
+        """Whether what stands is no idle talk and no pieces of something else."""
+        idle = self.explained < (EXPLAINED_SOME if self.naming.before.p < ALPHA else SMALL if self.wander > 1 else 0.0)
+        return bool(self.proven) and not idle and not self._left_over and not self._patched
 
     @property
     def _scattered(self) -> bool:
@@ -317,101 +325,3 @@ def judged(
         other = Station(signal, finger, actuator, joint, name_effects(states, left, typical=typical))
         station = other if other.believed else station
     return station
-
-
-def finding_of(station: Station, named: Named, share: float, size: float) -> tuple[float, Finding]:
-    """The finding of one effect, with its weight. size: over the noise of one reading."""
-    naming = station.naming
-    which = naming.fit.terms.index(named.term)
-    effect = named.term.effect
-    parameters = dict(station.parameters[which])
-    parameters |= effect.further(naming.balance.states, parameters)
-    values = {k: v["value"] for k, v in parameters.items()}
-    where: dict[str, Any] = {
-        "finger": station.finger,
-        "joint": getattr(effect, "joint", station.joint) if station.signal != "current" else None,
-        "actuator": station.actuator,
-        "signal": getattr(effect, "signal", station.signal),
-        "marker": None,
-        "trials": [s.trial for s in naming.balance.states],
-        # of the figures that the statement tells
-        "region": effect.region(naming.balance.states, station.reading.fit.terms[which].shape),
-        "share_of_mismatch": share * station.claimed,
-    }
-    top = named.rivals[0].evidence
-    weights = np.exp(np.array([r.evidence for r in named.rivals] + [0.0]) - max(top, 0.0))
-    weights = weights / weights.sum()
-    alternatives = tuple(
-        (r.name, float(p))
-        for r, p in zip(named.rivals, weights[:-1], strict=True)
-        if r.name != effect.name and p > 1e-3 and r.fit.terms[-1].effect.listed
-    )[:4]
-    unit = naming.balance.states[0].effort_unit
-    fit = {
-        "metric": f"{station.signal}_rmse",
-        "unit": unit,
-        **held_out(station.reading, which),
-        "engine": ENGINE[station.signal],
-    }
-    members = named.members if effect.name in named.members else (effect.name, *named.members)
-    recording = getattr(effect, "correction", None)
-    model = None if recording else dict(UNWRITTEN)
-    return weighed(size, station.contrast), Finding(
-        effect.name,
-        members,
-        named.probability,
-        alternatives,
-        where,
-        effect.statement(where, values),
-        parameters,
-        fit,
-        model,
-        recording,
-    )
-
-
-def outsider_of(station: Station, named: Named) -> dict[str, Any]:
-    """The unexplained entry of what no table of effects names, with what it looks like."""
-    values = {k: v["value"] for k, v in station.parameters[station.naming.fit.terms.index(named.term)].items()}
-    entry = unexplained_of(station, named.share * station.claimed)
-    said = named.term.effect.statement(entry["where"], values).removesuffix(".")
-    return {**entry, "shape": f"no known effect, but {said}"}
-
-
-def unexplained_of(station: Station, share: float) -> dict[str, Any]:
-    return {
-        "where": {
-            "finger": station.finger,
-            "joint": station.joint,
-            "actuator": station.actuator,
-            "signal": station.signal,
-        },
-        "share_of_mismatch": share,
-        "shape": f"varies with {station.naming.after.telling}",
-    }
-
-
-def unrepeated_of(station: Station) -> dict[str, Any]:
-    """The entry of what changes from one while to the next at the same place, speed and direction."""
-    wander = station.naming.wander
-    length = 0.0 if wander is None else wander.length_s
-    span = f"over whiles of {length:.1g} s" if np.isfinite(length) else "from stroke to stroke"
-    entry = unexplained_of(station, station.wander**2 / (1 + station.wander**2))
-    return {**entry, "shape": f"does not repeat: changes {span} by {station.wander:.1f} times the noise"}
-
-
-def channel_of(station: Station) -> dict[str, Any]:
-    """The channel's row of the findings. effects: those that stand in it; p_before, p_after: of the lack-of-fit test;
-    noise: in the unit of its effort."""
-    n, stands = station.naming, station.kept if station.believed else ()
-    return {
-        "finger": station.finger,
-        "joint": station.joint,
-        "signal": station.signal,
-        "p_before": n.before.p,
-        "p_after": n.after.p,
-        "varies_with": n.before.telling,
-        "noise": n.balance.sigma,
-        "effects": [f.term.effect.name for f in stands],
-        "explained": station.explained,
-    }
