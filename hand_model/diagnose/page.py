@@ -52,8 +52,9 @@ def render(findings: Findings, stations: Sequence[Any], replays: Sequence[Replay
     shapes = {_where(u["where"]): u["shape"] for u in findings.unexplained}
     places = [_where(vars(s)) for s in stations]
     apart = [s.missing or s.believed or p in shapes for s, p in zip(stations, places, strict=True)]
+    told = {_where(channel) for channel in findings.channels if channel["effects"]}
     sections += [
-        _station(s, f"station-{i}", shapes.get(p, ""))
+        _station(s, f"station-{i}", shapes.get(p, ""), s.believed or p in told)
         for i, (s, p, own) in enumerate(zip(stations, places, apart, strict=True))
         if own
     ]
@@ -270,9 +271,10 @@ def _where(where: Mapping[str, Any]) -> tuple[Any, ...]:
     return tuple(where.get(k) for k in ("finger", "joint", "signal"))
 
 
-def _station(station: Any, name: str, unexplained: str) -> Section:
+def _station(station: Any, name: str, unexplained: str, told: bool) -> Section:
+    """unexplained: what it varies with, "" where nothing is; told: whether its names stand."""
     position, velocity, residuals, sigma, unit, effort = _maps(station)
-    stands = (*station.kept, *station.outsiders) if station.believed else ()
+    stands = (*station.kept, *station.outsiders) if told else ()
     first = stands[0].term if stands else None
     at, axis = (
         (position, f"position [{unit}]")
@@ -296,7 +298,7 @@ def _station(station: Any, name: str, unexplained: str) -> Section:
     said = (
         f"{_place(vars(station))}: unexplained, {unexplained}"
         if unexplained and not station.missing
-        else station.line().replace("_", " ")
+        else station.line(told).replace("_", " ")
     )
     return Section(name, _place(vars(station)), said + ".", (figures(*drawn), _key()))
 

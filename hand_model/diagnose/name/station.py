@@ -204,12 +204,13 @@ class Station:
         """What the effects that stand add to the effort, over the noise (mean squares)."""
         return sum(f.size**2 for f in self.kept) if self.believed else 0.0
 
-    def line(self) -> str:
-        """One line for a progress display."""
+    def line(self, in_part: bool = False) -> str:
+        """One line for a progress display. in_part: whether names that leave something stand all the same."""
         place = " ".join(x for x in (self.finger, self.joint, self.signal) if x)
         if not self.missing:
             return f"{place}: consistent (p {self.naming.before.p:.2g})"
-        names = ", ".join(f.term.effect.name for f in self.kept) if self.believed and self.kept else "unexplained"
+        stands = self.kept if self.believed or in_part else ()
+        names = ", ".join(f.term.effect.name for f in stands) or "unexplained"
         return f"{place}: {names} (p {self.naming.before.p:.2g} -> {self.naming.after.p:.2g})"
 
 
