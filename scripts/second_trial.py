@@ -148,7 +148,9 @@ def main() -> None:
             sys.exit(str(error))
     apart = sessions.with_name("sessions.answers")
     made = json.loads((apart / "answers.json").read_text())
-    answers = {a["case"]: {"case": a["kind"], "effects": a["effects"], "settings": a["settings"]} for a in made}
+    # "form" in an effect is the twin's, whose parameters the score knows; the fifth recorder's are others
+    hidden = {a["case"]: [{"law" if k == "form" else k: v for k, v in e.items()} for e in a["effects"]] for a in made}
+    answers = {a["case"]: {"case": a["kind"], "effects": hidden[a["case"]], "settings": a["settings"]} for a in made}
     shutil.rmtree(apart)
     trial = judged(options.folder, answers, options.workers)
     for row in trial.rows:
