@@ -16,8 +16,8 @@ def spread_packets(time_s: Array) -> tuple[Array, float] | None:
     """Times (n,) at which rows were read, and how many came in a packet on average; None for a log that is not stamped
     in packets.
 
-    time_s: (n,) [s], not decreasing. Rows are taken to be read at even intervals since the last packet arrived, the last one of each
-    when it did.
+    time_s: (n,) [s], not decreasing. Rows are taken to be read at even intervals since the last packet arrived, the last
+    one of each when it did.
     """
     steps = np.diff(time_s)
     if len(steps) < 2 or not (time_s[-1] > time_s[0]):

@@ -24,8 +24,8 @@ COMMANDED = 0.67  # of what state leaves of a current: less left by the way to t
 def is_measured(states: tuple[DriveState, ...]) -> bool:
     """False where the current channel is dead or stays the same all along a stroke (the load of a spring or a polynomial
     of position does not, nor does noise), where the motion explains nothing of it (friction alone turns over with every
-    reversal), where the way to the target tells it better than where and how fast the drive moves, or where it is so free of noise beside a motion that it does not explain that it can only be a
-    command."""
+    reversal), where the way to the target tells it better than where and how fast the drive moves, or where it is so
+    free of noise beside a motion that it does not explain that it can only be a command."""
     current = np.concatenate([s.effort[np.isfinite(s.effort)] for s in states])
     if len(current) < 50:
         return True
