@@ -11,6 +11,7 @@ import pytest
 from test_diagnose import drive
 
 from hand_model.diagnose import weight
+from hand_model.diagnose.name import entries, reread
 from hand_model.diagnose.name.station import judged
 from hand_model.effects import effect
 
@@ -80,3 +81,21 @@ def test_a_preload_that_pushes_is_a_weights_whatever_else_bends_the_spring(monke
     stations, findings = heard(monkeypatch, pushed)
     named = {f.effect for _, f in findings} | {f.term.effect.name for s in stations if s.believed for f in s.kept}
     assert "gravity_load" in named and named <= {"gravity_load", "nonlinear_spring"}
+
+
+def test_a_weight_is_read_beside_what_is_usual_though_another_name_is_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beside nothing that holds its preload and spring a drive hardly tells a weight's size."""
+    size = -45.0
+
+    def pulled(s: Any) -> Any:
+        return size * np.sin(1.7 + SWEEP * s.position / 100) + 3.0 * np.sin(2 * np.pi * s.position / 17.0)
+
+    stations, findings = heard(monkeypatch, pulled)
+    assert not findings
+    (station,) = (s for s in stations if s.beside is not None)
+    (weighed,) = (f for f in station.kept if f.term.effect.name == "gravity_load")
+    finding = entries.finding_of(station, weighed, 1.0, 1.0)[1]
+    assert "torque_ripple" in {f.term.effect.name for f in station.kept}
+    (alone,), _ = reread.reread([finding], [station])
+    largest, (low, high) = (alone.parameters["largest"][k] for k in ("value", "ci95"))
+    assert low < 9.81 / 9.5 * abs(size) < high and high - low < largest

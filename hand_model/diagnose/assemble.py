@@ -42,7 +42,7 @@ MINUTE = 0.15
 TINY = 0.05  # the same where that test nearly sees something, and speaks of no mismatch all the same
 # of a weight counts where the declared model takes up what is named, so that nothing of the mismatch is its: only the
 # hand's other motors speak for it
-COMPARED = 0.1
+COMPARED = 0.01
 MANY = 3  # names of a finger, beside which a channel of it may be explained in part
 UNSEEN = 0.01  # probability from which the test sees nothing
 SIGNALS = {"drive": "current", "motors": "current", "command": "current", "encoder": "encoder", "linkage": "markers"}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from .locate.angles import FingerAngles
 from .locate.gravity import in_one_pose
 from .locate.preload import expected, preload_findings
 from .name.balance import Balance, Fit
+from .name.least_squares import from_products
 from .name.naming import CLASS_WIDTH, Named
 from .name.selection import EVIDENCE_LEAST
 from .name.station import Station, judged
@@ -26,7 +28,8 @@ from .name.term import Term
 Array = NDArray[np.float64]
 
 BENT, WEIGHT = "nonlinear_spring", "gravity_load"
-ALONG, ACROSS = "weight_along", "weight_across"  # declared columns of a weight that is known to be there
+BENDING = (BENT, "detent_load", "end_stop_contact")  # names that may be a weight's bend
+PULL = "weight"  # declared column of a weight that is known to be there
 HELD = "the declared preload and spring hold what these recordings show of it: the hand never turned"
 FLAT = 1e3  # standard deviations of the effort: of a coefficient of which nothing is known
 
@@ -56,12 +59,12 @@ def with_weights(
             continue
         pulled.add(actuator)
         if other is None:
-            other = judged(*call[:4], tuple(_declaring(s) for s in states), *call[5:])
+            if any(_kept(out[at], name) is not None for name in BENDING):
+                out[at] = judged(*call[:4], tuple(_declaring(s, pull[0]) for s in states), *call[5:])
             size, finding = odd[actuator]
             weights.append((size, _finding(finding, *pull, _sweep(states[0]))))
-        elif actuator in odd:
-            other = _beside_usual(other, usual)
-        out[at] = other
+        else:
+            out[at] = _beside_usual(other, usual)
     # what a weight leaves of a drive's preload says nothing of the others'
     return out, [*weights, *preload_findings([s for s in out if s.actuator not in pulled])]
 
@@ -135,7 +138,8 @@ class _Model:
     samples `inside`.
 
     priors: coefficient -> mean and standard deviation; of the others nothing is known, the further ones and the terms
-    have some `effort`. mean, covariance: of the coefficients (m,), (m, m).
+    have some `effort`. mean, covariance: of the coefficients (m,), (m, m); possible: their mode (m,) within what physics
+    allows.
     """
 
     def __init__(
@@ -147,9 +151,11 @@ class _Model:
         effort: float,
         further: Array | None = None,
     ) -> None:
-        matrix = balance.design(terms)[0]
+        matrix, low, high = balance.design(terms)
         if further is not None:
             matrix = np.c_[matrix, further]
+            unbounded = np.full(further.shape[1], np.inf)
+            low, high = np.r_[low, -unbounded], np.r_[high, unbounded]
         self.names = balance.names
         size = np.maximum(np.sqrt(np.mean(matrix**2, axis=0)), 1e-12)
         mean, deviation = np.zeros(len(size)), effort / size
@@ -165,10 +171,11 @@ class _Model:
         columns, left = columns * deviation, left - columns @ mean
         precision = columns.T @ columns + np.eye(len(size))
         found = np.linalg.solve(precision, columns.T @ left)
+        possible = from_products(precision, columns.T @ left, (low - mean) / deviation, (high - mean) / deviation)
         self.log_evidence = float(0.5 * (columns.T @ left) @ found - 0.5 * left @ left) - 0.5 * float(
             np.linalg.slogdet(precision)[1]
         )
-        self.mean = mean + deviation * found
+        self.mean, self.possible = mean + deviation * found, mean + deviation * possible
         self.covariance = np.linalg.inv(precision) * np.outer(deviation, deviation)
 
 
@@ -176,19 +183,18 @@ def _beside_usual(station: Station, usual: Usual) -> Station:
     """The station of a drive of which a weight is named, its sizes read where preload and spring are those of the
     hand's other drives: alone it hardly tells a weight's part in them."""
     balance, fit = station.reading.balance, station.reading.fit
-    at = next(i for i, t in enumerate(fit.terms) if t.effect.name == WEIGHT)
+    at = next((i for i, t in enumerate(fit.terms) if t.effect.name == WEIGHT), None)
+    if at is None:
+        return station
     rest = (*fit.terms[:at], *fit.terms[at + 1 :])
-    columns, low, high = balance.design(rest)
-    weights = balance.gather(_weight)
+    columns, weights = balance.design(rest)[0], balance.gather(_weight)
     effort = float(np.std(balance.effort[balance.train]))
     model = _Model(balance, rest, balance.unclipped(rest), usual, effort, weights)
-    if np.any(model.mean[:-2] < low) or np.any(model.mean[:-2] > high):
-        return station
-    sweep, values = _sweep(balance.states[0]), iter(model.mean.tolist())
+    sweep, values = _sweep(balance.states[0]), iter(model.possible.tolist())
     declared = {name: next(values) for name in balance.names}
     amplitudes = [{name: next(values) for name in a} for i, a in enumerate(fit.amplitudes) if i != at]
     own = dict(zip(fit.amplitudes[at], (*values, 0.0, 0.0), strict=True))
-    prediction = np.c_[columns, weights] @ model.mean
+    prediction = np.c_[columns, weights] @ model.possible
     for term in rest:
         prediction = term.effect.clip(prediction, term.shape) if term.effect.clips else prediction
     w = balance.weights(rest) * balance.train
@@ -201,8 +207,9 @@ def _beside_usual(station: Station, usual: Usual) -> Station:
         fit.size,
     )
     out = copy(station)
+    out.beside = partial(_beside_usual, usual=usual)
     out.reading = replace(station.reading, fit=read)
-    figures = _figures(model.mean[-2:], model.covariance[-2:, -2:], sweep, balance.states[0].effort_unit)
+    figures = _figures(model.possible[-2:], model.covariance[-2:, -2:], sweep, balance.states[0].effort_unit)
     out.parameters = {**station.parameters, at: figures}
     return out
 
@@ -217,12 +224,12 @@ def _weight(state: DriveState) -> Array:
     return effect(WEIGHT).columns(state, {"sweep": _sweep(state)})[:, :2]
 
 
-def _declaring(state: DriveState) -> DriveState:
-    """The state with a weight among what is declared."""
+def _declaring(state: DriveState, weight: Array) -> DriveState:
+    """The state with a weight (2,) that pulls as this one does among what is declared."""
     return replace(
         state,
-        declared=np.c_[state.declared, _weight(state)],
-        declared_names=(*state.declared_names, ALONG, ACROSS),
+        declared=np.c_[state.declared, _weight(state) @ weight],
+        declared_names=(*state.declared_names, PULL),
     )
 
 

@@ -66,6 +66,7 @@ def _written(station: Station, names: set[str]) -> Station:
         out.proven = tuple(again[id(f)] for f in station.proven if id(f) in again)
         out.reading = undisturbed(out.naming)
         out.parameters = {which: parameter_intervals(out.reading, which) for which in range(len(fit.terms))}
+        out = out if out.beside is None else out.beside(out)
     out.naming = replace(out.naming, declared=_recorded(out.naming.balance, out.naming.fit))
     out.reading = Reading(out.reading.balance, _recorded(out.reading.balance, out.reading.fit), out.reading.fit)
     return out

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from operator import attrgetter
 from typing import Any
@@ -34,7 +34,8 @@ EXPLAINED_PARTLY = 0.5
 
 
 class Station:
-    """One balance of one finger and what was named there."""
+    """One balance of one finger and what was named there. beside: reads its sizes again where more is known of the drive
+    than its own balance tells."""
 
     def __init__(
         self, signal: str, finger: str | None, actuator: str | None, joint: str | None, naming: Naming
@@ -42,6 +43,7 @@ class Station:
         self.signal, self.finger, self.actuator, self.joint, self.naming = signal, finger, actuator, joint, naming
         places = {id(f): naming.fit.terms.index(f.term) for f in naming.found}
         self.reading = undisturbed(naming)
+        self.beside: Callable[[Station], Station] | None = None
         least = EVIDENCE_LEAST + (np.log(CHANCES) if naming.before.p >= ALPHA else 0.0)
         stand = [
             places[id(f)]
