@@ -19,7 +19,8 @@ class DetentLoad(Effect):
     name = "detent_load"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """Centre over the range, width from 1.5 % to 20 % of it (wider is a spring)."""
+        """Centre over the range, width from 1.5 % to 12.5 % of it: what takes more than half of the range (two widths on
+        either side) is a spring."""
         low, high = position_range(states)
         span, unit = high - low, states[0].position_unit
         return (
@@ -27,7 +28,7 @@ class DetentLoad(Effect):
             Shape(
                 "centre", unit, low + 0.08 * span, high - 0.08 * span, tuple(low + span * np.linspace(0.08, 0.92, 18))
             ),
-            Shape("width", unit, 0.015 * span, 0.2 * span, (0.03 * span, 0.06 * span, 0.12 * span)),
+            Shape("width", unit, 0.015 * span, 0.125 * span, (0.03 * span, 0.06 * span, 0.12 * span)),
         )
 
     def amplitudes(self) -> tuple[Amplitude, ...]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...effects.base import DriveState
 from ...effects.path import dahl, from_rest
 from ...session import Log, Session, Trial
+from .doubt import with_doubt
 from .measurement import coefficients, extremes, is_measured
 from .motion import Motion, estimate_motion, sure_acceleration
 from .simulated import SimulatedDrive, with_simulated
@@ -19,13 +20,11 @@ Array = NDArray[np.float64]
 
 KINDS = ("flexion", "excitation")
 LEAST_ROWS = 50  # of a recording: fewer, and no motion is read from it
-START_DOUBT = 0.1  # of the Coulomb friction: what the give of other bristles than the session's would change
 GIVE_LEAST, GIVE_MOST = 0.02, 1.2  # [%] of the declared Coulomb friction's bristles; beyond, give is presliding
 GIVE_UNSEEN = 0.12  # [%] differences of bristles below this are within what starts tell
 SETTLE_SAMPLES = (14, 13)  # after a start and before a stop: where acceleration is smeared by the kernel
 
 UNFOLLOWED = 0.25  # of the range: commands that end farther than this from where the motion does are not its own
-TOLD_S = 2e-3  # to which the instants of a simulated motion are known
 ROUNDS = 4  # in which the effort required and its square settle
 SETTLE_TRAVEL = 4.0  # [%] some six bristle lengths of a healthy drive
 
@@ -81,7 +80,7 @@ def with_gives(
     have."""
     give, granted = gives({a: states for a, states in drives.items() if a in trusted})
     return {
-        a: with_required(tuple(with_coulomb(s, give.get(a, granted), granted) for s in states))
+        a: with_required(with_doubt(tuple(with_coulomb(s, give.get(a, granted), granted) for s in states)))
         for a, states in drives.items()
     }
 
@@ -213,33 +212,12 @@ def steady(time_s: Array, motion: Motion) -> NDArray[np.bool_]:
 
 
 def with_coulomb(state: DriveState, give: float, granted: float) -> DriveState:
-    """The state with a Dahl column of that bristle length [%] as its Coulomb friction, and with the uncertainty of
-    starts and stops. granted: the longest that is no presliding."""
+    """The state with a Dahl column of that bristle length [%] as its Coulomb friction. granted: the longest that is no
+    presliding."""
     declared = np.array(state.declared)
     declared[:, state.declared_names.index("coulomb")] = dahl(state.position, give)
     extra = {**state.extra, "give": np.full(len(state.time_s), give), "granted": np.full(len(state.time_s), granted)}
-    return with_timing(replace(state, declared=declared, extra=extra))
-
-
-def with_timing(state: DriveState) -> DriveState:
-    """Adds "slides", zero where the drive rests or has not left its place, and "sigma" [effort], zero in steady motion
-    where that is smoothed: what timing means for the declared prediction (half a sample interval around starts and
-    stops; TOLD_S all along a simulated motion), what is not known of friction while it turns over, and all that it may
-    hold where the drive rests or has not left its place."""
-    seen = np.isfinite(state.effort)
-    if seen.sum() < 20:
-        return state
-    beta = coefficients(state.declared[seen], state.effort[seen])
-    step = float(np.median(np.diff(state.time_s)))
-    slope = np.abs(np.gradient(state.declared @ beta, state.time_s))
-    slope = np.maximum.reduce([np.roll(slope, k) for k in (-2, -1, 0, 1, 2)])
-    turning = state.extra["steady"] <= 0
-    timing = 0.5 * step * turning if state.extra["smoothed"][0] else TOLD_S
-    sigma = np.hypot(timing * slope, START_DOUBT * beta[2] * turning)
-    near = np.minimum(from_rest(state.position, seen), from_rest(state.position[::-1], seen[::-1])[::-1])
-    held = near < max(2 * float(state.extra["granted"][0]), 6 * float(state.extra["position_noise"][0]))
-    sigma = np.where(held, np.hypot(sigma, beta[2]), sigma)
-    return replace(state, extra={**state.extra, "sigma": sigma, "slides": 1.0 - held})
+    return replace(state, declared=declared, extra=extra)
 
 
 def with_required(states: tuple[DriveState, ...]) -> tuple[DriveState, ...]:

@@ -54,9 +54,10 @@ def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]
         alike = [_preload_near(s, PRELOAD) for s in drives if s is not station]
         p = kin * preload_by_chance(own, error, alike) + (1 - kin) * max(unlike, default=1.0)
         odds = kin + (1 - kin) * (1.0 if len(others) > 1 else _odds(own, others))
-        if usual > 0 and p < ODD_P and odds > 0.5:
-            shape, scale = spread
-            out.append(_finding(station, own - usual, error, scale / shape * usual, (1 - p) * odds))
+        shape, scale = spread
+        doubt = 2 * float(np.hypot(error, np.sqrt(2) * scale / shape * usual))
+        if usual > 0 and p < ODD_P and odds > 0.5 and abs(own - usual) > doubt:
+            out.append(_finding(station, own - usual, doubt, (1 - p) * odds))
     return out
 
 
@@ -155,10 +156,8 @@ def _standard_error(station: Station) -> float:
     return float(np.sqrt(np.linalg.pinv(matrix.T @ matrix)[at, at] * balance.inflation))
 
 
-def _finding(
-    station: Station, half_difference: float, error: float, spread: float, probability: float
-) -> tuple[float, Finding]:
-    doubt = 2 * float(np.hypot(error, spread * np.sqrt(2)))
+def _finding(station: Station, half_difference: float, doubt: float, probability: float) -> tuple[float, Finding]:
+    """doubt: two standard deviations of the half difference."""
     unit = station.naming.balance.states[0].effort_unit
     parameters = {
         "half_difference": {

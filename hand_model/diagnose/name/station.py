@@ -53,6 +53,9 @@ class Station:
         ]
         self.parameters = {which: parameter_intervals(self.reading, which) for which in stand}
         self.proven = tuple(f for f in naming.found if places[id(f)] in stand)
+        self._plain = tuple(
+            f for f in self.proven if naming.before.p < ALPHA or _stands(naming, f, places[id(f)], least + EVIDENCE_LEAST)
+        )
 
     def names(self, finding: Finding) -> bool:
         """Whether a finding was named here."""
@@ -66,8 +69,8 @@ class Station:
     @property
     def missing(self) -> bool:
         """Whether the lack-of-fit test says that something is missing, or an effect that it overlooked holds out: along
-        the known effects mismatch shows earlier than in any grouping of cells."""
-        return self.naming.before.p < ALPHA or bool(self.proven)
+        the known effects mismatch shows earlier than in any grouping of cells. What no table names must be plain."""
+        return self.naming.before.p < ALPHA or any(f.term.effect.listed or f in self._plain for f in self.proven)
 
     @property
     def wander(self) -> float:
@@ -162,8 +165,9 @@ class Station:
     def kept(self) -> tuple[Named, ...]:
         """The effects that stand beside each other: one of a small share may be no more than the form of the large one
         being another, and is left to the unexplained part; so is what is smaller than something that no table names."""
-        strange = max((f.size for f in self.outsiders), default=0.0)
-        covered = {name for f in self.outsiders for name in f.term.effect.covers}
+        unlisted = [f for f in self._beside if not f.term.effect.listed]
+        strange = max((f.size for f in unlisted), default=0.0)
+        covered = {name for f in unlisted for name in f.term.effect.covers}
         restless = self.wander if self.wander > UNREST else 0.0
         return tuple(
             f
@@ -176,8 +180,9 @@ class Station:
 
     @property
     def outsiders(self) -> tuple[Named, ...]:
-        """What stands beside them and no table of effects names."""
-        return tuple(f for f in self._beside if not f.term.effect.listed)
+        """What stands beside them and no table of effects names, where a test sees it or it is plain: of all that a
+        table could lack some may seem to be there by chance."""
+        return tuple(f for f in self._beside if not f.term.effect.listed and f in self._plain)
 
     @property
     def _beside(self) -> tuple[Named, ...]:
