@@ -74,6 +74,10 @@ def test_motors_of_a_known_hand_are_told_by_their_figures_and_known_by_their_pre
     # another motor of the same hand that is unlike them, too, says that these differ more
     assert preload_by_chance(1.5 * PRELOAD, 0.1) < 0.02 < preload_by_chance(1.5 * PRELOAD, 0.1, [0.6 * PRELOAD])
     assert preload_by_chance(1.5 * PRELOAD, 0.1, [PRELOAD]) < 0.02
+    # so do motors that differ in all else
+    known, unlike = MEDIAN, {name: 1.4 * value for name, value in MEDIAN.items()}
+    assert preload_by_chance(1.5 * PRELOAD, 0.1, [PRELOAD], [known, unlike]) > 0.02
+    assert preload_by_chance(1.5 * PRELOAD, 0.1, [PRELOAD], [known, known]) < 0.02
 
 
 def test_of_two_motors_of_a_known_kind_the_one_unlike_those_is_odd_and_one_alone_can_be() -> None:
@@ -144,11 +148,10 @@ def test_only_a_finger_that_is_plainly_pulled_off_its_drive_keeps_its_drive_from
     term = Term(effect("spring_decoupling"), {"form": 1.0, "below": below})
     naming = SimpleNamespace(balance=SimpleNamespace(states=states), fit=SimpleNamespace(terms=(term,)))
     named = SimpleNamespace(
-        believed=True,
         signal="encoder",
         actuator="motor_0",
         naming=naming,
-        kept=[SimpleNamespace(term=term)],
+        standing={"spring_decoupling": SimpleNamespace(term=term)}.get,
         parameters={0: {"form": {"value": 1.0}, "below": {"value": below}, "lead": {"value": 0.3}}},
     )
     assert [f.where["finger"] for _, f in preload_findings([*hand(-12.0, 0.0), named])] == accused

@@ -76,9 +76,8 @@ def _reading(session: Session, finger: Finger, shape: Any, counts: dict[str, tup
 
 def _leaves(encoder: Station) -> bool:
     """Whether a finger is found to run ahead of its drive for a while."""
-    return encoder.believed and any(
-        f.term.effect.name == "spring_decoupling" and f.term.shape["form"] < 0.5 for f in encoder.kept
-    )
+    named = encoder.standing("spring_decoupling")
+    return named is not None and named.term.shape["form"] < 0.5
 
 
 def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, float]]) -> FingerReading:

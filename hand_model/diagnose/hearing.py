@@ -86,14 +86,13 @@ class Heard:
             a: with_gravity(session, self.fingers, states)
             for a, states in drive_states(session, encoder_corrections(self.stations), self.unread, simulated).items()
         }
-        for station in (s for s in self.stations if s.believed and s.actuator in drives):
-            for term in (f.term for f in station.kept if f.term.effect.name == "spring_decoupling"):
-                states = drives[station.actuator]
-                if term.shape["form"] < 0.5:
-                    states = without_excursions(states, station.naming.balance.states, self.fingers[station.finger])
-                elif pulls(station):  # else the spring stays on the drive, and most of the range is worth more
-                    states = while_driven(states, term.shape["below"])
-                drives[station.actuator] = states
+        for station in (s for s in self.stations if s.actuator in drives):
+            named, states = station.standing("spring_decoupling"), drives[station.actuator]
+            if named is not None and named.term.shape["form"] < 0.5:
+                states = without_excursions(states, station.naming.balance.states, self.fingers[station.finger])
+            elif named is not None and pulls(station):  # else the spring stays on it, and most of the range is worth more
+                states = while_driven(states, named.term.shape["below"])
+            drives[station.actuator] = states
         for actuator in [a for a, states in drives.items() if not is_measured(states)]:
             self.found.append(
                 refused(actuator, _finger_of(session, actuator), tuple(s.trial for s in drives.pop(actuator)))

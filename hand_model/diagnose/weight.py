@@ -20,7 +20,7 @@ from .locate.gravity import in_one_pose
 from .locate.preload import expected, preload_findings
 from .name.balance import Balance, Fit
 from .name.least_squares import from_products
-from .name.naming import CLASS_WIDTH, Named
+from .name.naming import CLASS_WIDTH
 from .name.selection import EVIDENCE_LEAST
 from .name.station import Station, judged
 from .name.term import Term
@@ -45,7 +45,7 @@ def with_weights(
     """
     out, weights, pulled = list(stations), list[tuple[float, Finding]](), set[str]()
     odd = {f.where["actuator"]: (size, f) for size, f in preload_findings(stations)}
-    bent = [s.actuator for s in stations if s.signal == "current" and _kept(s, BENT) is not None]
+    bent = [s.actuator for s in stations if s.signal == "current" and s.standing(BENT) is not None]
     for actuator in dict.fromkeys([*odd, *bent]):
         at = next(i for i, s in enumerate(out) if s.signal == "current" and s.actuator == actuator)
         call = next(c for c in calls if c[2] == actuator)
@@ -59,7 +59,7 @@ def with_weights(
             continue
         pulled.add(actuator)
         if other is None:
-            if any(_kept(out[at], name) is not None for name in BENDING):
+            if any(out[at].standing(name) is not None for name in BENDING):
                 out[at] = judged(*call[:4], tuple(_declaring(s, pull[0]) for s in states), *call[5:])
             size, finding = odd[actuator]
             weights.append((size, _finding(finding, *pull, _sweep(states[0]))))
@@ -71,16 +71,12 @@ def with_weights(
 
 def _named(call: tuple[Any, ...], states: tuple[DriveState, ...], station: Station) -> Station | None:
     """The drive with a weight named in place of its bent spring; None where that does not stand."""
-    bent = _kept(station, BENT)
+    bent = station.standing(BENT)
     if bent is None:
         return None
     other = judged(*call[:4], states, [e for e in call[5] if e.name != BENT], *call[6:])
-    weight = _kept(other, WEIGHT)
+    weight = other.standing(WEIGHT)
     return other if weight is not None and weight.evidence > bent.evidence - EVIDENCE_LEAST else None
-
-
-def _kept(station: Station, name: str) -> Named | None:
-    return next((f for f in station.kept if f.term.effect.name == name), None) if station.believed else None
 
 
 Usual = Mapping[str, tuple[float, float]]  # declared coefficient -> what to expect of it, and how surely

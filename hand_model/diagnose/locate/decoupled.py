@@ -24,9 +24,7 @@ CORNER = 0.2  # of the way on which the finger stays behind, beyond its end
 
 def pulls(station: Station) -> bool:
     """Whether a finger is pulled off its drive by more than a trifle."""
-    named = (
-        next((f for f in station.kept if f.term.effect.name == "spring_decoupling"), None) if station.believed else None
-    )
+    named = station.standing("spring_decoupling")
     if named is None:
         return False
     values = {k: v["value"] for k, v in station.parameters[station.naming.fit.terms.index(named.term)].items()}

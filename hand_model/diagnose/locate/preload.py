@@ -40,7 +40,8 @@ def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]
     """
     drives = _drives(stations)
     spread = _spread([s.naming.fit.declared for s in drives if not _lacks(s)])
-    kin = kinship([s.naming.fit.declared for s in drives])
+    motors = [s.naming.fit.declared for s in drives]
+    kin = kinship(motors)
     out = []
     for station in drives:
         rest = _others(drives, station)
@@ -52,7 +53,7 @@ def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]
         error = _standard_error(station)
         unlike = [_by_chance(own, error, other, spread) for other in others if other > 0]  # every other
         alike = [_preload_near(s, PRELOAD) for s in drives if s is not station]
-        p = kin * preload_by_chance(own, error, alike) + (1 - kin) * max(unlike, default=1.0)
+        p = kin * preload_by_chance(own, error, alike, motors) + (1 - kin) * max(unlike, default=1.0)
         odds = kin + (1 - kin) * (1.0 if len(others) > 1 else _odds(own, others))
         shape, scale = spread
         doubt = 2 * float(np.hypot(error, np.sqrt(2) * scale / shape * usual))

@@ -178,6 +178,10 @@ class Station:
             and (f.size >= restless or not f.term.effect.drifting)
         )
 
+    def standing(self, name: str) -> Named | None:
+        """What stands here by a name; None where nothing does."""
+        return next((f for f in self.kept if f.term.effect.name == name), None) if self.believed else None
+
     @property
     def outsiders(self) -> tuple[Named, ...]:
         """What stands beside them and no table of effects names, where a test sees it or it is plain: of all that a
