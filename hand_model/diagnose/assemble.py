@@ -96,7 +96,9 @@ def assemble(
     ranked = _without_tilts(_without_shadows(_one_clock(_of_hinges(ranked, unexplained)), stations))
     # how far a hinge that is none moves is told only beside what another hinge would explain: that it is none is sure
     # all the same
-    sized = [(_magnitude(f, stations, sure=f.effect not in HINGE), weight * _counted(f), f) for weight, f in ranked]
+    sized = [
+        (_magnitude(f, stations, sure=f.effect not in HINGE), weight * _counted(f, stations), f) for weight, f in ranked
+    ]
     ranked = sorted(((float((m**3 * weight) ** 0.25), f) for m, weight, f in sized), key=lambda item: -item[0])
     ranked = _heaviest(ranked, _same_place)
     trifles = _trifles(ranked, {id(f): m for m, _, f in sized})
@@ -141,9 +143,12 @@ def _beneath(station: Station) -> float:
     return MINUTE if p >= UNSEEN else TINY if p >= ALPHA else 0.0
 
 
-def _counted(finding: Finding) -> float:
-    """Share of a finding's weight that counts."""
-    return COMPARED if finding.fit.get("engine") == COMPARISON else 1.0
+def _counted(finding: Finding, stations: Sequence[Station]) -> float:
+    """Share of a finding's weight that counts: how large it is may be told by comparison alone."""
+    compared = finding.fit.get("engine") == COMPARISON or any(
+        finding.effect in s.compared and s.names(finding) for s in stations
+    )
+    return COMPARED if compared else 1.0
 
 
 def _leave_something(station: Station, stations: Sequence[Station]) -> bool:

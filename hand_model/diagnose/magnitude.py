@@ -161,6 +161,6 @@ PLAIN: Mapping[str, Rule] = {
     "moving_centre": lambda p, _: min(p["travel"] / 0.002, 1.0),
     "marker_slip": lambda p, _: p["distance"] / 0.002,
     "palm_marker_slip": lambda p, _: p["distance"] / 0.0025,
-    "support_slip": lambda p, _: p["turn"] / 0.07,
+    "support_slip": lambda p, _: p["turn"] / 0.05,
     "marker_swap": lambda p, _: p["lasting"] / 4.0,
 }

@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 BENT, WEIGHT = "nonlinear_spring", "gravity_load"
 BENDING = (BENT, "detent_load", "end_stop_contact")  # names that may be a weight's bend
 PULL = "weight"  # declared column of a weight that is known to be there
+LOPSIDED = 0.9  # of friction, at most, is lacking in one direction
 HELD = "the declared preload and spring hold what these recordings show of it: the hand never turned"
 FLAT = 1e3  # standard deviations of the effort: of a coefficient of which nothing is known
 
@@ -123,10 +124,10 @@ def _pulled(
 
 def _impossible(odd: _Model, usual: float, doubt: float) -> bool:
     """Whether no odd preload is as low as the one found, for sure: a spring pulls, and friction that is lopsided takes
-    at most as much off a usual preload as there is of it."""
+    at most as much off a usual preload as there is of it, for it never quite vanishes in one direction."""
     preload, coulomb = (odd.names.index(name) for name in ("preload", "coulomb"))
     surely = odd.mean[preload] + 2 * np.hypot(np.sqrt(odd.covariance[preload, preload]), doubt)
-    return bool(surely < min(0.0, usual - odd.mean[coulomb]))
+    return bool(surely < min(0.0, usual - LOPSIDED * odd.mean[coulomb]))
 
 
 class _Model:
@@ -203,7 +204,7 @@ def _beside_usual(station: Station, usual: Usual) -> Station:
         fit.size,
     )
     out = copy(station)
-    out.beside = partial(_beside_usual, usual=usual)
+    out.beside, out.compared = partial(_beside_usual, usual=usual), (WEIGHT,)
     out.reading = replace(station.reading, fit=read)
     figures = _figures(model.possible[-2:], model.covariance[-2:, -2:], sweep, balance.states[0].effort_unit)
     out.parameters = {**station.parameters, at: figures}

@@ -57,8 +57,8 @@ def name_effects(
     if naming.before.p < ALPHA and not naming.found and any(s.validate for s in states):
         # What happened in a validation recording only cannot be learned from the others.
         naming = _name(Balance(tuple(states), True, typical), tuple(effects), progress)
-    if naming.after.p < ALPHA and not balance.steady.all() and not naming.overwhelmed:
-        # Where starts mislead, steady motion may still be explained.
+    if naming.after.p < ALPHA and not balance.steady.all() and len(naming.fit.terms) < MOST_TERMS:
+        # Where starts mislead, steady motion may still be explained; with as many names as may be, more is missing.
         calm = _name(balance.settled(), tuple(effects), progress)
         return calm if calm.found and calm.after.p >= ALPHA else naming
     return naming

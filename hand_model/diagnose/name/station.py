@@ -35,7 +35,7 @@ EXPLAINED_PARTLY = 0.5
 
 class Station:
     """One balance of one finger and what was named there. beside: reads its sizes again where more is known of the drive
-    than its own balance tells."""
+    than its own balance tells; compared: names of which other drives tell the size."""
 
     def __init__(
         self, signal: str, finger: str | None, actuator: str | None, joint: str | None, naming: Naming
@@ -44,6 +44,7 @@ class Station:
         places = {id(f): naming.fit.terms.index(f.term) for f in naming.found}
         self.reading = undisturbed(naming)
         self.beside: Callable[[Station], Station] | None = None
+        self.compared: tuple[str, ...] = ()
         least = EVIDENCE_LEAST + (np.log(CHANCES) if naming.before.p >= ALPHA else 0.0)
         stand = [
             places[id(f)]
@@ -300,7 +301,7 @@ def judged(
     left = every = tuple(effects)
     station = Station(signal, finger, actuator, joint, name_effects(states, left, typical=typical))
     elsewhere = _elsewhere(station.naming)
-    for _ in range(SECOND_HEARINGS):
+    for _ in range(SECOND_HEARINGS if len(station.naming.found) < MOST_TERMS else 1):
         fallen = {f.term.effect.name for f in station.naming.found} - {f.term.effect.name for f in station.proven}
         lost = sum(
             f.share for f in station.naming.found if f.term.effect.name in fallen and f.evidence >= EVIDENCE_LEAST
