@@ -8,6 +8,8 @@ from types import SimpleNamespace
 import pytest
 
 from hand_model.diagnose.assemble import (
+    COMPARED,
+    _counted,
     _leave_something,
     _of_hinges,
     _shared,
@@ -248,3 +250,12 @@ def test_what_only_other_motors_tell_ranks_behind_what_the_recordings_show(engin
     ]
     found[0] = (1.0, replace(found[0][1], fit={"engine": engine}))
     assert assemble([], found, []).findings[0].effect == first
+
+
+def test_what_only_other_drives_size_hardly_counts_in_the_ranking() -> None:
+    own = Finding("gravity_load", ("gravity_load",), 1.0, (), {"finger": "index"}, "", {}, {"engine": "mujoco"}, None)
+    station = SimpleNamespace(compared=("gravity_load",), names=lambda finding: finding.where["finger"] == "index")
+    assert _counted(own, [station]) == COMPARED
+    assert _counted(replace(own, where={"finger": "ring"}), [station]) == 1.0
+    assert _counted(replace(own, effect="detent_load"), [station]) == 1.0
+    assert _counted(replace(own, fit={"engine": COMPARISON}), []) == COMPARED

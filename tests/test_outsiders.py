@@ -332,3 +332,12 @@ def test_five_effects_that_leave_most_of_a_plain_mismatch_are_enough(
     naming = heard(drive(3, planted(*PLANTED[0]))).naming
     before, after = replace(naming.before, p=1e-30, excess=100.0), replace(naming.after, p=p, excess=100.0 * left)
     assert replace(naming, before=before, after=after, found=naming.found[:1] * count).overwhelmed is overwhelmed
+
+
+def test_an_outsider_that_no_test_sees_must_be_plainer_than_an_effect() -> None:
+    """Faint grease beats the noise as an effect would, and is not said; twice as much is."""
+    faint, plain = (heard(drive(2, lambda s, k=k: k * grease(s))) for k in (0.115, 0.2))
+    assert faint.naming.before.p > 0.05 and plain.naming.before.p > 0.05
+    assert [f.term.effect.name for f in faint.proven] == ["thixotropy"]
+    assert not faint.outsiders and not faint.kept and not faint.missing
+    assert [f.term.effect.name for f in plain.outsiders] == ["thixotropy"] and plain.missing
