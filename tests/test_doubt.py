@@ -67,7 +67,9 @@ def test_stops_are_judged_apart_from_starts() -> None:
     middle = [np.isfinite(s.effort) & (np.abs(s.position - 50) < 20) for s in told]
     assert max(float(np.median(s.extra["sigma"][m])) for s, m in zip(told, middle, strict=True)) < 0.2 * NOISE
     stopping = [
-        np.isfinite(s.effort) & (from_rest(s.position[::-1], np.isfinite(s.effort)[::-1])[::-1] < 2 * GRANTED) & ~starting(s)
+        np.isfinite(s.effort)
+        & (from_rest(s.position[::-1], np.isfinite(s.effort)[::-1])[::-1] < 2 * GRANTED)
+        & ~starting(s)
         for s in told
     ]
     before = np.concatenate([s.extra["sigma"][m] for s, m in zip(told, stopping, strict=True)])

@@ -55,7 +55,9 @@ class Station:
         self.parameters = {which: parameter_intervals(self.reading, which) for which in stand}
         self.proven = tuple(f for f in naming.found if places[id(f)] in stand)
         self._plain = tuple(
-            f for f in self.proven if naming.before.p < ALPHA or _stands(naming, f, places[id(f)], least + EVIDENCE_LEAST)
+            f
+            for f in self.proven
+            if naming.before.p < ALPHA or _stands(naming, f, places[id(f)], least + EVIDENCE_LEAST)
         )
 
     def names(self, finding: Finding) -> bool:
