@@ -132,6 +132,19 @@ def test_give_that_grows_with_load_is_no_lost_motion(station: str, name: str) ->
     assert list(found) == [name]
 
 
+@pytest.mark.parametrize(("friction", "drag", "kept"), [(6.0, 0.25, ["linkage_compliance"]), (0.0, 0.4, [])])
+def test_what_gives_may_carry_more_of_the_drag_than_of_the_friction(
+    friction: float, drag: float, kept: list[str]
+) -> None:
+    """A segment that is only late gives nothing."""
+    states = joint(2, add=lambda t, x, v: -0.08 * (friction * np.tanh(v) + drag * v))
+    states = tuple(replace(s, declared=s.declared[:, :4], declared_names=s.declared_names[:4]) for s in states)
+    effects = [*catalogue("linkage"), *outsiders("linkage")]
+    station = judged("markers", "index", "index", "distal", states, effects)
+    assert station.believed and [f.term.effect.name for f in station.kept] == kept
+    assert [f.term.effect.name for f in station.outsiders] == ([] if kept else ["linkage_lag"])
+
+
 def test_a_play_and_as_much_give_are_both_named_and_little_give_is_the_plays_form() -> None:
     states = joint(
         1,

@@ -17,6 +17,7 @@ from .selection import EVIDENCE_LEAST, SMALL, name_effects
 # times the others are heard again, and the share of what was explained from which a fallen name has displaced others
 SECOND_HEARINGS, DISPLACING = 2, 0.1
 CHANCES = 20 * 25  # channels of a session, times names: what no test of a channel sees must stand against as many
+PART = 0.5  # of the size of a trace that is another effect's
 ALIKE = 1 / 3  # of the size of a larger effect of the same family: below, no finding of its own
 UNREST = 0.3  # of the noise: wander that every machine is granted; more is no explanation
 WORSE = 1.5  # times the mean square of training recordings
@@ -168,7 +169,7 @@ class Station:
     def kept(self) -> tuple[Named, ...]:
         """The effects that stand beside each other: one of a small share may be no more than the form of the large one
         being another, and is left to the unexplained part; so is what is smaller than something that no table names."""
-        unlisted = [f for f in self._beside if not f.term.effect.listed]
+        unlisted = [f for f in self._beside if not (f.term.effect.listed or self._part(f))]
         strange = max((f.size for f in unlisted), default=0.0)
         covered = {name for f in unlisted for name in f.term.effect.covers}
         restless = self.wander if self.wander > UNREST else 0.0
@@ -185,11 +186,16 @@ class Station:
         """What stands here by a name; None where nothing does."""
         return next((f for f in self.kept if f.term.effect.name == name), None) if self.believed else None
 
+    def _part(self, outsider: Named) -> bool:
+        """Whether an outsider is a trace of an effect that stands beside it, no smaller than half of it."""
+        whole = (f for f in self._beside if f.term.effect.name == outsider.term.effect.part_of)
+        return any(f.size >= PART * outsider.size for f in whole)
+
     @property
     def outsiders(self) -> tuple[Named, ...]:
         """What stands beside them and no table of effects names, where a test sees it or it is plain: of all that a
         table could lack some may seem to be there by chance."""
-        return tuple(f for f in self._beside if not f.term.effect.listed and f in self._plain)
+        return tuple(f for f in self._beside if not (f.term.effect.listed or self._part(f)) and f in self._plain)
 
     @property
     def _beside(self) -> tuple[Named, ...]:

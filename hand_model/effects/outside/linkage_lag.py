@@ -16,6 +16,7 @@ class LinkageLag(Outsider):
 
     name = "linkage_lag"
     station = "linkage"
+    part_of = "linkage_compliance"  # what gives carries all that damps the segment, and little of the motor's friction
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """How late, or early where it is negative."""
