@@ -41,6 +41,11 @@ def hung(state: DriveState) -> np.ndarray:
     return 13.0 * (state.time_s - state.time_s[0] > 0.4 * np.ptp(state.time_s))
 
 
+def amplified(state: DriveState) -> np.ndarray:
+    load = state.declared @ np.array([0.012, 0.15, 35.0, 0.22, 9.0])
+    return -0.2 * load * (state.time_s - state.time_s[0] > 0.53 * np.ptp(state.time_s))
+
+
 def tooth(state: DriveState) -> np.ndarray:
     shape = {"form": 1.0, "centre": 45.0, "width": 4.0}
     return BY_NAME["cycle_memory"].columns(state, shape)[:, 0] * 30.0
@@ -56,6 +61,7 @@ def grease(state: DriveState) -> np.ndarray:
         ("gain_change", gain),
         ("friction_jump", jump),
         ("load_jump", hung),
+        ("gain_jump", amplified),
         ("cycle_memory", tooth),
         ("thixotropy", grease),
     ],
