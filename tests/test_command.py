@@ -105,10 +105,14 @@ def test_drives_that_lose_speed_alike_are_of_a_kind_and_one_that_loses_more_sags
     def softer(x: float, full: float) -> float:
         return full * (1 - 0.0012 * load(x))
 
+    def hastier(x: float, full: float) -> float:
+        return full * (1 + 0.003 * load(x))
+
     assert sags(index=sagging, ring=healthy) == {"index"}
     assert sags(index=sagging) == {"index"}
     assert sags(index=sagging, ring=sagging) == set()
     assert sags(index=sagging, ring=softer) == {"index"}
+    assert sags(index=sagging, ring=hastier) == set()  # controllers of this hand err by as much
 
 
 def test_a_stroke_that_ends_slowly_is_at_no_limit() -> None:

@@ -88,8 +88,8 @@ def command_findings(
 
 def _sags(fact: CommandFacts, others: Sequence[CommandFacts]) -> bool:
     """Whether a drive loses speed for sure, more than controllers do, also once it has settled, and plainly more than
-    the session's other drives: one without much feedback loses more under load."""
-    usual = min((f.lost for f in others if np.isfinite(f.lost)), default=0.0)
+    the session's other drives lose, or seem to gain: one without much feedback loses more under load."""
+    usual = min((abs(f.lost) for f in others if np.isfinite(f.lost)), default=0.0)
     settled = fact.settled > SETTLED_T * fact.settled_se and fact.settled > LEAST_LOSS
     sure = fact.sag > SAG_T * fact.sag_se and fact.lost > LEAST_LOSS and settled
     return bool(sure and fact.lost > ALIKE * usual and fact.lost - usual > LEAST_LOSS)
