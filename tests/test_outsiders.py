@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from test_diagnose import PLANTED, drive, planted
+from test_diagnose import PLANTED, TRUTH, drive, planted
 from test_kinematic_stations import MAP, joint
 
 from hand_model.diagnose import Finding
@@ -29,8 +29,7 @@ def heard(states: tuple[DriveState, ...]) -> Station:
 
 
 def gain(state: DriveState) -> np.ndarray:
-    load = state.declared @ np.array([0.012, 0.15, 35.0, 0.22, 9.0])
-    return 0.4 * load * state.elapsed_s / 150.0
+    return 0.4 * (state.declared @ TRUTH) * state.elapsed_s / 150.0
 
 
 def jump(state: DriveState) -> np.ndarray:
@@ -42,8 +41,7 @@ def hung(state: DriveState) -> np.ndarray:
 
 
 def amplified(state: DriveState) -> np.ndarray:
-    load = state.declared @ np.array([0.012, 0.15, 35.0, 0.22, 9.0])
-    return -0.2 * load * (state.time_s - state.time_s[0] > 0.53 * np.ptp(state.time_s))
+    return -0.2 * (state.declared @ TRUTH) * (state.time_s - state.time_s[0] > 0.53 * np.ptp(state.time_s))
 
 
 def tooth(state: DriveState) -> np.ndarray:

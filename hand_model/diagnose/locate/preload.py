@@ -39,7 +39,7 @@ def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]
     without its name.
     """
     drives = _drives(stations)
-    spread = _spread([s.naming.fit.declared for s in drives if not _lacks(s)])
+    spread = shape, scale = _spread([s.naming.fit.declared for s in drives if not _lacks(s)])
     motors = [s.naming.fit.declared for s in drives]
     kin = kinship(motors)
     out = []
@@ -55,7 +55,6 @@ def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]
         alike = [_preload_near(s, PRELOAD) for s in drives if s is not station]
         p = kin * preload_by_chance(own, error, alike, motors) + (1 - kin) * max(unlike, default=1.0)
         odds = kin + (1 - kin) * (1.0 if len(others) > 1 else _odds(own, others))
-        shape, scale = spread
         doubt = 2 * float(np.hypot(error, np.sqrt(2) * scale / shape * usual))
         if usual > 0 and p < ODD_P and odds > 0.5 and abs(own - usual) > doubt:
             out.append(_finding(station, own - usual, doubt, (1 - p) * odds))

@@ -55,11 +55,14 @@ class Station:
         ]
         self.parameters = {which: parameter_intervals(self.reading, which) for which in stand}
         self.proven = tuple(f for f in naming.found if places[id(f)] in stand)
-        self._plain = tuple(
-            f
+        # names that no table holds, where no test sees them, and that bring no more than an effect must
+        self._faint = {
+            f.term.effect.name
             for f in self.proven
-            if naming.before.p < ALPHA or _stands(naming, f, places[id(f)], least + EVIDENCE_LEAST)
-        )
+            if naming.before.p >= ALPHA
+            and not f.term.effect.listed
+            and not _stands(naming, f, places[id(f)], least + EVIDENCE_LEAST)
+        }
 
     def names(self, finding: Finding) -> bool:
         """Whether a finding was named here."""
@@ -74,7 +77,7 @@ class Station:
     def missing(self) -> bool:
         """Whether the lack-of-fit test says that something is missing, or an effect that it overlooked holds out: along
         the known effects mismatch shows earlier than in any grouping of cells. What no table names must be plain."""
-        return self.naming.before.p < ALPHA or any(f.term.effect.listed or f in self._plain for f in self.proven)
+        return self.naming.before.p < ALPHA or any(f.term.effect.name not in self._faint for f in self.proven)
 
     @property
     def wander(self) -> float:
@@ -169,9 +172,8 @@ class Station:
     def kept(self) -> tuple[Named, ...]:
         """The effects that stand beside each other: one of a small share may be no more than the form of the large one
         being another, and is left to the unexplained part; so is what is smaller than something that no table names."""
-        unlisted = [f for f in self._beside if not (f.term.effect.listed or self._part(f))]
-        strange = max((f.size for f in unlisted), default=0.0)
-        covered = {name for f in unlisted for name in f.term.effect.covers}
+        strange = max((f.size for f in self._unlisted), default=0.0)
+        covered = {name for f in self._unlisted for name in f.term.effect.covers}
         restless = self.wander if self.wander > UNREST else 0.0
         return tuple(
             f
@@ -195,7 +197,11 @@ class Station:
     def outsiders(self) -> tuple[Named, ...]:
         """What stands beside them and no table of effects names, where a test sees it or it is plain: of all that a
         table could lack some may seem to be there by chance."""
-        return tuple(f for f in self._beside if not (f.term.effect.listed or self._part(f)) and f in self._plain)
+        return tuple(f for f in self._unlisted if f.term.effect.name not in self._faint)
+
+    @property
+    def _unlisted(self) -> tuple[Named, ...]:
+        return tuple(f for f in self._beside if not (f.term.effect.listed or self._part(f)))
 
     @property
     def _beside(self) -> tuple[Named, ...]:

@@ -17,9 +17,7 @@ class Outsider(Effect):
 
     listed: ClassVar[bool] = False
     covers: ClassVar[tuple[str, ...]] = ()  # effects that are a special case of it: none of them beside it
-    part_of: ClassVar[str | None] = (
-        None  # an effect of the table that leaves this trace, in another channel or beside it
-    )
+    part_of: ClassVar[str | None] = None  # an effect of the table that leaves this trace, elsewhere or beside it
 
     def log_prior(self, parameters: Mapping[str, float]) -> float:
         """What is known comes first."""
