@@ -115,6 +115,16 @@ def test_drives_that_lose_speed_alike_are_of_a_kind_and_one_that_loses_more_sags
     assert sags(index=sagging, ring=hastier) == set()  # controllers of this hand err by as much
 
 
+@pytest.mark.parametrize(("sag_t", "settled_t", "told"), [(8, 16, True), (16, 8, True), (8, 8, False), (3, 30, False)])
+def test_a_sag_is_told_for_sure_by_one_reading_and_likely_by_the_other(
+    sag_t: float, settled_t: float, told: bool
+) -> None:
+    state, current = strokes(sagging, 0, noise=1.0)
+    facts = command_facts((state,), (current,))
+    facts = replace(facts, sag_se=facts.sag / sag_t, settled_se=facts.settled / settled_t)
+    assert bool(command_findings({"index": facts}, {"index": "index"}, {})) == told
+
+
 def test_a_stroke_that_ends_slowly_is_at_no_limit() -> None:
     """A controller that takes half a second to stop: less current is needed there, and speed falls."""
     state, current = strokes(lambda x, full: full * min(1.0, 0.02 + (100 - x) / (0.35 * full)), 1, 8, 1.0)

@@ -9,7 +9,7 @@ import pytest
 from test_diagnose import drive, planted
 
 from hand_model.diagnose.assemble import SIGNALS
-from hand_model.diagnose.magnitude import LEAST, MOST, PLAIN, channel_figures, magnitude, sure_magnitude
+from hand_model.diagnose.magnitude import LEAST, MOST, PLAIN, Channel, channel_figures, magnitude, sure_magnitude
 from hand_model.effects import catalogue
 
 RAW = {
@@ -105,3 +105,10 @@ def test_a_ceiling_counts_by_what_it_would_cut_without_the_other_effects() -> No
     assert magnitude("current_saturation", high, channel) == LEAST
     assert magnitude("current_saturation", low, channel) == pytest.approx(1.0)
     assert magnitude("current_saturation", high, channel_figures(states)) == pytest.approx(1.0)  # nothing known of it
+
+
+def test_a_weight_that_preload_and_spring_take_up_must_be_larger_to_be_plain() -> None:
+    sizes = [
+        magnitude("gravity_load", {"largest": 5.0}, Channel(effort=20.0, turned=turned)) for turned in (True, False)
+    ]
+    assert sizes == pytest.approx([1.0, 1 / 3])

@@ -99,3 +99,18 @@ def test_a_weight_is_read_beside_what_is_usual_though_another_name_is_dropped(mo
     (alone,), _ = reread.reread([finding], [station])
     largest, (low, high) = (alone.parameters["largest"][k] for k in ("value", "ci95"))
     assert low < 9.81 / 9.5 * abs(size) < high and high - low < largest
+
+
+@pytest.mark.parametrize("beside_bend", [True, False])
+def test_a_bend_that_a_weight_explains_is_not_looked_for_beside_it(
+    monkeypatch: pytest.MonkeyPatch, beside_bend: bool
+) -> None:
+    """A weight's two columns and a bent spring's nearly cancel each other: together they may be of any size."""
+    asked = []
+    pull = weight.Pull(np.array([-10.0, 10.0]), np.eye(2), 0.99, beside_bend)
+    monkeypatch.setattr(weight, "_pulled", lambda *_: pull)
+    monkeypatch.setattr(weight, "_named", lambda *_: None)
+    monkeypatch.setattr(weight, "judged", lambda *call: asked.append(call[5]) or judged(*call))
+    heard(monkeypatch, lambda s: 60 * (s.position / 100) ** 2 - 40.0)
+    ((*effects,),) = asked
+    assert ("nonlinear_spring" in {e.name for e in effects}) == beside_bend

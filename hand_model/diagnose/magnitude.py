@@ -24,7 +24,8 @@ LEAST, MOST = 1e-3, 3.0  # beyond, a figure says nothing more about its kind
 class Channel:
     """What magnitudes refer to. effort, load: standard deviations; low, high: range of positions; fastest: speed;
     ahead: farthest that a joint ran ahead of its drive; granted: length of bristles that any drive of the session may
-    have; plain: sizes (n,) of what the drive needs without the named effects, where known."""
+    have; turned: whether the hand was seen to turn; plain: sizes (n,) of what the drive needs without the named
+    effects, where known."""
 
     effort: float = 1.0
     load: float = 0.0
@@ -33,6 +34,7 @@ class Channel:
     fastest: float = 100.0
     ahead: float = 0.0
     granted: float = 0.0
+    turned: bool = True
     plain: NDArray[np.float64] | None = None
 
     @property
@@ -67,6 +69,7 @@ def channel_figures(states: tuple[DriveState, ...], declared: Mapping[str, float
         speed_range(states)[1],
         float(np.nanmax(ahead)),
         float(np.max(granted)),
+        any(np.ptp(s.extra.get("gravity_along", np.zeros(1))) > 0 for s in states),
         needed,
     )
 
@@ -137,7 +140,8 @@ PLAIN: Mapping[str, Rule] = {
     "thermal_friction_drift": lambda p, c: p["cold_excess"] / (0.3 * c.effort),
     "detent_load": lambda p, c: p["load"] / (0.35 * c.effort),
     "nonlinear_spring": lambda p, c: p["bend"] / (0.15 * c.effort),
-    "gravity_load": lambda p, c: p["largest"] / (0.25 * c.effort),
+    # in one pose preload and spring take nearly all of it up
+    "gravity_load": lambda p, c: p["largest"] / ((0.25 if c.turned else 0.75) * c.effort),
     "torque_ripple": lambda p, c: p["amplitude"] / (0.17 * c.effort),
     "elastoplastic_hysteresis": lambda p, c: p["yield_load"] / (0.3 * c.effort),
     "viscoelastic_spring": lambda p, c: p["stiffness"] * c.span / (0.6 * c.effort),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -61,9 +61,12 @@ def with_weights(
         pulled.add(actuator)
         if other is None:
             if any(out[at].standing(name) is not None for name in BENDING):
-                out[at] = judged(*call[:4], tuple(_declaring(s, pull[0]) for s in states), *call[5:])
+                # a bend of the spring that a weight explains is none beside it
+                effects = [e for e in call[5] if e.name != BENT or pull.beside_bend]
+                posed = tuple(_declaring(s, pull.weight) for s in states)
+                out[at] = judged(*call[:4], posed, effects, *call[6:])
             size, finding = odd[actuator]
-            weights.append((size, _finding(finding, *pull, _sweep(states[0]))))
+            weights.append((size, _finding(finding, pull, _sweep(states[0]))))
         else:
             out[at] = _beside_usual(other, usual)
     # what a weight leaves of a drive's preload says nothing of the others'
@@ -80,6 +83,17 @@ def _named(call: tuple[Any, ...], states: tuple[DriveState, ...], station: Stati
     return other if weight is not None and weight.evidence > bent.evidence - EVIDENCE_LEAST else None
 
 
+@dataclass(frozen=True)
+class Pull:
+    """A weight along the finger and across it (2,), its covariance (2, 2) and its probability. beside_bend: whether the
+    spring is bent beside it all the same."""
+
+    weight: Array
+    covariance: Array
+    probability: float
+    beside_bend: bool
+
+
 Usual = Mapping[str, tuple[float, float]]  # declared coefficient -> what to expect of it, and how surely
 
 
@@ -90,12 +104,9 @@ def _usual(stations: Sequence[Station], station: Station) -> Usual | None:
     return usual if len(usual) == len(known) else None
 
 
-def _pulled(
-    usual: Usual, station: Station, states: tuple[DriveState, ...], odd_preload: bool
-) -> tuple[Array, Array, float] | None:
-    """Weight along the finger and across it (2,), its covariance (2, 2) and its probability, where a weight beside a
-    usual preload is likelier than an odd one (and what bends the spring, if that was named), or, where no preload is
-    odd, plainly likelier than what bends the spring; None else.
+def _pulled(usual: Usual, station: Station, states: tuple[DriveState, ...], odd_preload: bool) -> Pull | None:
+    """The weight, where one beside a usual preload is likelier than an odd one (and what bends the spring, if that was
+    named), or, where no preload is odd, plainly likelier than what bends the spring; None else.
 
     Marginal likelihoods of linear models with normal priors, where the preload and the spring of the weighed drive are
     those of the hand's others: an odd preload alone says nothing of the spring's shape, a weight foretells it.
@@ -112,14 +123,17 @@ def _pulled(
     weighed = _Model(balance, plain, inside, usual, effort, weights)
     spared = EVIDENCE_LEAST if len(plain) < len(terms) else 0.0  # one effect for two
     likelier = weighed.log_evidence - odd.log_evidence + (spared if odd_preload else -CLASS_WIDTH)
+    beside_bend = False
     if odd_preload and _impossible(odd, *usual["preload"]):
         both = _Model(balance, terms, inside, usual, effort, weights)
         if both.log_evidence > weighed.log_evidence + spared:
             weighed, likelier = both, both.log_evidence - odd.log_evidence
+            beside_bend = len(plain) < len(terms)
         likelier += CLASS_WIDTH + EVIDENCE_LEAST
     if likelier <= 0:
         return None
-    return weighed.mean[-2:], weighed.covariance[-2:, -2:], float(1 / (1 + np.exp(-likelier)))
+    probability = float(1 / (1 + np.exp(-likelier)))
+    return Pull(weighed.mean[-2:], weighed.covariance[-2:, -2:], probability, beside_bend)
 
 
 def _impossible(odd: _Model, usual: float, doubt: float) -> bool:
@@ -230,17 +244,17 @@ def _declaring(state: DriveState, weight: Array) -> DriveState:
     )
 
 
-def _finding(odd: Finding, weight: Array, covariance: Array, probability: float, sweep: float) -> Finding:
+def _finding(odd: Finding, pull: Pull, sweep: float) -> Finding:
     """The finding of an odd preload, as a weight's."""
-    parameters = _figures(weight, covariance, sweep, odd.parameters["half_difference"]["unit"])
+    parameters = _figures(pull.weight, pull.covariance, sweep, odd.parameters["half_difference"]["unit"])
     text = effect(WEIGHT).statement(odd.where, {name: entry["value"] for name, entry in parameters.items()})
-    members = (WEIGHT, *odd.members) if probability < 0.95 else (WEIGHT,)
+    members = (WEIGHT, *odd.members) if pull.probability < 0.95 else (WEIGHT,)
     return replace(
         odd,
         effect=WEIGHT,
         model={**UNWRITTEN, "note": HELD},
         members=members,
-        probability=probability * odd.probability,
+        probability=pull.probability * odd.probability,
         parameters=parameters,
         statement=text,
     )

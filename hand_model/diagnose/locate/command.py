@@ -18,7 +18,7 @@ from .strokes import LEAST_LOSS, ceiling, sag, settled_sag, strokes_of
 
 Array = NDArray[np.float64]
 
-SAG_T, SETTLED_T = 10.0, 4.0
+SURE_T, LIKELY_T = 10.0, 4.0  # standard errors of a loss by one of two readings, and by the other one
 ALIKE = 2.0  # times the loss of speed of the session's least sagging drive: drives of one kind may differ by as much
 # log likelihood that a limit must bring: for an effect, for the limits that are tried, and for as many names of as many
 # channels
@@ -90,8 +90,8 @@ def _sags(fact: CommandFacts, others: Sequence[CommandFacts]) -> bool:
     """Whether a drive loses speed for sure, more than controllers do, also once it has settled, and plainly more than
     the session's other drives lose, or seem to gain: one without much feedback loses more under load."""
     usual = min((abs(f.lost) for f in others if np.isfinite(f.lost)), default=0.0)
-    settled = fact.settled > SETTLED_T * fact.settled_se and fact.settled > LEAST_LOSS
-    sure = fact.sag > SAG_T * fact.sag_se and fact.lost > LEAST_LOSS and settled
+    told = sorted((fact.sag / fact.sag_se, fact.settled / fact.settled_se))
+    sure = told[0] > LIKELY_T and told[1] > SURE_T and min(fact.lost, fact.settled) > LEAST_LOSS
     return bool(sure and fact.lost > ALIKE * usual and fact.lost - usual > LEAST_LOSS)
 
 

@@ -16,6 +16,8 @@ from .simulated import SimulatedDrive
 EARLY = 3.0  # standard deviations by which answers that come before the command say so for sure
 # log likelihood that a shift of a drive's current must bring: less, and its drive tells none (two standard deviations)
 DELAY_TOLD = 2.0
+ALIKE = 2.0  # standard deviations of answers within which they and the balance say the same
+PLAINLY = 12.0  # log likelihood by which the balance says so by itself, for as many names of as many channels
 
 
 def timed_drives(
@@ -34,13 +36,14 @@ def _late(drives: dict[str, tuple[DriveState, ...]], timed: dict[str, tuple[Driv
     """Whether each drive's current may be delayed: a delay that all drives of a session share is how the log is read.
     Answers to commands tell a late or an early current better than the balance does, and must bear it out. timed: the
     drives with what these answers tell, which says nothing yet to the balance."""
-    best: dict[str, float] = {}
+    best, brought = dict[str, float](), dict[str, float]()
     for actuator, states in drives.items():
         balance = Balance(states)
         delay = next(e for e in catalogue("drive") if e.warps)
         fit = scan(balance, delay, ())
         polished = None if fit is None else polish(balance, fit, 0)
-        told = polished is not None and gain(balance, polished, balance.fit()) > DELAY_TOLD
+        brought[actuator] = 0.0 if polished is None else gain(balance, polished, balance.fit())
+        told = polished is not None and brought[actuator] > DELAY_TOLD
         best[actuator] = polished.terms[0].shape["delay"] if told else 0.0
     step = {a: float(np.median(np.diff(s[0].time_s))) for a, s in drives.items()}
     # a lone drive cannot tell how the log is read from what its own channel does: twice as much is asked of it
@@ -52,8 +55,9 @@ def _late(drives: dict[str, tuple[DriveState, ...]], timed: dict[str, tuple[Driv
         if actuator not in late:
             return abs(x) > bound
         if (told_to := least_delay(timed[actuator])) < bound:
-            told = float(late[actuator][0])  # and to the side to which the balance would shift it
-            return abs(told) > told_to and told * best[actuator] >= 0
+            told, doubt = late[actuator].tolist()  # and to the side to which the balance would shift it
+            plain = brought[actuator] > PLAINLY and abs(told - best[actuator]) < ALIKE * doubt
+            return max(abs(told), abs(best[actuator]) if plain else 0.0) > told_to and told * best[actuator] >= 0
         if late[actuator][0] < -max(bound, EARLY * late[actuator][1]):
             return True
         if x >= -bound:

@@ -239,13 +239,21 @@ class Balance:
         """The columns (n, j) of each shape that are not zero, weighted and whitened; what shifts them shifts all of
         them at once. Not remembered, for whole grids would push out what is asked for again."""
         plain = {
-            id(state): np.concatenate([effect.columns(self._rubbed(state, bends), shape) for shape in shapes], axis=1)
+            id(state): [effect.columns(self._rubbed(state, bends), shape) for shape in shapes]
             for state, rows in zip(self.states, self._rows, strict=True)
             if len(rows)
         }
-        acting = np.any([columns.any(0) for columns in plain.values()], axis=0)
-        together = self.gather(lambda state: warped(state, plain[id(state)][:, acting], bends)) * weight[:, None]
-        return np.split(self.whiten(together, weight), np.cumsum(acting.reshape(len(shapes), -1).sum(1))[:-1], axis=1)
+        acting = [np.any([part.any(0) for part in parts], axis=0) for parts in zip(*plain.values(), strict=True)]
+        some = [i for i, which in enumerate(acting) if which.any()]
+
+        def bent(state: DriveState) -> Array:
+            parts = [plain[id(state)][i][:, acting[i]] for i in some]
+            columns = np.concatenate(parts, axis=1) if parts else np.zeros((len(state.time_s), 0))
+            return warped(state, columns, bends)
+
+        together = self.gather(bent) * weight[:, None]
+        edges = np.cumsum([np.count_nonzero(which) for which in acting])[:-1]
+        return np.split(self.whiten(together, weight), edges, axis=1)
 
     def design(self, terms: tuple[Term, ...]) -> tuple[Array, Array, Array]:
         """Matrix (n, k + j) of declared and effect columns, lower and upper bounds (k + j,) of their coefficients."""

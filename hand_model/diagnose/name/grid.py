@@ -25,12 +25,17 @@ class Grid:
 @dataclass(frozen=True)
 class GridColumns:
     """matrix: (n, c), dense or sparse, of the columns that act at all. shape: (c,) to which shape of the grid each
-    belongs.
-    length: (c,) Euclidean norms."""
+    belongs. length: (c,) Euclidean norms. inside: (n,) rows that take part, None for all."""
 
     matrix: Any
     shape: NDArray[np.int64]
     length: Array
+    inside: NDArray[np.bool_] | None = None
+
+    @classmethod
+    def of(cls, matrix: Any, shape: NDArray[np.int64], inside: NDArray[np.bool_] | None = None) -> GridColumns:
+        """The columns of a matrix with their norms over the rows `inside`."""
+        return cls(matrix, shape, _lengths(matrix, inside), inside)
 
     @property
     def bytes(self) -> int:
@@ -39,37 +44,36 @@ class GridColumns:
 
     def products(self, other: Array) -> Array:
         """matrix^T other, (c,) or (c, k)."""
-        return np.asarray(self.matrix.T @ other)
+        return np.asarray(self.matrix.T @ (other if self.inside is None else (other.T * self.inside).T))
 
     def within(self, inside: NDArray[np.bool_]) -> GridColumns:
-        """The same columns, zero where `inside` (n,) is false."""
-        from scipy.sparse import csc_matrix
-        from scipy.sparse.linalg import norm
-
-        if isinstance(self.matrix, np.ndarray):
-            matrix = self.matrix * inside[:, None]
-            return GridColumns(matrix, self.shape, np.linalg.norm(matrix, axis=0))
-        matrix = csc_matrix(
-            (self.matrix.data * inside[self.matrix.indices], self.matrix.indices, self.matrix.indptr), self.matrix.shape
-        )
-        return GridColumns(matrix, self.shape, norm(matrix, axis=0))
+        """The same columns, of which only the rows `inside` (n,) take part."""
+        return GridColumns.of(self.matrix, self.shape, inside)
 
     def gram(self, which: NDArray[np.int64]) -> Array:
         """Products (k, k) of some columns with each other."""
         part = self.matrix[:, which]
         part = part if isinstance(part, np.ndarray) else part.toarray()
+        part = part if self.inside is None else part[self.inside]
         return part.T @ part
+
+
+def _lengths(matrix: Any, inside: NDArray[np.bool_] | None) -> Array:
+    """Norms (c,) of columns over some rows, in one pass without a copy."""
+    if not isinstance(matrix, np.ndarray):
+        rows = np.ones(matrix.shape[0]) if inside is None else inside.astype(float)
+        return np.sqrt(np.asarray(matrix.multiply(matrix).T @ rows))
+    if inside is None:
+        return np.sqrt(np.einsum("ij,ij->j", matrix, matrix))
+    return np.sqrt(np.einsum("ij,ij,i->j", matrix, matrix, inside.astype(float)))
 
 
 def stacked(columns: Iterable[Array]) -> GridColumns:
     """One matrix from the columns (n, j) of every shape that act at all (of one shape at least)."""
     from scipy.sparse import csc_matrix, hstack
-    from scipy.sparse.linalg import norm
 
     parts = [part[:, part.any(0)] for part in columns]
     owner = np.repeat(np.arange(len(parts)), [p.shape[1] for p in parts])
     if not len(owner) or sum(np.count_nonzero(p) for p in parts) > SPARSE * len(parts[0]) * len(owner):
-        dense = np.concatenate(parts, axis=1)
-        return GridColumns(dense, owner, np.linalg.norm(dense, axis=0))
-    matrix = hstack([csc_matrix(p) for p in parts if p.size], format="csc")
-    return GridColumns(matrix, owner, norm(matrix, axis=0))
+        return GridColumns.of(np.concatenate(parts, axis=1), owner)
+    return GridColumns.of(hstack([csc_matrix(p) for p in parts if p.size], format="csc"), owner)

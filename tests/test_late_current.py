@@ -1,0 +1,42 @@
+"""Which drives' currents may be late: what answers to commands and the balance say together."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_diagnose import drive
+
+from hand_model.diagnose.locate.late_current import _late
+from hand_model.effects.base import DriveState
+
+SHIFT_S = -0.02
+
+
+def shifted(states: tuple[DriveState, ...], delay_s: float) -> tuple[DriveState, ...]:
+    """The states with the current as it is `delay_s` earlier."""
+
+    def one(state: DriveState) -> DriveState:
+        seen = np.isfinite(state.effort)
+        late = np.interp(state.time_s - delay_s, state.time_s[seen], state.effort[seen])
+        return replace(state, effort=np.where(seen, late, np.nan))
+
+    return tuple(one(s) for s in states)
+
+
+@pytest.mark.parametrize(
+    ("told_s", "doubt_s", "may_be"),
+    [(-0.011, 0.0065, True), (-0.02, 0.0065, True), (-0.004, 0.0065, False), (0.011, 0.0065, False)],
+)
+def test_a_balance_that_plainly_shows_a_shift_is_believed_where_answers_agree(
+    told_s: float, doubt_s: float, may_be: bool
+) -> None:
+    """Answers that are wrong by a sample or two tell less than the balance does; those that speak against it do not."""
+    drives = {"index": shifted(drive(3), SHIFT_S), "ring": drive(4)}
+    told = {"index": (told_s, doubt_s), "ring": (0.0, doubt_s)}
+    timed = {
+        a: tuple(replace(s, extra={**s.extra, "late": np.array(told[a])}) for s in states)
+        for a, states in drives.items()
+    }
+    assert _late(drives, timed) == {"index": may_be, "ring": False}
