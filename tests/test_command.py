@@ -85,6 +85,14 @@ def test_a_drive_at_its_limit_in_part_of_its_strokes_is_seen(seed: int) -> None:
     assert finding.parameters["share_cut"]["value"] == facts.share_cut and 0 < facts.share_cut < 0.5
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_limit_that_slower_strokes_meet_too_is_read_as_it_is(seed: int) -> None:
+    """What each place needs is told by those that have not met it yet."""
+    held = 58.0  # at the end full speed needs 77 raw and the slowest strokes 66
+    state, current = strokes(lambda x, full: max(min(full, (held - load(x)) / VISCOUS), 3.0), seed)
+    assert command_facts((state,), (current,)).ceiling == pytest.approx(held, rel=0.03)
+
+
 @pytest.mark.parametrize("profile", [healthy, sagging, braking])
 def test_what_is_no_limit_has_none(profile) -> None:
     for seed in range(3):

@@ -18,10 +18,14 @@ PIECE_S = 0.15  # of strokes, that are compared
 RUNNING = 0.7  # of its median speed: slower at either end, a stroke still starts or stops
 # of the speed, over the recorded loads: less is within what controllers do (the most of 560 healthy drives 0.029)
 LEAST_LOSS = 0.035
-FULL_SPEED = 0.9  # quantile of the velocity in the fastest strokes
+FULL_SPEED = 0.9  # of the way, in which strokes of one commanded speed are no faster than at full speed
+AT_SPEED = 0.9  # of that, from which a drive does what it is told
 # of the current beyond its limit that a drive takes from its speed: one, but for noise in the limit
 CEILING_SHARE = 0.6
 CEILING_LEFT, CEILING_T = 0.1, 6.0
+# of the current beyond a limit over what is needed, from which it is none: a drive that slows down needs less
+FLAT, SLOPES_T = 0.3, 3.0
+ROUNDS = 3  # of telling where a limit is and what is beyond
 
 
 @dataclass(frozen=True)
@@ -144,16 +148,22 @@ def ceiling(strokes: list[Stroke]) -> tuple[float, float, float]:
     slower = [s for s in strokes if s.way > 0 and s.commanded < fast]
     if len(mine) < 3 or not slower:
         return none
-    beta = np.linalg.lstsq(_load_design(slower), np.concatenate([s.current for s in slower]), rcond=None)[0]
+    design, drawn, at_speed = _load_design(slower), np.concatenate([s.current for s in slower]), _at_speed(slower)
+    beta = np.linalg.lstsq(design[at_speed], drawn[at_speed], rcond=None)[0]
     viscous = float(beta[-1])
     if viscous <= 0:
         return none
-    velocity, current = (np.concatenate([getattr(s, name) for s in mine]) for name in ("velocity", "current"))
-    full = float(np.quantile(velocity, FULL_SPEED))
+    position, velocity, current = (
+        np.concatenate([getattr(s, k) for s in mine]) for k in ("position", "velocity", "current")
+    )
+    full = _full_speed(velocity)
     lost = np.minimum(full, _unloaded(strokes, mine)) - velocity
     needed = _load_design(mine) @ beta + viscous * lost
-    limit = float(np.median(current[needed > np.quantile(needed, 0.75)]))
-    over = needed > limit
+    seen = position <= np.max(np.concatenate([s.position for s in slower])[at_speed])
+    over = needed > np.quantile(needed, 0.75)
+    for _ in range(ROUNDS):  # the current stays at the limit wherever more is needed
+        limit = float(np.mean(current[over])) if over.any() else np.inf
+        over = (needed > limit) & seen
     if over.sum() < 10:
         return none
     x, y = (needed - limit)[over], viscous * lost[over]
@@ -161,13 +171,41 @@ def ceiling(strokes: list[Stroke]) -> tuple[float, float, float]:
     rest = y - share * x
     told = share > CEILING_T * float(np.std(rest)) / np.sqrt(max(float(x @ x), 1e-12))
     alone = float(rest @ rest) < CEILING_LEFT * float(y @ y)  # speed changes for no other reason
+    bends = _slope(needed[over], current[over])
+    slopes = abs(bends[0]) > max(FLAT, SLOPES_T * bends[1])
     slight = float(np.quantile(lost[over], FULL_SPEED)) < LEAST_LOSS * full  # a healthy controller loses as much
-    if slight or not (told and alone and CEILING_SHARE < share < 1 / CEILING_SHARE):
+    if slight or slopes or not (told and alone and CEILING_SHARE < share < 1 / CEILING_SHARE):
         return none
-    noise = max(float(np.std(np.concatenate([s.current for s in slower]) - _load_design(slower) @ beta)), 1e-9)
+    noise = max(float(np.std((drawn - design @ beta)[at_speed])), 1e-9)
     every = np.concatenate([s.current for s in strokes])
     weight = weighed(float(np.sqrt(y @ y / len(every))) / noise, float(np.std(every)) / noise)
-    return limit, weight, np.count_nonzero(over) / len(every)
+    return limit, weight, float(np.mean(over)) * len(current) / len(every)
+
+
+def _full_speed(speed: Array) -> float:
+    """The speed that strokes (n,) reach where nothing holds them up: in a tenth of their way they are as fast, however
+    long they take elsewhere."""
+    order = np.sort(np.maximum(speed, 0.0))
+    way = np.cumsum(order)
+    return float(np.interp(FULL_SPEED * way[-1], way, order))
+
+
+def _slope(x: Array, y: Array) -> tuple[float, float]:
+    """Slope of y over x, (n,) both, and its standard error."""
+    apart = x - x.mean()
+    size = max(float(apart @ apart), 1e-12)
+    slope = float(apart @ y) / size
+    return slope, float(np.std(y - y.mean() - slope * apart)) / float(np.sqrt(size))
+
+
+def _at_speed(strokes: list[Stroke]) -> NDArray[np.bool_]:
+    """Samples (n,) in which the drive has not fallen behind the speed that it reaches when told as much: in the others it
+    may be at its limit, too."""
+    reached = {}
+    for commanded in {s.commanded for s in strokes}:
+        mine = [s.way * s.velocity for s in strokes if s.commanded == commanded]
+        reached[commanded] = _full_speed(np.concatenate(mine))
+    return np.concatenate([s.way * s.velocity > AT_SPEED * reached[s.commanded] for s in strokes])
 
 
 def _unloaded(strokes: list[Stroke], mine: list[Stroke]) -> Array:

@@ -328,9 +328,10 @@ def judged(
             break  # else what fell had held the better part: what it left over stands on nothing
         station = other
     hopeless = station.naming.overwhelmed and not elsewhere  # in the training recordings already
-    if station.missing and not station.believed and not hopeless and _eventful(station.naming):
+    many = len(station.naming.found) >= MOST_TERMS  # more is missing than is looked for, whatever is learned from
+    if station.missing and not (station.believed or hopeless or many) and _eventful(station.naming):
         station = _foretold(station, states, every, typical) or station
-    untold = not station.believed or elsewhere and station.naming.after.p < ALPHA
+    untold = not (station.believed or many) or elsewhere and station.naming.after.p < ALPHA
     if (station.missing and untold and not hopeless or not station.proven and _altered(station.naming)) and any(
         s.validate for s in states
     ):
