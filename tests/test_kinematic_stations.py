@@ -15,6 +15,8 @@ from hand_model.diagnose.name.station import Station, judged
 from hand_model.effects import catalogue, effect, outsiders
 from hand_model.effects.base import DriveState
 from hand_model.effects.driven import driven, play, soft_play
+from hand_model.effects.law import Moment
+from hand_model.effects.path import lowpass
 from hand_model.identify.chain import ChainData
 from hand_model.identify.repair import Swap, repair_labels
 
@@ -52,6 +54,7 @@ def joint(seed: int, move=None, add=None, noise: float = 0.6, drift: float = 0.0
             "scale": np.full(len(x), 100.0),
             "slope": slope,
             "load": load,
+            "drag": 0.15 * v,
         }
         out.append(
             DriveState(
@@ -132,8 +135,38 @@ def test_give_that_grows_with_load_is_no_lost_motion(station: str, name: str) ->
     assert list(found) == [name]
 
 
-@pytest.mark.parametrize(("friction", "drag", "kept"), [(6.0, 0.25, ["linkage_compliance"]), (0.0, 0.4, [])])
-def test_what_gives_may_carry_more_of_the_drag_than_of_the_friction(
+@pytest.mark.parametrize("lag_s", [0.1, 0.3])
+def test_a_give_that_follows_its_load_late_is_no_play(lag_s: float) -> None:
+    """A damper beside the spring (Kelvin-Voigt) rounds a reversal in time, not in travel."""
+
+    def given(t, x, v):
+        return lowpass(t, -0.03 * (15.0 + 0.2 * x + 35.0 * np.tanh(v) + 0.15 * v), lag_s)
+
+    effects = [*catalogue("linkage"), *outsiders("linkage")]
+    station = judged("markers", "index", "index", "distal", joint(2, add=given), effects)
+    assert station.believed and [f.term.effect.name for f in station.kept] == ["linkage_compliance"]
+    (figures,) = (station.parameters[station.naming.fit.terms.index(f.term)] for f in station.kept)
+    assert figures["lag"]["value"] == pytest.approx(lag_s, rel=0.2)
+    assert figures["compliance"]["value"] == pytest.approx(0.03, rel=0.2) or figures["form"]["value"] == 2.0
+
+
+def test_the_law_of_a_late_give_is_its_column() -> None:
+    (state, *_) = joint(2)
+    shape, give = {"form": 3.0, "lag": 0.2}, effect("linkage_compliance")
+    law = give.law({**shape, "compliance": 0.05})
+    steps = np.r_[0.0, np.diff(state.time_s)]
+    moments = zip(state.time_s, steps, state.extra["load"], strict=True)
+    moved = [np.rad2deg(law(Moment(t, step, 0.0, 0.0, 0.0, 0.0, load, 0.0, 0.0))) for t, step, load in moments]
+    assert moved == pytest.approx(
+        0.05 * give.columns(state, shape)[:, 0], abs=0.02 * 0.05 * np.ptp(state.extra["load"])
+    )
+
+
+@pytest.mark.parametrize(
+    ("friction", "drag", "kept"),
+    [(6.0, 0.25, ["linkage_compliance"]), (17.5, 0.0, ["linkage_compliance"]), (0.0, 0.4, [])],
+)
+def test_what_gives_may_carry_another_share_of_the_drag_than_of_the_friction(
     friction: float, drag: float, kept: list[str]
 ) -> None:
     """A segment that is only late gives nothing."""
@@ -215,7 +248,7 @@ def test_a_driver_is_as_quiet_as_its_encoder_where_nothing_is_expected_yet(cover
     x, v = strokes((45.0, 27.0), rest_s=2.0)
     t = np.arange(len(x)) / 100.0
     truth = np.polynomial.Polynomial(MAP)(x / 100) + 0.8 * np.sin(x / 20)  # no cubic
-    log = _Log(x, v, 0 * v, None, np.ones(len(x), bool))
+    log = _Log(x, v, 0 * v, None, None, np.ones(len(x), bool))
     told = (t >= covered) & (x > 0.05 * np.ptp(x) * (covered > 0))
     driver, *_ = _smoothed(t, truth + np.random.default_rng(4).normal(0, 1.0, len(x)), log, (t[told], truth[told]))
     assert np.std((driver - truth)[t > 2.5]) < 0.1  # of 1 deg a frame

@@ -18,7 +18,9 @@ def test_load_is_the_current_without_what_accelerates_the_motor_and_without_most
     load += 6.0 * np.sin(2 * np.pi * s.time_s / 15.0)  # no function of the motion
     rng = np.random.default_rng(3)
     current = load + 0.013 * s.acceleration + rng.normal(0, NOISE, len(load))
-    found = transmitted_load(s.time_s, current, estimate_motion(s.time_s, s.position + rng.normal(0, 0.02, len(load))))
+    found, _ = transmitted_load(
+        s.time_s, current, estimate_motion(s.time_s, s.position + rng.normal(0, 0.02, len(load)))
+    )
     # a reversal within one sample interval is known no better than that
     steady = np.abs(s.velocity) > 5.0
     assert np.sqrt(np.mean((found - load)[steady] ** 2)) < 0.3 * NOISE
@@ -34,7 +36,7 @@ def test_what_a_controller_does_at_rest_says_nothing_of_the_load() -> None:
     noise = np.random.default_rng(4).normal(0, NOISE, len(t))
     inside = moving & np.roll(moving, 3) & np.roll(moving, -3)
     for at_rest in (1.0, 0.0):
-        found = transmitted_load(t, np.where(moving, load, at_rest * load) + noise, motion)
+        found, _ = transmitted_load(t, np.where(moving, load, at_rest * load) + noise, motion)
         assert np.sqrt(np.mean((found - load)[inside] ** 2)) < 0.5 * NOISE
 
 
@@ -47,5 +49,5 @@ def test_rows_that_are_stamped_in_packets_are_smoothed_all_the_same() -> None:
 def test_a_motor_that_never_moved_passes_its_current_on() -> None:
     t = np.arange(400) * 0.02
     current = 7.0 + np.random.default_rng(1).normal(0, NOISE, len(t))
-    found = transmitted_load(t, current, estimate_motion(t, np.full(len(t), 30.0)))
+    found, _ = transmitted_load(t, current, estimate_motion(t, np.full(len(t), 30.0)))
     assert np.abs(found - 7.0).max() < 0.6 * NOISE

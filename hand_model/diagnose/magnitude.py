@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..effects.base import DriveState, position_range, speed_range
+from ..effects.compliance import at_driver
 
 SLIGHT = 0.25  # of the size at which an effect is plain
 LEAST, MOST = 1e-3, 3.0  # beyond, a figure says nothing more about its kind
@@ -124,7 +125,7 @@ def _apart(p: Mapping[str, float], c: Channel) -> float:
 
 
 def _give(p: Mapping[str, float], c: Channel) -> float:
-    return p["compliance"] * c.load / (0.017 * (c.span if p.get("form") == 0.0 else 3.5 * c.effort))
+    return p["compliance"] * c.load / (0.017 * (c.span if at_driver({"form": 1.0, **p}) else 3.5 * c.effort))
 
 
 PLAIN: Mapping[str, Rule] = {

@@ -4,16 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape
-from .law import Law
+from .law import Law, Moment
+from .path import lowpass
+
+DRIVER, FOLLOWER, LATE_DRIVER, LATE_FOLLOWER, DRAGGED_DRIVER, DRAGGED_FOLLOWER = range(6)
+# [s]: a damper that lets a give follow faster is none that a hand's motion shows, and one slower holds it still
+LAG_S = 0.03, 0.6
+MOST_DRAG = 12.0  # times as much as to other load, at most, a give yields to drag: else a segment is only late
 
 
 class Compliance(Effect):
     """The part behind stays back by compliance * load, at the driver's end (follower = map(driver - give)) or at its
-    own.
+    own. At once, or as a damper beside the spring lets it (Kelvin-Voigt: lag give' + give = compliance load), or with a
+    compliance of its own for the load that grows with speed: how much of the drive's friction and of its drag passes
+    through what gives depends on where they act.
 
     The load is what the motor's current passes on. What of it depends on position alone is in the map already: the
     compliance is known from what friction and speed add.
@@ -22,23 +31,94 @@ class Compliance(Effect):
     family = "lost motion"
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """form 0: give at the driver's end, in its unit; form 1: at the end of what follows, in its unit."""
-        loaded = all("load" in s.extra for s in states)
-        return (Shape("form", "1", 0.0, 1.0, (0.0, 1.0) if loaded else ()),)
+        """form 0: give at the driver's end, in its unit; form 1: at the end of what follows, in its unit; forms 2 and 3:
+        the same, damped, with a time constant; forms 4 and 5: the same as the first, drag apart."""
+        forms = tuple(float(form) for form in range(6)) if all("drag" in s.extra for s in states) else ()
+        return Shape("form", "1", DRIVER, DRAGGED_FOLLOWER, forms), Shape("lag", "s", *LAG_S, (0.06, 0.15, 0.35))
+
+    def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
+        """Every time constant of what is damped."""
+        points = super().grid(states)
+        return [p for p in points if damped(p) or p["lag"] == points[0]["lag"]]
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
-        """Compliance, always yielding to the load."""
-        return (("compliance", "position/raw", 0.0, np.inf),)
+        """Compliance, and what it is for drag where that is another, always yielding."""
+        return ("compliance", "position/raw", 0.0, np.inf), ("drag_compliance", "position/raw", 0.0, np.inf)
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """Minus the load, (n, 1), times the map's slope where the give is at the driver's end."""
-        return -(state.extra["load"] * (state.slope if shape["form"] == 0.0 else 1.0))[:, None]
+        """Minus the load, or what of it the give has followed, and nothing; or minus the load without drag, and minus
+        drag, (n, 2); times the map's slope where the give is at the driver's end."""
+        load, apart = state.extra["load"], np.zeros(len(state.time_s))
+        if damped(shape):
+            load = lowpass(state.time_s, load, shape["lag"])
+        elif dragged(shape):
+            load, apart = load - state.extra["drag"], state.extra["drag"]
+        return -np.stack([load, apart], axis=-1) * (state.slope if at_driver(shape) else np.ones(len(load)))[:, None]
+
+    def parameters(
+        self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]
+    ) -> dict[str, float]:
+        """The compliance and where it is, the time constant of what is damped, the compliance for drag where it is
+        another."""
+        known = {"form": shape["form"], "compliance": amplitude["compliance"]}
+        if dragged(shape):
+            known["drag_compliance"] = amplitude["drag_compliance"]
+        return {**known, "lag": shape["lag"]} if damped(shape) else known
+
+    def possible(self, states: tuple[DriveState, ...], parameters: Mapping[str, float]) -> bool:
+        """What yields to drag alone gives nothing: it is late."""
+        return parameters.get("drag_compliance", 0.0) <= MOST_DRAG * parameters["compliance"]
 
     def units(self, shape: Mapping[str, float]) -> Mapping[str, str]:
         """Of what yields: the driver's or the follower's position."""
-        return {"compliance": "position/raw" if shape["form"] == 0.0 else "effort/raw"}
+        return dict.fromkeys(("compliance", "drag_compliance"), "position/raw" if at_driver(shape) else "effort/raw")
+
+    def further(
+        self, states: tuple[DriveState, ...], parameters: Mapping[str, Mapping[str, Any]]
+    ) -> dict[str, dict[str, Any]]:
+        """What drag is, over the driver's speed, where it has a compliance of its own."""
+        if "drag_compliance" not in parameters:
+            return {}
+        speed, drag = (np.concatenate(v) for v in ([s.velocity for s in states], [s.extra["drag"] for s in states]))
+        unit = f"raw s/{states[0].position_unit}"
+        return {"drag": {"value": float(speed @ drag / max(speed @ speed, 1e-12)), "unit": unit, "ci95": None}}
 
     def law(self, parameters: Mapping[str, float]) -> Law:
         """Minus compliance times load, through the map's slope where the give is at the driver's end."""
-        compliance, at_driver = parameters["compliance"], parameters.get("form", 1.0) == 0.0
-        return lambda now: -compliance * now.load * (now.slope if at_driver else math.radians(1.0))
+        compliance, there = parameters["compliance"], at_driver({"form": FOLLOWER, **parameters})
+        followed = _Followed(parameters["lag"]) if damped(parameters) else None
+        other = (parameters["drag_compliance"] - compliance) * parameters["drag"] if dragged(parameters) else 0.0
+
+        def departure(now: Moment) -> float:
+            load = now.load if followed is None else followed(now)
+            give = compliance * load + other * now.velocity
+            return -give * (now.slope if there else math.radians(1.0))
+
+        return departure
+
+
+class _Followed:
+    """The load [raw] behind a first-order low pass, step by step."""
+
+    def __init__(self, lag_s: float) -> None:
+        self.lag_s, self.state = lag_s, math.nan
+
+    def __call__(self, now: Moment) -> float:
+        before = now.load if math.isnan(self.state) else self.state
+        self.state = now.load + (before - now.load) * math.exp(-now.step_s / self.lag_s)
+        return self.state
+
+
+def damped(parameters: Mapping[str, float]) -> bool:
+    """Whether a give follows its load late."""
+    return parameters.get("form", FOLLOWER) in (LATE_DRIVER, LATE_FOLLOWER)
+
+
+def dragged(parameters: Mapping[str, float]) -> bool:
+    """Whether a give yields to drag otherwise than to other load."""
+    return parameters.get("form", FOLLOWER) >= DRAGGED_DRIVER
+
+
+def at_driver(parameters: Mapping[str, float]) -> bool:
+    """Whether the give is at the driver's end."""
+    return parameters["form"] % 2 == 0

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from .base import figure
-from .compliance import Compliance
+from .compliance import Compliance, at_driver, damped
 
 
 class LinkageCompliance(Compliance):
@@ -19,12 +19,13 @@ class LinkageCompliance(Compliance):
         """How far the segment stays back, at which end."""
         give, end = (
             figure(100 * parameters["compliance"]),
-            "of the joint before it" if parameters["form"] == 0.0 else "of its own",
+            "of the joint before it" if at_driver(parameters) else "of its own",
         )
+        late = f", {1e3 * parameters['lag']:.0f} ms late" if damped(parameters) else ""
         segment = where.get("joint") or "distal"
         return (
             f"the linkage gives: the {segment} segment stays back by {give} deg {end} for every 100 "
-            "raw of the motor's load"
+            f"raw of the motor's load{late}"
         )
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from .base import figure
-from .compliance import Compliance
+from .compliance import Compliance, at_driver, damped
 
 
 class SeriesElasticity(Compliance):
@@ -19,12 +19,13 @@ class SeriesElasticity(Compliance):
         """How far the segment stays back, at which end."""
         give, end = (
             figure(100 * parameters["compliance"]),
-            "% of the encoder's range" if parameters["form"] == 0.0 else "deg",
+            "% of the encoder's range" if at_driver(parameters) else "deg",
         )
+        late = f", {1e3 * parameters['lag']:.0f} ms late" if damped(parameters) else ""
         segment = where.get("joint") or "proximal"
         return (
             f"the drive train gives: the {segment} segment stays back by {give} {end} for every 100 "
-            "raw of the motor's load"
+            f"raw of the motor's load{late}"
         )
 
 

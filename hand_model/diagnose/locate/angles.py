@@ -181,6 +181,7 @@ def linkage_states(
         extra = {
             "trial_index": np.full(len(t), float(index)),
             "load": None if log is None else log.load,
+            "drag": None if log is None else log.drag,
             "scale": np.full(len(t), scale),
             "slope": _slope(driver, driver, q[:, joint], sure, 4),
         }
@@ -227,6 +228,7 @@ def encoder_states(angles: FingerAngles, low: float, high: float, steps: Sequenc
         extra = {
             "trial_index": np.full(len(t), float(index)),
             "load": log.load,
+            "drag": log.drag,
             "scale": np.full(len(t), 100.0),
             "slope": slope,
         }
@@ -252,13 +254,14 @@ def encoder_states(angles: FingerAngles, low: float, high: float, steps: Sequenc
 
 @dataclass(frozen=True)
 class _Log:
-    """A log at mocap frames: counts, speed, acceleration (where it is sure) [counts, s], load [raw] or None, inside:
-    where it was running. (n,)."""
+    """A log at mocap frames: counts, speed, acceleration (where it is sure) [counts, s], load and what of it
+    grows with speed [raw] or None, inside: where it was running. (n,)."""
 
     counts: Array
     speed: Array
     acceleration: Array
     load: Array | None
+    drag: Array | None
     inside: NDArray[np.bool_]
 
 
@@ -279,12 +282,13 @@ def _at_frames(record: FlexionAngles, time_s: Array, drifting: bool = True) -> _
         then = time_s + float(clock.log_time(np.array([middle]))[0]) - middle
     motion = estimate_motion(at, counts)
     current = log.columns.get("current")
-    load = None
+    load = drag = None
     if current is not None and np.isfinite(current[seen]).sum() > 20:
         known = np.isfinite(current[seen])
-        load = np.interp(then, at, transmitted_load(at, np.interp(at, at[known], current[seen][known]), motion))
+        passed = transmitted_load(at, np.interp(at, at[known], current[seen][known]), motion)
+        load, drag = (np.interp(then, at, part) for part in passed)
     v, a = (np.interp(then, at, y) for y in (motion.velocity, sure_acceleration(motion, at)))
-    return _Log(position_at(motion, at, then), v, a, load, (then > at[0]) & (then < at[-1]))
+    return _Log(position_at(motion, at, then), v, a, load, drag, (then > at[0]) & (then < at[-1]))
 
 
 def expected_angles(naming: Naming) -> dict[str, tuple[Array, Array]]:

@@ -18,8 +18,9 @@ LETS_GO = 1.2  # times the variance of what motion leaves unexplained
 ORDER = 4  # of the load over the position
 
 
-def transmitted_load(time_s: Array, current: Array, motion: Motion) -> Array:
-    """Load (n,) [raw] that a motor passes on: its current without what accelerates it and without its noise.
+def transmitted_load(time_s: Array, current: Array, motion: Motion) -> tuple[Array, Array]:
+    """Load (n,) [raw] that a motor passes on: its current without what accelerates it and without its noise; and what of
+    it grows with speed (n,).
 
     A current's noise would be an error of a regressor, and smoothing it rounds what happens at a reversal, which is
     what tells a give from a play. Speed, friction that builds up after reversals (Dahl's or Jenkins's, whichever the
@@ -28,20 +29,22 @@ def transmitted_load(time_s: Array, current: Array, motion: Motion) -> Array:
     """
     span, moving = float(np.ptp(motion.position)), motion.moving
     if span == 0 or moving.sum() < FEWEST:
-        return least_error(time_s, current)[0]
+        return least_error(time_s, current)[0], np.zeros(len(current))
     designs = _designs(motion)
     everywhere = _explained(current, designs, np.ones(len(current), bool))
     in_motion = _explained(current, designs, moving)
     lets_go = np.var((current - everywhere[0])[moving]) > LETS_GO * np.var((current - in_motion[0])[moving])
-    explained, inertia = in_motion if lets_go else everywhere
+    explained, inertia, viscous = in_motion if lets_go else everywhere
     rest = current - explained
     if lets_go:
         rest = np.interp(time_s, time_s[moving], rest[moving])
-    return explained + least_error(time_s, rest)[0] - max(inertia, 0.0) * motion.acceleration
+    load = explained + least_error(time_s, rest)[0] - max(inertia, 0.0) * motion.acceleration
+    return load, max(viscous, 0.0) * motion.velocity
 
 
 def _designs(motion: Motion) -> list[Array]:
-    """What may explain a current, (n, k) each: one for every way in which friction builds up; inertia comes first."""
+    """What may explain a current, (n, k) each: one for every way in which friction builds up; inertia comes first, then
+    drag."""
     position = motion.position
     span = float(np.ptp(position))
     moved = np.stack([motion.acceleration, motion.velocity, np.ones(len(position))], axis=-1)
@@ -49,12 +52,12 @@ def _designs(motion: Motion) -> list[Array]:
     return [np.c_[moved, rise(position, reach), powers] for rise in (dahl, jenkins) for reach in REACHES * span]
 
 
-def _explained(current: Array, designs: Sequence[Array], use: NDArray[np.bool_]) -> tuple[Array, float]:
-    """What the best design explains of the current (n,), learned from some samples, and the inertia."""
-    best, out = np.inf, (current, 0.0)
+def _explained(current: Array, designs: Sequence[Array], use: NDArray[np.bool_]) -> tuple[Array, float, float]:
+    """What the best design explains of the current (n,), learned from some samples, inertia and drag over speed."""
+    best, out = np.inf, (current, 0.0, 0.0)
     for columns in designs:
         fitted = np.linalg.lstsq(columns[use], current[use], rcond=1e-12)[0]
         error = float(np.sum((current - columns @ fitted)[use] ** 2))
         if error < best:
-            best, out = error, (columns @ fitted, float(fitted[0]))
+            best, out = error, (columns @ fitted, float(fitted[0]), float(fitted[1]))
     return out

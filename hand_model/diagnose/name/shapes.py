@@ -148,7 +148,8 @@ def refit(balance: Balance, fit: Fit, rounds: int = 2) -> Fit:
 
 
 def reform(balance: Balance, fit: Fit, which: int) -> Fit:
-    """The likeliest of the forms of one term, each with its shape optimised."""
+    """The likeliest of the forms of one term, each with its shape optimised and paying for its parameters (Schwarz
+    1978)."""
     term = fit.terms[which]
     forms = next((s.starts for s in term.effect.shapes(balance.states) if s.name == "form"), ())
     fits = [fit]
@@ -157,7 +158,8 @@ def reform(balance: Balance, fit: Fit, which: int) -> Fit:
             terms = list(fit.terms)
             terms[which] = Term(term.effect, {**term.shape, "form": form})
             fits.append(polish(balance, balance.fit(tuple(terms)), which))
-    return likeliest(balance, fits, which)
+    price = balance.inflation * float(np.log(max(balance.train.sum() / balance.inflation, 2.0)))
+    return likeliest(balance, fits, which, lambda f: f.rss + price * f.size)
 
 
 def likeliest(balance: Balance, fits: Iterable[Fit], which: int, cost: Callable[[Fit], float] = lambda f: f.rss) -> Fit:
