@@ -15,6 +15,7 @@ from .path import lowpass
 DRIVER, FOLLOWER, LATE_DRIVER, LATE_FOLLOWER, DRAGGED_DRIVER, DRAGGED_FOLLOWER = range(6)
 # [s]: a damper that lets a give follow faster is none that a hand's motion shows, and one slower holds it still
 LAG_S = 0.03, 0.6
+PLAIN = 0.4  # probability of each of the two plain forms
 MOST_DRAG = 12.0  # times as much as to other load, at most, a give yields to drag: else a segment is only late
 
 
@@ -68,6 +69,11 @@ class Compliance(Effect):
     def possible(self, states: tuple[DriveState, ...], parameters: Mapping[str, float]) -> bool:
         """What yields to drag alone gives nothing: it is late."""
         return parameters.get("drag_compliance", 0.0) <= MOST_DRAG * parameters["compliance"]
+
+    def log_prior(self, parameters: Mapping[str, float]) -> float:
+        """Most gives are plain."""
+        plain = not (damped(parameters) or dragged(parameters))
+        return math.log(6 * (PLAIN if plain else 0.25 * (1 - 2 * PLAIN)))
 
     def units(self, shape: Mapping[str, float]) -> Mapping[str, str]:
         """Of what yields: the driver's or the follower's position."""

@@ -39,13 +39,13 @@ def scan(balance: Balance, effect: Any, terms: tuple[Term, ...], least: float = 
     fits = [balance.fit((*terms, Term(effect, shape)), held=False) for shape in shapes]
     if not fits:
         return None
-    best = likeliest(balance, fits, -1)
+    best = likeliest(balance, fits, -1, priced(balance))
     return best if balance.train.all() else balance.fit(best.terms)
 
 
 def _project(balance: Balance, grid: Grid, terms: tuple[Term, ...], least: float) -> list[dict[str, float]]:
     """The two best shapes of a grid by the fall of the RSS, more than `least`, that its columns, orthogonal to the
-    design, bring."""
+    design, bring; parameters have their price."""
     rest = balance.apart(terms)
     columns = balance.grid_columns(grid, rest.weight, terms)
     inside = columns.products(rest.basis)
@@ -66,8 +66,8 @@ def _project(balance: Balance, grid: Grid, terms: tuple[Term, ...], least: float
         else:
             gram = columns.gram(mine) - inside[mine] @ inside[mine].T
             gains[i] = float(right[mine] @ np.linalg.lstsq(gram, right[mine], rcond=None)[0])
-    order = np.argsort(gains)[::-1]
-    return [grid.shapes[i] for i in order[:2] if gains[i] > max(least, 0.0)]
+    worth = np.where(gains > max(least, 0.0), gains - parameter_price(balance) * np.diff(first), -np.inf)
+    return [grid.shapes[i] for i in np.argsort(worth)[::-1][:2] if np.isfinite(worth[i])]
 
 
 def polish(balance: Balance, fit: Fit, which: int) -> Fit:
@@ -158,8 +158,18 @@ def reform(balance: Balance, fit: Fit, which: int) -> Fit:
             terms = list(fit.terms)
             terms[which] = Term(term.effect, {**term.shape, "form": form})
             fits.append(polish(balance, balance.fit(tuple(terms)), which))
-    price = balance.inflation * float(np.log(max(balance.train.sum() / balance.inflation, 2.0)))
-    return likeliest(balance, fits, which, lambda f: f.rss + price * f.size)
+    return likeliest(balance, fits, which, priced(balance))
+
+
+def parameter_price(balance: Balance) -> float:
+    """What a parameter must take off a sum of squares (Schwarz 1978)."""
+    return balance.inflation * float(np.log(max(balance.train.sum() / balance.inflation, 2.0)))
+
+
+def priced(balance: Balance) -> Callable[[Fit], float]:
+    """The sum of squares of a fit and the price of its effects' parameters."""
+    price = parameter_price(balance)
+    return lambda fit: fit.rss + price * fit.size
 
 
 def likeliest(balance: Balance, fits: Iterable[Fit], which: int, cost: Callable[[Fit], float] = lambda f: f.rss) -> Fit:
