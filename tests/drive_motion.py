@@ -26,5 +26,5 @@ def state(n: int = 1200, seed: int = 0) -> DriveState:
         effort,
         declared,
         declared_names=names,
-        extra={"load": effort, "trial_index": np.zeros(n)},
+        extra={"load": effort, "drag": np.zeros(n), "trial_index": np.zeros(n)},
     )

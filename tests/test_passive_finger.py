@@ -33,6 +33,7 @@ def kinematic_state(station: str) -> DriveState:
     extra = {
         "scale": 0 * x + scale,
         "load": now.declared @ np.array(list(DECLARED.values())),
+        "drag": DECLARED["viscous"] * now.velocity,
         "slope": np.rad2deg(polynomial.deriv()(u)) * per,
     }
     return DriveState(
@@ -40,7 +41,7 @@ def kinematic_state(station: str) -> DriveState:
         "index",
         now.time_s,
         x,
-        now.velocity,
+        now.velocity * (1.0 if station == "encoder" else 0.72),
         now.acceleration,
         np.rad2deg(polynomial(u)),
         declared,
@@ -86,6 +87,9 @@ def replayed(folder, now: DriveState, station: str, *written: tuple[str, dict, d
         for s in ("encoder", "linkage")
     }
     values = {name: effect(name).parameters(shape, amplitude, {}) for name, shape, amplitude in written}
+    for name, value in values.items():
+        further = effect(name).further((now,), {k: {"value": v} for k, v in value.items()})
+        value.update({k: entry["value"] for k, entry in further.items() if k not in value})
     found = tuple(
         Effect(name, at[effect(name).station], {k: Estimate(v, None, "", "") for k, v in value.items()})
         for name, value in values.items()
@@ -122,7 +126,8 @@ def test_written_finger_moves_as_the_effect_predicts(name, shape, amplitude, tmp
     )
     size = np.abs(wanted - now.effort).max()
     assert size > 0.5
-    assert np.quantile(np.abs(moved - wanted), 0.98) < 0.05 * size + 0.03
+    share = 0.08 if effect(name).hurries({**shape, **amplitude}) else 0.05  # ties follow less closely at full speed
+    assert np.quantile(np.abs(moved - wanted), 0.98) < share * size + 0.03
 
 
 @pytest.mark.parametrize(

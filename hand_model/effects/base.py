@@ -264,6 +264,10 @@ class Effect:
         sensor holds it."""
         return effort
 
+    def hurries(self, parameters: Mapping[str, float]) -> bool:
+        """Whether what it does to a follower depends on time or speed, and no slower replay shows it."""
+        return False
+
     def started(self, state: DriveState, parameters: Mapping[str, float]) -> dict[str, float]:
         """Parameters that only a recording knows: what went before it. None here."""
         return {}

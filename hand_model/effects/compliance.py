@@ -89,6 +89,10 @@ class Compliance(Effect):
         unit = f"raw s/{states[0].position_unit}"
         return {"drag": {"value": float(speed @ drag / max(speed @ speed, 1e-12)), "unit": unit, "ci95": None}}
 
+    def hurries(self, parameters: Mapping[str, float]) -> bool:
+        """What follows late, or yields to drag."""
+        return damped(parameters) or dragged(parameters)
+
     def law(self, parameters: Mapping[str, float]) -> Law:
         """Minus compliance times load, through the map's slope where the give is at the driver's end."""
         compliance, there = parameters["compliance"], at_driver({"form": FOLLOWER, **parameters})
@@ -110,6 +114,9 @@ class _Followed:
         self.lag_s, self.state = lag_s, math.nan
 
     def __call__(self, now: Moment) -> float:
+        """The load that the give has followed up to this moment."""
+        if math.isnan(self.state) and now.step_s == 0:  # nothing has been simulated yet, and no load computed
+            return now.load
         before = now.load if math.isnan(self.state) else self.state
         self.state = now.load + (before - now.load) * math.exp(-now.step_s / self.lag_s)
         return self.state

@@ -102,7 +102,8 @@ def _prepare(
         if seen.sum() < LEAST_ROWS:
             continue
         time_s, position = log.time_s[seen], 100 * (counts[seen] - low) / (high - low)
-        motion = estimate_motion(time_s, position if correct is None else correct(position))
+        believed = position if correct is None else correct(position)
+        motion = estimate_motion(time_s, believed, uneven=log.packet > 1)
         if simulated is not None and trial.name in simulated.motions:
             motion = with_simulated(motion, time_s, simulated.motions[trial.name]) or motion
         extra = {

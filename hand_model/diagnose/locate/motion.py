@@ -16,6 +16,10 @@ from ...effects.path import runs
 Array = NDArray[np.float64]
 
 SURE = 3.0  # standard deviations
+WIDENED = 4  # times a kernel may be widened
+# of the acceleration of fast motion, at most, is noise: as an error of a regressor it takes its square off the inertia
+ROUGH = 0.2
+QUICK = 0.5  # of the fastest speed, from which what times are wrong by shows in the position
 FEWEST_BLOCKS = 12  # that a smoothing is made of
 DEPARTURES_S = (0.1, 0.25, 0.6, 1.5)  # bandwidths of what departs from a known course
 
@@ -58,17 +62,23 @@ def local_quadratic(time_s: Array, values: Array, bandwidth_s: float) -> Array:
     return np.stack([values + c[:, 0], c[:, 1] / bandwidth_s, 2 * c[:, 2] / bandwidth_s**2])
 
 
-def estimate_motion(time_s: Array, position: Array, bandwidth_s: float | None = None) -> Motion:
-    """Motion (n,) of one channel; the bandwidth defaults to 1.5 sample intervals, doubled while velocity noise
-    exceeds 4 % of the fastest speed."""
+def estimate_motion(time_s: Array, position: Array, bandwidth_s: float | None = None, uneven: bool = False) -> Motion:
+    """Motion (n,) of one channel; the bandwidth defaults to 1.5 sample intervals, widened while velocity noise exceeds
+    2 % of the fastest speed. uneven: times are known less well than they are told, so that a fast position is known
+    less well than one at rest, and its acceleration must be known, too."""
     step = float(np.median(np.diff(time_s)))
-    noise = float(np.median(np.abs(np.diff(position, 3))) / 0.6745 / np.sqrt(20.0))
+    apart = np.abs(np.diff(position, 3)) / 0.6745 / np.sqrt(20.0)
+    noise = wrong = float(np.median(apart))
     h = 1.5 * step if bandwidth_s is None else bandwidth_s
-    for _ in range(4):
+    for _ in range(WIDENED):
         x, v, a = local_quadratic(time_s, position, h)
         fastest = float(np.percentile(np.abs(v), 98))
         velocity_noise = noise / h * np.sqrt(step / (4 * np.sqrt(np.pi) * h))
-        if bandwidth_s is not None or velocity_noise < 0.02 * fastest:
+        quick = np.abs(v) > QUICK * fastest
+        if uneven and quick[3:].any():
+            wrong = max(wrong, float(np.median(apart[quick[3:]])))
+        rough = uneven and _acceleration_noise(wrong, step, h) > ROUGH * float(np.sqrt(np.mean(a[quick] ** 2)))
+        if bandwidth_s is not None or (velocity_noise < 0.02 * fastest and not rough):
             break
         h *= 1.4
     moving = np.abs(v) > max(5 * velocity_noise, 0.03 * fastest)
@@ -114,9 +124,13 @@ def sure_acceleration(motion: Motion, time_s: Array) -> Array:
     exceeds it stays as it is."""
     if not motion.smoothed:
         return motion.acceleration
-    step = float(np.median(np.diff(time_s)))
-    noise = motion.noise * np.sqrt(0.2116 * step / motion.bandwidth_s**5)
+    noise = _acceleration_noise(motion.noise, float(np.median(np.diff(time_s))), motion.bandwidth_s)
     return np.where(np.abs(motion.acceleration) > SURE * noise, motion.acceleration, 0.0)
+
+
+def _acceleration_noise(noise: float, step_s: float, bandwidth_s: float) -> float:
+    """Standard deviation of the second derivative that a kernel makes of so noisy a position."""
+    return noise * float(np.sqrt(0.2116 * step_s / bandwidth_s**5))
 
 
 def _drop_short(flag: NDArray[np.bool_], shortest: int) -> NDArray[np.bool_]:

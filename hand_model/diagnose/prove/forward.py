@@ -95,11 +95,16 @@ def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, pat
     model.opt.gravity[:] = 0
     model.opt.tolerance = 1e-16  # of forces on inertias a millionth of the held one
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    slower = (
+        1.0
+        if any(effect(e.effect).hurries({k: x.value for k, x in e.parameters.items()}) for e in hand.effects)
+        else SLOWER
+    )
     _rub(
         model,
         driver,
         float(model.dof_M0[model.jnt_dofadr[follower]]),
-        float(np.abs(np.gradient(path, state.time_s)).max()) / SLOWER,
+        float(np.abs(np.gradient(path, state.time_s)).max()) / slower,
     )
     held = {driver}
     for actuator in range(len(model.actuator_trnid)):
@@ -117,7 +122,7 @@ def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, pat
     absolute = model.eq_solref[:, 0] < 0
     model.eq_solref[absolute] = 2 * STEP_S, 1.0
     at, rate = model.jnt_qposadr[driver], model.jnt_dofadr[driver]
-    time_s = SLOWER * state.time_s
+    time_s = slower * state.time_s
     spline = PchipInterpolator(time_s, path)
     grid = np.arange(time_s[0], time_s[-1] + STEP_S, STEP_S)
     position, velocity = spline(grid.clip(None, time_s[-1])), spline(grid.clip(None, time_s[-1]), 1)
