@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .base import Amplitude, Array, DriveState, Effect, Shape
+from .base import Amplitude, Array, DriveState, Effect, Shape, figure
 from .law import Law, Moment
 from .path import lowpass
 
@@ -130,6 +130,13 @@ def damped(parameters: Mapping[str, float]) -> bool:
 def dragged(parameters: Mapping[str, float]) -> bool:
     """Whether a give yields to drag otherwise than to other load."""
     return parameters.get("form", FOLLOWER) >= DRAGGED_DRIVER
+
+
+def besides(parameters: Mapping[str, float]) -> str:
+    """What a sentence about a give says of time or drag; nothing of a plain one."""
+    if damped(parameters):
+        return f", {1e3 * parameters['lag']:.0f} ms late"
+    return f", and by {figure(100 * parameters['drag_compliance'])} where speed makes it" if dragged(parameters) else ""
 
 
 def at_driver(parameters: Mapping[str, float]) -> bool:

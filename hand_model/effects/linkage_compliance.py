@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from .base import figure
-from .compliance import Compliance, at_driver, damped
+from .compliance import Compliance, at_driver, besides
 
 
 class LinkageCompliance(Compliance):
@@ -21,11 +21,10 @@ class LinkageCompliance(Compliance):
             figure(100 * parameters["compliance"]),
             "of the joint before it" if at_driver(parameters) else "of its own",
         )
-        late = f", {1e3 * parameters['lag']:.0f} ms late" if damped(parameters) else ""
         segment = where.get("joint") or "distal"
         return (
             f"the linkage gives: the {segment} segment stays back by {give} deg {end} for every 100 "
-            f"raw of the motor's load{late}"
+            f"raw of the motor's load{besides(parameters)}"
         )
 
 
