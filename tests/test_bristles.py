@@ -9,11 +9,14 @@ import numpy as np
 import pytest
 from test_diagnose import drive
 
+from hand_model.diagnose.locate.drive import gives
 from hand_model.diagnose.name.balance import Balance
 from hand_model.diagnose.name.shapes import refit
 from hand_model.diagnose.name.term import Term, replaced
 from hand_model.diagnose.prove.improve import as_fitted
 from hand_model.effects import catalogue, effect, outsiders
+from hand_model.effects.base import DriveState
+from hand_model.effects.path import dahl
 from hand_model.hand import Hand
 
 BRISTLES = Term(effect("presliding_friction"), {"bristle_length": 6.0, "bristle_time": 0.0, "form": 0.0})
@@ -86,3 +89,21 @@ def test_a_written_motor_has_the_bristles_that_were_named() -> None:
     )
     assert before.parameters["presliding"].value == 0.7
     assert after.parameters["presliding"].value == BRISTLES.shape["bristle_length"]
+
+
+@pytest.mark.parametrize(("friction", "granted"), [(50.0, True), (25.0, False)])
+def test_bristles_may_be_as_long_as_anothers_or_as_stiff(friction: float, granted: bool) -> None:
+    """Twice the friction turns over within twice the way on bristles of one stiffness; as much within twice the way is
+    presliding."""
+
+    def rubbing(seed: int, coulomb: float, length: float) -> tuple[DriveState, ...]:
+        def one(state: DriveState) -> DriveState:
+            effort = state.declared @ np.array([0.0, 0.15, 0.0, 0.22, 10.0]) + coulomb * dahl(state.position, length)
+            noise = np.random.default_rng(seed).normal(0, 1.0, len(effort))
+            return replace(state, effort=np.where(np.isfinite(state.effort), effort + noise, np.nan))
+
+        return tuple(one(s) for s in drive(seed))
+
+    found, _ = gives({"ring": rubbing(1, friction, 0.83), "index": rubbing(2, 25.0, 0.4)})
+    assert found["index"].length == pytest.approx(0.4, rel=0.1)
+    assert (found["ring"].granted > 0.83) == granted

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 KINDS = ("flexion", "excitation")
 LEAST_ROWS = 50  # of a recording: fewer, and no motion is read from it
 GIVE_LEAST, GIVE_MOST = 0.02, 1.2  # [%] of the declared Coulomb friction's bristles; beyond, give is presliding
+ALIKE = 1.6  # times the bristles of the drive that gives least, at most, another healthy one's are
 GIVE_UNSEEN = 0.12  # [%] differences of bristles below this are within what starts tell
 SETTLE_SAMPLES = (14, 13)  # after a start and before a stop: where acceleration is smeared by the kernel
 
@@ -78,9 +79,10 @@ def with_gives(
 ) -> dict[str, tuple[DriveState, ...]]:
     """The states with each drive's bristle length, and what the `trusted` ones say that any drive of the session may
     have."""
-    give, granted = gives({a: states for a, states in drives.items() if a in trusted})
+    own, granted = gives({a: states for a, states in drives.items() if a in trusted})
+    found = {a: own.get(a, Give(granted, granted)) for a in drives}
     return {
-        a: with_required(with_doubt(tuple(with_coulomb(s, give.get(a, granted), granted) for s in states)))
+        a: with_required(with_doubt(tuple(with_coulomb(s, found[a].length, found[a].granted) for s in states)))
         for a, states in drives.items()
     }
 
@@ -239,23 +241,35 @@ def with_required(states: tuple[DriveState, ...]) -> tuple[DriveState, ...]:
     return tuple(replace(s, extra={**s.extra, "required": own}) for s, own in zip(states, parts, strict=True))
 
 
-def gives(prepared: Mapping[str, Sequence[DriveState]]) -> tuple[dict[str, float], float]:
-    """Bristle length [%] of each drive's declared Coulomb friction, and the most that any drive of the session is
-    granted.
+@dataclass(frozen=True)
+class Give:
+    """length: of a drive's bristles [%]. granted: the longest that is no effect [%]."""
 
-    Coulomb friction turns over within a small distance in any drive; the drive that gives least shows how small. What a
-    drive gives clearly beyond that is presliding, an effect.
+    length: float
+    granted: float
+
+
+def gives(prepared: Mapping[str, Sequence[DriveState]]) -> tuple[dict[str, Give], float]:
+    """Bristles of each drive's declared Coulomb friction, and what any other drive of the session is granted.
+
+    Coulomb friction turns over within a small distance in any drive; the drive that gives least shows how small: bristles
+    may be as long as its own, or as stiff, so that they are as much longer as friction is larger (Canudas de Wit 1995).
+    What a drive gives clearly beyond that is presliding, an effect.
     """
     lengths = np.geomspace(GIVE_LEAST, GIVE_MOST, 12)
     best = {
-        a: float(lengths[int(np.argmin([_misfit(states, length) for length in lengths]))])
+        a: float(lengths[int(np.argmin([_misfit(states, length)[0] for length in lengths]))])
         for a, states in prepared.items()
     }
-    granted = max(1.6 * min(best.values(), default=GIVE_LEAST), GIVE_UNSEEN)
-    return {a: min(length, granted) for a, length in best.items()}, granted
+    friction = {a: max(_misfit(states, best[a])[1], 0.0) for a, states in prepared.items()}
+    least = min(best.values(), default=GIVE_LEAST)
+    softest = min((best[a] / f for a, f in friction.items() if f > 0), default=0.0)  # of the stiffest drive [%/raw]
+    granted = {a: max(ALIKE * max(least, softest * friction[a]), GIVE_UNSEEN) for a in best}
+    return {a: Give(min(best[a], granted[a]), granted[a]) for a in best}, max(ALIKE * least, GIVE_UNSEEN)
 
 
-def _misfit(states: Sequence[DriveState], give: float) -> float:
+def _misfit(states: Sequence[DriveState], give: float) -> tuple[float, float]:
+    """Squared error of the declared balance with bristles of that length [%], and its Coulomb friction."""
     columns, efforts = [], []
     for state in states:
         declared = np.array(state.declared)
@@ -264,4 +278,5 @@ def _misfit(states: Sequence[DriveState], give: float) -> float:
         columns.append(declared[seen])
         efforts.append(state.effort[seen])
     a, y = np.concatenate(columns), np.concatenate(efforts)
-    return float(np.sum((y - a @ coefficients(a, y)) ** 2))
+    found = coefficients(a, y)
+    return float(np.sum((y - a @ found) ** 2)), float(found[2])
