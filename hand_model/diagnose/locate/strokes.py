@@ -25,6 +25,7 @@ CEILING_SHARE = 0.6
 CEILING_LEFT, CEILING_T = 0.1, 6.0
 # of the current beyond a limit over what is needed, from which it is none: a drive that slows down needs less
 FLAT, SLOPES_T = 0.3, 3.0
+BEYOND_T = 2.0  # standard deviations of the current, of what is beyond a limit
 ROUNDS = 3  # of telling where a limit is and what is beyond
 
 
@@ -174,9 +175,10 @@ def ceiling(strokes: list[Stroke]) -> tuple[float, float, float]:
     bends = _slope(needed[over], current[over])
     slopes = abs(bends[0]) > max(FLAT, SLOPES_T * bends[1])
     slight = float(np.quantile(lost[over], FULL_SPEED)) < LEAST_LOSS * full  # a healthy controller loses as much
-    if slight or slopes or not (told and alone and CEILING_SHARE < share < 1 / CEILING_SHARE):
-        return none
     noise = max(float(np.std((drawn - design @ beta)[at_speed])), 1e-9)
+    hidden = float(np.sqrt(x @ x)) < BEYOND_T * noise  # what is needed beyond it is less than the current tells
+    if slight or slopes or hidden or not (told and alone and CEILING_SHARE < share < 1 / CEILING_SHARE):
+        return none
     every = np.concatenate([s.current for s in strokes])
     weight = weighed(float(np.sqrt(y @ y / len(every))) / noise, float(np.std(every)) / noise)
     return limit, weight, float(np.mean(over)) * len(current) / len(every)
