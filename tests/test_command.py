@@ -36,9 +36,10 @@ def braking(x: float, full: float) -> float:
 
 
 def strokes(
-    profile, seed: int, repeats: int = 4, noise: float = 5.0, viscous: float = VISCOUS
+    profile, seed: int, repeats: int = 4, noise: float = 5.0, viscous: float = VISCOUS, back: float | None = None
 ) -> tuple[DriveState, np.ndarray]:
-    """One recording of strokes there and back at every commanded speed, and its current."""
+    """One recording of strokes there and back at every commanded speed, and its current. back: share of full speed at
+    which strokes back follow the profile, too."""
     rng = np.random.default_rng(seed)
     x, v, c, told = [], [], [], []
     for raw, full in sorted(COMMANDED.items()) * repeats:
@@ -46,7 +47,7 @@ def strokes(
             at = 0.0
             while at < 100:
                 place = at if way > 0 else 100 - at
-                speed = profile(place, full) if way > 0 else full
+                speed = profile(at, full) if way > 0 else full if back is None else profile(at, back * full)
                 x, v, told = [*x, place], [*v, way * speed], [*told, raw]
                 c.append(load(place) + viscous * speed if way > 0 else -25 + 0.2 * place - viscous * speed)
                 at += speed * STEP_S
@@ -137,6 +138,15 @@ def test_a_stroke_that_ends_slowly_is_at_no_limit() -> None:
     """A controller that takes half a second to stop: less current is needed there, and speed falls."""
     state, current = strokes(lambda x, full: full * min(1.0, 0.02 + (100 - x) / (0.35 * full)), 1, 8, 1.0)
     assert np.isnan(command_facts((state,), (current,)).ceiling)
+
+
+def test_who_brakes_both_ways_is_at_no_limit() -> None:
+    """Whatever noise lets the fastest strokes seem to need near their end, and however long the strokes back take."""
+    for seed in range(14):
+        state, current = strokes(
+            lambda at, full: full * min(1.0, 0.02 + (100 - at) / (0.35 * full)), seed, 4, 7.0, 0.08, back=0.7
+        )
+        assert np.isnan(command_facts((state,), (current,)).ceiling)
 
 
 def answering(delay_s: float, seed: int) -> tuple[DriveState, np.ndarray]:

@@ -211,15 +211,20 @@ def _at_speed(strokes: list[Stroke]) -> NDArray[np.bool_]:
 
 
 def _unloaded(strokes: list[Stroke], mine: list[Stroke]) -> Array:
-    """Speed (n,) [%/s] of extending strokes of the same commanded speed at the same time after their start as each
-    sample of `mine`, which a spring helps: what is settling still is no limit. Infinite where there are none."""
+    """Speed (n,) [%/s] of extending strokes of the same commanded speed, which a spring helps, at the same time after
+    their start and before their end as each sample of `mine`, the lower one: what is settling still, or brakes, is no
+    limit. Infinite where there are none."""
     back = [s for s in strokes if s.way < 0 and s.commanded == mine[0].commanded]
-    time_s = np.concatenate([s.time_s for s in mine])
     if not back:
-        return np.full(len(time_s), np.inf)
-    at, speed = (np.concatenate(v) for v in ([s.time_s // PIECE_S for s in back], [-s.velocity for s in back]))
-    known = np.unique(at)
-    return np.interp(time_s / PIECE_S - 0.5, known, [float(np.median(speed[at == k])) for k in known])
+        return np.full(sum(len(s.time_s) for s in mine), np.inf)
+    speed = np.concatenate([-s.velocity for s in back])
+    out = []
+    for since in (lambda s: s.time_s, lambda s: s.time_s[-1] - s.time_s):
+        at = np.concatenate([since(s) // PIECE_S for s in back])
+        known = np.unique(at)
+        usual = [float(np.median(speed[at == k])) for k in known]
+        out.append(np.interp(np.concatenate([since(s) for s in mine]) / PIECE_S - 0.5, known, usual))
+    return np.minimum(*out)
 
 
 def _load_design(strokes: list[Stroke]) -> Array:
