@@ -72,8 +72,7 @@ class Compliance(Effect):
 
     def log_prior(self, parameters: Mapping[str, float]) -> float:
         """Most gives are plain."""
-        plain = not (damped(parameters) or dragged(parameters))
-        return math.log(6 * (PLAIN if plain else 0.25 * (1 - 2 * PLAIN)))
+        return math.log(6 * (0.25 * (1 - 2 * PLAIN) if self.hurries(parameters) else PLAIN))
 
     def units(self, shape: Mapping[str, float]) -> Mapping[str, str]:
         """Of what yields: the driver's or the follower's position."""

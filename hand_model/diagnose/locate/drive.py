@@ -257,15 +257,15 @@ def gives(prepared: Mapping[str, Sequence[DriveState]]) -> tuple[dict[str, Give]
     What a drive gives clearly beyond that is presliding, an effect.
     """
     lengths = np.geomspace(GIVE_LEAST, GIVE_MOST, 12)
-    best = {
-        a: float(lengths[int(np.argmin([_misfit(states, length)[0] for length in lengths]))])
-        for a, states in prepared.items()
-    }
-    friction = {a: max(_misfit(states, best[a])[1], 0.0) for a, states in prepared.items()}
-    least = min(best.values(), default=GIVE_LEAST)
-    softest = min((best[a] / f for a, f in friction.items() if f > 0), default=0.0)  # of the stiffest drive [%/raw]
-    granted = {a: max(ALIKE * max(least, softest * friction[a]), GIVE_UNSEEN) for a in best}
-    return {a: Give(min(best[a], granted[a]), granted[a]) for a in best}, max(ALIKE * least, GIVE_UNSEEN)
+    fits = {a: min((*_misfit(states, x), x) for x in lengths.tolist()) for a, states in prepared.items()}
+    best = {a: (length, max(friction, 0.0)) for a, (_, friction, length) in fits.items()}
+    least = min((length for length, _ in best.values()), default=GIVE_LEAST)
+    softness = min((length / f for length, f in best.values() if f > 0), default=0.0)  # of the stiffest drive [%/raw]
+
+    def granted(friction: float) -> float:
+        return max(ALIKE * max(least, softness * friction), GIVE_UNSEEN)
+
+    return {a: Give(min(x, granted(f)), granted(f)) for a, (x, f) in best.items()}, granted(0.0)
 
 
 def _misfit(states: Sequence[DriveState], give: float) -> tuple[float, float]:

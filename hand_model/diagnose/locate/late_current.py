@@ -9,7 +9,7 @@ from ...effects.base import DriveState, least_delay
 from ..name.balance import Balance
 from ..name.evidence import gain
 from ..name.shapes import polish, scan
-from .command import CommandFacts, with_lateness
+from .command import BEYOND_CHANCE, CommandFacts, with_lateness
 from .drive import with_gives
 from .simulated import SimulatedDrive
 
@@ -17,7 +17,6 @@ EARLY = 3.0  # standard deviations by which answers that come before the command
 # log likelihood that a shift of a drive's current must bring: less, and its drive tells none (two standard deviations)
 DELAY_TOLD = 2.0
 ALIKE = 2.0  # standard deviations of answers within which they and the balance say the same
-PLAINLY = 12.0  # log likelihood by which the balance says so by itself, for as many names of as many channels
 
 
 def timed_drives(
@@ -56,7 +55,7 @@ def _late(drives: dict[str, tuple[DriveState, ...]], timed: dict[str, tuple[Driv
             return abs(x) > bound
         if (told_to := least_delay(timed[actuator])) < bound:
             told, doubt = late[actuator].tolist()  # and to the side to which the balance would shift it
-            plain = brought[actuator] > PLAINLY and abs(told - best[actuator]) < ALIKE * doubt
+            plain = brought[actuator] > BEYOND_CHANCE and abs(told - best[actuator]) < ALIKE * doubt
             return max(abs(told), abs(best[actuator]) if plain else 0.0) > told_to and told * best[actuator] >= 0
         if late[actuator][0] < -max(bound, EARLY * late[actuator][1]):
             return True

@@ -75,9 +75,10 @@ def estimate_motion(time_s: Array, position: Array, bandwidth_s: float | None = 
         fastest = float(np.percentile(np.abs(v), 98))
         velocity_noise = noise / h * np.sqrt(step / (4 * np.sqrt(np.pi) * h))
         quick = np.abs(v) > QUICK * fastest
+        rough = False
         if uneven and quick[3:].any():
             wrong = max(wrong, float(np.median(apart[quick[3:]])))
-        rough = uneven and _acceleration_noise(wrong, step, h) > ROUGH * float(np.sqrt(np.mean(a[quick] ** 2)))
+            rough = _acceleration_noise(wrong, step, h) > ROUGH * float(np.sqrt(np.mean(a[quick] ** 2)))
         if bandwidth_s is not None or (velocity_noise < 0.02 * fastest and not rough):
             break
         h *= 1.4

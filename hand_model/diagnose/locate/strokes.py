@@ -18,6 +18,7 @@ PIECE_S = 0.15  # of strokes, that are compared
 RUNNING = 0.7  # of its median speed: slower at either end, a stroke still starts or stops
 # of the speed, over the recorded loads: less is within what controllers do (the most of 560 healthy drives 0.029)
 LEAST_LOSS = 0.035
+NEARLY_MOST = 0.9  # quantile of the speed that is lost beyond a limit
 FULL_SPEED = 0.9  # of the way, in which strokes of one commanded speed are no faster than at full speed
 AT_SPEED = 0.9  # of that, from which a drive does what it is told
 # of the current beyond its limit that a drive takes from its speed: one, but for noise in the limit
@@ -78,7 +79,7 @@ def _load_rise(strokes: list[Stroke]) -> dict[float, np.poly1d]:
     out = {}
     for way in (1.0, -1.0):
         mine = [s for s in strokes if s.way == way]
-        beta = np.linalg.lstsq(_load_design(mine), np.concatenate([s.current for s in mine]), rcond=None)[0]
+        beta = np.linalg.lstsq(_load_design(mine), _joined(mine, "current"), rcond=None)[0]
         out[way] = np.poly1d((beta[:4] * scale)[::-1]).deriv()
     return out
 
@@ -149,18 +150,16 @@ def ceiling(strokes: list[Stroke]) -> tuple[float, float, float]:
     slower = [s for s in strokes if s.way > 0 and s.commanded < fast]
     if len(mine) < 3 or not slower:
         return none
-    design, drawn, at_speed = _load_design(slower), np.concatenate([s.current for s in slower]), _at_speed(slower)
+    design, drawn, at_speed = _load_design(slower), _joined(slower, "current"), _at_speed(slower)
     beta = np.linalg.lstsq(design[at_speed], drawn[at_speed], rcond=None)[0]
     viscous = float(beta[-1])
     if viscous <= 0:
         return none
-    position, velocity, current = (
-        np.concatenate([getattr(s, k) for s in mine]) for k in ("position", "velocity", "current")
-    )
+    position, velocity, current = (_joined(mine, name) for name in ("position", "velocity", "current"))
     full = _full_speed(velocity)
     lost = np.minimum(full, _unloaded(strokes, mine)) - velocity
     needed = _load_design(mine) @ beta + viscous * lost
-    seen = position <= np.max(np.concatenate([s.position for s in slower])[at_speed])
+    seen = position <= np.max(_joined(slower, "position")[at_speed])
     over = needed > np.quantile(needed, 0.75)
     for _ in range(ROUNDS):  # the current stays at the limit wherever more is needed
         limit = float(np.mean(current[over])) if over.any() else np.inf
@@ -174,14 +173,14 @@ def ceiling(strokes: list[Stroke]) -> tuple[float, float, float]:
     alone = float(rest @ rest) < CEILING_LEFT * float(y @ y)  # speed changes for no other reason
     bends = _slope(needed[over], current[over])
     slopes = abs(bends[0]) > max(FLAT, SLOPES_T * bends[1])
-    slight = float(np.quantile(lost[over], FULL_SPEED)) < LEAST_LOSS * full  # a healthy controller loses as much
+    slight = float(np.quantile(lost[over], NEARLY_MOST)) < LEAST_LOSS * full  # a healthy controller loses as much
     noise = max(float(np.std((drawn - design @ beta)[at_speed])), 1e-9)
     hidden = float(np.sqrt(x @ x)) < BEYOND_T * noise  # what is needed beyond it is less than the current tells
     if slight or slopes or hidden or not (told and alone and CEILING_SHARE < share < 1 / CEILING_SHARE):
         return none
-    every = np.concatenate([s.current for s in strokes])
+    every = _joined(strokes, "current")
     weight = weighed(float(np.sqrt(y @ y / len(every))) / noise, float(np.std(every)) / noise)
-    return limit, weight, float(np.mean(over)) * len(current) / len(every)
+    return limit, weight, int(over.sum()) / len(every)
 
 
 def _full_speed(speed: Array) -> float:
@@ -227,7 +226,12 @@ def _unloaded(strokes: list[Stroke], mine: list[Stroke]) -> Array:
     return np.minimum(*out)
 
 
+def _joined(strokes: list[Stroke], name: str) -> Array:
+    """One channel (n,) of all strokes, one after the other."""
+    return np.concatenate([getattr(s, name) for s in strokes])
+
+
 def _load_design(strokes: list[Stroke]) -> Array:
     """Columns (n, 5): powers 0 to 3 of position / 100 %, and velocity [%/s]."""
-    position, velocity = (np.concatenate([getattr(s, name) for s in strokes]) for name in ("position", "velocity"))
+    position, velocity = _joined(strokes, "position"), _joined(strokes, "velocity")
     return np.stack([*((position / 100) ** k for k in range(4)), velocity], axis=-1)

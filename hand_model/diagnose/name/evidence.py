@@ -31,8 +31,13 @@ def gain(balance: Balance, fit: Fit, reference: Fit, scale: float = 1.0) -> floa
 
 def rough_evidence(balance: Balance, fit: Fit, reference: Fit, scale: float = 1.0) -> float:
     """Gain less the penalty of Schwarz (1978): cheap, to choose whom to look at closely."""
-    count = max(balance.train.sum() / balance.inflation, 2.0)
-    return gain(balance, fit, reference, scale) - 0.5 * (fit.size - reference.size) * float(np.log(count))
+    penalty = 0.5 * parameter_price(balance) / balance.inflation
+    return gain(balance, fit, reference, scale) - (fit.size - reference.size) * penalty
+
+
+def parameter_price(balance: Balance) -> float:
+    """What a parameter must take off a sum of squares (Schwarz 1978)."""
+    return balance.inflation * float(np.log(max(balance.train.sum() / balance.inflation, 2.0)))
 
 
 def evidence(balance: Balance, fit: Fit, reference: Fit, which: int = -1, scale: float = 1.0) -> float:

@@ -13,6 +13,7 @@ from scipy.optimize import minimize
 
 from ...effects.base import Shape
 from .balance import Balance, Fit
+from .evidence import parameter_price
 from .grid import Grid
 from .term import DISCRETE, Term, additive
 
@@ -159,11 +160,6 @@ def reform(balance: Balance, fit: Fit, which: int) -> Fit:
             terms[which] = Term(term.effect, {**term.shape, "form": form})
             fits.append(polish(balance, balance.fit(tuple(terms)), which))
     return likeliest(balance, fits, which, priced(balance))
-
-
-def parameter_price(balance: Balance) -> float:
-    """What a parameter must take off a sum of squares (Schwarz 1978)."""
-    return balance.inflation * float(np.log(max(balance.train.sum() / balance.inflation, 2.0)))
 
 
 def priced(balance: Balance) -> Callable[[Fit], float]:

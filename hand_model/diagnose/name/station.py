@@ -80,6 +80,11 @@ class Station:
         return self.naming.before.p < ALPHA or any(f.term.effect.name not in self._faint for f in self.proven)
 
     @property
+    def full(self) -> bool:
+        """Whether as many effects as may be named are."""
+        return len(self.naming.found) >= MOST_TERMS
+
+    @property
     def wander(self) -> float:
         """Standard deviation of what does not repeat over that of the noise."""
         wander = self.naming.wander
@@ -110,7 +115,7 @@ class Station:
     def believed_in_part(self) -> bool:
         """Whether the names would stand but that as many as may be leave something: in a finger of which much is missing
         that is to be expected."""
-        many = self.naming.after.p < ALPHA and len(self.naming.found) >= MOST_TERMS
+        many = self.naming.after.p < ALPHA and self.full
         return self._tells and many and self.explained >= EXPLAINED_PARTLY
 
     @property
@@ -123,11 +128,7 @@ class Station:
     def _scattered(self) -> bool:
         """Whether as many names as may be leave something that the test sees, and none of them holds the better part of
         what they explain: each describes a piece of what is something else."""
-        return (
-            self.naming.after.p < ALPHA
-            and len(self.naming.found) >= MOST_TERMS
-            and max(f.share for f in self.naming.found) < MAIN
-        )
+        return self.naming.after.p < ALPHA and self.full and max(f.share for f in self.naming.found) < MAIN
 
     @property
     def _left_over(self) -> bool:
@@ -315,7 +316,7 @@ def judged(
     left = every = tuple(effects)
     station = Station(signal, finger, actuator, joint, name_effects(states, left, typical=typical))
     elsewhere = _elsewhere(station.naming)
-    for _ in range(SECOND_HEARINGS if len(station.naming.found) < MOST_TERMS else 1):
+    for _ in range(1 if station.full else SECOND_HEARINGS):
         fallen = {f.term.effect.name for f in station.naming.found} - {f.term.effect.name for f in station.proven}
         lost = sum(
             f.share for f in station.naming.found if f.term.effect.name in fallen and f.evidence >= EVIDENCE_LEAST
@@ -328,7 +329,7 @@ def judged(
             break  # else what fell had held the better part: what it left over stands on nothing
         station = other
     hopeless = station.naming.overwhelmed and not elsewhere  # in the training recordings already
-    many = len(station.naming.found) >= MOST_TERMS  # more is missing than is looked for, whatever is learned from
+    many = station.full  # more is missing than is looked for, whatever is learned from
     if station.missing and not (station.believed or hopeless or many) and _eventful(station.naming):
         station = _foretold(station, states, every, typical) or station
     untold = not (station.believed or many) or elsewhere and station.naming.after.p < ALPHA

@@ -95,11 +95,8 @@ def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, pat
     model.opt.gravity[:] = 0
     model.opt.tolerance = 1e-16  # of forces on inertias a millionth of the held one
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
-    slower = (
-        1.0
-        if any(effect(e.effect).hurries({k: x.value for k, x in e.parameters.items()}) for e in hand.effects)
-        else SLOWER
-    )
+    hurried = any(effect(e.effect).hurries({k: x.value for k, x in e.parameters.items()}) for e in hand.effects)
+    slower = 1.0 if hurried else SLOWER
     _rub(
         model,
         driver,
