@@ -173,6 +173,27 @@ def test_how_far_a_centre_travels_is_told_with_how_surely(way) -> None:
     assert low <= 3e-3 <= high and value == pytest.approx(3e-3, rel=0.5)
 
 
+@pytest.mark.parametrize("travels", [True, False])
+def test_a_small_travel_beside_a_large_slip_stands_unless_the_slip_only_has_another_form(travels: bool) -> None:
+    """A centre that travels 2 mm hardly shows beside a slip of 9 mm; nor does a slip that also changes with the angle,
+    which no joint does."""
+    centre = travelling(lambda u: np.stack([2e-3 * u, 0 * u], axis=1))
+
+    def shift(share, turn, arm):
+        u = 0.5 * (1 - np.cos(2 * np.pi * 4 * share))
+        own = turn @ Rotation.from_rotvec(np.outer(2 * u * FLEXED[1], [0.0, 1.0, 0.0])).as_matrix()
+        slip = (share >= 0.6) * (1.0 if travels else 1.0 + 0.02 * u**2)
+        out = np.array(centre(share, turn, arm)) * travels
+        out[:, 0] += slip[:, None] * (own @ np.array([6e-3, -6e-3, 3e-3]))
+        return out
+
+    naming = seen(shift, body=2)
+    most = max(e.gain for e in naming.found)
+    assert {e.effect for e in naming.found if e.gain > 0.1 * most} == {"marker_slip"}
+    small = [e for e in naming.found if e.effect in markers.HINGE and e.gain < markers.SMALL * most]
+    assert [e.effect for e in small if e.apart] == (["moving_centre"] if travels else [])
+
+
 def test_what_no_finger_can_do_is_said_where_nothing_else_explains_the_markers(monkeypatch) -> None:
     """Whatever is found first is held to go beyond what a joint can: a slip is found without, a tilting joint is not."""
     found = markers._named

@@ -11,10 +11,10 @@ import pytest
 
 from hand_model.rig.swing import compete as swing_compete
 from hand_model.rig.swing.build import ENOUGH_STEPS, thinned
-from hand_model.rig.swing.compete import PARTS, Variant, _folds
+from hand_model.rig.swing.compete import PARTS, Variant, _folds, fit_stages
 from hand_model.rig.swing.diagnose import _figures, _searched, _standing, _starts
-from hand_model.rig.swing.fit import Fitted
-from hand_model.rig.swing.simulation import INDEX, PARAMETERS, Lane, Swing, vector
+from hand_model.rig.swing.fit import Fitted, Task
+from hand_model.rig.swing.simulation import INDEX, PARAMETERS, Lane, Swing, simulate, vector
 
 
 def test_effects_that_help_only_together_stand_together() -> None:
@@ -150,39 +150,31 @@ def test_recordings_are_left_out_one_by_one_while_they_are_few() -> None:
         assert all(sorted((*kept, *left)) == list(range(count)) for kept, left in folds)
 
 
-@pytest.mark.parametrize(("helps", "names"), [(True, ["stribeck_friction", "command_delay"]), (False, [])])
-def test_what_one_effect_hides_is_sought_beside_another(
-    monkeypatch: pytest.MonkeyPatch, helps: bool, names: list[str]
-) -> None:
-    """Friction that gains in two recordings and costs in the others, as long as a late drive is not known: both or
-    none."""
-    count, blocks = 8, 8 * PARTS
-    stage = SimpleNamespace(
-        lanes=[SimpleNamespace(trial=f"run_{k}") for k in range(count)], driven=True, train=lambda: np.arange(count)
-    )
-    fitted = Fitted(np.zeros(len(PARAMETERS)), 1.0, 1, 3)
-    better = replace(fitted, cost=0.5)
-    alone = np.where(np.arange(blocks) < 2 * PARTS, 0.1, 1.05)
+@pytest.mark.parametrize("planted", [True, False])
+def test_what_one_effect_hides_is_sought_beside_another(monkeypatch: pytest.MonkeyPatch, planted: bool) -> None:
+    """A drive that sags and friction that rises at low speed, neither of which is taken alone: both, or none."""
+    line = {"inertia": 0.02, "gain": 0.19, "back_emf": 0.28, "damping": 0.02, "coulomb": 0.06}
+    more = {"sag": 0.2, "static_excess": 0.08, "stribeck_speed": 0.9} if planted else {}
+    t, random = np.arange(0, 3, 4e-3), np.random.default_rng(0)
+    volts = [4 * np.sin(2.1 * t + k) + 3 * np.sin(4.7 * t + 2 * k) for k in range(6)]
+    none, seen = np.zeros(len(t)), np.ones(len(t))
+    lanes = tuple(Lane(f"run_{k}", False, u, 1.0, none, (0.0, 0.0), none, seen) for k, u in enumerate(volts))
+    blank = Swing(lanes, 1.0, 0.0, line, True, 4e-3)
+    q = simulate(blank, np.repeat(vector({**line, **more})[None], 6, 0), np.arange(6))
+    q += 1e-3 * random.standard_normal(q.shape)
+    swing = replace(blank, lanes=tuple(replace(lane, position=q[:, k]) for k, lane in enumerate(lanes)))
+    judged = swing_compete._judged
 
-    def two_rounds(stages, taken, current, test, folds, without):
-        rival = swing_compete._Rival(
-            Variant("command_delay" if taken else "stribeck_friction", "", {}),
-            better,
-            np.full(blocks, 0.2) if taken and helps else alone,
-        )
-        return fitted, np.ones(blocks), [rival] if len(taken) < 2 else []
+    def pairs_alone(current, none, rivals, *more):
+        return judged(current, none, rivals, *more) if all(" and " in r.variant.effect for r in rivals) else None
 
-    monkeypatch.setattr(swing_compete, "_round", two_rounds)
-    monkeypatch.setattr(swing_compete, "freed", lambda swing, theta: swing)
-    monkeypatch.setattr(swing_compete, "swings_free", lambda swing: False)
-    monkeypatch.setattr(swing_compete, "_exchanged", lambda stages, taken, fit: (taken, fit))
-    monkeypatch.setattr(
-        swing_compete,
-        "_folds",
-        lambda swing, train, whole: (swing, [(tuple(i for i in range(count) if i != k), (k,)) for k in range(count)]),
-    )
-    taken = swing_compete.compete_swing([stage], fitted)
-    assert [v.effect for v, _ in taken] == names and [r.variant.effect for _, r in taken] == names
+    monkeypatch.setattr(swing_compete, "_judged", pairs_alone)
+    declared = fit_stages([swing], [Task(tuple(line), vector(line), ())], 12)[0]
+    taken = swing_compete.compete_swing([swing], declared, 1e-4)
+    assert {v.effect for v, _ in taken} == ({"drive_sag", "stribeck_friction"} if planted else set())
+    assert [r.variant for _, r in taken] == [v for v, _ in taken] and [len(r.taken) for _, r in taken] == [1, 2][
+        : len(taken)
+    ]
 
 
 @pytest.mark.parametrize(("error", "names"), [(3.0, ["stribeck_friction"]), (1.0, [])])

@@ -119,6 +119,29 @@ def test_simulated_fit_uses_each_trials_weight_and_covers_the_truth(tmp_path: Pa
     assert replayed.figure("position_rmse", True) < 0.05 * np.std(q[:, 3])
 
 
+def test_a_file_with_friction_by_the_carried_load_moves_as_simulated(tmp_path: Path) -> None:
+    """What a joint carries has the inertia of its bodies in it, in MuJoCo on the written file as in our simulation; by
+    gravity alone the motion is another."""
+    t = np.arange(0, 4, 0.002)
+    volts = [2.5 * np.sin(4.2 * t + k) + 1.5 * np.sin(9.1 * t + 2 * k) for k in range(4)]
+
+    def recorded(folder: Path, q: np.ndarray | None = None) -> Path:
+        table = [np.stack([t, 0 * t if q is None else q[: len(t), k], u], 1) for k, u in enumerate(volts)]
+        return session(folder, VOLTAGE, "voltage", table, "time,position,voltage")
+
+    rig = load_rig(read_session(recorded(tmp_path / "blank")))
+    swing = build_swing(rig, fit_declared(rig))
+    line = {"inertia": 0.0085, "gain": 0.13, "back_emf": 0.05, "damping": 0.012, "coulomb": 0.02}
+    carried, gravity = (vector({**line, name: 0.4}) for name in ("load_carried", "load_external"))
+    q = simulate(swing, np.repeat(carried[None], 4, 0), np.arange(4))
+    held = read_session(recorded(tmp_path / "s", np.pad(q, ((0, len(t) - len(q)), (0, 0)), "edge")))
+    left = [
+        replay_rig(held, write_swing(rig, swing, theta), efforts=False).figure("position_rmse", True)
+        for theta in (carried, gravity)
+    ]
+    assert left[0] < 0.03 * np.std(q[:, 3]) < 0.5 * left[1]
+
+
 def test_overrides_reach_what_mjcf_names() -> None:
     """Scalars of option, servo gains, references; what the model lacks, or cannot take, is refused by name."""
     import mujoco
@@ -267,8 +290,8 @@ def test_effort_recorded_of_a_voltage_drive_is_the_effort(tmp_path: Path, torque
 
 
 def test_the_form_of_a_friction_by_load_is_the_one_that_was_planted(tmp_path: Path) -> None:
-    """Friction by the gear's load, or by the square of the load that the motor drives at low speed: the first effect is
-    it, in that form, and explains the recordings down to their noise."""
+    """Friction by the gear's load, by what the joint carries with its inertia, or by the square of the load that the motor
+    drives at low speed: the first effect is it, in that form, and explains the recordings down to their noise."""
     t = np.arange(0, 5, 0.002)
     volts = [2.5 * np.sin(2.2 * t + k) + 1.5 * np.sin(5.1 * t + 2 * k) for k in range(4)]
     folder = session(
@@ -276,9 +299,9 @@ def test_the_form_of_a_friction_by_load_is_the_one_that_was_planted(tmp_path: Pa
     )
     blank = build_swing(rig := load_rig(read_session(folder)), fit_declared(rig), 4e-3, 1.0)
     line = {"inertia": 0.0085, "gain": 0.13, "back_emf": 0.05, "damping": 0.012, "coulomb": 0.02}
-    noise = 1e-3 * np.random.default_rng(0).standard_normal((2, len(blank.lanes), len(t)))
-    squared = {"external_squared": 0.6, "stribeck_speed": 1.5}
-    for planted, form, e in zip(({"load_gear": 0.1}, squared), ("gear", "squared"), noise, strict=True):
+    noise = 1e-3 * np.random.default_rng(0).standard_normal((3, len(blank.lanes), len(t)))
+    forms = ({"load_gear": 0.1}, {"external_squared": 0.6, "stribeck_speed": 1.5}, {"load_carried": 0.2})
+    for planted, form, e in zip(forms, ("gear", "squared", "carried"), noise, strict=True):
         q = simulate(
             blank, np.repeat(vector({**line, **planted})[None], len(blank.lanes), 0), np.arange(len(blank.lanes))
         )

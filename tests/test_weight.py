@@ -14,9 +14,10 @@ from hand_model.diagnose import weight
 from hand_model.diagnose.name import entries, reread
 from hand_model.diagnose.name.station import judged
 from hand_model.effects import effect
+from hand_model.effects.path import dahl
 
 SWEEP = 1.4
-EFFECTS = [effect(name) for name in ("nonlinear_spring", "torque_ripple", "gravity_load")]
+EFFECTS = [effect(name) for name in ("nonlinear_spring", "torque_ripple", "gravity_load", "presliding_friction")]
 
 
 def posed(states: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -35,12 +36,16 @@ def posed(states: tuple[Any, ...]) -> tuple[Any, ...]:
     return tuple(one(s) for s in states)
 
 
-def heard(monkeypatch: pytest.MonkeyPatch, load: Any) -> tuple[list[Any], list[Any]]:
-    """Stations and findings of two drives, the second one loaded."""
+def none(state: Any) -> Any:
+    return np.zeros(len(state.time_s))
+
+
+def heard(monkeypatch: pytest.MonkeyPatch, load: Any, other: Any = none) -> tuple[list[Any], list[Any]]:
+    """Stations and findings of two drives, the second one loaded, the first one as `other` has it."""
     monkeypatch.setattr(weight, "in_one_pose", lambda session, fingers, states: posed(states))
     calls = [
         ("current", f"finger_{i}", f"motor_{i}", None, drive(11 + i, added), EFFECTS, None)
-        for i, added in enumerate((lambda s: np.zeros(len(s.time_s)), load))
+        for i, added in enumerate((other, load))
     ]
     stations = [judged(*call) for call in calls]
     return weight.with_weights(SimpleNamespace(), {}, stations, calls)
@@ -99,6 +104,19 @@ def test_a_weight_is_read_beside_what_is_usual_though_another_name_is_dropped(mo
     (alone,), _ = reread.reread([finding], [station])
     largest, (low, high) = (alone.parameters["largest"][k] for k in ("value", "ci95"))
     assert low < 9.81 / 9.5 * abs(size) < high and high - low < largest
+
+
+def test_a_weight_is_told_beside_a_drive_that_lacks_something_else(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What presliding changes of a drive's preload is far from what a weight does to another's."""
+    size = -58.0
+
+    def preslides(s: Any) -> Any:
+        return 25.0 * (dahl(s.position, 4.0) - s.declared[:, s.declared_names.index("coulomb")])
+
+    stations, findings = heard(monkeypatch, lambda s: size * np.sin(1.7 + SWEEP * s.position / 100), preslides)
+    named = {(s.finger, f.term.effect.name) for s in stations if s.believed for f in s.kept}
+    named |= {(f.where["finger"], f.effect) for _, f in findings}
+    assert named == {("finger_0", "presliding_friction"), ("finger_1", "gravity_load")}
 
 
 @pytest.mark.parametrize("beside_bend", [True, False])

@@ -19,14 +19,15 @@ class PositionDependentFriction(Effect):
     rubs = True
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """Centre over the range, width from 2 % to 25 % of it."""
+        """Centre over the range, width from 1.5 % to 12.5 % of it: what takes more than half of the range (two widths on
+        either side) is no spot."""
         low, high = position_range(states)
         span, unit = high - low, states[0].position_unit
         return (
             Shape(
                 "centre", unit, low + 0.03 * span, high - 0.03 * span, tuple(low + span * np.linspace(0.05, 0.95, 19))
             ),
-            Shape("width", unit, 0.015 * span, 0.25 * span, (0.03 * span, 0.06 * span, 0.12 * span)),
+            Shape("width", unit, 0.015 * span, 0.125 * span, (0.03 * span, 0.06 * span, 0.12 * span)),
         )
 
     def amplitudes(self) -> tuple[Amplitude, ...]:

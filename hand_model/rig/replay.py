@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..engines.mujoco import divergence
 from ..session import Session
+from .carried import CarriedLoad, bodies_inertia
 from .inverse import apply_levels, effort_residuals
 from .laws import Now, law
 from .mjcf import read_effects
@@ -74,6 +75,7 @@ class EffectStepper:
         self.model = model
         self.coulomb = np.array(model.dof_frictionloss)
         self.entries = [(model.joint(e["joint"]).id, e["swing"]) for e in effects if "swing" in e]
+        self.restart()
         records = [e for e in effects if "effect" in e]
         self.unknown = tuple(r["effect"] for r in records if law(r) is None)
         self.laws = [(model.joint(r["joint"]).id, act) for r in records if (act := law(r)) is not None]
@@ -100,22 +102,28 @@ class EffectStepper:
                 return float(constant / resistance)
         return 0.0
 
+    def restart(self) -> None:
+        """Forget how the joints moved: they are put elsewhere."""
+        self.carried = [CarriedLoad(bodies_inertia(self.model, joint)) for joint, _ in self.entries]
+
     def passive(self, model: Any, data: Any) -> None:
         """Add the effects to qfrc_passive and to the bound of dry friction, at the state in `data`."""
-        for joint, e in self.entries:
+        for (joint, e), load in zip(self.entries, self.carried, strict=True):
             get = e.get
             q, v = float(data.qpos[joint]), float(data.qvel[joint])
             external = -float(data.qfrc_bias[joint]) + get("offset", 0.0)
             data.qfrc_passive[joint] += get("offset", 0.0) - get("lateral", 0.0) * np.cos(q) - get("stiffness", 0.0) * q
             external += -get("lateral", 0.0) * np.cos(q) - get("stiffness", 0.0) * q - get("offset", 0.0)
             shaft = float(data.qfrc_actuator[joint])
+            carried = abs(load(float(data.time), v, external))
             damping = get("load_speed", 0.0) * abs(external) + get("damping_asymmetry", 0.0) * np.sign(v)
             data.qfrc_passive[joint] -= damping * v
             more = (
                 get("load_gear", 0.0) * abs(external - shaft)
                 + get("asymmetry", 0.0) * np.sign(v)
                 + abs(get("load_external", 0.0) * external - get("load_motor", 0.0) * shaft)
-                + _low_speed(e, v, external, shaft)
+                + get("load_carried", 0.0) * carried
+                + _low_speed(e, v, external, shaft, carried)
             )
             # the bound takes effect in the next step: the constraint of this one stands already
             model.dof_frictionloss[joint] = max(self.coulomb[joint] + more, 1e-9)
@@ -131,13 +139,15 @@ class EffectStepper:
             model.dof_frictionloss[joint] = max(value, 1e-9)
 
 
-def _low_speed(e: dict[str, float], v: float, external: float, shaft: float) -> float:
-    """Dry friction that standing still adds, by load, at joint velocity v under external and shaft effort."""
+def _low_speed(e: dict[str, float], v: float, external: float, shaft: float, carried: float) -> float:
+    """Dry friction that standing still adds, by load, at joint velocity v under external and shaft effort; carried: size
+    of the load with the inertia that moves."""
     get = e.get
     level = (
         get("static_excess", 0.0)
         + get("load_gear_low", 0.0) * abs(external - shaft)
         + abs(get("load_external_low", 0.0) * external - get("load_motor_low", 0.0) * shaft)
+        + get("load_carried_low", 0.0) * carried
     )
     if external * shaft < 0:
         drives = abs(shaft) > abs(external)
@@ -212,6 +222,7 @@ def _simulated(
 
     data = mujoco.MjData(model)
     step, grid = float(model.opt.timestep), control
+    effects.restart()
     data.qpos[:], data.qvel[:] = (s[0] for s in starts)
     if not model.nu:  # semi-implicit Euler is leapfrog when the velocity starts half a step early
         mujoco.mj_forward(model, data)
@@ -225,6 +236,7 @@ def _simulated(
                     mujoco.mj_resetData(model, data)
                     broken.clear()
                 data.qpos[:], data.qvel[:] = (s[k // stride] for s in starts)
+                effects.restart()
             out[k] = np.nan if broken else data.qpos
             if broken:
                 continue

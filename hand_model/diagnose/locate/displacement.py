@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +47,7 @@ class Candidate:
 class MarkerEffect:
     """A candidate that was chosen. everywhere: (b, 3m, c) unprojected, as if it acted always. begin, end: first block
     of a step and the one after its last, None where it acts always. coefficients: (c,) of the columns, covariance: (c,
-    c)."""
+    c). apart: whether no other form of the larger ones could stand for it."""
 
     effect: str
     body: int
@@ -61,6 +61,7 @@ class MarkerEffect:
     covariance: Array = field(default_factory=lambda: np.zeros((0, 0)))
     shifts: tuple[bool, ...] = ()
     sides: bool = False
+    apart: bool = False
 
     @property
     def columns(self) -> Array:
@@ -119,6 +120,19 @@ def creeping(blocks: Blocks, slip: Candidate) -> list[Candidate]:
         within[mine] = (t - t[0]) / max(t[-1] - t[0], 1e-9)
     whole = np.arange(len(within)) / max(len(within) - 1, 1)
     return [Candidate(CREEP, slip.body, slip.label, slip.base * ramp[:, None, None], False) for ramp in (whole, within)]
+
+
+def of_any_form(blocks: Blocks, effect: MarkerEffect) -> MarkerEffect:
+    """What the same place could show in any form: any motion of what a joint carries, in step with its angle; a slip
+    that is not constant, but changes with each joint's angle and with time."""
+    if effect.begin is None:
+        columns = _any_motion(blocks, effect.body)[0].columns
+    else:
+        angles = [share_of_range(blocks, k) for k in range(int(blocks.body.max()))]
+        since = np.linspace(0.0, 1.0, len(blocks.time_s))
+        courses = np.stack([np.ones(len(since)), since, *angles, *(u**2 for u in angles)], axis=-1)
+        columns = np.concatenate([effect.columns * course[:, None, None] for course in courses.T], axis=-1)
+    return replace(effect, begin=None, end=None, everywhere=columns)
 
 
 def _frames(blocks: Blocks, body: int, marker: int) -> list[Array]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ...effects.outside.outsider import UNLIKELY
 from .angles import FingerAngles, refitted
 from .blocks import Blocks, blocks_of, project
-from .displacement import NO_HINGE, MarkerEffect, candidates_of, creeping
+from .displacement import NO_HINGE, MarkerEffect, candidates_of, creeping, of_any_form
 from .stepwise import HINGE, Stepwise
 from .wobble import possible
 
@@ -27,6 +27,7 @@ EVIDENCE_LEAST = 15.0  # log evidence of a marker effect, beyond its parameters 
 MOST = 10  # a slip that is put right between recordings is one a recording
 SKIP_P = 0.3  # lack of fit above which no candidate is tried
 ALPHA = 0.003  # false alarms per finger
+SMALL = 0.03  # of what another brings: less may be no more than that one's form being another
 EXPLAINED_LEAST = 0.9  # of the misfit: below, the names are not believed
 SPELL = 12  # blocks, about a second, whose mean shows what stays correlated
 UNHINGED = (*HINGE, NO_HINGE)  # of joints that are no hinges: in step with the angle
@@ -91,6 +92,7 @@ def _named(search: Stepwise, before: tuple[float, float]) -> MarkerNaming:
         creep = max((search.alone(c) for slip in slips for c in creeping(blocks, slip)), key=lambda c: c.gain)
         if search.score([*others, creep]) > search.score(found) + UNLIKELY:
             found = _pruned(search, [creep, *others])
+    found = [replace(e, apart=_apart(search, found, e)) for e in found]
     every = np.concatenate([shared, *(project(blocks, e.columns) for e in found)], axis=-1)
     inverse, right = _chain_part(every, y)
     coefficients = inverse @ right
@@ -153,6 +155,16 @@ def _pruned(search: Stepwise, found: list[MarkerEffect]) -> list[MarkerEffect]:
             break
         found = [e for e in found if e is not weakest]
     return found
+
+
+def _apart(search: Stepwise, found: list[MarkerEffect], effect: MarkerEffect) -> bool:
+    """Whether a joint is no hinge, whatever form the much larger effects have: what is small beside one may else be no
+    more than its form being another."""
+    if effect.effect not in HINGE:
+        return False
+    others = [e for e in found if e is not effect]
+    beside = [of_any_form(search.blocks, e) if effect.gain < SMALL * e.gain else e for e in others] + [effect]
+    return _borne(search, beside, search.without(beside)[-1], effect) >= EVIDENCE_LEAST
 
 
 def _borne(search: Stepwise, found: Sequence[MarkerEffect], gain: float, effect: MarkerEffect) -> float:

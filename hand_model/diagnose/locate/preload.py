@@ -83,12 +83,15 @@ def _odds(own: float, others: Sequence[float]) -> float:
 
 def expected(stations: Sequence[Station], station: Station, name: str) -> tuple[float, float] | None:
     """What the hand's other drives let expect of a positive coefficient of one drive, and how sure that is (standard
-    deviation); None where they say nothing."""
+    deviation); None where they say nothing. What a drive's names changed of it is as much as they may be wrong by."""
     drives = _drives(stations)
-    values = [float(s.naming.fit.declared[name]) for s in _others(drives, station)]
-    usual = float(np.median(values)) if values else 0.0
+    rest = [s.naming for s in drives if s is not station]
+    usual = float(np.median([n.fit.declared[name] for n in rest])) if rest else 0.0
+    if usual <= 0:
+        return None
+    changed = float(np.median([abs(n.fit.declared[name] - n.declared.declared[name]) for n in rest]))
     shape, scale = _spread([s.naming.fit.declared for s in drives if not _lacks(s)])
-    return (usual, np.sqrt(2) * scale / shape * usual) if usual > 0 else None
+    return usual, float(np.hypot(np.sqrt(2) * scale / shape * usual, changed))
 
 
 def _drives(stations: Sequence[Station]) -> list[Station]:

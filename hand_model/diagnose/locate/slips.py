@@ -17,7 +17,7 @@ from .angles import FingerAngles, Step
 from .blocks import Blocks
 from .course_amount import course_amount
 from .displacement import NO_HINGE, NOT_RIGID, UNNAMED, MarkerEffect
-from .markers import ALPHA, UNHINGED, MarkerNaming
+from .markers import ALPHA, SMALL, UNHINGED, MarkerNaming
 from .wobble import side_to_side
 
 Array = NDArray[np.float64]
@@ -28,7 +28,6 @@ CORRECTION = {
     "support_slip": "the support's turn is taken out from the moment of the slip",
     "marker_swap": "the labels are put right while they were exchanged",
 }
-SMALL = 0.03  # share of what the marker station explains
 IN_STEP = "the markers leave the hinge's motion in step with the angle"
 DRAWS = 60  # of coefficients, for an interval
 SWAP_FRAMES = 5  # shorter exchanges are ghosts
@@ -44,7 +43,8 @@ def marker_findings(angles: FingerAngles, naming: MarkerNaming) -> list[tuple[fl
         groups.setdefault((effect.effect, effect.body, effect.label), []).append(effect)
     least = _least(naming)
     for (name, body, label), members in groups.items():
-        if name in UNNAMED or sum(e.gain for e in members) < least:
+        small = sum(e.gain for e in members) < least
+        if name in UNNAMED or small and not any(e.apart for e in members):
             continue
         readings = max(float(naming.blocks.weight.sum()) * 3, 1.0)
         moved = float(np.sqrt(sum(e.gain for e in members) / readings))  # over the noise of one reading

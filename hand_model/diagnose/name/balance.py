@@ -110,7 +110,7 @@ class Balance:
                 state, extra={**state.extra, "slope": Polynomial(powers).deriv()(state.position / scale) / scale}
             )
 
-        return self._with(states=tuple(with_slope(s) for s in self.states), _last=Memory())
+        return self.told(with_slope)
 
     def required(self, fit: Fit) -> Balance:
         """The same balance with what is "required" of the drive as a fit has it, its effects included."""
@@ -121,7 +121,11 @@ class Balance:
                 effort = effort + fit.added(which, state)
             return replace(state, extra={**state.extra, "required": effort})
 
-        return self._with(states=tuple(asked(s) for s in self.states), _last=Memory())
+        return self.told(asked)
+
+    def told(self, other: Callable[[DriveState], DriveState]) -> Balance:
+        """The same balance with `other` of each state in its place: of the same samples, efforts and noise."""
+        return self._with(states=tuple(other(s) for s in self.states), _last=Memory())
 
     def settled(self) -> Balance:
         """The same balance with next to no weight on starts and stops."""

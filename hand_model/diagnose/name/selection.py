@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ...background import Pair
 from ...effects.base import least_delay, position_range
 from .balance import Balance, Fit
+from .bristles import with_bristles
 from .evidence import evidence, gain, rough_evidence, scale_of
 from .lack_of_fit import LackOfFit, lack_of_fit
 from .naming import ALPHA, MOST_TERMS, Named, Naming, Rival, overwhelmed
@@ -75,17 +76,21 @@ def _named(
     effects: tuple[Any, ...],
     progress: Callable[[str], None] | None,
 ) -> Naming:
-    wander, mapped = estimate_wander(balance, balance.fit().prediction), balance
+    wander, other = estimate_wander(balance, balance.fit().prediction), balance
+    start: tuple[Term, ...] = ()
     for _ in range(MOST_SEARCHES):
-        balance = mapped.wandering(wander)
+        balance = other.wandering(wander)
         pair = paired(balance.learning())
-        learned, brought, ranked = _search(pair, effects, progress)
+        learned, brought, ranked = _search(pair, effects, progress, start)
         fit = balance.fit(learned.terms)
         wander = _unrepeated(balance, fit)
         lost = _overwhelmed(balance, fit)
         mapped = _remapped(balance, fit)
-        if lost or (_alike(wander, balance.wander) and mapped is balance):
+        other, bristled = with_bristles(mapped, fit)
+        same = _alike(wander, balance.wander) and mapped is balance
+        if lost or same and other is balance:
             break
+        start = bristled.terms if same else ()
     rival = None if lost else _calmed(pair.state, learned, ranked)
     if rival is not None:
         other = balance.wandering(estimate_wander(balance, balance.fit(rival.fit.terms).prediction))

@@ -104,7 +104,7 @@ def build_swing(rig: RigModel, fit: DeclaredFit, step_s: float = STEP_S, longest
 
     def built(step_s: float, sampled: bool) -> Swing:
         lanes = tuple(lane for t in rig.trials for lane in _stretches(rig, t, step_s, longest_s, sampled))
-        return Swing(lanes, sine, cosine, initial, drive is not None, step_s, free_period_s(rig), leapfrog_s)
+        return Swing(lanes, sine, cosine, initial, drive is not None, step_s, free_period_s(rig), leapfrog_s, inertia)
 
     if drive is None:
         swing = built(step_s, True)

@@ -117,13 +117,14 @@ def compete_swing(
         found = _judged(current, none, rivals, test, folds, floor)
         # what one leaves may hide it, as a late drive hides friction: two at once
         if found is None and rivals and not taken:
-            first = min(rivals, key=lambda r: r.error.sum())
-            stages = [freed(s, first.fit.theta) for s in stages]
-            rivals = _round(stages, (first.variant,), first.fit, test, folds, without)[2]
-            found = _judged(current, none, rivals, test, folds, floor, BEYOND_DOUBT)
-            if found is not None:
-                taken = (first.variant,)
-                rounds = [replace(found[1], variant=first.variant, fit=first.fit, taken=taken)]
+            pairs = _pairs(stages, rivals, current, test, folds, without)
+            both = _judged(current, none, [p.rival for p in pairs], test, folds, floor, BEYOND_DOUBT)
+            if both is not None:
+                first, second = pairs[both[0]].variants
+                current, taken = pairs[both[0]].rival.fit, (first, second)
+                rounds = [replace(both[1], variant=v, equals=(v.effect,), fit=current, taken=taken) for v in taken]
+                rounds[0] = replace(rounds[0], fit=pairs[both[0]].alone, taken=(first,))
+                continue
         if found is None:
             break
         won = rivals[found[0]]
@@ -164,6 +165,38 @@ def _round(stages: Sequence[Swing], taken: tuple[Variant, ...], current: Fitted,
         swing, test, folds, (same, current), [(tasks[k], f) for k, f in zip(order, best, strict=True)]
     )
     return current, none, [_Rival(others[k], f, s) for k, f, s in zip(order, best, scores, strict=True)]
+
+
+@dataclass(frozen=True)
+class _Two:
+    """Two variants added at once, as a rival of none; alone: the fit of the first."""
+
+    variants: tuple[Variant, Variant]
+    rival: _Rival
+    alone: Fitted
+
+
+def _pairs(stages: Sequence[Swing], rivals: Sequence[_Rival], current: Fitted, test: Swing, folds: list,
+           without: frozenset[str] = frozenset()) -> list[_Two]:  # fmt: skip
+    """The best pairs of those that came nearest alone, and of the nearest with any other."""
+    swing = stages[-1]
+    near = sorted(rivals, key=lambda r: float(r.error.sum()))
+    found = [(a, b.variant) for k, a in enumerate(near) for b in near[k + 1 :]]
+    found += [(near[0], v) for v in variants(swing) if v.effect not in without and v not in [r.variant for r in near]]
+    apart = [(a, v) for a, v in found if v.effect != a.variant.effect and not set(v.start) & set(a.variant.start)]
+    tasks = [Task(asked(swing, (a.variant, v)), begun(a.fit.theta, v), (), True) for a, v in apart]
+    fits = fit_stages([freed(s, near[0].fit.theta) for s in stages], tasks, 8)
+    together = [Variant(f"{a.variant.effect} and {v.effect}", f"{a.variant.key} and {v.key}", {**a.variant.start, **v.start})
+                for a, v in apart]  # fmt: skip
+    order = _shortlist(together, fits)
+    train = tuple(int(i) for i in swing.train())
+    best = _several(swing, [Task(tasks[k].free, fits[k].theta, train) for k in order])
+    none = Task(asked(swing, ()), current.theta, train), current
+    scores = _left_out(swing, test, folds, none, [(tasks[k], f) for k, f in zip(order, best, strict=True)])[1]
+    return [
+        _Two((apart[k][0].variant, apart[k][1]), _Rival(together[k], f, s), apart[k][0].fit)
+        for k, f, s in zip(order, best, scores, strict=True)
+    ]
 
 
 def _judged(current: Fitted, none: Array, rivals: Sequence[_Rival], test: Swing, folds: list, floor: float,

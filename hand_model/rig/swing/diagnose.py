@@ -30,6 +30,7 @@ from .variants import Variant, all_free, begun, free_declared
 
 RESAMPLES = 500
 MOST_SEARCHES = 2
+SMALL = 0.005
 Taken = tuple[Variant, Round]
 Ends = Mapping[str, tuple[float, float]]
 
@@ -184,7 +185,7 @@ def _standing(
             return kept, chain, rejected
         others = [*kept[:worse], *kept[worse + 1 :]]
         without, key = chain_of(others), kept[worse][0].key
-        if not chain[-1].error < (1.0 - LEAST_GAIN) * without[-1].error:
+        if not _better(chain[-1], without[-1], chain[0]):
             rejected.append({"effect": key, "reason": NOT_BORNE_OUT})
             kept, chain = others, without
             continue
@@ -205,7 +206,14 @@ def _sides(
 
 def _falls(chain: Sequence[Link]) -> list[bool]:
     """Whether each effect of a chain lowers the held-out error by enough where it comes in."""
-    return [b.error < (1.0 - LEAST_GAIN) * a.error for a, b in pairwise(chain)]
+    return [_better(b, a, chain[0]) for a, b in pairwise(chain)]
+
+
+def _better(one: Link, other: Link, declared: Link) -> bool:
+    """Whether one model predicts the recordings held out better than another; beside earlier effects only what takes a
+    share of the declared model's squared error is more than their form being another."""
+    least = 0.0 if other is declared else SMALL * declared.error**2
+    return one.error < (1.0 - LEAST_GAIN) * other.error and other.error**2 - one.error**2 >= least
 
 
 def _links(rig: RigModel, session: Session, held: bool, stages: Sequence[tuple[Swing, int]], declared: np.ndarray,

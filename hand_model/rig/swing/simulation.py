@@ -13,6 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ..carried import followed
 from .friction import dry_friction, wet_friction
 
 Array = NDArray[np.float64]
@@ -25,6 +26,7 @@ PARAMETERS = (
     "load_gear", "load_motor", "load_external",  # + k |tau_external - tau_motor|, |k_e tau_external - k_m tau_motor|
     "load_gear_low", "load_motor_low", "load_external_low",  # the same, times exp(-|v / vs|^a)
     "motor_squared", "external_squared",  # + k tau^2 of the larger of opposed efforts, times exp(-|v / vs|^a)
+    "load_carried", "load_carried_low",  # + k |tau_external - inertia acceleration|, the same times exp(-|v / vs|^a)
     "load_speed",  # damping that grows with |tau_external|
     "asymmetry", "damping_asymmetry", "drag", "offset", "lateral", "stiffness",
     "sag", "supply", "delay",
@@ -32,7 +34,8 @@ PARAMETERS = (
 INDEX = {name: i for i, name in enumerate(PARAMETERS)}
 DECLARED = PARAMETERS[:5]
 NEUTRAL = {"stribeck_speed": 1.0, "stribeck_exponent": 2.0}  # what is not zero where an effect is absent
-BY_LOAD = ("load_gear", "load_motor", "load_external")
+BY_LOAD = ("load_gear", "load_motor", "load_external", "load_carried")
+CARRIED = ("load_carried", "load_carried_low")
 LOW_SPEED = (
     "static_excess",
     "load_gear_low",
@@ -40,6 +43,7 @@ LOW_SPEED = (
     "load_external_low",
     "motor_squared",
     "external_squared",
+    "load_carried_low",
 )
 
 
@@ -85,7 +89,7 @@ class Lane:
 @dataclass(frozen=True, eq=False)
 class Swing:
     """All stretches of a session, the joint's weight: gravity effort = sine sin q + cosine cos q (what holds it), and
-    the period period_s [s] of its small swings. leapfrog_s: step [s] of the leapfrog that has to move as recorded (of a
+    the period period_s [s] of its small swings; bodies: inertia [kg m2 or kg] of what the joint carries. leapfrog_s: step [s] of the leapfrog that has to move as recorded (of a
     free swing under its weight; zero: the law itself has to)."""
 
     lanes: tuple[Lane, ...]
@@ -96,6 +100,7 @@ class Swing:
     step_s: float = STEP_S
     period_s: float = 1.0
     leapfrog_s: float = 0.0
+    bodies: float = 0.0
 
     def train(self) -> Array:
         """Indices of stretches that may be fitted."""
@@ -175,6 +180,7 @@ def _run(swing: Swing, theta: Array, lanes: Array, steps: int, residual: bool) -
     p, has = constants(swing, theta, lanes)
     q, v = np.array([swing.lanes[i].start for i in lanes]).T.copy()
     h = swing.step_s
+    carried, p["acceleration"] = any(has[n] for n in CARRIED), np.zeros(len(lanes))
     drive = _drive(swing, theta, lanes, has, steps) if swing.driven else None
     # Semi-implicit Euler is leapfrog when the velocity starts half a step early: second order instead of first.
     if not swing.driven:
@@ -186,7 +192,9 @@ def _run(swing: Swing, theta: Array, lanes: Array, steps: int, residual: bool) -
             external = p["weight"] * np.sin(q + p["phase"] if has["phase"] else q)
             if has["stiffness"]:
                 external -= p["stiffness"] * q
-            v = _next_speed(p, has, v, external, None if drive is None else drive[k])
+            before, v = v, _next_speed(p, has, v, external, None if drive is None else drive[k])
+            if carried:
+                p["acceleration"] = followed(p["acceleration"], v - before, h)
             q = q + h * v
         if residual:
             position, used = _stacked(swing)[2:4]
@@ -214,7 +222,9 @@ def constants(swing: Swing, theta: Array, lanes: Array) -> tuple[dict[str, Array
     cosine = cosine + p["lateral"]
     p["weight"], p["phase"] = -np.hypot(sine, cosine), np.arctan2(cosine, sine)
     has["phase"] = bool(np.any(p["phase"]))
-    p["hi"] = swing.step_s / (p["inertia"] + np.array([c.more_inertia for c in chosen]))
+    more = np.array([c.more_inertia for c in chosen])
+    p["hi"] = swing.step_s / (p["inertia"] + more)
+    p["bodies"] = np.minimum(swing.bodies, p["inertia"]) + more
     p["coulomb"] = p["coulomb"] * np.array([c.coulomb_scale for c in chosen])
     p["emf"] = p["back_emf"] * live**2
     p["inverse"] = 1.0 / p["stribeck_speed"]

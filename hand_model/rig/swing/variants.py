@@ -58,6 +58,12 @@ def variants(swing: Swing) -> tuple[Variant, ...]:
         out += [
             Variant("load_dependent_friction", "with speed", {"load_speed": 0.0}),
             Variant("load_dependent_friction", "gear", {"load_gear": 0.0}),
+            Variant("load_dependent_friction", "carried", {"load_carried": 0.0}),
+            Variant(
+                "load_dependent_friction",
+                "carried, low speed",
+                {"load_carried_low": 0.0, "stribeck_speed": 0.2 * speed},
+            ),
             Variant("load_dependent_friction", "motor", {"load_motor": 0.0}),
             Variant("load_dependent_friction", "directional", {"load_motor": 0.0, "load_external": 0.0}),
             Variant(
