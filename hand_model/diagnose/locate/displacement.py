@@ -122,17 +122,13 @@ def creeping(blocks: Blocks, slip: Candidate) -> list[Candidate]:
     return [Candidate(CREEP, slip.body, slip.label, slip.base * ramp[:, None, None], False) for ramp in (whole, within)]
 
 
-def of_any_form(blocks: Blocks, effect: MarkerEffect) -> MarkerEffect:
-    """What the same place could show in any form: any motion of what a joint carries, in step with its angle; a slip
-    that is not constant, but changes with each joint's angle and with time."""
-    if effect.begin is None:
-        columns = _any_motion(blocks, effect.body)[0].columns
-    else:
-        angles = [share_of_range(blocks, k) for k in range(int(blocks.body.max()))]
-        since = np.linspace(0.0, 1.0, len(blocks.time_s))
-        courses = np.stack([np.ones(len(since)), since, *angles, *(u**2 for u in angles)], axis=-1)
-        columns = np.concatenate([effect.columns * course[:, None, None] for course in courses.T], axis=-1)
-    return replace(effect, begin=None, end=None, everywhere=columns)
+def of_any_form(blocks: Blocks, slip: MarkerEffect) -> MarkerEffect:
+    """A slip that need not stay as it is: it changes with each joint's angle and with time."""
+    angles = [share_of_range(blocks, k) for k in range(int(blocks.body.max()))]
+    since = np.linspace(0.0, 1.0, len(blocks.time_s))
+    courses = [np.ones(len(since)), since, *angles, *(u**2 for u in angles)]
+    columns = np.concatenate([slip.columns * course[:, None, None] for course in courses], axis=-1)
+    return replace(slip, begin=None, end=None, everywhere=columns)
 
 
 def _frames(blocks: Blocks, body: int, marker: int) -> list[Array]:

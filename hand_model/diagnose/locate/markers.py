@@ -158,12 +158,13 @@ def _pruned(search: Stepwise, found: list[MarkerEffect]) -> list[MarkerEffect]:
 
 
 def _apart(search: Stepwise, found: list[MarkerEffect], effect: MarkerEffect) -> bool:
-    """Whether a joint is no hinge, whatever form the much larger effects have: what is small beside one may else be no
-    more than its form being another."""
-    if effect.effect not in HINGE:
+    """Whether a joint is no hinge, whatever form the much larger slips have: what is small beside one may else be no
+    more than its form being another; beside another joint that is none, what is of second order in that."""
+    larger = [e for e in found if effect.gain < SMALL * e.gain]
+    if effect.effect not in HINGE or any(e.begin is None for e in larger):
         return False
-    others = [e for e in found if e is not effect]
-    beside = [of_any_form(search.blocks, e) if effect.gain < SMALL * e.gain else e for e in others] + [effect]
+    own = [e for e in found if e is not effect and effect.gain >= SMALL * e.gain]
+    beside = [*(of_any_form(search.blocks, e) for e in larger), *own, effect]
     return _borne(search, beside, search.without(beside)[-1], effect) >= EVIDENCE_LEAST
 
 
