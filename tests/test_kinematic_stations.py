@@ -196,6 +196,23 @@ def test_a_play_and_as_much_give_are_both_named_and_little_give_is_the_plays_for
     assert Station.forms.fget(SimpleNamespace(proven=(play_, of("series_elasticity", 1.1), other))) == ()
 
 
+def test_a_play_that_a_smaller_give_nearly_stands_in_for_is_named_beside_it() -> None:
+    """Whatever either takes alone: of one family the larger one stands; another that takes as little does not."""
+
+    def of(name: str, size: float, share: float) -> SimpleNamespace:
+        return SimpleNamespace(term=SimpleNamespace(effect=effect(name)), size=size, share=share)
+
+    give, play_, other = (
+        of("linkage_compliance", 0.8, 0.9),
+        of("linkage_backlash", 1.6, 0.02),
+        of("distal_stop", 1.6, 0.02),
+    )
+    small = of("linkage_backlash", 0.7, 0.02)
+    for proven, kept in (((give, play_, other), (give, play_)), ((give, small), (give,))):
+        station = SimpleNamespace(proven=proven, forms=())
+        assert Station._beside.fget(station) == kept
+
+
 def test_deadband_and_stop_are_told_apart_and_placed() -> None:
     deadband = named(joint(3, move=lambda x: np.maximum(x, 9.0)), "linkage")
     assert list(deadband) == ["coupling_deadband"]

@@ -206,19 +206,15 @@ class Station:
 
     @property
     def _beside(self) -> tuple[Named, ...]:
-        return tuple(f for f in self.proven if (f.share >= SMALL or f is self.proven[0]) and f not in self.forms)
+        large = [f for f in self.proven if f.share >= SMALL or f is self.proven[0]]
+        return tuple(
+            f for f in self.proven if (f in large or any(_outgrows(f, g) for g in large)) and f not in self.forms
+        )
 
     @property
     def forms(self) -> tuple[Named, ...]:
         """What adds little beside another of its family: a play with a mass that floats in it gives a little, too."""
-        return tuple(
-            f
-            for f in self.proven
-            for g in self.proven
-            if f.term.effect.family is not None
-            and f.term.effect.family == g.term.effect.family
-            and f.size < ALIKE * g.size
-        )
+        return tuple(f for f in self.proven for g in self.proven if _related(f, g) and f.size < ALIKE * g.size)
 
     @property
     def contrast(self) -> float:
@@ -239,6 +235,16 @@ class Station:
         stands = self.kept if self.believed or in_part else ()
         names = ", ".join(f.term.effect.name for f in stands) or "unexplained"
         return f"{place}: {names} (p {self.naming.before.p:.2g} -> {self.naming.after.p:.2g})"
+
+
+def _related(one: Named, other: Named) -> bool:
+    """Whether both are of one family."""
+    return one.term.effect.family is not None and one.term.effect.family == other.term.effect.family
+
+
+def _outgrows(one: Named, other: Named) -> bool:
+    """Whether one does more than another of its family: what either takes alone is little, for the other stands in."""
+    return _related(one, other) and one.size > other.size
 
 
 def _stands(naming: Naming, named: Named, which: int, least: float) -> bool:

@@ -30,7 +30,7 @@ from .variants import Variant, all_free, begun, free_declared
 
 RESAMPLES = 500
 MOST_SEARCHES = 2
-SMALL = 0.005
+SMALL = 0.005  # of the declared squared error: less beside an earlier effect may be its form being another
 Taken = tuple[Variant, Round]
 Ends = Mapping[str, tuple[float, float]]
 
