@@ -172,6 +172,7 @@ def test_what_one_effect_hides_is_sought_beside_another(monkeypatch: pytest.Monk
     declared = fit_stages([swing], [Task(tuple(line), vector(line), ())], 12)[0]
     taken = swing_compete.compete_swing([swing], declared, 1e-4)
     assert {v.effect for v, _ in taken} == ({"drive_sag", "stribeck_friction"} if planted else set())
+    assert all([v.key] == [key for key, _ in r.rivals] for v, r in taken[:2])
     assert [r.variant for _, r in taken] == [v for v, _ in taken] and [len(r.taken) for _, r in taken] == [1, 2][
         : len(taken)
     ]

@@ -122,8 +122,11 @@ def compete_swing(
             if both is not None:
                 first, second = pairs[both[0]].variants
                 current, taken = pairs[both[0]].rival.fit, (first, second)
-                rounds = [replace(both[1], variant=v, equals=(v.effect,), fit=current, taken=taken) for v in taken]
-                rounds[0] = replace(rounds[0], fit=pairs[both[0]].alone, taken=(first,))
+                alone, said = pairs[both[0]].alone, both[1]
+                rounds = [
+                    replace(said, variant=v, rivals=((v.key, said.probability),), equals=(v.effect,), fit=f, taken=some)
+                    for v, f, some in ((first, alone, (first,)), (second, current, taken))
+                ]
                 continue
         if found is None:
             break
