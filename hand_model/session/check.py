@@ -25,6 +25,9 @@ UNIT_RATIO = 1.5
 # noise of a coordinate this many times over, for then a frame's turn is known to a third of a radian.
 FLATNESS = 0.01
 OFF_LINE_OVER_NOISE = 3.0
+# times what the noise of distances lets markers on a line seem to be off it: a second principal length goes with the
+# square root of what the first one's square is wrong by
+CHANCE = 1.5
 # Fewer frames than this show no flexion.
 FLEXION_FRAMES = 10
 # The longest sampling interval [s] of a log whose `time` can be in seconds.
@@ -100,7 +103,7 @@ def check_mocap(session: Session, trial: Trial, mocap: Mocap) -> list[str]:
             )
         if (
             len(labels) >= 3
-            and on_a_line(position)
+            and on_a_line(position, hinged=body not in ("palm", "probe"))
             and not (body == "probe" and session.probe.position_probe is not None)
         ):
             raise SessionError(
@@ -169,10 +172,12 @@ def flatness(position: Array) -> float:
     return second / first if first > 0 else 0.0
 
 
-def on_a_line(position: Array) -> bool:
-    """Whether markers (n, k, 3) [m] of a rigid body lie on one line, as far as a frame of them shows."""
+def on_a_line(position: Array, hinged: bool = False) -> bool:
+    """Whether markers (n, k, 3) [m] of a rigid body lie on one line, as far as a frame of them shows; of a body that a
+    hinge carries, whose turns need not be read frame by frame, as far as all frames together show."""
     first, second, noise = _principal(position)
-    return second <= max(FLATNESS * first, OFF_LINE_OVER_NOISE * noise)
+    by_chance = CHANCE * np.sqrt(first * noise) / len(position) ** 0.25 if hinged else np.inf
+    return bool(second <= max(FLATNESS * first, min(by_chance, OFF_LINE_OVER_NOISE * noise)))
 
 
 def _principal(position: Array) -> tuple[float, float, float]:
