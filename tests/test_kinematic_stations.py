@@ -13,10 +13,11 @@ from hand_model.diagnose.locate.slips import _swaps
 from hand_model.diagnose.name.selection import name_effects
 from hand_model.diagnose.name.station import Station, judged
 from hand_model.effects import catalogue, effect, outsiders
+from hand_model.effects.backlash import GRADUAL
 from hand_model.effects.base import DriveState
 from hand_model.effects.driven import driven, play, soft_play
 from hand_model.effects.law import Moment
-from hand_model.effects.path import lowpass
+from hand_model.effects.path import dahl, lowpass
 from hand_model.identify.chain import ChainData
 from hand_model.identify.repair import Swap, repair_labels
 
@@ -194,6 +195,20 @@ def test_a_play_and_as_much_give_are_both_named_and_little_give_is_the_plays_for
     play_, little, other = of("drive_backlash", 3.0), of("series_elasticity", 0.9), of("encoder_periodic_error", 0.1)
     assert Station.forms.fget(SimpleNamespace(proven=(play_, little, other))) == (little,)
     assert Station.forms.fget(SimpleNamespace(proven=(play_, of("series_elasticity", 1.1), other))) == ()
+
+
+@pytest.mark.parametrize(("station", "name"), [("encoder", "drive_backlash"), ("linkage", "linkage_backlash")])
+def test_a_gap_that_is_crossed_gradually_is_no_give(station: str, name: str) -> None:
+    """Two thirds of it within a way of its own, as long as that is: no load does so."""
+    states = joint(3, move=lambda x: x - 0.5 * 1.8 * dahl(x, 5.0), noise=0.2)
+    (found,) = judged("markers", "index", "index", "distal", states, catalogue(station)).kept
+    shape = found.term.shape
+    assert found.term.effect.name == name and shape["form"] == GRADUAL
+    assert shape["gap"] == pytest.approx(1.8, rel=0.1) and shape["reach"] == pytest.approx(5.0, rel=0.25)
+    said = effect(name).sentence({}, effect(name).parameters(shape, {}, {}))
+    assert "gradually" in said and "give" not in said
+    plain = effect(name).parameters({**shape, "form": 0.0}, {}, {})
+    assert "reach" not in plain and "gradually" not in effect(name).sentence({}, plain)
 
 
 def test_a_play_that_a_smaller_give_nearly_stands_in_for_is_named_beside_it() -> None:

@@ -9,9 +9,11 @@ import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
 from .driven import driven, path_behind, segment_gap, soft_play
+from .path import dahl
 
-HARD, SOFT, HARD_BEHIND, SOFT_BEHIND = 0.0, 1.0, 2.0, 3.0
+HARD, SOFT, HARD_BEHIND, SOFT_BEHIND, GRADUAL = 0.0, 1.0, 2.0, 3.0, 4.0
 SOFTNESS = 0.5
+RARE = 4.0  # log evidence that a gap which is crossed gradually must bring beyond one with ends
 
 
 class Backlash(Effect):
@@ -22,7 +24,8 @@ class Backlash(Effect):
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """Full width of the gap in the driver's unit; form 0: at the driver, hard ends; form 1: ends that give (half to
-        one and a half gap); forms 2 and 3: the same at what follows, that wide where its map has its mean slope."""
+        one and a half gap); forms 2 and 3: the same at what follows, that wide where its map has its mean slope; form
+        4: crossed gradually, two thirds of it within a reach of its own (Dahl 1968), as cables and soft teeth do."""
         low, high = position_range(states)
         span = high - low
         return (
@@ -34,8 +37,14 @@ class Backlash(Effect):
                 tuple(span * np.geomspace(0.002, 0.1, 8)),
                 True,
             ),
-            Shape("form", "1", HARD, SOFT_BEHIND, (HARD, SOFT, HARD_BEHIND, SOFT_BEHIND)),
+            Shape("form", "1", HARD, GRADUAL, (HARD, SOFT, HARD_BEHIND, SOFT_BEHIND, GRADUAL)),
+            Shape("reach", states[0].position_unit, 0.015 * span, 0.2 * span, (0.03 * span, 0.08 * span)),
         )
+
+    def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
+        """Every reach of what is crossed gradually."""
+        points = super().grid(states)
+        return [p for p in points if p["form"] == GRADUAL or p["reach"] == points[0]["reach"]]
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """No amplitude: the map is fitted anew behind the gap."""
@@ -43,17 +52,36 @@ class Backlash(Effect):
 
     def declared(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """The map's columns of the position behind the gap."""
+        if shape["form"] == GRADUAL:
+            return driven(state, lambda x: x - 0.5 * shape["gap"] * dahl(x, shape["reach"]))
         softness = SOFTNESS if gives_way(shape) else 0.0
         if shape["form"] < HARD_BEHIND:
             return driven(state, lambda x: soft_play(x, shape["gap"], softness))
         path, rate = path_behind(state)
         return driven(state, lambda x: x + (soft_play(path, shape["gap"], softness) - path) / rate)
 
+    def parameters(
+        self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]
+    ) -> dict[str, float]:
+        """The gap and its form; the reach of what is crossed gradually."""
+        return {name: value for name, value in shape.items() if name != "reach" or shape["form"] == GRADUAL}
+
+    def log_prior(self, parameters: Mapping[str, float]) -> float:
+        """Most gaps have ends."""
+        return -RARE if parameters["form"] == GRADUAL else 0.0
+
     def further(
         self, states: tuple[DriveState, ...], parameters: Mapping[str, Mapping[str, Any]]
     ) -> dict[str, dict[str, Any]]:
         """The gap as what follows shows it."""
         return {"segment_gap": segment_gap(states, parameters["gap"])}
+
+
+def ends(parameters: Mapping[str, float]) -> str:
+    """What a sentence says of how a gap ends; nothing of a hard one."""
+    if parameters.get("form", HARD) == GRADUAL:
+        return f", gradually, two thirds of it within {parameters['reach']:.1f}"
+    return ", with ends that give" if gives_way(parameters) else ""
 
 
 def gives_way(parameters: Mapping[str, float]) -> bool:

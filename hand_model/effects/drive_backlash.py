@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from .backlash import Backlash, gives_way
+from .backlash import Backlash, ends
 from .input import map_of, write_play
 
 
@@ -18,9 +18,8 @@ class DriveBacklash(Backlash):
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """How much motion is lost, on both sides."""
         seen = f", {parameters['segment_gap']:.2f} deg of the segment" if "segment_gap" in parameters else ""
-        ends = ", with ends that give" if gives_way(parameters) else ""
         segment, gap = where.get("joint") or "proximal", parameters["gap"]
-        return f"the {segment} segment loses {gap:.2f} % of the encoder's range when the motion turns{seen}{ends}"
+        return f"the {segment} segment loses {gap:.2f} % of the encoder's range when the motion turns{seen}{ends(parameters)}"
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """An input joint behind the motor joint, within the gap."""

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from .backlash import Backlash, gives_way
+from .backlash import Backlash, ends
 from .input import map_of, write_play
 
 
@@ -19,9 +19,8 @@ class LinkageBacklash(Backlash):
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """How much motion is lost, on both sides."""
         seen = f", {parameters['segment_gap']:.2f} deg of the segment" if "segment_gap" in parameters else ""
-        ends = ", with ends that give" if gives_way(parameters) else ""
         segment, gap = where.get("joint") or "distal", parameters["gap"]
-        return f"the {segment} segment loses {gap:.2f} deg of the joint before it when the motion turns{seen}{ends}"
+        return f"the {segment} segment loses {gap:.2f} deg of the joint before it when the motion turns{seen}{ends(parameters)}"
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
         """An input joint behind the driver, within the gap."""
