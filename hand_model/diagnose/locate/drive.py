@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...effects.base import DriveState
-from ...effects.path import dahl, from_rest
+from ...effects.path import from_rest
 from ...session import Log, Session, Trial
+from ..name.bristles import bristled
 from .doubt import with_doubt
 from .measurement import coefficients, extremes, is_measured
 from .motion import Motion, estimate_motion, sure_acceleration
@@ -217,10 +218,8 @@ def steady(time_s: Array, motion: Motion) -> NDArray[np.bool_]:
 def with_coulomb(state: DriveState, give: float, granted: float) -> DriveState:
     """The state with a Dahl column of that bristle length [%] as its Coulomb friction. granted: the longest that is no
     presliding."""
-    declared = np.array(state.declared)
-    declared[:, state.declared_names.index("coulomb")] = dahl(state.position, give)
-    extra = {**state.extra, "give": np.full(len(state.time_s), give), "granted": np.full(len(state.time_s), granted)}
-    return replace(state, declared=declared, extra=extra)
+    state = bristled(state, give)
+    return replace(state, extra={**state.extra, "granted": np.full(len(state.time_s), granted)})
 
 
 def with_required(states: tuple[DriveState, ...]) -> tuple[DriveState, ...]:
@@ -272,10 +271,8 @@ def _misfit(states: Sequence[DriveState], give: float) -> tuple[float, float]:
     """Squared error of the declared balance with bristles of that length [%], and its Coulomb friction."""
     columns, efforts = [], []
     for state in states:
-        declared = np.array(state.declared)
-        declared[:, 2] = dahl(state.position, give)
         seen = np.isfinite(state.effort)
-        columns.append(declared[seen])
+        columns.append(bristled(state, give).declared[seen])
         efforts.append(state.effort[seen])
     a, y = np.concatenate(columns), np.concatenate(efforts)
     found = coefficients(a, y)

@@ -20,8 +20,7 @@ def dry_friction(
         friction = friction + p["load_gear"] * np.abs(external - shaft)
     if has["load_motor"] or has["load_external"]:
         friction = friction + np.abs(p["load_external"] * external - p["load_motor"] * shaft)
-    some = has["load_carried"] or has["load_carried_low"]
-    carried = external - p["bodies"] * p["acceleration"] if some else external
+    carried = external - p["bodies"] * p["acceleration"] if has["carried"] else external
     if has["load_carried"]:
         friction = friction + p["load_carried"] * np.abs(carried)
     if has["low"]:

@@ -180,7 +180,7 @@ def _run(swing: Swing, theta: Array, lanes: Array, steps: int, residual: bool) -
     p, has = constants(swing, theta, lanes)
     q, v = np.array([swing.lanes[i].start for i in lanes]).T.copy()
     h = swing.step_s
-    carried, p["acceleration"] = any(has[n] for n in CARRIED), np.zeros(len(lanes))
+    p["acceleration"] = np.zeros(len(lanes))
     drive = _drive(swing, theta, lanes, has, steps) if swing.driven else None
     # Semi-implicit Euler is leapfrog when the velocity starts half a step early: second order instead of first.
     if not swing.driven:
@@ -193,7 +193,7 @@ def _run(swing: Swing, theta: Array, lanes: Array, steps: int, residual: bool) -
             if has["stiffness"]:
                 external -= p["stiffness"] * q
             before, v = v, _next_speed(p, has, v, external, None if drive is None else drive[k])
-            if carried:
+            if has["carried"]:
                 p["acceleration"] = followed(p["acceleration"], v - before, h)
             q = q + h * v
         if residual:
@@ -213,6 +213,7 @@ def constants(swing: Swing, theta: Array, lanes: Array) -> tuple[dict[str, Array
     p = {name: np.ascontiguousarray(theta[:, i]) for name, i in INDEX.items()}
     has = {name: bool(np.any(values)) for name, values in p.items()}
     has["low"] = any(has[k] for k in LOW_SPEED)
+    has["carried"] = any(has[k] for k in CARRIED)
     has["exponent"] = bool(np.any(p["stribeck_exponent"] != NEUTRAL["stribeck_exponent"]))
     has["dry"] = has["low"] or any(has[k] for k in (*BY_LOAD, "asymmetry"))
     has["wet"] = any(has[k] for k in ("load_speed", "drag", "damping_asymmetry"))
