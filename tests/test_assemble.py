@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from hand_model.diagnose.assemble import (
@@ -19,6 +20,8 @@ from hand_model.diagnose.assemble import (
 )
 from hand_model.diagnose.findings import Finding, weighed
 from hand_model.diagnose.hearing import _without_settled_sags
+from hand_model.diagnose.locate.answers import Answers
+from hand_model.diagnose.locate.command import CommandFacts
 from hand_model.diagnose.locate.displacement import NO_HINGE
 from hand_model.diagnose.locate.preload import COMPARISON
 from hand_model.effects import effect
@@ -223,16 +226,17 @@ def test_angles_of_markers_that_leave_segments_or_hinge_need_names_that_leave_no
 def test_a_loss_of_speed_is_named_once_and_not_where_the_current_is_cut_or_friction_grows_with_the_load(
     named: str, figures: dict[str, dict[str, float]], believed: bool, stays: bool
 ) -> None:
-    term = SimpleNamespace(effect=effect(named))
+    term = SimpleNamespace(effect=effect(named), shape={"limit": 60.0})
     naming = SimpleNamespace(fit=SimpleNamespace(terms=(term,)))
     kept = [SimpleNamespace(term=term)]
+    facts = {"index": CommandFacts(Answers(np.zeros(0), np.zeros(0), 0.018), *[float("nan")] * 5)}
     station = SimpleNamespace(actuator="index", believed=believed, kept=kept, naming=naming, parameters={0: figures})
     mine, other = (
         (1.0, finding("drive_sag", "index", "command", sag=0.1)),
         (1.0, finding("drive_sag", "ring", "command", sag=0.1)),
     )
     late = (1.0, finding("command_delay", "index", "command", delay=0.05))
-    assert _without_settled_sags([mine, other, late], [station]) == ([mine] if stays else []) + [other, late]
+    assert _without_settled_sags([mine, other, late], [station], facts) == ([mine] if stays else []) + [other, late]
 
 
 def test_a_session_without_a_balance_claims_no_figures() -> None:

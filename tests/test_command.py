@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hand_model.diagnose.locate.answers import Answers, lateness
-from hand_model.diagnose.locate.command import command_facts, command_findings
+from hand_model.diagnose.locate.command import command_facts, command_findings, sags_beneath
 from hand_model.effects.base import DriveState
 
 STEP_S, VISCOUS, LIMIT = 0.018, 0.15, 66.0
@@ -132,6 +132,19 @@ def test_a_sag_is_told_for_sure_by_one_reading_and_likely_by_the_other(
     facts = command_facts((state,), (current,))
     facts = replace(facts, sag_se=facts.sag / sag_t, settled_se=facts.settled / settled_t)
     assert bool(command_findings({"index": facts}, {"index": "index"}, {})) == told
+
+
+@pytest.mark.parametrize(("profile", "told"), [(sagging, True), (healthy, False)])
+def test_a_sag_beside_a_reading_that_clips_is_told_by_strokes_that_stay_below(profile, told: bool) -> None:
+    """The faster strokes reach the limit where they flex."""
+
+    def clipped(profile, seed: int) -> tuple[tuple[DriveState, ...], tuple[np.ndarray, ...]]:
+        state, current = strokes(profile, seed, repeats=8, noise=1.0)
+        return (state,), (np.clip(current, -72.0, 72.0),)
+
+    facts = {"index": command_facts(*clipped(profile, 0)), "ring": command_facts(*clipped(healthy, 1))}
+    assert sags_beneath(facts, "index", 72.0) is told
+    assert not sags_beneath(facts, "index", 20.0)  # nothing is left that tells
 
 
 def test_a_stroke_that_ends_slowly_is_at_no_limit() -> None:

@@ -15,7 +15,7 @@ from ..session import Log, Session, check_session, moves
 from .findings import Finding
 from .finger import FingerReading, finger_calls
 from .locate.angles import FingerAngles
-from .locate.command import CommandFacts, command_facts, command_findings, refused
+from .locate.command import CommandFacts, command_facts, command_findings, refused, sags_beneath
 from .locate.course import FingerCourses
 from .locate.decoupled import pulls, while_driven, without_excursions
 from .locate.drive import drive_states, drive_trials, opposes, too_short
@@ -42,6 +42,7 @@ class Heard:
         self.notes = [*check_session(session, dead=True), *too_short(session)]
         self.fingers: dict[str, FingerAngles] = {}
         self.courses: dict[str, FingerCourses] = {}
+        self.facts: dict[str, CommandFacts] = {}
         self.stations: list[Station] = []
         distrusted = _distrusted(session)
         self.unexplained = [_false_stamps(session, a, s) for a, s in distrusted.items()]
@@ -108,7 +109,7 @@ class Heard:
         self, drives: Mapping[str, tuple[DriveState, ...]], simulated: Mapping[str, SimulatedDrive]
     ) -> dict[str, CommandFacts]:
         """What the drives did of what they were told."""
-        facts = _command(self.session, drives)
+        facts = self.facts = _command(self.session, drives)
         self.found += command_findings(facts, {a: _finger_of(self.session, a) for a in facts}, simulated)
         for _, finding in self.found:
             self.tell(finding.statement)
@@ -129,21 +130,22 @@ class Heard:
         self.stations, odd = with_weights(self.session, self.fingers, self.stations, calls)
         for _, finding in odd:
             self.tell(finding.statement)
-        self.found = _without_settled_sags([*self.found, *odd], self.stations)
+        self.found = _without_settled_sags([*self.found, *odd], self.stations, self.facts)
 
 
 def _without_settled_sags(
-    found: list[tuple[float, Finding]], stations: Sequence[Station]
+    found: list[tuple[float, Finding]], stations: Sequence[Station], facts: Mapping[str, CommandFacts]
 ) -> list[tuple[float, Finding]]:
     """Without losses of speed of drives whose current settles the matter: a reading that clips says little of the load
-    on which such a sag is judged, one that the current shows, too, is named there, with a law to write, and friction
-    that plainly grows with the load is a reason for a soft controller to fall behind."""
+    on which such a sag is judged (it stands where strokes that stay below show it), one that the current shows, too, is
+    named there, with a law to write, and friction that plainly grows with the load is a reason for a soft controller to
+    fall behind."""
     settled = {
         s.actuator
         for s in stations
         if s.believed
         for which, f in ((s.naming.fit.terms.index(f.term), f) for f in s.kept)
-        if f.term.effect.clips
+        if (f.term.effect.clips and not sags_beneath(facts, s.actuator, f.term.shape["limit"]))
         or f.term.effect.name == "drive_sag"
         or f.term.effect.name == "load_dependent_friction"
         and magnitude("load_dependent_friction", _values(s.parameters[which])) > REASON

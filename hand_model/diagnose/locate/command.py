@@ -14,7 +14,7 @@ from ..findings import UNWRITTEN, Finding, weighed
 from .answers import Answers, answers_of, lateness
 from .ceiling import Ceiling
 from .simulated import SimulatedDrive
-from .strokes import LEAST_LOSS, ceiling, sag, settled_sag, strokes_of
+from .strokes import LEAST_LOSS, Stroke, beneath, ceiling, sag, settled_sag, strokes_of
 
 Array = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ class CommandFacts:
     range of loads [raw]; nan where strokes do not tell. settled, settled_se: share of the speed that is lost over the
     loads where strokes are compared at equal times after their starts, and its standard error. ceiling: current [raw]
     at which the drive is at its limit, or nan; cut: the weight of what it takes away; share_cut: of the time at steady
-    speed in which more would be needed. strokes: how many tell the sag. trials: names of the recordings."""
+    speed in which more would be needed. strokes: that tell the sag. trials: names of the recordings."""
 
     answers: Answers
     sag: float
@@ -44,7 +44,7 @@ class CommandFacts:
     ceiling: float = float("nan")
     cut: float = 0.0
     share_cut: float = 0.0
-    strokes: int = 0
+    strokes: tuple[Stroke, ...] = ()
     trials: tuple[str, ...] = ()
 
     @property
@@ -61,7 +61,7 @@ def command_facts(states: tuple[DriveState, ...], currents: tuple[Array, ...]) -
         *sag(strokes),
         *settled_sag(strokes),
         *ceiling(strokes),
-        len(strokes),
+        tuple(strokes),
         tuple(s.trial for s in states),
     )
 
@@ -93,6 +93,14 @@ def _sags(fact: CommandFacts, others: Sequence[CommandFacts]) -> bool:
     told = sorted((fact.sag / fact.sag_se, fact.settled / fact.settled_se))
     sure = told[0] > LIKELY_T and told[1] > SURE_T and min(fact.lost, fact.settled) > LEAST_LOSS
     return bool(sure and fact.lost > ALIKE * usual and fact.lost - usual > LEAST_LOSS)
+
+
+def sags_beneath(facts: Mapping[str, CommandFacts], actuator: str, limit: float) -> bool:
+    """Whether a drive loses speed in strokes whose current stays below a limit [raw] of its reading: such a reading
+    says little of the load of others."""
+    strokes = beneath(facts[actuator].strokes, limit)
+    fact = CommandFacts(facts[actuator].answers, *sag(strokes), *settled_sag(strokes))
+    return _sags(fact, [f for a, f in facts.items() if a != actuator])
 
 
 def with_lateness(
@@ -247,6 +255,6 @@ def _sag_finding(actuator: str, finger: str | None, fact: CommandFacts) -> tuple
         "engine": "strokes",
     }
     text = f"The {actuator} motor loses {100 * loss:.1f} % of its speed over the recorded loads."
-    per_stroke = fact.sag / fact.sag_se / np.sqrt(fact.strokes)
+    per_stroke = fact.sag / fact.sag_se / np.sqrt(len(fact.strokes))
     where, weight = _where(actuator, finger), weighed(per_stroke, per_stroke / max(loss, 1e-9))
     return weight, Finding("drive_sag", ("drive_sag",), 0.999, (), where, text, parameters, fit, dict(UNWRITTEN))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -19,6 +20,7 @@ RUNNING = 0.7  # of its median speed: slower at either end, a stroke still start
 # of the speed, over the recorded loads: less is within what controllers do (the most of 560 healthy drives 0.029)
 LEAST_LOSS = 0.035
 NEARLY_MOST = 0.9  # quantile of the speed that is lost beyond a limit
+NEAR = 0.95  # of a limit: a reading there may be cut
 FULL_SPEED = 0.9  # of the way, in which strokes of one commanded speed are no faster than at full speed
 AT_SPEED = 0.9  # of that, from which a drive does what it is told
 # of the current beyond its limit that a drive takes from its speed: one, but for noise in the limit
@@ -70,6 +72,11 @@ def strokes_of(states: tuple[DriveState, ...], currents: tuple[Array, ...]) -> l
                     )
                 )
     return out
+
+
+def beneath(strokes: Sequence[Stroke], limit: float) -> list[Stroke]:
+    """Those whose current hardly ever comes near a limit [raw]."""
+    return [s for s in strokes if np.quantile(np.abs(s.current), NEARLY_MOST) < NEAR * limit]
 
 
 def _load_rise(strokes: list[Stroke]) -> dict[float, np.poly1d]:
