@@ -15,7 +15,6 @@ from hand_model.diagnose.assemble import (
     _of_hinges,
     _shared,
     _without_shadows,
-    _without_tilts,
     assemble,
 )
 from hand_model.diagnose.findings import Finding, weighed
@@ -61,13 +60,6 @@ def test_a_small_load_beside_an_encoder_error_of_the_same_motor_is_its_shadow_an
     assert _without_shadows([error, (0.2, large)], []) == [error, (0.2, large)]  # for one of its kind
     assert _without_shadows([error, (0.8, load)], []) == [error, (0.8, load)]
     assert _without_shadows([error, (0.08, periodic("detent_load", "ring", 1.0)[1])], [])[1:]
-
-
-def test_a_trifle_in_the_angles_of_a_finger_whose_joint_wobbles_is_no_finding_and_another_finger_s_is() -> None:
-    wobble, (_, lead) = periodic("joint_wobble", "index", 1.0), periodic("spring_decoupling", "index", 1.0)
-    drift, other = periodic("clock_drift", "index", 1.0), periodic("spring_decoupling", "ring", 1.0)[1]
-    assert _without_tilts([wobble, (0.1, lead)]) == [wobble]
-    assert len(_without_tilts([wobble, (0.4, lead), (0.1, drift[1]), (0.1, other)])) == 4
 
 
 def with_share(weight: float, effect: str, finger: str, signal: str, share: float) -> tuple[float, Finding]:

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from hand_model.diagnose.locate.answers import Answers, lateness
-from hand_model.diagnose.locate.command import command_facts, command_findings, sags_beneath
+from hand_model.diagnose.locate.command import command_facts, command_findings, sags_beneath, with_lateness
+from hand_model.diagnose.locate.simulated import SimulatedDrive
 from hand_model.effects.base import DriveState
 
 STEP_S, VISCOUS, LIMIT = 0.018, 0.15, 66.0
@@ -290,3 +291,22 @@ def test_a_soft_controller_is_slow_and_not_late() -> None:
 
 def test_answers_too_few_say_nothing() -> None:
     assert not lateness({"index": Answers(np.full(4, 0.09), np.full(4, 0.09), STEP_S)})
+
+
+def test_what_one_simulated_drive_says_of_its_current_is_held_against_answers_to_commands() -> None:
+    """How the log is read is in the lateness of the one that was simulated; of two the other tells it."""
+    drives = {name: answering(0.0, seed) for seed, name in enumerate(("index", "ring"))}
+    facts = {name: command_facts((state,), (current,)) for name, (state, current) in drives.items()}
+    states = {name: (state,) for name, (state, _) in drives.items()}
+    early, prompt = SimulatedDrive("index", -0.02, 2e-3), SimulatedDrive("ring", 0.0, 2e-3)
+    answers = lateness({name: f.answers for name, f in facts.items()})["index"]
+
+    def late(*simulated: SimulatedDrive) -> tuple[float, float]:
+        timed = with_lateness(states, facts, {d.actuator: d for d in simulated})
+        return tuple(timed["index"][0].extra["late"])
+
+    assert late() == pytest.approx((answers.channel_s, np.hypot(answers.doubt_s, 0.1 * answers.channel_s)))
+    assert late(early, prompt) == pytest.approx((-0.02, 2e-3))
+    value, doubt = late(early)
+    assert -0.01 < value < late()[0] and 2e-3 < doubt < late()[1]
+    assert late(replace(early, doubt_s=float("inf"))) == late()

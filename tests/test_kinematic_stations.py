@@ -224,7 +224,8 @@ def test_a_play_that_a_smaller_give_nearly_stands_in_for_is_named_beside_it() ->
     )
     small = of("linkage_backlash", 0.7, 0.02)
     for proven, kept in (((give, play_, other), (give, play_)), ((give, small), (give,))):
-        station = SimpleNamespace(proven=proven, forms=())
+        naming = SimpleNamespace(balance=SimpleNamespace(sigma=1.0))
+        station = SimpleNamespace(proven=proven, forms=(), naming=naming, tilt=0.0)
         assert Station._beside.fget(station) == kept
 
 
@@ -458,3 +459,16 @@ def test_a_segment_held_back_for_a_while_gives_no_more_than_others(met: bool) ->
     findings = assemble([station], [(1.0, contact)] if met else [], [])
     assert [f.effect for f in findings.findings] == ["external_contact"] * met
     assert any("holds the distal segment back" in e["shape"] for e in findings.unexplained) is not met
+
+
+def test_a_departure_within_the_tilt_of_a_joint_that_is_no_hinge_does_not_stand_and_a_clock_does() -> None:
+    def bumped(t, x, v):
+        return 0.35 * np.sin(2 * np.pi * x / 31.0)
+
+    effects = [*catalogue("encoder"), *outsiders("encoder")]
+    station = judged("encoder", "index", "index", "proximal", joint(6, add=bumped, drift=2e-3), effects)
+    assert {f.term.effect.name for f in station.kept} == {"encoder_periodic_error", "clock_drift"}
+    station.tilt = 0.2  # [deg]
+    assert {f.term.effect.name for f in station.kept} == {"encoder_periodic_error", "clock_drift"}
+    station.tilt = 0.3
+    assert {f.term.effect.name for f in station.kept} == {"clock_drift"}

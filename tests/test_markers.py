@@ -10,10 +10,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from hand_model.diagnose.locate import markers
-from hand_model.diagnose.locate.blocks import _assembled
+from hand_model.diagnose.locate.blocks import _assembled, present_way, way_of_motion
 from hand_model.diagnose.locate.displacement import CREEP, NO_HINGE
-from hand_model.diagnose.locate.markers import MarkerNaming, named_in
-from hand_model.diagnose.locate.slips import _finding, unexplained
+from hand_model.diagnose.locate.markers import MarkerNaming, named_in, tilt
+from hand_model.diagnose.locate.slips import _finding, _turning, unexplained
 from hand_model.identify.chain import Chain
 
 BODY = np.repeat([0, 1, 2], 4)
@@ -147,6 +147,34 @@ def test_a_joint_with_play_tilts_to_the_side_that_its_motion_takes_it() -> None:
     assert naming.believed and places(naming) == {("joint_wobble", None)} and naming.p_after > 0.003
     assert naming.found[0].sides
     assert amount_of(naming)[0] == pytest.approx(0.012, rel=0.1)
+
+
+def test_at_rest_a_joint_moves_no_way_and_has_moved_one_before() -> None:
+    blocks = seen(slipping(0.4)).blocks
+    still = blocks.angle.copy()
+    still[60:90] = still[60]  # on its way back
+    blocks = replace(blocks, angle=still)
+    now, before = present_way(blocks, 1), way_of_motion(blocks, 1)
+    assert np.all(np.abs(now[62:88]) < 1e-9) and np.all(before[62:88] == before[59])
+    assert set(now[[10, 40, 100]]) == {1.0, -1.0} and np.all(now[[10, 40, 100]] == before[[10, 40, 100]])
+
+
+def test_a_step_that_is_small_beside_a_joint_with_play_is_not_told() -> None:
+    wobble = seen(tilting(lambda u, way: 0.012 * way), body=2).found[0]
+    step = replace(wobble, effect="support_slip", sides=False, begin=40, gain=0.01 * wobble.gain)
+    assert _turning([wobble, step], step) and not _turning([wobble, step], wobble)
+    assert not _turning([wobble, replace(step, gain=0.1 * wobble.gain)], replace(step, gain=0.1 * wobble.gain))
+    assert not _turning([replace(wobble, sides=False), step], step)
+
+
+def test_what_angles_may_owe_to_a_joint_that_is_no_hinge_grows_with_its_turn() -> None:
+    """A quarter of the turn, the whole where its way is unknown; nothing beside slips."""
+    small, large = (seen(tilting(lambda u, way, a=a: a * np.sin(np.pi * u)), body=2) for a in (0.006, 0.012))
+    assert tilt(seen(slipping(0.4))) == 0.0
+    assert tilt(large) == pytest.approx(2 * tilt(small), rel=0.05)
+    assert 0.0 < tilt(large) < 0.25 * np.rad2deg(0.012)
+    lost = replace(large, p_after=0.0, excess_after=large.excess_before)
+    assert not lost.believed and tilt(lost) > 2.0 * tilt(large)
 
 
 @pytest.mark.parametrize("waves", [0.65, 1.0, 1.4, 1.7])

@@ -32,7 +32,6 @@ UNLIKE_OTHERS = 2.0  # times the wander of the calmest finger
 HARMONICS = 4
 # of an encoder error's size, and of that of its kind: less, in the current of the same motor, may be what is left of it
 SHADOW = 0.5
-TILT = 0.2  # the same, of a wobble's or a travelling centre's, in the angles of the finger
 ANGULAR = {e.name for station in ("encoder", "linkage") for e in catalogue(station)} - {"clock_drift"}
 REFUSED = "command_as_measurement"  # a channel that tells nothing: no other finding is small beside it
 TRIFLE = 0.01  # of the square of the heaviest weight
@@ -93,7 +92,7 @@ def assemble(
     named = {(f.effect, f.where["finger"]) for _, f in ranked}
     unexplained += [outsider_of(s, f) for s, f in strange if (f.term.effect.part_of, s.finger) not in named]
     unexplained += [unrepeated_of(s) for s in stations if _wanders(s, stations)]
-    ranked = _without_tilts(_without_shadows(_one_clock(_of_hinges(ranked, unexplained)), stations))
+    ranked = _without_shadows(_one_clock(_of_hinges(ranked, unexplained)), stations)
     # how far a hinge that is none moves is told only beside what another hinge would explain: that it is none is sure
     # all the same
     sized = [
@@ -276,17 +275,6 @@ def _of_hinges(
     bent = {entry["where"]["finger"] for entry in unexplained if NO_HINGE in entry["shape"]}
     wrong = ANGULAR | {*HINGE, *SLIPS} if len(bent) > 1 else set()
     return [item for item in ranked if item[1].where["finger"] not in bent or item[1].effect not in wrong]
-
-
-def _without_tilts(ranked: list[tuple[float, Finding]]) -> list[tuple[float, Finding]]:
-    """Without what a joint that is no plain hinge leaves in its angle: small departures of that finger's angles are no
-    evidence."""
-    crooked = {f.where["finger"]: weight for weight, f in ranked if f.effect in HINGE}
-    return [
-        (weight, f)
-        for weight, f in ranked
-        if f.effect not in ANGULAR or weight >= TILT * crooked.get(f.where["finger"], 0.0)
-    ]
 
 
 def _merged(found: tuple[Named, ...]) -> list[tuple[Named, float, float]]:

@@ -22,7 +22,7 @@ from .locate.angles import (
 )
 from .locate.course import FingerCourses, finger_courses
 from .locate.decoupled import beside_excursions
-from .locate.markers import HINGE, corrected_angles, name_markers
+from .locate.markers import HINGE, corrected_angles, name_markers, tilt
 from .locate.slips import marker_findings, steps, with_steps
 from .locate.slips import unexplained as unexplained_of
 from .name.station import Station, judged
@@ -106,6 +106,8 @@ def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, f
             stations.append(
                 judged("markers", finger.name, finger.actuator, finger.segments[joint].name, states, effects)
             )
+    for station in stations:
+        station.tilt = tilt(markers)
     lines += [s.line() for s in stations]
     found = with_steps(found, seen, markers, {s.joint: s.naming.fit.declared for s in stations})
     return FingerReading(

@@ -18,6 +18,7 @@ BLOCK = 8  # frames averaged into one row block
 # blocks over which the noise is read, and the share of the usual variance from which it is louder
 LOUD_BLOCKS, LOUD = 5, 0.6
 TURNED = 0.02  # of a joint's range: over so much of it play changes sides
+RESTING = 0.1  # of a joint's fast speeds: slower it is about to stand
 LASTING_S = 2.0  # half of it is how long something must last that is no ghost
 
 
@@ -154,6 +155,17 @@ def way_of_motion(blocks: Blocks, joint: int) -> Array:
         if blocks.record[i] == blocks.record[i - 1]:
             out[i] = min(max(out[i - 1] + 2 * (u[i] - u[i - 1]) / TURNED, -1.0), 1.0)
     return out
+
+
+def present_way(blocks: Blocks, joint: int) -> Array:
+    """Which way (b,) a joint is moving: one while its angle grows, minus one while it falls, zero at rest."""
+    u, out = share_of_range(blocks, joint), np.zeros(len(blocks.time_s))
+    for r in np.unique(blocks.record):
+        rows = np.flatnonzero(blocks.record == r)
+        if len(rows) > 1:
+            out[rows] = np.gradient(u[rows], blocks.time_s[rows])
+    fast = float(np.quantile(np.abs(out), 0.9))
+    return np.clip(out / max(RESTING * fast, 1e-12), -1.0, 1.0)
 
 
 def project(blocks: Blocks, columns: Array) -> Array:

@@ -109,13 +109,19 @@ def with_lateness(
     simulated: Mapping[str, SimulatedDrive],
 ) -> dict[str, tuple[DriveState, ...]]:
     """The states with what is known of their current channel: "late" (2,) [s], by how much and its doubt, by the
-    simulated drive or by answers to commands; a late current shows starts and stops late as well, whatever model it is
-    held against."""
+    simulated drive or by answers to commands, or by both where no other drive was simulated: how the log is read is in
+    its lateness then, and may be a sample. A late current shows starts and stops late as well, whatever model it is held
+    against."""
     told = {
         a: (x.channel_s, float(np.hypot(x.doubt_s, UNLIKE * x.channel_s)))
         for a, x in lateness({a: f.answers for a, f in facts.items()}).items()
     }
-    told |= {a: (d.delay_s, d.doubt_s) for a, d in simulated.items() if a in drives and np.isfinite(d.doubt_s)}
+    by_simulation = {a: (d.delay_s, d.doubt_s) for a, d in simulated.items() if a in drives and np.isfinite(d.doubt_s)}
+    if len(by_simulation) == 1 < len(drives) and by_simulation.keys() <= told.keys():
+        ((actuator, (delay_s, doubt_s)),) = by_simulation.items()
+        step_s = float(np.median(np.diff(drives[actuator][0].time_s)))
+        by_simulation[actuator] = _weighted(told[actuator], (delay_s, float(np.hypot(doubt_s, step_s))))
+    told |= by_simulation
     out = dict(drives)
     for actuator, late in told.items():
         out[actuator] = tuple(
@@ -123,6 +129,12 @@ def with_lateness(
             for s in drives[actuator]
         )
     return out
+
+
+def _weighted(*readings: tuple[float, float]) -> tuple[float, float]:
+    """Mean of values with their doubts, by precision, and its doubt."""
+    value, precision = np.array([v for v, _ in readings]), 1.0 / np.array([max(d, 1e-9) for _, d in readings]) ** 2
+    return float(precision @ value / precision.sum()), float(precision.sum() ** -0.5)
 
 
 def _lasting(state: DriveState, late_s: float) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .angles import Step
-from .blocks import Blocks, across_axis, share_of_range, way_of_motion
+from .blocks import Blocks, across_axis, present_way, share_of_range, way_of_motion
 
 Array = NDArray[np.float64]
 
@@ -142,14 +142,14 @@ def _frames(blocks: Blocks, body: int, marker: int) -> list[Array]:
 def _no_hinge(blocks: Blocks, k: int) -> list[Candidate]:
     """Wobble and moving centre of joint k - 1, each with a few forms over its angle. The other axis of a wobble meets
     the hinge where the centre is taken to be, or passes anywhere: then what it carries is shifted in step with the
-    tilt. A pin with play changes sides with the way of motion."""
+    tilt. A pin with play changes sides with the way of motion; where friction tilts it, it comes back at rest."""
     b, m = blocks.weight.shape
     u = share_of_range(blocks, k - 1)[:, None]
-    way = way_of_motion(blocks, k - 1)[:, None]
-    functions = [u, u**2, u**3, *_waves(u, 2), *_waves(u, 3), *_waves(u, 4), way]
-    even, square, cube, *waves, side = range(len(functions))
-    wave = waves[:2]
-    forms = [[square], [square, cube], wave, [square, cube, *wave], [square, cube, *waves], [side]]
+    turns = [f(blocks, k - 1)[:, None] for f in (way_of_motion, present_way)]
+    functions = [u, u**2, u**3, *_waves(u, 2), *_waves(u, 3), *_waves(u, 4), *turns]
+    even, square, cube, *waves, last, present = range(len(functions))
+    wave, sides = waves[:2], ([last], [present])
+    forms = [[square], [square, cube], wave, [square, cube, *wave], [square, cube, *waves], *sides]
     moved = np.flatnonzero(blocks.body >= k)
     across = across_axis(blocks, k - 1)
     arm = blocks.position[:, moved] - blocks.centres[:, k - 1][:, None]
@@ -162,12 +162,12 @@ def _no_hinge(blocks: Blocks, k: int) -> list[Candidate]:
     def candidate(name: str, form: Sequence[int], which: Sequence[int]) -> Candidate:
         pick = tuple(len(ways) * f + way for f in form for way in which)
         shifted = tuple(way in shifts for _ in form for way in which)
-        return Candidate(name, k, None, base, False, shifts=shifted, pick=pick, sides=side in form)
+        return Candidate(name, k, None, base, False, shifts=shifted, pick=pick, sides=form in sides)
 
     out = []
     for form in forms:
         out += [candidate("joint_wobble", form, tilts), candidate("joint_wobble", form, tilts + shifts)]
-        if side not in form:
+        if form not in sides:
             out.append(candidate("moving_centre", form if form is wave else [even, *form], shifts))
     return out
 

@@ -31,6 +31,9 @@ SMALL = 0.03  # of what another brings: less may be no more than that one's form
 EXPLAINED_LEAST = 0.9  # of the misfit: below, the names are not believed
 SPELL = 12  # blocks, about a second, whose mean shows what stays correlated
 UNHINGED = (*HINGE, NO_HINGE)  # of joints that are no hinges: in step with the angle
+# of a turn that markers see, what it may have along the hinge, where nobody sees it: of one that follows a known way, and
+# of what is left beside it
+ALONG, LEFT = 0.25, 4.0
 SLIPS = ("marker_slip", "palm_marker_slip", "support_slip")
 
 
@@ -242,6 +245,30 @@ def _lack(residual: Array, blocks: Blocks) -> tuple[float, float]:
 
 def _bins(values: Array, count: int) -> NDArray[np.int64]:
     return np.searchsorted(np.quantile(values, np.linspace(0, 1, count + 1)[1:-1]), values)
+
+
+def tilt(naming: MarkerNaming) -> float:
+    """By how much [deg, root mean square] angles may depart where joints are no plain hinges: what turns segments, or
+    moves them, across the hinge, may do so along it, too. Of a known way a part, of what is left several times as much;
+    of no known way all of it."""
+    ways, unknown = [e for e in naming.found if e.effect in UNHINGED], naming.p_before < ALPHA and not naming.believed
+    if not ways and not unknown:
+        return 0.0
+    blocks = naming.blocks
+    apart = [
+        np.linalg.norm(own - own.mean(1, keepdims=True), axis=-1).max()
+        for own in (blocks.position[:, blocks.body == k] for k in np.unique(blocks.body[blocks.body > 0]))
+    ]
+
+    def turn_deg(excess: float) -> float:
+        size_m = naming.sigma_m * np.sqrt(max(excess, 0.0) / (3 * blocks.weight.size))
+        return float(np.rad2deg(size_m / np.median(apart)))
+
+    if unknown:
+        return turn_deg(naming.excess_before)
+    whole = turn_deg(min(sum(e.gain for e in ways), naming.excess_before))
+    share = 1.0 if any(e.effect == NO_HINGE for e in ways) else ALONG
+    return max(share * whole, LEFT * turn_deg(naming.excess_after))
 
 
 def corrected_angles(angles: FingerAngles, naming: MarkerNaming) -> FingerAngles:

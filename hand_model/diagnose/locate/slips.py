@@ -39,7 +39,7 @@ def marker_findings(angles: FingerAngles, naming: MarkerNaming) -> list[tuple[fl
     if not naming.believed:
         return out
     groups: dict[tuple[str, int, str | None], list[MarkerEffect]] = {}
-    for effect in naming.found:
+    for effect in (e for e in naming.found if not _turning(naming.found, e)):
         groups.setdefault((effect.effect, effect.body, effect.label), []).append(effect)
     least = _least(naming)
     for (name, body, label), members in groups.items():
@@ -50,6 +50,12 @@ def marker_findings(angles: FingerAngles, naming: MarkerNaming) -> list[tuple[fl
         moved = float(np.sqrt(sum(e.gain for e in members) / readings))  # over the noise of one reading
         out.append((weighed(moved, _contrast(angles)), _finding(angles, naming, name, body, label, members)))
     return out
+
+
+def _turning(found: Sequence[MarkerEffect], effect: MarkerEffect) -> bool:
+    """Whether a step is small beside a joint that changes sides as the motion turns: it may do so a little later than is
+    taken here."""
+    return effect.begin is not None and any(e.sides and effect.gain < SMALL * e.gain for e in found)
 
 
 def _least(naming: MarkerNaming) -> float:

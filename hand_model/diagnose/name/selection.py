@@ -7,7 +7,7 @@ recording.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from typing import Any
 
@@ -98,7 +98,7 @@ def _named(
         if rival.name in _names(further) and not _doubled(other, further):
             balance, brought = other.wandering(_unrepeated(other, other.fit(further.terms))), {**brought, **more}
             pair = paired(balance.learning())
-            learned = refit(pair.state, pair.state.fit(further.terms))
+            learned = settle(pair, effects, further.terms)[1]  # beside other chance, another may explain it better
             fit = balance.fit(learned.terms)
     declared = balance.fit()
     before, after = _lacks(balance, declared, fit)
@@ -342,23 +342,18 @@ def _findings(pair: Pair, effects: tuple[Any, ...], fit: Fit) -> tuple[Named, ..
     """Each term with its rivals (every candidate in its place, small terms aside that may stand for one of them), its
     share and its probability; largest share first."""
     balance, found, terms = pair.state, [], fit.terms
-    losses = [
-        max(balance.fit(tuple(t for i, t in enumerate(terms) if i != which)).rss - fit.rss, 0.0)
-        for which in range(len(terms))
-    ]
+    left = [balance.fit(tuple(t for i, t in enumerate(terms) if i != which)) for which in range(len(terms))]
+    losses = [max(rest.rss - fit.rss, 0.0) for rest in left]
     large = [loss >= SMALL * sum(losses) for loss in losses]
     for which, term in enumerate(terms):
-        others = [i for i in range(len(terms)) if i != which and (large[i] or not large[which])]
-        rest = tuple(terms[i] for i in others)
-        without, beside = balance.fit(rest), fit if len(others) == len(terms) - 1 else balance.fit((*rest, term))
-        place = which if beside is fit else len(rest)
-        ranked = rank(pair, effects, rest, without, refine=3)
-        own = evidence(balance, beside, without, place, scale_of(balance, beside))
-        rivals = [r for r in ranked if r.name != term.effect.name]
-        rivals.append(
-            Rival(term.effect.name, max([own, *[r.evidence for r in ranked if r.name == term.effect.name]]), fit)
-        )
-        rivals.sort(key=lambda r: -r.evidence)
+        every = [i for i in range(len(terms)) if i != which]
+        others = [i for i in every if large[i] or not large[which]]
+        rivals = _in_place(pair, effects, fit, which, others)
+        if rivals[0].name != term.effect.name and others != every:
+            own, small = next(r for r in rivals if r.name == term.effect.name), [i for i in every if i not in others]
+            brought = sum(max(evidence(balance, fit, left[i], i, scale_of(balance, fit)), 0.0) for i in small)
+            if own.evidence + brought > rivals[0].evidence:  # they do not stand for it: together they explain more
+                rivals = _in_place(pair, effects, fit, which, every)
         weights = np.exp(np.array([r.evidence for r in rivals] + [0.0]) - max(rivals[0].evidence, 0.0))
         mine = [r.name for r in rivals].index(term.effect.name)
         share = losses[which] / max(sum(losses), 1e-12)
@@ -373,6 +368,18 @@ def _findings(pair: Pair, effects: tuple[Any, ...], fit: Fit) -> tuple[Named, ..
             )
         )
     return tuple(sorted(found, key=lambda f: -f.share))
+
+
+def _in_place(pair: Pair, effects: tuple[Any, ...], fit: Fit, which: int, others: Sequence[int]) -> list[Rival]:
+    """Every candidate in the place of a term, beside the terms `others` alone, and that term; best evidence first."""
+    balance, term = pair.state, fit.terms[which]
+    rest = tuple(fit.terms[i] for i in others)
+    without, beside = balance.fit(rest), fit if len(rest) == len(fit.terms) - 1 else balance.fit((*rest, term))
+    own = evidence(balance, beside, without, which if beside is fit else len(rest), scale_of(balance, beside))
+    ranked = rank(pair, effects, rest, without, refine=3)
+    same = [r.evidence for r in ranked if r.name == term.effect.name]
+    rivals = [r for r in ranked if r.name != term.effect.name] + [Rival(term.effect.name, max([own, *same]), fit)]
+    return sorted(rivals, key=lambda r: -r.evidence)
 
 
 def _size(balance: Balance, fit: Fit, which: int) -> float:

@@ -36,7 +36,8 @@ EXPLAINED_PARTLY = 0.5
 
 class Station:
     """One balance of one finger and what was named there. beside: reads its sizes again where more is known of the drive
-    than its own balance tells; compared: names of which other drives tell the size."""
+    than its own balance tells; compared: names of which other drives tell the size; tilt: root mean square, in the unit
+    of the balance, below which a departure of an angle may be what a joint that is no plain hinge leaves in it."""
 
     def __init__(
         self, signal: str, finger: str | None, actuator: str | None, joint: str | None, naming: Naming
@@ -46,6 +47,7 @@ class Station:
         self.reading = undisturbed(naming)
         self.beside: Callable[[Station], Station] | None = None
         self.compared: tuple[str, ...] = ()
+        self.tilt = 0.0
         least = EVIDENCE_LEAST + (np.log(CHANCES) if naming.before.p >= ALPHA else 0.0)
         stand = [
             places[id(f)]
@@ -208,7 +210,11 @@ class Station:
     def _beside(self) -> tuple[Named, ...]:
         large = [f for f in self.proven if f.share >= SMALL or f is self.proven[0]]
         return tuple(
-            f for f in self.proven if (f in large or any(_outgrows(f, g) for g in large)) and f not in self.forms
+            f
+            for f in self.proven
+            if (f in large or any(_outgrows(f, g) for g in large))
+            and f not in self.forms
+            and (f.size * self.naming.balance.sigma >= self.tilt or f.term.effect.name == "clock_drift")
         )
 
     @property
