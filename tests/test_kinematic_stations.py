@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from hand_model.diagnose.locate.decoupled import pulls
 from hand_model.diagnose.locate.excursions import with_excursions
 from hand_model.diagnose.locate.slips import _swaps
 from hand_model.diagnose.name.selection import name_effects
@@ -472,3 +473,17 @@ def test_a_departure_within_the_tilt_of_a_joint_that_is_no_hinge_does_not_stand_
     assert {f.term.effect.name for f in station.kept} == {"encoder_periodic_error", "clock_drift"}
     station.tilt = 0.3
     assert {f.term.effect.name for f in station.kept} == {"clock_drift"}
+
+
+@pytest.mark.parametrize(("lead", "pulled"), [(0.2, True), (0.08, True), (0.025, False)])
+def test_a_finger_that_stays_bent_takes_its_spring_off_the_drive_unless_it_is_a_trifle(
+    lead: float, pulled: bool
+) -> None:
+    """At its full, at two fifths and at a tenth of what a worn spring does."""
+
+    def stays(t, x, v):
+        return lead * np.maximum(20.0 - x, 0.0)
+
+    station = judged("encoder", "index", "index", "proximal", joint(4, add=stays, noise=0.2), catalogue("encoder"))
+    assert [f.term.effect.name for f in station.kept] == ["spring_decoupling"]
+    assert pulls(station) is pulled

@@ -91,7 +91,7 @@ class Heard:
             named, states = station.standing("spring_decoupling"), drives[station.actuator]
             if named is not None and named.term.shape["form"] < 0.5:
                 states = without_excursions(states, station.naming.balance.states, self.fingers[station.finger])
-            elif named is not None and pulls(station):  # else the spring stays on it: most of the range is worth more
+            elif named is not None and pulls(station):
                 states = while_driven(states, named.term.shape["below"])
             drives[station.actuator] = states
         for actuator in [a for a, states in drives.items() if not is_measured(states)]:

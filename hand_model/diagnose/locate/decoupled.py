@@ -12,13 +12,16 @@ from ...effects.base import DriveState, position_range
 from ...effects.spring_decoupling import spans
 from ...errors import IdentificationError
 from ...identify.clock import align
-from ..magnitude import SLIGHT, channel_figures, magnitude
+from ..magnitude import channel_figures, magnitude
 from ..name.station import Station
 from .angles import FingerAngles
 
 Array = NDArray[np.float64]
 
 BESIDE, MOST_S = 0.4, 1.0  # of an excursion's length, at most, on either side: it is seen from where it stands out
+# of the size at which a finger's lead is plain: less leaves nearly all of the spring on its drive, and most of the range
+# is worth more
+TRIFLE = 0.12
 CORNER = 0.2  # of the way on which the finger stays behind, beyond its end
 
 
@@ -28,7 +31,7 @@ def pulls(station: Station) -> bool:
     if named is None:
         return False
     values = {k: v["value"] for k, v in station.parameters[station.naming.fit.terms.index(named.term)].items()}
-    return magnitude("spring_decoupling", values, channel_figures(station.naming.balance.states)) >= SLIGHT
+    return magnitude("spring_decoupling", values, channel_figures(station.naming.balance.states)) > TRIFLE
 
 
 def while_driven(states: Sequence[DriveState], below: float) -> tuple[DriveState, ...]:
