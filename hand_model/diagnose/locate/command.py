@@ -18,7 +18,7 @@ from .strokes import LEAST_LOSS, Stroke, beneath, ceiling, sag, settled_sag, str
 
 Array = NDArray[np.float64]
 
-SURE_T, LIKELY_T = 10.0, 4.0  # standard errors of a loss by one of two readings, and by the other one
+SURE_T, LIKELY_T = 10.0, 6.0  # standard errors of a loss by one of two readings, and by the other one
 ALIKE = 2.0  # times the loss of speed of the session's least sagging drive: drives of one kind may differ by as much
 # log likelihood that a limit must bring: for an effect, for the limits that are tried, and for as many names of as many
 # channels
