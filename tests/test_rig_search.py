@@ -12,8 +12,9 @@ from hand_model.effects.path import jenkins
 from hand_model.rig import diagnose_rig, load_rig
 from hand_model.rig.diagnose import trusted_fit
 from hand_model.rig.laws import TURNING
+from hand_model.rig.name.beside import score
 from hand_model.rig.name.candidates import candidates
-from hand_model.rig.name.compete import _settled_down, borne_out, compete, score, splits
+from hand_model.rig.name.compete import _settled_down, borne_out, compete, splits
 from hand_model.rig.name.problem import Term, extended, normal, pose
 from hand_model.session import read_session
 

@@ -15,8 +15,9 @@ from rig_bench import ARM, Motion, recorded
 from hand_model.rig import load_rig
 from hand_model.rig.diagnose import _rank, trusted_fit
 from hand_model.rig.findings import Finding
+from hand_model.rig.name.beside import Beside, score
 from hand_model.rig.name.candidates import Candidate, candidates
-from hand_model.rig.name.compete import LEAST_SHARE, _met, compete, score
+from hand_model.rig.name.compete import LEAST_SHARE, _met, compete
 from hand_model.rig.name.problem import Term, held_out, normal, pose
 from hand_model.rig.name.refit import refit
 from hand_model.rig.words import shares
@@ -58,7 +59,8 @@ def test_a_rival_is_held_to_what_stands_with_its_shapes_moved_for_it(rig_fit: An
     parts = normal(problem, terms)
     none = held_out(problem, terms, parts).sum()
     frozen = score(problem, terms, known["quadratic_damping@hinge"], parts)
-    moved = _met(problem, terms, parts, [frozen], 0)[0]
+    with Beside(problem, terms, parts, [known["quadratic_damping@hinge"]], 0) as beside:
+        moved = _met(problem, terms, beside)[0]
     assert frozen.error.sum() > (1 - 2 * LEAST_SHARE) * none
     assert moved.error.sum() < 0.3 * none
     assert moved.others[0].shape["stribeck_speed"] == pytest.approx(SPEED, rel=0.1)
@@ -100,7 +102,8 @@ def test_a_rival_is_held_to_the_others_at_its_best_place_not_at_that_of_a_grid(t
     problem = pose(fit, "hinge")
     parts = normal(problem, ())
     frozen = score(problem, (), coarse, parts)
-    best = _met(problem, (), parts, [frozen], 0)[0]
+    with Beside(problem, (), parts, [coarse], 0) as beside:
+        best = _met(problem, (), beside)[0]
     assert best.error.sum() < 0.5 * frozen.error.sum()
     assert (best.term.shape["centre"], best.term.shape["width"]) == pytest.approx((0.13, 0.09), rel=0.1)
 
@@ -158,3 +161,20 @@ def test_shares_that_hardly_differ_do_not_set_the_order() -> None:
     declared = {j: {"before": 1.0, "noise_floor": 0.0} for j in ("effort", "angle", "half")}
     told = shares([found("half", 1.0, 0.7), found("effort", 1.0, 0.08), found("angle", 1.0, 0.02)], declared)
     assert [f.where["joint"] for f in sorted(told, key=_rank)] == ["effort", "angle", "half"]
+
+
+def test_two_processes_try_rivals_as_one_does(rig_fit: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    rig, fit = rig_fit
+    problem, known = pose(fit, "hinge"), {c.key: c for c in candidates(rig, fit, "hinge")}
+    rivals = [known[f"{name}@hinge"] for name in ("quadratic_damping", "stribeck_friction", "asymmetric_friction")]
+    rivals[1] = replace(rivals[1], grid=rivals[1].grid[:3])
+    parts, found = normal(problem, ()), []
+    for forks in (True, False):
+        monkeypatch.setattr("hand_model.background._forks", lambda forks=forks: forks)
+        with Beside(problem, (), parts, rivals, 0) as beside:
+            scores = beside.scores()
+            found.append((scores, beside.together(scores)))
+    for two, one in zip(*found, strict=True):
+        assert [s.term.candidate.key for s in two] == [c.key for c in rivals]
+        assert [s.term.shape for s in two] == [s.term.shape for s in one]
+        assert all(np.array_equal(a.error, b.error) for a, b in zip(two, one, strict=True))

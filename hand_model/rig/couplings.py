@@ -6,7 +6,8 @@ from dataclasses import replace
 
 from .declared import DeclaredFit
 from .model import Coupling, RigModel
-from .name.compete import Score, Step, compete
+from .name.beside import Score
+from .name.compete import Step, compete
 from .name.problem import Term, pose, solution
 from .patch import write_couplings
 from .transmission import coupling_candidates, fit_coupling, zero_shift

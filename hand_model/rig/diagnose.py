@@ -21,8 +21,9 @@ from .declared import DeclaredFit, fit_declared
 from .findings import NOT_TAKEN, CouplingResidual, Finding, RigFindings, whereabouts
 from .horizon import open_loop
 from .model import RigModel, load_rig
+from .name.beside import Score, score
 from .name.candidates import Candidate, candidates
-from .name.compete import LEAST_SHARE, Score, Step, judge, score
+from .name.compete import LEAST_SHARE, Step, judge
 from .name.joint_search import as_term, offsets_first, search_joints
 from .name.problem import Term, held_out, normal, pose, solution
 from .noise import effort_noise

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from ...diagnose.name.term import DISCRETE
 from ..evidence import BEYOND_DOUBT, weigh
+from .beside import Beside, Score
 from .candidates import Candidate
 from .problem import (
     Problem,
     Term,
-    extended,
     held_out,
     left_out,
     left_out_whole,
@@ -27,7 +27,7 @@ from .problem import (
     rescaled,
     training_error,
 )
-from .refit import moves, refined, refit
+from .refit import refit
 
 Array = NDArray[np.float64]
 LEAST_SHARE = 0.05  # of the held-out residual variance: less is not worth a name
@@ -36,22 +36,6 @@ MOST_TERMS, MOST_OF_FEW = 4, 3  # of few recordings what is left after so many g
 TOGETHER = 3  # rivals that meet in their best shapes, beside those of what stands
 
 Settle = Callable[[tuple[Term, ...]], tuple[tuple[Term, ...], Sequence[Candidate]]]
-
-
-@dataclass(frozen=True)
-class Score:
-    """A candidate added to the terms so far. error (B,): squared error of every block when left out [normalised];
-    parts: its normal equations by block; others: the terms that it is added to, where all shapes have moved for each
-    other (None: not yet)."""
-
-    term: Term
-    error: Array
-    parts: tuple = ()
-    others: tuple[Term, ...] | None = None
-
-    def beside(self, terms: tuple[Term, ...]) -> tuple[Term, ...]:
-        """All terms with it, where it is added to some."""
-        return (*(terms if self.others is None else self.others), self.term)
 
 
 @dataclass(frozen=True)
@@ -125,39 +109,31 @@ def _round(
     its terms, normal equations and errors (B,)). first: from which on shapes of terms move."""
     standing, its_parts, none = plain
     parts, taken = its_parts if terms is standing else normal(problem, terms), {t.candidate.key for t in terms}
-    scores = [score(problem, terms, c, parts) for c in rivals if c.repeats or c.key not in taken]
-    scores = _met(problem, terms, parts, scores, first)
-    stand = (
-        scores
-        if left_out_whole(problem)
-        else [s for s in scores if borne_out(problem, (standing, its_parts), (s.beside(terms), s.parts))]
-    )
-    found = judge(none, stand, problem)
-    if found is None:
-        return scores, None
-    # Between the points of a grid a rival may be better than on them: those not told apart meet again at their best.
-    last = [_together(problem, terms, parts, stand[k], first) for k in dict.fromkeys((found[0], *found[1].close))]
+    with Beside(problem, terms, parts, [c for c in rivals if c.repeats or c.key not in taken], first) as beside:
+        scores = _met(problem, terms, beside)
+        stand = (
+            scores
+            if left_out_whole(problem)
+            else [s for s in scores if borne_out(problem, (standing, its_parts), (s.beside(terms), s.parts))]
+        )
+        found = judge(none, stand, problem)
+        if found is None:
+            return scores, None
+        # Between the points of a grid a rival may be better than on them: those not told apart meet again at their best.
+        last = beside.together([stand[k] for k in dict.fromkeys((found[0], *found[1].close))])
     again = judge(none, last, problem) if len(last) > 1 else None
     won, step = (0, found[1]) if again is None else again
     return scores, (last[won].beside(terms), step)
 
 
-def _met(problem: Problem, terms: tuple[Term, ...], parts: tuple, scores: list[Score], first: int) -> list[Score]:
-    """The scores, those of the rivals that explain most of what they were fitted to in their best shapes (a detent
-    between two places of a grid is half of itself) and with the shapes of the terms moved for them, from `first` on: a
-    shape that has moved to take up what a rival is there for hides it (a Stribeck speed that is too high, drag)."""
+def _met(problem: Problem, terms: tuple[Term, ...], beside: Beside) -> list[Score]:
+    """Scores of the rivals, of those that explain most of what they were fitted to in their best shapes (a detent
+    between two places of a grid is half of itself) and with the shapes of the terms moved for them: a shape that has
+    moved to take up what a rival is there for hides it (a Stribeck speed that is too high, drag)."""
+    scores = beside.scores()
     best = sorted(scores, key=lambda s: training_error(problem, (*terms, s.term), s.parts))[:TOGETHER]
-    return [_together(problem, terms, parts, s, first) if any(s is b for b in best) else s for s in scores]
-
-
-def _together(problem: Problem, terms: tuple[Term, ...], parts: tuple, rival: Score, first: int) -> Score:
-    """The rival's score in the best of its forms, with all shapes from `first` on fitted beside each other."""
-    if rival.others is not None:
-        return rival
-    every = (*terms, refined(problem, terms, rival.term, parts))
-    every = refit(problem, every, first) if any(moves(t) for t in terms[first:]) else every
-    more = normal(problem, every)
-    return Score(every[-1], held_out(problem, every, more), more, every[:-1])
+    met = {id(s): m for s, m in zip(best, beside.together(best), strict=True)}
+    return [met.get(id(s), s) for s in scores]
 
 
 def _settled_down(
@@ -214,18 +190,6 @@ def _superfluous(problem: Problem, terms: tuple[Term, ...], first: int) -> int |
 
 def _names(terms: Sequence[Term]) -> tuple[str, ...]:
     return tuple(sorted(t.candidate.key for t in terms))
-
-
-def score(problem: Problem, terms: Sequence[Term], candidate: Candidate, parts: tuple) -> Score:
-    """The candidate at the best of its starting shapes, by the training error."""
-    best: tuple[float, Term, tuple] | None = None
-    for shape in candidate.grid:
-        term = Term(candidate, shape)
-        more = normal(problem, [*terms, term]) if candidate.delays else extended(problem, terms, term, parts)
-        train = training_error(problem, [*terms, term], more)
-        if best is None or train < best[0]:
-            best = train, term, more
-    return Score(best[1], held_out(problem, [*terms, best[1]], best[2]), best[2])
 
 
 def judge(none: Array, scores: Sequence[Score], problem: Problem) -> tuple[int, Step] | None:
