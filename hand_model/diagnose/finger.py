@@ -106,8 +106,9 @@ def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, f
             stations.append(
                 judged("markers", finger.name, finger.actuator, finger.segments[joint].name, states, effects)
             )
+    tilt_deg = tilt(markers)
     for station in stations:
-        station.tilt = tilt(markers)
+        station.tilt = tilt_deg
     lines += [s.line() for s in stations]
     found = with_steps(found, seen, markers, {s.joint: s.naming.fit.declared for s in stations})
     return FingerReading(

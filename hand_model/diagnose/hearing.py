@@ -145,7 +145,8 @@ def _without_settled_sags(
         for s in stations
         if s.believed
         for which, f in ((s.naming.fit.terms.index(f.term), f) for f in s.kept)
-        if (f.term.effect.clips and not sags_beneath(facts, s.actuator, f.term.shape["limit"]))
+        if f.term.effect.clips
+        and not sags_beneath(facts, s.actuator, f.term.shape["limit"])
         or f.term.effect.name == "drive_sag"
         or f.term.effect.name == "load_dependent_friction"
         and magnitude("load_dependent_friction", _values(s.parameters[which])) > REASON
