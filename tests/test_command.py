@@ -310,3 +310,33 @@ def test_what_one_simulated_drive_says_of_its_current_is_held_against_answers_to
     value, doubt = late(early)
     assert -0.01 < value < late()[0] and 2e-3 < doubt < late()[1]
     assert late(replace(early, doubt_s=float("inf"))) == late()
+
+
+def test_a_current_that_rises_before_its_commands_is_early_by_what_all_of_them_show_together() -> None:
+    """Each change alone shows next to nothing before it: noise of a third of the rise, which takes 60 ms."""
+
+    def rising(early_s: float, seed: int) -> tuple[DriveState, np.ndarray]:
+        rng = np.random.default_rng(seed)
+        t = np.cumsum(rng.uniform(0.8, 1.2, 2400)) * STEP_S
+        setpoint, x, c = np.zeros(len(t)), np.zeros(len(t)), np.zeros(len(t))
+        for k in range(0, len(t) - 60, 60):
+            at, up = t[k] + rng.uniform(0, 3 * STEP_S), (k // 60) % 2 == 0
+            now = (t >= at) & (t < at + 60 * STEP_S)
+            setpoint[t >= at] = 100.0 * up
+            ramp = np.clip((t - at + early_s) / 0.06, 0.0, 1.0) * ((t - at + early_s) < 0.6)
+            c += (1 if up else -1) * 60.0 * ramp * (t < at + 60 * STEP_S - 0.25)
+            x[now] = 50 + (1 if up else -1) * np.clip((t[now] - at - 0.03) * 150 - 45, -45, 45)
+        state = DriveState(
+            "trial", "index", t, x, np.gradient(x, t), 0 * t, c, np.ones((len(t), 1)),
+            extra={"setpoint": setpoint},
+        )  # fmt: skip
+        return state, c + rng.normal(0, 5.0, len(t))
+
+    def told(early_s: float) -> dict[str, float]:
+        drives = {"index": rising(early_s, 1), "ring": rising(0.0, 2)}
+        facts = {a: command_facts((state,), (current,)) for a, (state, current) in drives.items()}
+        return {a: x.channel_s for a, x in lateness({a: f.answers for a, f in facts.items()}).items()}
+
+    assert told(0.0) == pytest.approx({"index": 0.0, "ring": 0.0}, abs=5e-3)
+    early = told(0.03)
+    assert early["index"] == pytest.approx(-0.03, abs=0.01) and early["ring"] == pytest.approx(0.0, abs=5e-3)

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hand_model.diagnose.locate.decoupled import pulls
+from hand_model.diagnose.locate.decoupled import TRIFLE, pulls
 from hand_model.diagnose.locate.excursions import with_excursions
 from hand_model.diagnose.locate.slips import _swaps
 from hand_model.diagnose.name.selection import name_effects
@@ -486,4 +486,4 @@ def test_a_finger_that_stays_bent_takes_its_spring_off_the_drive_unless_it_is_a_
 
     station = judged("encoder", "index", "index", "proximal", joint(4, add=stays, noise=0.2), catalogue("encoder"))
     assert [f.term.effect.name for f in station.kept] == ["spring_decoupling"]
-    assert pulls(station) is pulled
+    assert pulls(station, TRIFLE) is pulled

@@ -17,7 +17,7 @@ from .finger import FingerReading, finger_calls
 from .locate.angles import FingerAngles
 from .locate.command import CommandFacts, command_facts, command_findings, refused, sags_beneath
 from .locate.course import FingerCourses
-from .locate.decoupled import pulls, while_driven, without_excursions
+from .locate.decoupled import TRIFLE, pulls, while_driven, without_excursions
 from .locate.drive import drive_states, drive_trials, opposes, too_short
 from .locate.encoder_error import encoder_corrections
 from .locate.gravity import with_gravity
@@ -91,7 +91,7 @@ class Heard:
             named, states = station.standing("spring_decoupling"), drives[station.actuator]
             if named is not None and named.term.shape["form"] < 0.5:
                 states = without_excursions(states, station.naming.balance.states, self.fingers[station.finger])
-            elif named is not None and pulls(station):
+            elif named is not None and pulls(station, TRIFLE):
                 states = while_driven(states, named.term.shape["below"])
             drives[station.actuator] = states
         for actuator in [a for a, states in drives.items() if not is_measured(states)]:

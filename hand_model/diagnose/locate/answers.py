@@ -34,6 +34,7 @@ SHARES = (0.1, 0.25, 0.5)  # of a current's rise, by which a late one is told fr
 SLOWER = 3.0  # times as slow as another drive's, at most, is the rise of a healthy one
 BIN_S, RISEN_S = 0.005, 0.35  # in which samples after all changes are averaged, and after which the rise is over
 SHIFTED = 0.5  # of what a drive's answers are late, at least, is a shift of its rise and no slowness
+RISEN_T = 6.0  # standard errors by which a current must have risen before the changes come
 EARLY_S = 0.2  # by which a current's time stamps may run ahead
 
 
@@ -41,12 +42,14 @@ EARLY_S = 0.2  # by which a current's time stamps may run ahead
 class Answers:
     """current_s, motion_s: (e,) from each change of the setpoint to its answer. step_s: sample interval. rise_s: (s,)
     time from the changes until the current, mean over them all, has risen to SHARES (s) of its most; nan where
-    that is not told."""
+    that is not told. lead_s: (s,) the same counted from before the changes, where it has risen for sure before they
+    come; else nan."""
 
     current_s: Array
     motion_s: Array
     step_s: float
     rise_s: Array = field(default_factory=lambda: np.full(len(SHARES), np.nan))
+    lead_s: Array = field(default_factory=lambda: np.full(len(SHARES), np.nan))
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,8 @@ def answers_of(states: Sequence[DriveState], currents: Sequence[Array]) -> Answe
     current = [x for s, c in zip(states, currents, strict=True) for x in _answered(s, c, EARLY_S)]
     motion = [x for s in states for x in _answered(s, s.position)]
     step = sample_interval(states)
-    return Answers(_usual(np.array(current), step), _usual(np.array(motion), step), step, _rise(states, currents))
+    rises = _rise(states, currents, step)
+    return Answers(_usual(np.array(current), step), _usual(np.array(motion), step), step, *rises)
 
 
 def lateness(answers: Mapping[str, Answers]) -> dict[str, Lateness]:
@@ -96,6 +100,11 @@ def lateness(answers: Mapping[str, Answers]) -> dict[str, Lateness]:
         torn = total > LATE * x.step_s and UNCLEAR * total < behind < (1 - UNCLEAR) * total
         between = min(behind, total - behind) if torn else 0.0
         unlike = (1.0 if alone else UNLIKE) * x.step_s
+        ahead, scatter = _ahead(x, [y for a, y in told.items() if a != actuator])
+        if ahead < -unlike:  # by as much more as the drive is late, if it is, and not slower to break loose
+            half = 0.5 * max(float(np.nan_to_num(behind)), 0.0)
+            out[actuator] = Lateness(np.zeros(0), ahead - half, float(np.linalg.norm([unlike, scatter, half])))
+            continue
         unsure = total - channel if slow else 0.0
         doubt = float(np.hypot(unlike + between + unsure, np.std(x.current_s) / np.sqrt(len(x.current_s))))
         out[actuator] = Lateness(late if drive else np.zeros(0), channel, doubt)
@@ -113,10 +122,22 @@ def _shift(rise_s: Array, others: Sequence[Array]) -> float:
     return min(shifts, default=np.inf)
 
 
-def _rise(states: Sequence[DriveState], currents: Sequence[Array]) -> Array:
+def _ahead(x: Answers, others: Sequence[Answers]) -> tuple[float, float]:
+    """By how much [s] a current that has risen before the changes come rises later (negative: earlier) than those of
+    other drives, the most of these, or than the changes where there is none; and how far its shares differ in that. Zero
+    of one that rises with them or after."""
+    if not np.isfinite(x.lead_s).all():
+        return 0.0, 0.0
+    shifts = [x.lead_s - (y.lead_s if np.isfinite(y.lead_s).all() else y.rise_s) for y in others]
+    shifts = [d for d in shifts if np.isfinite(d).all()] or [x.lead_s[:1]]
+    nearest = max(shifts, key=lambda d: float(np.median(d)))
+    return float(np.median(nearest)), float(np.std(nearest))
+
+
+def _rise(states: Sequence[DriveState], currents: Sequence[Array], step_s: float) -> tuple[Array, Array]:
     """Times (len(SHARES),) [s] at which a drive's current has risen to SHARES of its most, mean over all changes of the
     setpoint before which it stood: their moments lie anywhere between samples, so that the mean tells much less than
-    one."""
+    one. And the same counted from before the changes, nan where it has not risen for sure when they come."""
     since, risen = [np.zeros(0)], [np.zeros(0)]
     for state, current in zip(states, currents, strict=True):
         setpoint, t = state.extra.get("setpoint", np.zeros(len(state.time_s))), state.time_s
@@ -128,12 +149,25 @@ def _rise(states: Sequence[DriveState], currents: Sequence[Array]) -> Array:
     since_s, rise = np.concatenate(since), np.concatenate(risen)
     cells, at, count = np.unique(np.floor(since_s / BIN_S).astype(int), return_inverse=True, return_counts=True)
     told = cells >= 0
+    unknown = np.full(len(SHARES), np.nan)
     if len(since) <= LEAST_ANSWERS or told.sum() < 2:
-        return np.full(len(SHARES), np.nan)
+        return unknown, unknown
     middle, mean = BIN_S * (cells + 0.5), np.bincount(at, rise) / count
     half_s = _reached(middle[told], mean[told], count[told])[-1]
     settling = _course(*(x[middle <= half_s] for x in (middle, mean, count)))
-    return _reached(middle[told], (mean - settling(middle))[told], count[told])
+    own = _reached(middle[told], (mean - settling(middle))[told], count[told])
+    return own, _reached(middle, mean, count) if _risen_before(since, risen, step_s) else unknown
+
+
+def _risen_before(since: Sequence[Array], risen: Sequence[Array], step_s: float) -> bool:
+    """Whether what a current has risen by in the last sample before the changes is more than chance, and than a course
+    that it was on."""
+    steps = [
+        float(rise[(time_s < 0) & (time_s >= -1.5 * step_s)].mean() - rise[time_s < -0.5 * EARLY_S].mean())
+        for time_s, rise in zip(since, risen, strict=True)
+        if np.any((time_s < 0) & (time_s >= -1.5 * step_s)) and np.any(time_s < -0.5 * EARLY_S)
+    ]
+    return len(steps) > LEAST_ANSWERS and float(np.mean(steps)) > RISEN_T * float(np.std(steps)) / np.sqrt(len(steps))
 
 
 def _reached(time_s: Array, mean: Array, count: Array) -> Array:

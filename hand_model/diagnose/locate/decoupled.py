@@ -12,7 +12,7 @@ from ...effects.base import DriveState, position_range
 from ...effects.spring_decoupling import spans
 from ...errors import IdentificationError
 from ...identify.clock import align
-from ..magnitude import channel_figures, magnitude
+from ..magnitude import SLIGHT, channel_figures, magnitude
 from ..name.station import Station
 from .angles import FingerAngles
 
@@ -25,13 +25,13 @@ TRIFLE = 0.12
 CORNER = 0.2  # of the way on which the finger stays behind, beyond its end
 
 
-def pulls(station: Station) -> bool:
-    """Whether a finger is pulled off its drive by more than a trifle."""
+def pulls(station: Station, least: float = SLIGHT) -> bool:
+    """Whether a finger is pulled off its drive, by at least that share of the size at which this is plain."""
     named = station.standing("spring_decoupling")
     if named is None:
         return False
     values = {k: v["value"] for k, v in station.parameters[station.naming.fit.terms.index(named.term)].items()}
-    return magnitude("spring_decoupling", values, channel_figures(station.naming.balance.states)) > TRIFLE
+    return magnitude("spring_decoupling", values, channel_figures(station.naming.balance.states)) >= least
 
 
 def while_driven(states: Sequence[DriveState], below: float) -> tuple[DriveState, ...]:
