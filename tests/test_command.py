@@ -340,3 +340,10 @@ def test_a_current_that_rises_before_its_commands_is_early_by_what_all_of_them_s
     assert told(0.0) == pytest.approx({"index": 0.0, "ring": 0.0}, abs=5e-3)
     early = told(0.03)
     assert early["index"] == pytest.approx(-0.03, abs=0.01) and early["ring"] == pytest.approx(0.0, abs=5e-3)
+
+
+def test_a_drive_that_seems_to_answer_a_little_before_it_is_told_is_prompt_and_the_late_one_late() -> None:
+    prompt, late = (Answers(np.full(20, current), np.full(20, 0.02), STEP_S) for current in (-5e-4, 0.085))
+    told = lateness({"index": late, "ring": prompt})
+    assert told["index"].channel_s == pytest.approx(0.085, abs=1e-3) and not len(told["index"].drive_s)
+    assert told["ring"].channel_s == pytest.approx(0.0, abs=1e-3)

@@ -77,7 +77,8 @@ def lateness(answers: Mapping[str, Answers]) -> dict[str, Lateness]:
     told = {a: x for a, x in answers.items() if len(x.current_s) >= LEAST_ANSWERS}
     alone = len(told) == 1
     # who answers before it is told is early, and no measure for the others
-    first = min((m for m in (float(np.mean(x.current_s)) for x in told.values()) if m >= 0), default=0.0)
+    means = [(float(np.mean(x.current_s)), x.step_s) for x in told.values()]
+    first = max(min((m for m, step_s in means if m >= -UNLIKE * step_s), default=0.0), 0.0)
     moved = {a: float(np.mean(x.motion_s)) for a, x in told.items() if len(x.motion_s) >= LEAST_ANSWERS}
     out = {}
     for actuator, x in told.items():
