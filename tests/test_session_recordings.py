@@ -7,6 +7,7 @@ import pytest
 from session_refusal import edit, refusal
 from session_writers import FINGERS, PALM, PROBE, rigid_markers, write_c3d, write_log, write_session
 
+from hand_model.diagnose.finger import _on_a_line
 from hand_model.session import check_session, read_session
 from hand_model.session.check import flatness, missing_direction, moves, on_a_line
 
@@ -163,6 +164,15 @@ def test_recordings_refused(case, root):
     message = refusal(lambda: check_session(read_session(root)))
     for word in words:
         assert any(part in message for part in word.split("|")), (word, message)
+
+
+def test_a_diagnosis_leaves_out_a_finger_with_markers_on_one_line_and_hears_the_others(root):
+    assert not any("one line" in note for note in check_session(read_session(root), dead=True))
+    spoil_line(0.0)(root)
+    session = read_session(root)
+    (note,) = [note for note in check_session(session, dead=True) if "one line" in note]
+    assert note.startswith("mocap/index.c3d") and "IP1, IP2, IP3" in note and "nothing was read" in note
+    assert {f.name: _on_a_line(session, f) for f in session.fingers} == {"index": True, "ring": False}
 
 
 def test_a_direction_that_is_missing():

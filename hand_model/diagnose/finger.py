@@ -11,6 +11,7 @@ from typing import Any
 from ..effects import catalogue, outsiders
 from ..errors import IdentificationError
 from ..session import Finger, Session
+from ..session.check import on_a_line
 from .findings import Finding
 from .locate.angles import (
     FingerAngles,
@@ -64,6 +65,8 @@ def finger_calls(session: Session, unread: tuple[str, ...] = ()) -> list[Callabl
 
 
 def _reading(session: Session, finger: Finger, shape: Any, counts: dict[str, tuple[float, float]]) -> FingerReading:
+    if _on_a_line(session, finger):  # `check_session` notes it
+        return FingerReading(finger.name)
     try:
         seen = finger_angles(session, finger, shape)
     except IdentificationError as error:
@@ -72,6 +75,17 @@ def _reading(session: Session, finger: Finger, shape: Any, counts: dict[str, tup
         return _judged(finger, seen, counts)
     except IdentificationError as error:
         return FingerReading(finger.name, seen, notes=(str(error),))
+
+
+def _on_a_line(session: Session, finger: Finger) -> bool:
+    """Whether the markers of one of a finger's segments are, so that how the segment turns about it is not seen."""
+    return any(
+        on_a_line(trial.mocap().markers(segment.markers), hinged=True)
+        for trial in session.select("flexion", finger.name)
+        if trial.mocap_path is not None
+        for segment in finger.segments
+        if len(segment.markers) >= 3
+    )
 
 
 def _leaves(encoder: Station) -> bool:

@@ -39,7 +39,8 @@ MOTION_OVER_NOISE = 10.0
 def check_session(session: Session, dead: bool = False) -> tuple[str, ...]:
     """Read every recording of a session once and check it for identification; readings are kept for later use.
 
-    dead: whether an encoder that never moves is let through, for a diagnosis to name.
+    dead: whether an encoder that never moves is let through, for a diagnosis to name, and a finger with markers on one
+    line, for it to leave out.
 
     Returns notes: what was mended or ignored, one sentence each, the session's own included. Raises SessionError for
     the first recording that lacks a marker or column, has one that is never seen, markers on one line, a length or time
@@ -58,7 +59,7 @@ def check_session(session: Session, dead: bool = False) -> tuple[str, ...]:
         if trial.mocap_path is not None:
             mocap = trial.mocap()
             notes += [f"{_place(session, mocap)}: {note}" for note in mocap.notes]
-            notes += check_mocap(session, trial, mocap)
+            notes += check_mocap(session, trial, mocap, dead)
             if session.palm and all(label in mocap.labels for label in session.palm.labels):
                 palm_sizes[str(trial.mocap_path)] = _size(mocap.markers(session.palm.labels))
         if trial.log_path is not None:
@@ -79,9 +80,10 @@ def _place(session: Session, recording: Mocap | Log) -> str:
     return recording.path.relative_to(session.path).as_posix()
 
 
-def check_mocap(session: Session, trial: Trial, mocap: Mocap) -> list[str]:
-    """Markers of one trial: labelled, seen, of a possible size, and off a line. Returns notes; raises SessionError."""
-    bodies = _bodies(session, trial)
+def check_mocap(session: Session, trial: Trial, mocap: Mocap, dead: bool = False) -> list[str]:
+    """Markers of one trial: labelled, seen, of a possible size, and off a line (`dead`: those of a finger noted where
+    they are not). Returns notes; raises SessionError."""
+    bodies, notes = _bodies(session, trial), list[str]()
     if trial.kind not in (*PROBED, "flexion", "pivot"):
         missing = [label for labels in bodies.values() for label in labels if label not in mocap.labels]
         return [
@@ -106,13 +108,14 @@ def check_mocap(session: Session, trial: Trial, mocap: Mocap) -> list[str]:
             and on_a_line(position, hinged=body not in ("palm", "probe"))
             and not (body == "probe" and session.probe.position_probe is not None)
         ):
-            raise SessionError(
-                f"{mocap.path}: the markers {', '.join(labels)} ({body}) lie on one line; three that do not are needed"
-            )
+            said = f"the markers {', '.join(labels)} ({body}) lie on one line; three that do not are needed"
+            if not dead or body in ("palm", "probe"):
+                raise SessionError(f"{mocap.path}: {said}")
+            notes.append(f"{_place(session, mocap)}: {said}, and nothing was read from the markers of this finger")
     check_extent(mocap, [label for labels in bodies.values() for label in labels])
     if "probe" in bodies and session.probe.position_probe is not None:
         _check_probe_size(session, mocap)
-    return []
+    return notes
 
 
 def _bodies(session: Session, trial: Trial) -> dict[str, tuple[str, ...]]:
