@@ -77,7 +77,7 @@ def diagnose(
     simulated = delays_apart({d.actuator: d for d in told[: len(read)] if d is not None})
     drives = heard.drives(simulated)
     facts = heard.listen_to_commands(drives, simulated)
-    heard.listen_to_drives(*timed_drives(drives, facts, simulated))
+    heard.listen_to_drives(*timed_drives(drives, facts, simulated), facts)
     stations = heard.stations
     findings = assemble(stations, heard.found, heard.notes, heard.unexplained)
     listed, written = reread(findings.findings, stations)

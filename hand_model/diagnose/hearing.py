@@ -42,7 +42,6 @@ class Heard:
         self.notes = [*check_session(session, dead=True), *too_short(session)]
         self.fingers: dict[str, FingerAngles] = {}
         self.courses: dict[str, FingerCourses] = {}
-        self.facts: dict[str, CommandFacts] = {}
         self.stations: list[Station] = []
         distrusted = _distrusted(session)
         self.unexplained = [_false_stamps(session, a, s) for a, s in distrusted.items()]
@@ -109,14 +108,16 @@ class Heard:
         self, drives: Mapping[str, tuple[DriveState, ...]], simulated: Mapping[str, SimulatedDrive]
     ) -> dict[str, CommandFacts]:
         """What the drives did of what they were told."""
-        facts = self.facts = _command(self.session, drives)
+        facts = _command(self.session, drives)
         self.found += command_findings(facts, {a: _finger_of(self.session, a) for a in facts}, simulated)
         for _, finding in self.found:
             self.tell(finding.statement)
         return facts
 
-    def listen_to_drives(self, drives: dict[str, tuple[DriveState, ...]], late: dict[str, bool]) -> None:
-        """What the motors' currents say. late: whether each drive's current may be."""
+    def listen_to_drives(
+        self, drives: dict[str, tuple[DriveState, ...]], late: dict[str, bool], facts: Mapping[str, CommandFacts]
+    ) -> None:
+        """What the motors' currents say. late: whether each drive's current may be; facts: of their commands."""
         alone = {a: Balance(states).fit() for a, states in drives.items()}
         calls = []
         for actuator, states in drives.items():
@@ -130,7 +131,7 @@ class Heard:
         self.stations, odd = with_weights(self.session, self.fingers, self.stations, calls)
         for _, finding in odd:
             self.tell(finding.statement)
-        self.found = _without_settled_sags([*self.found, *odd], self.stations, self.facts)
+        self.found = _without_settled_sags([*self.found, *odd], self.stations, facts)
 
 
 def _without_settled_sags(

@@ -103,13 +103,14 @@ def check_mocap(session: Session, trial: Trial, mocap: Mocap, dead: bool = False
                 f"{mocap.path}: three of the markers {listed} ({body}) are seen together in {together} of {len(seen)} "
                 f"frames; {needed} or more are needed"
             )
+        hinged = body not in ("palm", "probe")
         if (
             len(labels) >= 3
-            and on_a_line(position, hinged=body not in ("palm", "probe"))
+            and on_a_line(position, hinged)
             and not (body == "probe" and session.probe.position_probe is not None)
         ):
             said = f"the markers {', '.join(labels)} ({body}) lie on one line; three that do not are needed"
-            if not dead or body in ("palm", "probe"):
+            if not (dead and hinged):
                 raise SessionError(f"{mocap.path}: {said}")
             notes.append(f"{_place(session, mocap)}: {said}, and nothing was read from the markers of this finger")
     check_extent(mocap, [label for labels in bodies.values() for label in labels])

@@ -163,11 +163,11 @@ def _rise(states: Sequence[DriveState], currents: Sequence[Array], step_s: float
 def _risen_before(since: Sequence[Array], risen: Sequence[Array], step_s: float) -> bool:
     """Whether what a current has risen by in the last sample before the changes is more than chance, and than a course
     that it was on."""
-    steps = [
-        float(rise[(time_s < 0) & (time_s >= -1.5 * step_s)].mean() - rise[time_s < -0.5 * EARLY_S].mean())
+    parts = [
+        (rise[(time_s < 0) & (time_s >= -1.5 * step_s)], rise[time_s < -0.5 * EARLY_S])
         for time_s, rise in zip(since, risen, strict=True)
-        if np.any((time_s < 0) & (time_s >= -1.5 * step_s)) and np.any(time_s < -0.5 * EARLY_S)
     ]
+    steps = [float(last.mean() - before.mean()) for last, before in parts if len(last) and len(before)]
     return len(steps) > LEAST_ANSWERS and float(np.mean(steps)) > RISEN_T * float(np.std(steps)) / np.sqrt(len(steps))
 
 

@@ -53,9 +53,8 @@ class Beside:
     def __init__(
         self, problem: Problem, terms: tuple[Term, ...], parts: tuple, rivals: Iterable[Candidate], first: int
     ) -> None:
-        self._state = _State(problem, terms, parts, tuple(rivals), first)
-        self._places = {id(c): k for k, c in enumerate(self._state.rivals)}
-        self._pair = Pair(self._state)
+        self._pair = Pair(_State(problem, terms, parts, tuple(rivals), first))
+        self._places = {id(c): k for k, c in enumerate(self._pair.state.rivals)}
 
     def __enter__(self) -> Self:
         return self
@@ -65,7 +64,7 @@ class Beside:
 
     def scores(self) -> list[Score]:
         """Every rival at the best of its starting shapes, by the training error."""
-        rivals = self._state.rivals
+        rivals = self._pair.state.rivals
         told = self._pair.map(_at_best_start, range(len(rivals)), costs=[float(len(c.grid)) for c in rivals])
         return [Score(Term(c, shape), error, parts) for c, (shape, error, parts) in zip(rivals, told, strict=True)]
 
@@ -74,9 +73,10 @@ class Beside:
         asked = [s for s in scores if s.others is None]
         told = self._pair.map(_at_best_together, [(self._places[id(s.term.candidate)], s.term.shape) for s in asked])
         done = {}
-        for score, (shapes, error, parts) in zip(asked, told, strict=True):
-            others = tuple(Term(t.candidate, shape) for t, shape in zip(self._state.terms, shapes, strict=False))
-            done[id(score)] = Score(Term(score.term.candidate, shapes[-1]), error, parts, others)
+        for rival, ((*shapes, own), error, parts) in zip(asked, told, strict=True):
+            terms = zip(self._pair.state.terms, shapes, strict=True)
+            others = tuple(Term(t.candidate, shape) for t, shape in terms)
+            done[id(rival)] = Score(Term(rival.term.candidate, own), error, parts, others)
         return [done.get(id(s), s) for s in scores]
 
 
