@@ -135,6 +135,20 @@ def test_a_sag_is_told_for_sure_by_one_reading_and_likely_by_the_other(
     assert bool(command_findings({"index": facts}, {"index": "index"}, {})) == told
 
 
+@pytest.mark.parametrize(
+    ("lost", "sag_t", "settled_t", "told"),
+    [(0.028, 24, 15, True), (0.028, 7, 30, False), (0.015, 24, 15, False), (0.04, 7, 30, True)],
+)
+def test_a_loss_that_controllers_have_by_chance_is_told_where_both_readings_are_sure(
+    lost: float, sag_t: float, settled_t: float, told: bool
+) -> None:
+    state, current = strokes(sagging, 0, noise=1.0)
+    facts = command_facts((state,), (current,))
+    sag = lost / facts.load_range
+    facts = replace(facts, sag=sag, sag_se=sag / sag_t, settled=lost, settled_se=lost / settled_t)
+    assert bool(command_findings({"index": facts}, {"index": "index"}, {})) == told
+
+
 @pytest.mark.parametrize(("profile", "told"), [(sagging, True), (healthy, False)])
 def test_a_sag_beside_a_reading_that_clips_is_told_by_strokes_that_stay_below(profile, told: bool) -> None:
     """The faster strokes reach the limit where they flex."""

@@ -105,6 +105,9 @@ def test_a_ceiling_counts_by_what_it_would_cut_without_the_other_effects() -> No
     assert magnitude("current_saturation", high, channel) == LEAST
     assert magnitude("current_saturation", low, channel) == pytest.approx(1.0)
     assert magnitude("current_saturation", high, channel_figures(states)) == pytest.approx(1.0)  # nothing known of it
+    stiffer = {**declared, "preload": 3.0}  # of two accounts the one that says least counts
+    assert magnitude("current_saturation", high, channel_figures(states, stiffer)) == pytest.approx(1.0)
+    assert magnitude("current_saturation", high, channel_figures(states, stiffer, declared)) == LEAST
 
 
 def test_a_weight_that_preload_and_spring_take_up_must_be_larger_to_be_plain() -> None:

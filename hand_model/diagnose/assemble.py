@@ -14,7 +14,7 @@ from ..effects.base import sample_interval
 from .findings import Finding, Findings
 from .locate.displacement import NO_HINGE, NOT_RIGID
 from .locate.markers import HINGE, SLIPS
-from .locate.preload import COMPARISON
+from .locate.preload import COMPARISON, expected
 from .magnitude import SLIGHT, channel_figures, magnitude, sure_magnitude
 from .name.distinguishability import protocol_pairs
 from .name.entries import (
@@ -161,17 +161,21 @@ def _magnitude(finding: Finding, stations: Sequence[Station], sure: bool = False
     """How large a finding is for its kind, measured by the channel in which effects of its kind show; or how large it
     is for sure."""
     shown = next(
-        (
-            s.naming
-            for s in stations
-            if s.signal == SHOWN_IN.get(finding.effect) and s.finger == finding.where["finger"]
-        ),
-        None,
+        (s for s in stations if s.signal == SHOWN_IN.get(finding.effect) and s.finger == finding.where["finger"]), None
     )
-    channel = None if shown is None else channel_figures(shown.balance.states, shown.fit.declared)
+    channel = None if shown is None else channel_figures(shown.naming.balance.states, *_accounts(shown, stations))
     if sure:
         return sure_magnitude(finding.effect, finding.parameters, channel)
     return magnitude(finding.effect, {name: entry["value"] for name, entry in finding.parameters.items()}, channel)
+
+
+def _accounts(station: Station, stations: Sequence[Station]) -> tuple[Mapping[str, float], ...]:
+    """What a station's declared model needs, as fitted beside the names, and with preload and spring as the hand's other
+    drives have them: its own may hold what names left over."""
+    declared = station.naming.fit.declared
+    known = {name: expected(stations, station, name) for name in ("preload", "spring") if name in declared}
+    usual = {name: value[0] for name, value in known.items() if value is not None}
+    return (declared, {**declared, **usual}) if usual else (declared,)
 
 
 def _heaviest(found: Sequence[tuple[float, Finding]], key: Callable[[Finding], Any]) -> list[tuple[float, Finding]]:

@@ -25,8 +25,8 @@ LEAST, MOST = 1e-3, 3.0  # beyond, a figure says nothing more about its kind
 class Channel:
     """What magnitudes refer to. effort, load: standard deviations; low, high: range of positions; fastest: speed;
     ahead: farthest that a joint ran ahead of its drive; granted: length of bristles that any drive of the session may
-    have; turned: whether the hand was seen to turn; plain: sizes (n,) of what the drive needs without the named
-    effects, where known."""
+    have; turned: whether the hand was seen to turn; plain: sizes (n,) of what the drive needs without the named effects,
+    by each account of it."""
 
     effort: float = 1.0
     load: float = 0.0
@@ -36,7 +36,7 @@ class Channel:
     ahead: float = 0.0
     granted: float = 0.0
     turned: bool = True
-    plain: NDArray[np.float64] | None = None
+    plain: tuple[NDArray[np.float64], ...] = ()
 
     @property
     def span(self) -> float:
@@ -44,24 +44,18 @@ class Channel:
         return self.high - self.low
 
     def beyond(self, limit: float) -> float:
-        """Share of what the drive needs without the named effects that is beyond a limit; one where it is unknown."""
-        return 1.0 if self.plain is None else float(np.mean(self.plain > limit))
+        """Share of what the drive needs without the named effects that is beyond a limit, by the account that says least;
+        one where it is unknown."""
+        return min((float(np.mean(plain > limit)) for plain in self.plain), default=1.0)
 
 
-def channel_figures(states: tuple[DriveState, ...], declared: Mapping[str, float] | None = None) -> Channel:
-    """The figures of one balance's recordings. declared: name -> coefficient, as fitted beside the named effects."""
+def channel_figures(states: tuple[DriveState, ...], *declared: Mapping[str, float]) -> Channel:
+    """The figures of one balance's recordings. declared: accounts of what the drive needs, name -> coefficient."""
     effort = np.concatenate([s.effort[np.isfinite(s.effort)] for s in states])
     load, ahead, granted = (
         np.concatenate([s.extra.get(name, np.zeros(1)) for s in states]) for name in ("load", "ahead", "granted")
     )
     low, high = position_range(states)
-    needed = None
-    if declared is not None:
-        needed = np.abs(
-            np.concatenate(
-                [(s.declared @ [declared[n] for n in s.declared_names])[np.isfinite(s.effort)] for s in states]
-            )
-        )
     return Channel(
         max(float(np.std(effort)), 1e-12),
         float(np.nanstd(load)),
@@ -71,8 +65,14 @@ def channel_figures(states: tuple[DriveState, ...], declared: Mapping[str, float
         float(np.nanmax(ahead)),
         float(np.max(granted)),
         any(np.ptp(s.extra.get("gravity_along", np.zeros(1))) > 0 for s in states),
-        needed,
+        tuple(_needed(states, account) for account in declared),
     )
+
+
+def _needed(states: tuple[DriveState, ...], account: Mapping[str, float]) -> NDArray[np.float64]:
+    """Sizes (n,) of the effort that declared coefficients ask for."""
+    asked = [(s.declared @ [account[n] for n in s.declared_names])[np.isfinite(s.effort)] for s in states]
+    return np.abs(np.concatenate(asked))
 
 
 def magnitude(effect: str, parameters: Mapping[str, float], channel: Channel | None = None) -> float:
@@ -140,8 +140,8 @@ PLAIN: Mapping[str, Rule] = {
     "presliding_friction": lambda p, c: max(p["bristle_length"] - c.granted, 0.0) / (0.02 * c.span),
     "thermal_friction_drift": lambda p, c: p["cold_excess"] / (0.3 * c.effort),
     "detent_load": lambda p, c: p["load"] / (0.35 * c.effort),
-    "nonlinear_spring": lambda p, c: p["bend"] / (0.15 * c.effort),
-    # in one pose preload and spring take nearly all of it up
+    # in one pose a weight bends the spring, and preload and spring take nearly all else of it up
+    "nonlinear_spring": lambda p, c: p["bend"] / ((0.15 if c.turned else 0.2) * c.effort),
     "gravity_load": lambda p, c: p["largest"] / ((0.25 if c.turned else 0.75) * c.effort),
     "torque_ripple": lambda p, c: p["amplitude"] / (0.17 * c.effort),
     "elastoplastic_hysteresis": lambda p, c: p["yield_load"] / (0.3 * c.effort),

@@ -14,7 +14,7 @@ from ..findings import UNWRITTEN, Finding, weighed
 from .answers import Answers, answers_of, lateness
 from .ceiling import Ceiling
 from .simulated import SimulatedDrive
-from .strokes import LEAST_LOSS, Stroke, beneath, ceiling, sag, settled_sag, strokes_of
+from .strokes import LEAST_LOSS, LEAST_SURE_LOSS, Stroke, beneath, ceiling, sag, settled_sag, strokes_of
 
 Array = NDArray[np.float64]
 
@@ -91,8 +91,9 @@ def _sags(fact: CommandFacts, others: Sequence[CommandFacts]) -> bool:
     the session's other drives lose, or seem to gain: one without much feedback loses more under load."""
     usual = min((abs(f.lost) for f in others if np.isfinite(f.lost)), default=0.0)
     told = sorted((fact.sag / fact.sag_se, fact.settled / fact.settled_se))
-    sure = told[0] > LIKELY_T and told[1] > SURE_T and min(fact.lost, fact.settled) > LEAST_LOSS
-    return bool(sure and fact.lost > ALIKE * usual and fact.lost - usual > LEAST_LOSS)
+    least = LEAST_SURE_LOSS if told[0] > SURE_T else LEAST_LOSS
+    sure = told[0] > LIKELY_T and told[1] > SURE_T and min(fact.lost, fact.settled) > least
+    return bool(sure and fact.lost > ALIKE * usual and fact.lost - usual > least)
 
 
 def sags_beneath(facts: Mapping[str, CommandFacts], actuator: str, limit: float) -> bool:
