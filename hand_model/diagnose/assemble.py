@@ -32,7 +32,7 @@ UNLIKE_OTHERS = 2.0  # times the wander of the calmest finger
 HARMONICS = 4
 # of an encoder error's size, and of that of its kind: less, in the current of the same motor, may be what is left of it
 SHADOW = 0.5
-ANGULAR = {e.name for station in ("encoder", "linkage") for e in catalogue(station)} - {"clock_drift"}
+ANGULAR = {e.name for station in ("encoder", "linkage") for e in catalogue(station) if e.signal != "log"}
 REFUSED = "command_as_measurement"  # a channel that tells nothing: no other finding is small beside it
 TRIFLE = 0.01  # of the square of the heaviest weight
 # of that magnitude: less, where the lack-of-fit test sees nothing, is left to the imperfections of reading angles and

@@ -109,7 +109,7 @@ def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, f
     if states:
         effects = [*catalogue("encoder"), *outsiders("encoder")]
         stations.append(judged("encoder", finger.name, finger.actuator, finger.segments[0].name, states, effects))
-    parted = any(getattr(f.term.effect, "signal", None) == "log" for s in stations for f in s.outsiders)
+    parted = any(f.term.effect.signal == "log" for s in stations for f in s.outsiders)
     for joint in range(1, len(finger.segments)):
         expected = expected_angles(stations[0].naming) if stations and joint == 1 else {}
         states = linkage_states(angles, joint, moments, expected, not parted)

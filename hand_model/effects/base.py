@@ -145,6 +145,8 @@ class Effect:
     # declared column without which the effect is none (a ratio to a friction of zero)
     needs: ClassVar[str | None] = None
     of_the_hand: ClassVar[bool] = True  # False of what only one recording had, such as an obstacle
+    # channel that is wrong, where it is another than the one in which the effect shows
+    signal: ClassVar[str | None] = None
     # of the recording, not of the machine: the machine is compared with what is left without it
     recorded: ClassVar[bool] = False
     # seen as a level that changes slowly or with the recording, as a zero that wanders is

@@ -120,8 +120,8 @@ def with_lateness(
     by_simulation = {a: (d.delay_s, d.doubt_s) for a, d in simulated.items() if a in drives and np.isfinite(d.doubt_s)}
     if len(by_simulation) == 1 < len(drives) and by_simulation.keys() <= told.keys():
         ((actuator, (delay_s, doubt_s)),) = by_simulation.items()
-        step_s = float(np.median(np.diff(drives[actuator][0].time_s)))
-        by_simulation[actuator] = _weighted(told[actuator], (delay_s, float(np.hypot(doubt_s, step_s))))
+        doubt_s = float(np.hypot(doubt_s, facts[actuator].answers.step_s))
+        by_simulation[actuator] = _weighted(told[actuator], (delay_s, doubt_s))
     told |= by_simulation
     out = dict(drives)
     for actuator, late in told.items():

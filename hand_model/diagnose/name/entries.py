@@ -31,7 +31,7 @@ def finding_of(station: Station, named: Named, share: float, size: float) -> tup
         "finger": station.finger,
         "joint": getattr(effect, "joint", station.joint) if station.signal != "current" else None,
         "actuator": station.actuator,
-        "signal": getattr(effect, "signal", station.signal),
+        "signal": effect.signal or station.signal,
         "marker": None,
         "trials": [s.trial for s in naming.balance.states],
         # of the figures that the statement tells

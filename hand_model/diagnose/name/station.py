@@ -214,7 +214,7 @@ class Station:
             for f in self.proven
             if (f in large or any(_outgrows(f, g) for g in large))
             and f not in self.forms
-            and (f.size * self.naming.balance.sigma >= self.tilt or f.term.effect.name == "clock_drift")
+            and (f.size * self.naming.balance.sigma >= self.tilt or f.term.effect.signal == "log")
         )
 
     @property
