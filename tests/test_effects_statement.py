@@ -115,11 +115,7 @@ def test_statement_never_raises_and_shows_no_figure_that_is_none(candidate, para
 
 @pytest.mark.parametrize(
     "candidate",
-    [
-        e
-        for e in (*catalogue("encoder"), *catalogue("linkage"))
-        if e.signal is None and e.name != "spring_decoupling"
-    ],
+    [e for e in (*catalogue("encoder"), *catalogue("linkage")) if e.signal is None and e.name != "spring_decoupling"],
     ids=lambda e: e.name,
 )
 def test_statement_names_the_segment_that_follows(candidate) -> None:
