@@ -14,7 +14,7 @@ from ..effects.base import sample_interval
 from .findings import Finding, Findings
 from .locate.displacement import NO_HINGE, NOT_RIGID
 from .locate.markers import HINGE, SLIPS
-from .locate.preload import COMPARISON, expected
+from .locate.preload import COMPARISON, usual_spring
 from .magnitude import SLIGHT, channel_figures, magnitude, sure_magnitude
 from .name.distinguishability import protocol_pairs
 from .name.entries import (
@@ -173,9 +173,8 @@ def _accounts(station: Station, stations: Sequence[Station]) -> tuple[Mapping[st
     """What a station's declared model needs, as fitted beside the names, and with preload and spring as the hand's other
     drives have them: its own may hold what names left over."""
     declared = station.naming.fit.declared
-    known = {name: expected(stations, station, name) for name in ("preload", "spring") if name in declared}
-    usual = {name: value[0] for name, value in known.items() if value is not None}
-    return (declared, {**declared, **usual}) if usual else (declared,)
+    known = usual_spring(stations, station) if station.signal == "current" else {}
+    return (declared, {**declared, **{name: value for name, (value, _) in known.items()}}) if known else (declared,)
 
 
 def _heaviest(found: Sequence[tuple[float, Finding]], key: Callable[[Finding], Any]) -> list[tuple[float, Finding]]:

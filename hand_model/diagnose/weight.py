@@ -17,7 +17,7 @@ from ..session import Session
 from .findings import UNWRITTEN, Finding
 from .locate.angles import FingerAngles
 from .locate.gravity import in_one_pose
-from .locate.preload import expected, preload_findings
+from .locate.preload import SPRING, preload_findings, usual_spring
 from .name.balance import Balance, Fit
 from .name.least_squares import from_products
 from .name.naming import CLASS_WIDTH
@@ -99,9 +99,8 @@ Usual = Mapping[str, tuple[float, float]]  # declared coefficient -> what to exp
 
 def _usual(stations: Sequence[Station], station: Station) -> Usual | None:
     """What the hand's other drives let expect of a drive's preload and spring; None where they do not say both."""
-    known = {name: expected(stations, station, name) for name in ("preload", "spring")}
-    usual = {name: value for name, value in known.items() if value is not None}
-    return usual if len(usual) == len(known) else None
+    known = usual_spring(stations, station)
+    return known if len(known) == len(SPRING) else None
 
 
 def _pulled(usual: Usual, station: Station, states: tuple[DriveState, ...], odd_preload: bool) -> Pull | None:

@@ -21,6 +21,7 @@ from .known_motors import PRELOAD, kinship, preload_by_chance
 # mean absolute deviation of the logarithm of a drive's preload within one hand, as sure as from so many comparisons
 SPREAD, HANDS = 0.15, 3.0
 LIKE = ("viscous", "coulomb", "spring")  # coefficients that say how alike the drives of a hand are
+SPRING = ("preload", "spring")  # coefficients of what pulls a finger back
 ODD_P = 0.03  # of two drives that differ as much by chance; beyond, one of them is odd
 LOST = 0.2  # of the other's preload: less, or the wrong sign, and there is none
 SURE_LEAST = 0.1  # of a half difference counts in the ranking, however uncertain the rest is
@@ -92,6 +93,12 @@ def expected(stations: Sequence[Station], station: Station, name: str) -> tuple[
     changed = float(np.median([abs(n.fit.declared[name] - n.declared.declared[name]) for n in rest]))
     shape, scale = _spread([s.naming.fit.declared for s in drives if not _lacks(s)])
     return usual, float(np.hypot(np.sqrt(2) * scale / shape * usual, changed))
+
+
+def usual_spring(stations: Sequence[Station], station: Station) -> dict[str, tuple[float, float]]:
+    """What the hand's other drives let expect of one drive's preload and spring, as `expected`, where they say it."""
+    known = {name: expected(stations, station, name) for name in SPRING}
+    return {name: value for name, value in known.items() if value is not None}
 
 
 def _drives(stations: Sequence[Station]) -> list[Station]:
