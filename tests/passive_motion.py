@@ -95,6 +95,8 @@ KINEMATIC = [
     ("series_elasticity", {"form": 5.0}, {"compliance": 0.02, "drag_compliance": 0.03}),
     ("linkage_compliance", {"form": 3.0, "lag": 0.2}, {"compliance": 0.03, "drag_compliance": 0.0}),
     ("linkage_compliance", {"form": 4.0}, {"compliance": 0.01, "drag_compliance": 0.04}),
+    ("series_elasticity", {"form": 7.0, "stiff": 30.0}, {"compliance": 0.03, "drag_compliance": 0.0}),
+    ("linkage_compliance", {"form": 6.0, "stiff": 40.0}, {"compliance": 0.03, "drag_compliance": 0.0}),
     ("coupling_deadband", {"until": 15.0, "corner": 0.1}, {}),
     ("distal_stop", {"from": 50.0, "passing": 0.0}, {}),
     ("distal_stop", {"from": 50.0, "passing": 0.2}, {}),

@@ -152,6 +152,20 @@ def test_a_give_that_follows_its_load_late_is_no_play(lag_s: float) -> None:
     assert figures["compliance"]["value"] == pytest.approx(0.03, rel=0.2)
 
 
+@pytest.mark.parametrize(("station", "name"), [("encoder", "series_elasticity"), ("linkage", "linkage_compliance")])
+def test_a_give_that_stiffens_is_no_play(station: str, name: str) -> None:
+    """As tendons and cables do: far from rest it hardly moves more, as a play does, near it a give."""
+
+    def given(t, x, v):
+        return -0.06 * 30.0 * np.tanh((15.0 + 0.2 * x + 35.0 * np.tanh(v) + 0.15 * v) / 30.0)
+
+    station = judged("markers", "index", "index", "distal", joint(2, add=given), catalogue(station))
+    assert station.believed and [f.term.effect.name for f in station.kept] == [name]
+    (figures,) = (station.parameters[station.naming.fit.terms.index(f.term)] for f in station.kept)
+    assert figures["stiff"]["value"] == pytest.approx(30.0, rel=0.2)
+    assert figures["compliance"]["value"] == pytest.approx(0.06, rel=0.2)
+
+
 def test_the_law_of_a_late_give_is_its_column() -> None:
     (state, *_) = joint(2)
     shape, give = {"form": 3.0, "lag": 0.2}, effect("linkage_compliance")

@@ -159,20 +159,31 @@ def test_pieces_stand_in_a_finger_of_which_much_else_is_missing(
 
 
 @pytest.mark.parametrize(
-    ("count", "p", "explained", "tells", "part"),
+    ("count", "p", "explained", "tells", "kept_out", "part"),
     [
-        (5, 1e-4, 0.6, True, True),
-        (5, 1e-4, 0.4, True, False),
-        (4, 1e-4, 0.6, True, False),
-        (5, 0.2, 0.6, True, False),
-        (5, 1e-4, 0.6, False, False),
+        (5, 1e-4, 0.6, True, (1.4, 1.0), True),
+        (5, 1e-4, 0.4, True, (1.4, 1.0), False),
+        (4, 1e-4, 0.6, True, (1.4, 1.0), False),
+        (5, 0.2, 0.6, True, (1.4, 1.0), False),
+        (5, 0.2, 0.6, True, (1.4, 1.2), True),  # the test passes, recordings kept out show that something is left
+        (5, 0.2, 0.6, True, (1.4, 1.5), False),  # and get worse
+        (5, 1e-4, 0.6, False, (1.4, 1.2), False),
     ],
 )
 def test_in_part_means_as_many_names_as_may_be_of_more_than_half_of_the_mismatch(
-    count: int, p: float, explained: float, tells: bool, part: bool, monkeypatch: pytest.MonkeyPatch
+    count: int,
+    p: float,
+    explained: float,
+    tells: bool,
+    kept_out: tuple[float, float],
+    part: bool,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     station = object.__new__(Station)
-    station.naming = SimpleNamespace(after=SimpleNamespace(p=p), found=[None] * count)
+    friction = SimpleNamespace(term=SimpleNamespace(effect=effect("load_dependent_friction")))
+    naming = {"before": SimpleNamespace(p=1e-6), "after": SimpleNamespace(p=p), "found": [friction] * count}
+    station.naming, station.wander = SimpleNamespace(**naming), 0.0
+    monkeypatch.setattr(Station, "_kept_out", kept_out)
     monkeypatch.setattr(Station, "explained", explained)
     monkeypatch.setattr(Station, "_tells", tells)
     assert station.believed_in_part is part

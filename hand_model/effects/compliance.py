@@ -12,10 +12,12 @@ from .base import Amplitude, Array, DriveState, Effect, Shape, figure
 from .law import Law, Moment
 from .path import lowpass
 
-DRIVER, FOLLOWER, LATE_DRIVER, LATE_FOLLOWER, DRAGGED_DRIVER, DRAGGED_FOLLOWER = range(6)
+DRIVER, FOLLOWER, LATE_DRIVER, LATE_FOLLOWER, DRAGGED_DRIVER, DRAGGED_FOLLOWER, STIFF_DRIVER, STIFF_FOLLOWER = range(8)
 # [s]: a damper that lets a give follow faster is none that a hand's motion shows, and one slower holds it still
 LAG_S = 0.03, 0.6
 PLAIN = 0.4  # probability of each of the two plain forms
+# times the greatest load: a give that is stiff below that moves like a play, one that stiffens later is plain
+STIFF = 0.25, 1.5
 MOST_DRAG = 12.0  # times as much as to other load, at most, a give yields to drag: else a segment is only late
 
 
@@ -23,7 +25,7 @@ class Compliance(Effect):
     """The part behind stays back by compliance * load, at the driver's end (follower = map(driver - give)) or at its
     own. At once, or as a damper beside the spring lets it (Kelvin-Voigt: lag give' + give = compliance load), or with a
     compliance of its own for the load that grows with speed: how much of the drive's friction and of its drag passes
-    through what gives depends on where they act.
+    through what gives depends on where they act. Or it stiffens, as tendons and cables do: compliance stiff tanh(load / stiff).
 
     The load is what the motor's current passes on. What of it depends on position alone is in the map already: the
     compliance is known from what friction and speed add.
@@ -33,9 +35,18 @@ class Compliance(Effect):
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """form 0: give at the driver's end, in its unit; form 1: at the end of what follows, in its unit; forms 2 and 3:
-        the same, damped, with a time constant; forms 4 and 5: the same as the first, drag apart."""
-        forms = tuple(float(form) for form in range(6)) if all("drag" in s.extra for s in states) else ()
-        return Shape("form", "1", DRIVER, DRAGGED_FOLLOWER, forms), Shape("lag", "s", *LAG_S, (0.06, 0.15, 0.35))
+        the same, damped, with a time constant; forms 4 and 5: the same as the first, drag apart; forms 6 and 7: the
+        same as the first, stiffening from a load on."""
+        forms = tuple(float(form) for form in range(8)) if all("drag" in s.extra for s in states) else ()
+        most = max(
+            (float(np.percentile(np.abs(s.extra["load"]), 99)) for s in states if "load" in s.extra), default=1.0
+        )
+        least, greatest = (share * max(most, 1e-9) for share in STIFF)
+        return (
+            Shape("form", "1", DRIVER, STIFF_FOLLOWER, forms),
+            Shape("lag", "s", *LAG_S, (0.06, 0.15, 0.35)),
+            Shape("stiff", "raw", least, greatest, (2 * least,)),
+        )
 
     def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
         """Every time constant of what is damped."""
@@ -50,6 +61,8 @@ class Compliance(Effect):
         """Minus the load, or what of it the give has followed, and nothing; or minus the load without drag, and minus
         drag, (n, 2); times the map's slope where the give is at the driver's end."""
         load, apart = state.extra["load"], np.zeros(len(state.time_s))
+        if stiffens(shape):
+            load = shape["stiff"] * np.tanh(load / shape["stiff"])
         if damped(shape):
             load = lowpass(state.time_s, load, shape["lag"])
         elif dragged(shape):
@@ -60,10 +73,12 @@ class Compliance(Effect):
         self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]
     ) -> dict[str, float]:
         """The compliance and where it is, the time constant of what is damped, the compliance for drag where it is
-        another."""
+        another, the load from which it stiffens."""
         known = {"form": shape["form"], "compliance": amplitude["compliance"]}
         if dragged(shape):
             known["drag_compliance"] = amplitude["drag_compliance"]
+        if stiffens(shape):
+            known["stiff"] = shape["stiff"]
         return {**known, "lag": shape["lag"]} if damped(shape) else known
 
     def possible(self, states: tuple[DriveState, ...], parameters: Mapping[str, float]) -> bool:
@@ -72,7 +87,8 @@ class Compliance(Effect):
 
     def log_prior(self, parameters: Mapping[str, float]) -> float:
         """Most gives are plain."""
-        return math.log(6 * (0.25 * (1 - 2 * PLAIN) if self.hurries(parameters) else PLAIN))
+        plain = not (self.hurries(parameters) or stiffens(parameters))
+        return math.log(8 * (PLAIN if plain else (1 - 2 * PLAIN) / 6))
 
     def units(self, shape: Mapping[str, float]) -> Mapping[str, str]:
         """Of what yields: the driver's or the follower's position."""
@@ -97,9 +113,11 @@ class Compliance(Effect):
         compliance, there = parameters["compliance"], at_driver({"form": FOLLOWER, **parameters})
         followed = _Followed(parameters["lag"]) if damped(parameters) else None
         other = (parameters["drag_compliance"] - compliance) * parameters["drag"] if dragged(parameters) else 0.0
+        stiff = parameters["stiff"] if stiffens(parameters) else math.inf
 
         def departure(now: Moment) -> float:
             load = now.load if followed is None else followed(now)
+            load = load if math.isinf(stiff) else stiff * math.tanh(load / stiff)
             give = compliance * load + other * now.velocity
             return -give * (now.slope if there else math.radians(1.0))
 
@@ -128,13 +146,20 @@ def damped(parameters: Mapping[str, float]) -> bool:
 
 def dragged(parameters: Mapping[str, float]) -> bool:
     """Whether a give yields to drag otherwise than to other load."""
-    return parameters.get("form", FOLLOWER) >= DRAGGED_DRIVER
+    return parameters.get("form", FOLLOWER) in (DRAGGED_DRIVER, DRAGGED_FOLLOWER)
+
+
+def stiffens(parameters: Mapping[str, float]) -> bool:
+    """Whether a give yields less to more load."""
+    return parameters.get("form", FOLLOWER) >= STIFF_DRIVER
 
 
 def besides(parameters: Mapping[str, float]) -> str:
-    """What a sentence about a give says of time or drag; nothing of a plain one."""
+    """What a sentence about a give says of time, drag or load; nothing of a plain one."""
     if damped(parameters):
         return f", {1e3 * parameters['lag']:.0f} ms late"
+    if stiffens(parameters):
+        return f", stiffening from {figure(parameters['stiff'])} raw on"
     return f", and by {figure(100 * parameters['drag_compliance'])} where speed makes it" if dragged(parameters) else ""
 
 

@@ -115,9 +115,9 @@ class Station:
 
     @property
     def believed_in_part(self) -> bool:
-        """Whether the names would stand but that as many as may be leave something: in a finger of which much is missing
-        that is to be expected."""
-        many = self.naming.after.p < ALPHA and self.full
+        """Whether the names would stand but that as many as may be leave something, by the test or of recordings kept
+        out (and make these no worse): in a finger of which much is missing that is to be expected."""
+        many = self.full and (self.naming.after.p < ALPHA or self._short and not self._worse)
         return self._tells and many and self.explained >= EXPLAINED_PARTLY
 
     @property
@@ -154,7 +154,7 @@ class Station:
     def _predicted(self) -> bool:
         """Whether recordings kept out, plainly above their noise before, are within it beside the names: the test asks
         what repeats at the same place, speed and direction, and not what changes over a recording."""
-        before, after = (variance_ratio(self.naming, fit) for fit in (self.naming.declared, self.naming.fit))
+        before, after = self._kept_out
         return self.naming.balance.untouched and after <= KEPT_OUT**2 < PLAINLY * before
 
     @property
@@ -165,11 +165,21 @@ class Station:
             f.term.effect.warps or f.term.effect.replaces for f in self.naming.found
         ):
             return False
-        before, after = (variance_ratio(self.naming, fit) for fit in (self.naming.declared, self.naming.fit))
-        least, floor = KEPT_OUT**2, 1 + self.wander**2
-        return (
-            after > max(before, least) or after > least * floor and before - after < EXPLAINED_MOST * (before - floor)
-        )
+        before, after = self._kept_out
+        floor = 1 + self.wander**2
+        return self._worse or after > KEPT_OUT**2 * floor and before - after < EXPLAINED_MOST * (before - floor)
+
+    @property
+    def _worse(self) -> bool:
+        """Whether the names make recordings kept out worse, and leave them above their noise."""
+        before, after = self._kept_out
+        return after > max(before, KEPT_OUT**2)
+
+    @property
+    def _kept_out(self) -> tuple[float, float]:
+        """Mean square of recordings kept out, in that of the noise, without the names and with them."""
+        declared, fit = (variance_ratio(self.naming, f) for f in (self.naming.declared, self.naming.fit))
+        return declared, fit
 
     @property
     def kept(self) -> tuple[Named, ...]:
