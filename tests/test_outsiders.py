@@ -181,8 +181,13 @@ def test_in_part_means_as_many_names_as_may_be_of_more_than_half_of_the_mismatch
 ) -> None:
     station = object.__new__(Station)
     friction = SimpleNamespace(term=SimpleNamespace(effect=effect("load_dependent_friction")))
-    naming = {"before": SimpleNamespace(p=1e-6), "after": SimpleNamespace(p=p), "found": [friction] * count}
-    station.naming, station.wander = SimpleNamespace(**naming), 0.0
+    naming = {
+        "before": SimpleNamespace(p=1e-6),
+        "after": SimpleNamespace(p=p),
+        "found": [friction] * count,
+        "wander": None,
+    }
+    station.naming = SimpleNamespace(**naming)
     monkeypatch.setattr(Station, "_kept_out", kept_out)
     monkeypatch.setattr(Station, "explained", explained)
     monkeypatch.setattr(Station, "_tells", tells)
