@@ -140,8 +140,9 @@ PLAIN: Mapping[str, Rule] = {
     "presliding_friction": lambda p, c: max(p["bristle_length"] - c.granted, 0.0) / (0.02 * c.span),
     "thermal_friction_drift": lambda p, c: p["cold_excess"] / (0.3 * c.effort),
     "detent_load": lambda p, c: p["load"] / (0.35 * c.effort),
-    # in one pose a weight bends the spring, and preload and spring take nearly all else of it up
-    "nonlinear_spring": lambda p, c: p["bend"] / ((0.15 if c.turned else 0.2) * c.effort),
+    # whatever loads the drive a little by position bends its spring, in one pose a weight, too, of which preload and
+    # spring take nearly all else up
+    "nonlinear_spring": lambda p, c: p["bend"] / ((0.25 if c.turned else 0.33) * c.effort),
     "gravity_load": lambda p, c: p["largest"] / ((0.25 if c.turned else 0.75) * c.effort),
     "torque_ripple": lambda p, c: p["amplitude"] / (0.17 * c.effort),
     "elastoplastic_hysteresis": lambda p, c: p["yield_load"] / (0.3 * c.effort),
