@@ -40,6 +40,19 @@ def test_what_a_controller_does_at_rest_says_nothing_of_the_load() -> None:
         assert np.sqrt(np.mean((found - load)[inside] ** 2)) < 0.5 * NOISE
 
 
+def test_what_friction_has_built_up_stays_at_rest_however_the_position_is_read() -> None:
+    """A give follows the load: where noise of the position undid friction at rest, plays had the better word."""
+    t = np.arange(2400) * 0.018
+    phase = np.clip((np.mod(t, 3.0) - 1.0) / 1.4, 0.0, 1.0)  # rests of 1.6 s
+    x = 10 + 80 * np.abs(np.mod(np.floor(t / 3.0), 2) - phase)
+    load = 0.2 * x + 9.0 + 35.0 * dahl(x, 0.6)
+    rng = np.random.default_rng(5)
+    motion = estimate_motion(t, x + rng.normal(0, 0.12, len(t)))
+    found, _ = transmitted_load(t, load + rng.normal(0, NOISE, len(t)), motion)
+    resting = ~np.any([np.roll(motion.moving, k) for k in range(-10, 11)], axis=0)
+    assert resting.sum() > 500 and np.sqrt(np.mean((found - load)[resting] ** 2)) < 0.25 * NOISE
+
+
 def test_rows_that_are_stamped_in_packets_are_smoothed_all_the_same() -> None:
     t = np.repeat(np.arange(100) * 0.14, 8) + np.tile(np.arange(8) * 2e-5, 100)
     smooth, _ = least_error(t, np.sin(t) + np.random.default_rng(0).normal(0, 0.3, len(t)))

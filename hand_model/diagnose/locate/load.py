@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...effects.path import dahl, jenkins
-from .motion import Motion, least_error
+from .motion import Motion, least_error, smoothings
 
 Array = NDArray[np.float64]
 
@@ -16,6 +16,8 @@ REACHES = np.geomspace(0.001, 0.05, 12)  # of the range, over which friction bui
 FEWEST = 50  # samples in motion
 LETS_GO = 1.2  # times the variance of what motion leaves unexplained
 ORDER = 4  # of the load over the position
+NEAR_S = 0.3  # of a start or a stop
+JITTER = 4.0  # times the median departure of a resting position: more is no noise
 
 
 def transmitted_load(time_s: Array, current: Array, motion: Motion) -> tuple[Array, Array]:
@@ -24,7 +26,8 @@ def transmitted_load(time_s: Array, current: Array, motion: Motion) -> tuple[Arr
 
     A current's noise would be an error of a regressor, and smoothing it rounds what happens at a reversal, which is
     what tells a give from a play. Speed, friction that builds up after reversals (Dahl's or Jenkins's, whichever the
-    current prefers) and position explain nearly all of it; of the rest, what a smoothing with least error leaves. A
+    current prefers) and position explain nearly all of it; of the rest, what a smoothing with least error leaves: near
+    starts and stops, in steady motion and at rest by a bandwidth of its own. A
     controller that lets go of the load at rest is told by how much worse rests make the motion fit: they are bridged.
     """
     span, moving = float(np.ptp(motion.position)), motion.moving
@@ -38,8 +41,36 @@ def transmitted_load(time_s: Array, current: Array, motion: Motion) -> tuple[Arr
     rest = current - explained
     if lets_go:
         rest = np.interp(time_s, time_s[moving], rest[moving])
-    load = explained + least_error(time_s, rest)[0] - max(inertia, 0.0) * motion.acceleration
+    load = explained + _departure(time_s, rest, moving) - max(inertia, 0.0) * motion.acceleration
     return load, max(viscous, 0.0) * motion.velocity
+
+
+def _departure(time_s: Array, rest: Array, moving: NDArray[np.bool_]) -> Array:
+    """What is no noise of what motion leaves unexplained of a current (n,)."""
+    changes = time_s[1:][moving[1:] != moving[:-1]]
+    there = np.searchsorted(changes, time_s)
+    known = np.r_[-np.inf, changes, np.inf]
+    near = np.minimum(time_s - known[there], known[there + 1] - time_s) < NEAR_S
+    tried = [(error, smooth) for error, smooth, _ in smoothings(time_s, rest)]
+    out = np.zeros(len(rest))
+    for part in (near, moving & ~near, ~moving & ~near):
+        if part.any():
+            out[part] = min(tried, key=lambda x: float(np.mean(x[0][part])))[1][part]
+    return out
+
+
+def _path(motion: Motion) -> Array:
+    """The position (n,) without its noise at rest: that goes back and forth, and would undo what friction has built
+    up."""
+    out = motion.position.copy()
+    edges = np.flatnonzero(np.diff(motion.moving)) + 1
+    for rest in np.split(np.arange(len(out)), edges):
+        if not motion.moving[rest[0]]:
+            level = float(np.median(out[rest]))
+            off = out[rest] - level
+            noise = JITTER * float(np.median(np.abs(off)))
+            out[rest] = level + np.sign(off) * np.maximum(np.abs(off) - noise, 0.0)
+    return out
 
 
 def _designs(motion: Motion) -> list[Array]:
@@ -49,7 +80,8 @@ def _designs(motion: Motion) -> list[Array]:
     span = float(np.ptp(position))
     moved = np.stack([motion.acceleration, motion.velocity, np.ones(len(position))], axis=-1)
     powers = ((position - position.min()) / span)[:, None] ** np.arange(1, ORDER + 1)
-    return [np.c_[moved, rise(position, reach), powers] for rise in (dahl, jenkins) for reach in REACHES * span]
+    path = _path(motion)
+    return [np.c_[moved, rise(path, reach), powers] for rise in (dahl, jenkins) for reach in REACHES * span]
 
 
 def _explained(current: Array, designs: Sequence[Array], use: NDArray[np.bool_]) -> tuple[Array, float, float]:

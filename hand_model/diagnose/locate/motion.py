@@ -6,6 +6,7 @@ motion starts or stops within the kernel the estimate is smeared, and such sampl
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -90,8 +91,13 @@ def estimate_motion(time_s: Array, position: Array, bandwidth_s: float | None = 
 def least_error(time_s: Array, values: Array) -> tuple[Array, Array]:
     """Values smoothed over time and their rate (n,), at the bandwidth with the least leave-one-out error (Stone
     1974)."""
+    _, smooth, rate = min(smoothings(time_s, values), key=lambda x: float(np.mean(x[0])))
+    return smooth, rate
+
+
+def smoothings(time_s: Array, values: Array) -> Iterator[tuple[Array, Array, Array]]:
+    """Square of the leave-one-out error, values smoothed and their rate, (n,) each, at every bandwidth."""
     step = max(float(np.median(np.diff(time_s))), 1e-9)
-    tried = []
     for bandwidth in DEPARTURES_S:
         # samples averaged first: six to a bandwidth lose nothing; stamps in packets have next to no step
         count = max(1, min(int(bandwidth / step / 6), len(values) // FEWEST_BLOCKS))
@@ -102,9 +108,7 @@ def least_error(time_s: Array, values: Array) -> tuple[Array, Array]:
         impulse[len(y) // 2] = 1 / count
         own = float(local_quadratic(t, impulse, bandwidth)[0][len(y) // 2])
         smooth, rate = (np.interp(time_s, t, x) for x in local_quadratic(t, y, bandwidth)[:2])
-        tried.append((float(np.mean((values - smooth) ** 2)) / (1 - own) ** 2, smooth, rate))
-    _, smooth, rate = min(tried, key=lambda x: x[0])
-    return smooth, rate
+        yield ((values - smooth) / (1 - own)) ** 2, smooth, rate
 
 
 def position_at(motion: Motion, time_s: Array, then: Array) -> Array:
