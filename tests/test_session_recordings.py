@@ -7,7 +7,8 @@ import pytest
 from session_refusal import edit, refusal
 from session_writers import FINGERS, PALM, PROBE, rigid_markers, write_c3d, write_log, write_session
 
-from hand_model.diagnose.finger import _on_a_line
+from hand_model.diagnose.finger import _on_a_line, finger_calls
+from hand_model.diagnose.locate import angles
 from hand_model.session import check_session, read_session
 from hand_model.session.check import flatness, missing_direction, moves, on_a_line
 
@@ -173,6 +174,15 @@ def test_a_diagnosis_leaves_out_a_finger_with_markers_on_one_line_and_hears_the_
     (note,) = [note for note in check_session(session, dead=True) if "one line" in note]
     assert note.startswith("mocap/index.c3d") and "IP1, IP2, IP3" in note and "nothing was read" in note
     assert {f.name: _on_a_line(session, f) for f in session.fingers} == {"index": True, "ring": False}
+
+
+def test_a_diagnosis_leaves_out_a_finger_that_is_held_and_says_how_far_it_turns(root, monkeypatch):
+    """A weight that the drive does not lift: the axis of what hardly turns is noise, and so is its sign."""
+    monkeypatch.setattr(angles, "LEAST_TURN", np.pi)
+    for call in finger_calls(read_session(root)):
+        reading = call()
+        assert reading.angles is None and not reading.stations
+        assert f'"{reading.finger}" turns by ' in reading.notes[0] and "180 deg at least" in reading.notes[0]
 
 
 def test_a_direction_that_is_missing():

@@ -33,6 +33,7 @@ LEARN_FRAMES = 1500  # of each recording, evenly spaced: enough for a chain, all
 FIRST_SAMPLES, BEGUN = 5, 0.05  # of a recording, and the share of the range from which lost motion is closed
 FARTHEST_M = 6e-3  # a residual beyond is a ghost or a wrong label, no slip
 MOMENT_S = 0.2  # within which a step's moment is known
+LEAST_TURN = np.deg2rad(6.0)  # of a joint: a finger that turns less is held, and its axis is noise
 
 
 @dataclass(frozen=True)
@@ -81,7 +82,7 @@ def finger_angles(session: Session, finger: Finger, shape: Array) -> FingerAngle
     part), and its angles in every flexion recording.
 
     shape: (3, 3) [m] palm markers (`identify.palm_shape`). Raises IdentificationError where no recording tells the
-    chain.
+    chain, or none turns the first joint far enough to tell its axis.
     """
     trials = [t for t in session.select("flexion", finger.name) if t.mocap_path is not None]
     if not trials:
@@ -90,7 +91,14 @@ def finger_angles(session: Session, finger: Finger, shape: Array) -> FingerAngle
     observed = [observations(session, finger, mocap) for mocap in mocaps]
     recordings = [_Recording(*r) for r in zip(trials, mocaps, *zip(*observed, strict=True), strict=True)]
     data, still = _learned_from(recordings)
-    return _posed(finger, recordings, start_chain(data, still, shape))
+    angles = _posed(finger, recordings, start_chain(data, still, shape))
+    turned = max(float(np.ptp(np.nanpercentile(r.angle_rad[:, 0], (5, 95)))) for r in angles.records)
+    if turned < LEAST_TURN:
+        raise IdentificationError(
+            f'{session.path}: finger "{finger.name}" turns by {np.rad2deg(turned):.1f} deg in its flexions; what holds it? Its '
+            f"axes need {np.rad2deg(LEAST_TURN):.0f} deg at least"
+        )
+    return angles
 
 
 def refitted(angles: FingerAngles, markers: Sequence[ChainData]) -> FingerAngles:
