@@ -86,6 +86,7 @@ PLANTED = [
     ("end_stop_contact", {"side": 1.0, "inward": 18.0, "end": 100.0}, [1.5]),
     ("thermal_friction_drift", {"form": 0.0, "warm_up_time": 60.0}, [12.0]),
     ("nonlinear_spring", {}, [2e-4, 1.5e-5]),
+    ("nonlinear_spring", {"form": 1.0, "knee": 71.0}, [0.0, 0.7]),  # further out it would be a stop
     ("viscoelastic_spring", {"relaxation_time": 1.0}, [0.2]),
 ]
 

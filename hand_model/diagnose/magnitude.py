@@ -142,7 +142,7 @@ PLAIN: Mapping[str, Rule] = {
     "detent_load": lambda p, c: p["load"] / (0.35 * c.effort),
     # whatever loads the drive a little by position bends its spring, in one pose a weight, too, of which preload and
     # spring take nearly all else up
-    "nonlinear_spring": lambda p, c: p["bend"] / ((0.25 if c.turned else 0.33) * c.effort),
+    "nonlinear_spring": lambda p, c: p["bend"] / ((0.22 if c.turned else 0.3) * c.effort),
     "gravity_load": lambda p, c: p["largest"] / ((0.25 if c.turned else 0.75) * c.effort),
     "torque_ripple": lambda p, c: p["amplitude"] / (0.17 * c.effort),
     "elastoplastic_hysteresis": lambda p, c: p["yield_load"] / (0.3 * c.effort),

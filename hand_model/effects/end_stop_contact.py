@@ -14,7 +14,7 @@ from .mjcf import joint_tendon, motor_joint
 class EndStopContact(Effect):
     """F = k max(0, x - x0) at the upper end, or -k max(0, x0 - x) at the lower.
 
-    A stop lies in the outer third of the range; what bends further in is a spring.
+    A stop lies in the outer quarter of the range; what bends further in is a spring.
     """
 
     name = "end_stop_contact"
@@ -25,7 +25,7 @@ class EndStopContact(Effect):
         span = high - low
         return (
             Shape("side", "1", -1.0, 1.0, (-1.0, 1.0)),
-            Shape("inward", states[0].position_unit, 0.015 * span, span / 3, tuple(span * np.linspace(0.03, 0.31, 10))),
+            Shape("inward", states[0].position_unit, 0.015 * span, span / 4, tuple(span * np.linspace(0.03, 0.24, 8))),
         )
 
     def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:

@@ -17,7 +17,7 @@ class NonlinearSpring(Effect):
     """Beyond the declared line: b x^2 + c x^3 (form 0), or another stiffness from a knee on, c max(0, x - knee) (form
     1).
 
-    A knee lies in the inner part of the range; what bends in the outer third is an end stop.
+    A knee lies in the inner part of the range; what bends in the outer quarter is an end stop.
     """
 
     name = "nonlinear_spring"
@@ -32,8 +32,8 @@ class NonlinearSpring(Effect):
                 "knee",
                 states[0].position_unit,
                 low + 0.15 * span,
-                high - span / 3,
-                tuple(low + span * np.linspace(0.2, 0.65, 7)),
+                high - span / 4,
+                tuple(low + span * np.linspace(0.2, 0.72, 8)),
             ),
         )
 
