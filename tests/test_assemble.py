@@ -181,25 +181,28 @@ def test_where_no_finger_is_a_hinge_to_the_cameras_angles_tell_nothing() -> None
 
 
 @pytest.mark.parametrize(
-    ("finger", "signal", "p", "other", "doubtful"),
+    ("finger", "signal", "p", "explained", "other", "doubtful"),
     [
-        ("index", "markers", 1e-9, 0.5, True),
-        ("index", "encoder", 1e-9, 0.5, True),
-        ("index", "markers", 0.2, 0.5, False),
-        ("index", "markers", 0.2, 1e-9, True),
-        ("index", "current", 1e-9, 0.5, False),
-        ("ring", "markers", 0.2, 1e-9, False),
+        ("index", "markers", 1e-9, 0.8, 0.5, True),
+        ("index", "encoder", 1e-9, 0.8, 0.5, True),
+        ("index", "markers", 0.2, 0.8, 0.5, False),
+        ("index", "markers", 0.2, 0.8, 1e-9, True),
+        ("index", "markers", 1e-9, 0.99, 0.5, False),  # a play of which the test sees a hundredth still
+        ("index", "markers", 1e-9, 0.99, 1e-9, True),
+        ("index", "current", 1e-9, 0.8, 0.5, False),
+        ("ring", "markers", 0.2, 0.8, 1e-9, False),
     ],
 )
 def test_angles_of_markers_that_leave_segments_or_hinge_need_names_that_leave_nothing(
-    finger: str, signal: str, p: float, other: float, doubtful: bool
+    finger: str, signal: str, p: float, explained: float, other: float, doubtful: bool
 ) -> None:
     """At no station of that finger's angles: other is the p of the index's other one."""
 
-    def station(finger: str, signal: str, p: float) -> SimpleNamespace:
-        return SimpleNamespace(finger=finger, signal=signal, naming=SimpleNamespace(after=SimpleNamespace(p=p)))
+    def station(finger: str, signal: str, p: float, explained: float = 0.8) -> SimpleNamespace:
+        naming = SimpleNamespace(after=SimpleNamespace(p=p))
+        return SimpleNamespace(finger=finger, signal=signal, naming=naming, explained=explained)
 
-    asked = station(finger, signal, p)
+    asked = station(finger, signal, p, explained)
     every = [asked, station("index", "encoder", other), station("index", "current", 1e-9)]
     assert _leave_something(asked, every) is doubtful
 

@@ -43,6 +43,7 @@ TINY = 0.05  # the same where that test nearly sees something, and speaks of no 
 # hand's other motors speak for it
 COMPARED = 0.01
 MANY = 3  # names of a finger, beside which a channel of it may be explained in part
+NEARLY_ALL = 0.95  # of a mismatch: names that take as much leave nothing worth a word
 UNSEEN = 0.01  # probability from which the test sees nothing
 SIGNALS = {"drive": "current", "motors": "current", "command": "current", "encoder": "encoder", "linkage": "markers"}
 SHOWN_IN = {e.name: SIGNALS[e.station] for e in catalogue() if e.station in SIGNALS}
@@ -82,7 +83,7 @@ def assemble(
                     ranked.append((weight, finding))
         elif station.missing:
             unexplained.append(unexplained_of(station, 1.0))
-        if stands and station.naming.after.p < ALPHA and station.explained < 0.95:
+        if stands and station.naming.after.p < ALPHA and station.explained < NEARLY_ALL:
             unexplained.append(unexplained_of(station, 1 - station.explained))
         rejected += [
             {"effect": name, "where": str(station.finger), "reason": _reason(value)}
@@ -151,10 +152,10 @@ def _counted(finding: Finding, stations: Sequence[Station]) -> float:
 
 
 def _leave_something(station: Station, stations: Sequence[Station]) -> bool:
-    """Whether a station is of angles, and angles of its finger leave something beside their names: where markers leave
-    their segments or their hinge by no known way, what is wrong with the markers may be behind both."""
+    """Whether a station is of angles, and angles of its finger leave more than next to nothing beside their names: where
+    markers leave their segments or their hinge by no known way, what is wrong with the markers may be behind both."""
     angles = [s for s in stations if s.finger == station.finger and s.signal != "current"]
-    return station.signal != "current" and any(s.naming.after.p < ALPHA for s in angles)
+    return station.signal != "current" and any(s.naming.after.p < ALPHA and s.explained < NEARLY_ALL for s in angles)
 
 
 def _magnitude(finding: Finding, stations: Sequence[Station], sure: bool = False) -> float:
