@@ -166,6 +166,17 @@ def test_a_give_that_stiffens_is_no_play(station: str, name: str) -> None:
     assert figures["compliance"]["value"] == pytest.approx(0.06, rel=0.2)
 
 
+@pytest.mark.parametrize(("beyond", "over"), [(30.0, 15.0), (46.0, 15.0), (65.0, 8.0)])
+def test_a_finger_that_its_weight_tips_over_has_left_its_drive(beyond: float, over: float) -> None:
+    """Neither an error that repeats along the range nor a play: it runs ahead beyond a place, whichever way it goes."""
+    states = joint(2, add=lambda t, x, v: 4.0 * np.clip((x - beyond) / over, 0.0, 1.0))
+    station = judged("encoder", "index", "index", "proximal", states, [*catalogue("encoder"), *outsiders("encoder")])
+    assert station.believed and [f.term.effect.name for f in station.kept] == ["spring_decoupling"]
+    (figures,) = (station.parameters[station.naming.fit.terms.index(f.term)] for f in station.kept)
+    assert figures["lead"]["value"] == pytest.approx(4.0, rel=0.15)
+    assert figures["beyond"]["value"] == pytest.approx(beyond, abs=2.0)
+
+
 def test_the_law_of_a_late_give_is_its_column() -> None:
     (state, *_) = joint(2)
     shape, give = {"form": 3.0, "lag": 0.2}, effect("linkage_compliance")

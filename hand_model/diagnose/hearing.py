@@ -10,6 +10,7 @@ import numpy as np
 from ..background import Background
 from ..effects import catalogue, outsiders
 from ..effects.base import DriveState
+from ..effects.spring_decoupling import tips_over
 from ..errors import SessionError
 from ..session import Log, Session, check_session, moves
 from .findings import Finding
@@ -90,7 +91,7 @@ class Heard:
             named, states = station.standing("spring_decoupling"), drives[station.actuator]
             if named is not None and named.term.shape["form"] < 0.5:
                 states = without_excursions(states, station.naming.balance.states, self.fingers[station.finger])
-            elif named is not None and pulls(station, TRIFLE):
+            elif named is not None and not tips_over(named.term.shape) and pulls(station, TRIFLE):
                 states = while_driven(states, named.term.shape["below"])
             drives[station.actuator] = states
         for actuator in [a for a, states in drives.items() if not is_measured(states)]:

@@ -10,9 +10,12 @@ import numpy as np
 from .base import Amplitude, Array, DriveState, Effect, Shape, figure, position_range
 from .path import runs
 
+WHILES, OPEN, TIPS = 0.0, 1.0, 2.0
+
 
 class SpringDecoupling(Effect):
-    """The finger runs ahead of its actuator: for a while, wherever it is, or in every cycle near the open end."""
+    """The finger runs ahead of its actuator: for a while, wherever it is, or in every cycle near the open end, or beyond
+    a position, where its weight tips over."""
 
     name = "spring_decoupling"
     station = "encoder"
@@ -21,49 +24,67 @@ class SpringDecoupling(Effect):
     )
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """form 0: for a while, "ahead" in `extra`; form 1: below an encoder position, at which the finger stays
-        behind."""
+        """form 0: for a while, "ahead" in `extra`; form 1: below an encoder position, at which the finger stays behind;
+        form 2: beyond one, the whole lead reached over a way of its own."""
         low, high = position_range(states)
-        span = high - low
+        span, unit = high - low, states[0].position_unit
+        below, beyond = (tuple(low + span * np.linspace(*ends)) for ends in ((0.03, 0.5, 12), (0.15, 0.8, 14)))
         return (
-            Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),
-            Shape(
-                "below",
-                states[0].position_unit,
-                low + 0.01 * span,
-                low + 0.6 * span,
-                tuple(low + span * np.linspace(0.03, 0.5, 12)),
-            ),
+            Shape("form", "1", WHILES, TIPS, (WHILES, OPEN, TIPS)),
+            Shape("below", unit, low + 0.01 * span, low + 0.6 * span, below),
+            Shape("beyond", unit, low + 0.1 * span, low + 0.85 * span, beyond),
+            Shape("over", unit, 0.03 * span, 0.3 * span, (0.08 * span, 0.2 * span)),
         )
 
     def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
-        """One start for what passes, several for the open end."""
-        below = self.shapes(states)[1].starts
-        return [{"form": 0.0, "below": below[0]}, *({"form": 1.0, "below": b} for b in below)]
+        """One start for what passes, several for the open end, and for where it tips over."""
+        _, below, beyond, over = (shape.starts for shape in self.shapes(states))
+        places = [
+            (WHILES, below[0], beyond[0], over[0]),
+            *((OPEN, b, beyond[0], over[0]) for b in below),
+            *((TIPS, below[0], b, o) for b in beyond for o in over),
+        ]
+        return [dict(zip(("form", "below", "beyond", "over"), place, strict=True)) for place in places]
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
-        """Share of the seen excursion (form 0), or angle per position that the finger stays behind (form 1)."""
+        """Share of the seen excursion (form 0), angle per position that the finger stays behind (form 1), or angle by
+        which it tips over (form 2)."""
         return (("lead", "1", 0.0, np.inf),)
 
     def units(self, shape: Mapping[str, float]) -> Mapping[str, str]:
-        """Of how far it stays behind for each unit of position."""
-        return {"lead": "effort/position"} if shape["form"] > 0.5 else {}
+        """Of how far it stays behind for each unit of position, or runs ahead."""
+        return {} if shape["form"] == WHILES else {"lead": "effort" if tips_over(shape) else "effort/position"}
+
+    def parameters(
+        self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]
+    ) -> dict[str, float]:
+        """The lead, and where."""
+        where = ("beyond", "over") if tips_over(shape) else ("below",)
+        return {**{name: shape[name] for name in ("form", *where)}, **amplitude}
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """The excursions, or max(0, below - x), (n, 1)."""
-        if shape["form"] == 0.0:
+        """The excursions, or max(0, below - x), or the share of the way over which it tips, (n, 1)."""
+        if shape["form"] == WHILES:
             return state.extra.get("ahead", np.zeros(len(state.time_s)))[:, None]
+        if tips_over(shape):
+            return np.clip((state.position - shape["beyond"]) / shape["over"], 0.0, 1.0)[:, None]
         return np.maximum(shape["below"] - state.position, 0.0)[:, None]
 
     def region(self, states: tuple[DriveState, ...], shape: Mapping[str, float]) -> dict[str, Any] | None:
-        """The whiles [s] by trial, or from the open end to where it follows again."""
-        if shape["form"] == 0.0:
+        """The whiles [s] by trial, or from the open end to where it follows again, or from where it tips over on."""
+        if shape["form"] == WHILES:
             return {"time": {s.trial: spans(s) for s in states if spans(s)}, "unit": "s"}
-        low, _ = position_range(states)
-        return {"position": [low, shape["below"]], "unit": states[0].position_unit}
+        low, high = position_range(states)
+        ends = [shape["beyond"], high] if tips_over(shape) else [low, shape["below"]]
+        return {"position": ends, "unit": states[0].position_unit}
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """When the finger runs ahead, or where it stays behind."""
+        if tips_over(parameters):
+            return (
+                f"beyond {parameters['beyond']:.1f} % of the encoder's range the finger runs ahead of its motor, by "
+                f"{figure(parameters['lead'])} deg after {parameters['over']:.1f} % more"
+            )
         if parameters["form"] > 0.5:
             return (
                 f"below {parameters['below']:.1f} % of the encoder's range the finger does not follow its motor open: "
@@ -78,6 +99,11 @@ class SpringDecoupling(Effect):
         return (
             f"the finger leaves its actuator and runs ahead of it, {longest}from {begin:.1f} to {end:.1f} s of {trial}"
         )
+
+
+def tips_over(parameters: Mapping[str, float]) -> bool:
+    """Whether a finger leaves its actuator beyond a position."""
+    return parameters["form"] > 1.5
 
 
 def spans(state: DriveState) -> list[list[float]]:
