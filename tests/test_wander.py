@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from test_diagnose import drive, planted
 
-from hand_model.diagnose.locate.measurement import echoes_command, is_measured, rests_on_command
+from hand_model.diagnose.locate.measurement import echoes_command, frozen, is_measured, rests_on_command
 from hand_model.diagnose.locate.stamps import stamps
 from hand_model.diagnose.name.balance import Balance
 from hand_model.diagnose.name.selection import name_effects
@@ -230,3 +230,21 @@ def test_a_loud_moment_counts_for_less_and_a_quiet_recording_for_all():
     calm = _calm(scatter)
     assert np.all(calm[84:116] < 0.1)
     assert np.all(calm[:70] == 1)
+
+
+@pytest.mark.parametrize(("level", "found"), [(None, False), (30.0, True), (60.0, False), (0.0, False)])
+def test_a_current_that_stands_still_in_motion_was_not_read(level: float | None, found: bool) -> None:
+    """By chance neighbours are alike; at its limit a reading stays, and at zero it may be dead."""
+    rng = np.random.default_rng(4)
+    current = np.clip(np.round(30.0 + rng.normal(0, 6.0, 3000)), None, 60.0)
+    current[100:104] = 60.0
+    if level is not None:
+        current[1000:1020] = level
+    moving = np.arange(3000) % 200 < 150
+    still = frozen(current, moving)
+    assert still.any() == found
+    if found:
+        assert still[1001:1019].all() and still.sum() < 25
+    at_rest = current.copy()
+    at_rest[160:190] = 25.0  # a controller holds
+    assert not frozen(at_rest, moving)[150:200].any()

@@ -19,7 +19,7 @@ from .locate.angles import FingerAngles
 from .locate.command import CommandFacts, command_facts, command_findings, refused, sags_beneath
 from .locate.course import FingerCourses
 from .locate.decoupled import TRIFLE, pulls, while_driven, without_excursions
-from .locate.drive import drive_states, drive_trials, opposes, too_short
+from .locate.drive import drive_states, drive_trials, frozen_share, opposes, too_short, unread
 from .locate.encoder_error import encoder_corrections
 from .locate.gravity import with_gravity
 from .locate.measurement import echoes_command, is_measured, rests_on_command
@@ -32,6 +32,7 @@ from .name.station import Station, judged
 from .weight import with_weights
 
 REASON = 0.5  # of the size at which friction by load is plain: a soft controller falls behind by so much
+FROZEN = 0.02  # of the time in motion: a current that stands still for more is no slip of a bus
 
 
 class Heard:
@@ -87,6 +88,10 @@ class Heard:
             a: with_gravity(session, self.fingers, states)
             for a, states in drive_states(session, encoder_corrections(self.stations), self.unread, simulated).items()
         }
+        self.notes += [note for states in drives.values() for note in unread(states)]
+        self.unexplained += [
+            _frozen(session, a, share) for a, states in drives.items() if (share := frozen_share(states)) > FROZEN
+        ]
         for station in (s for s in self.stations if s.actuator in drives):
             named, states = station.standing("spring_decoupling"), drives[station.actuator]
             if named is not None and named.term.shape["form"] < 0.5:
@@ -183,6 +188,14 @@ def _false_stamps(session: Session, actuator: str, judged: Stamps) -> dict[str, 
         "shape": f"the rows' time stamps do not follow the motion (off by some {1e3 * judged.wrong_s:.0f} ms, as if given in "
         "packets): speed, current and encoder against time were not judged",
     }
+
+
+def _frozen(session: Session, actuator: str, share: float) -> dict[str, Any]:
+    where = {"finger": _finger_of(session, actuator), "joint": None, "actuator": actuator, "signal": "current"}
+    shape = (
+        f"the current stands still while the motor moves, {100 * share:.0f} % of the time: those readings were left out"
+    )
+    return {"where": where, "share_of_mismatch": 1.0, "shape": shape}
 
 
 def _made(call: Callable[[], Any]) -> Any:

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...effects.base import DriveState
-from ...effects.path import from_rest
+from ...effects.path import from_rest, runs
 from ...session import Log, Session, Trial
 from ..name.bristles import bristled
 from .doubt import with_doubt
-from .measurement import coefficients, extremes, is_measured
+from .measurement import coefficients, extremes, frozen, is_measured
 from .motion import Motion, estimate_motion, sure_acceleration
 from .simulated import SimulatedDrive, with_simulated
 
@@ -123,7 +123,9 @@ def _prepare(
         end = float(time_s[-1])
         extra["trial_index"] = np.full(len(time_s), float(index))
         extra["validation_index"] = np.full(len(time_s), float(sum(t.validate for t, _ in entries[:index])))
-        effort = np.where(motion.moving, current[seen], np.nan)
+        still = frozen(current[seen], motion.moving)
+        effort = np.where(motion.moving & ~still, current[seen], np.nan)
+        extra["frozen"] = still.astype(float)
         extra["bandwidth_s"] = np.full(len(time_s), motion.bandwidth_s)
         extra["position_noise"] = np.full(len(time_s), motion.noise)
         extra["steady"] = steady(time_s, motion).astype(float)
@@ -170,6 +172,27 @@ def too_short(session: Session) -> list[str]:
         for name, n in rows.items()
         if n < LEAST_ROWS
     ]
+
+
+def frozen_share(states: Sequence[DriveState]) -> float:
+    """Share of the time in motion in which a drive's current stands still."""
+    moving, still = (np.concatenate([s.extra[name] for s in states]) > 0 for name in ("moving", "frozen"))
+    return float(np.mean(still[moving])) if moving.any() else 0.0
+
+
+def unread(states: Sequence[DriveState]) -> list[str]:
+    """What is to be said of currents that stand still while their drive moves."""
+    out = []
+    for state in states:
+        whiles = runs(state.extra["frozen"] > 0)
+        if whiles:
+            longest = max(float(state.time_s[b - 1] - state.time_s[a]) for a, b in whiles)
+            times = "once" if len(whiles) == 1 else f"{len(whiles)} times"
+            out.append(
+                f"{state.trial}: the current stands still {times} while the motor moves, for up to {longest:.2g} s: those "
+                "readings were left out"
+            )
+    return out
 
 
 def _held(values: Array) -> Array:

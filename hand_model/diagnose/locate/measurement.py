@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...effects.base import DriveState
+from ...effects.path import runs
 from ...session import Log
 from .answers import latencies
 
@@ -18,6 +19,9 @@ UNMOVED = 0.95  # of a current's standard deviation: more than this left by the 
 FEWEST_RESTS, FINE = 10, 200  # rests that are looked at, and different readings of an encoder that is no coarse one
 LONG_STROKE = 15  # samples, over which a current changes
 PLACES, SPEEDS = 20, 8  # bins of position and of speed, each way
+# of neighbours alike, at most, where a reading that stands still means anything; of such runs by chance; of the largest
+# reading, from which it may have reached its end
+OFTEN, BY_CHANCE, AT_END = 0.5, 1e-4, 0.9
 COMMANDED = 0.67  # of what state leaves of a current: less left by the way to the target, and it is asked for
 
 
@@ -36,6 +40,21 @@ def is_measured(states: tuple[DriveState, ...]) -> bool:
     left = float(np.std(current - declared @ coefficients(declared, current)))
     jitter = float(np.median(np.abs(np.diff(current, 2)))) / 0.6745 / np.sqrt(6)
     return left < UNMOVED * spread and not (jitter < 0.03 * spread and left > 10 * max(jitter, 0.02 * spread))
+
+
+def frozen(current: Array, moving: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Samples (n,) in motion at which a current stands still for longer than chance would have it: nobody read it then.
+    Not where it is zero or as large as it gets: there a reading may have its ends."""
+    same = np.r_[False, current[1:] == current[:-1]]
+    often = float(np.mean(same[moving])) if moving.any() else 1.0
+    largest = float(np.max(np.abs(current[np.isfinite(current)]), initial=0.0))
+    free = moving & (current != 0) & (np.abs(current) < AT_END * largest)
+    out = np.zeros(len(current), bool)
+    if often <= OFTEN:
+        for a, b in runs(same):
+            if len(current) * often ** int(np.sum(free[a:b])) < BY_CHANCE:
+                out[a - 1 : b] = True
+    return out
 
 
 def _level(states: tuple[DriveState, ...]) -> bool:
