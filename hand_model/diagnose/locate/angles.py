@@ -92,7 +92,8 @@ def finger_angles(session: Session, finger: Finger, shape: Array) -> FingerAngle
     recordings = [_Recording(*r) for r in zip(trials, mocaps, *zip(*observed, strict=True), strict=True)]
     data, still = _learned_from(recordings)
     angles = _posed(finger, recordings, start_chain(data, still, shape))
-    turned = max(float(np.ptp(np.nanpercentile(r.angle_rad[:, 0], (5, 95)))) for r in angles.records)
+    first = [r.angle_rad[np.isfinite(r.angle_rad[:, 0]), 0] for r in angles.records]
+    turned = max((float(np.ptp(np.percentile(q, (5, 95)))) for q in first if len(q)), default=0.0)
     if turned < LEAST_TURN:
         raise IdentificationError(
             f'{session.path}: finger "{finger.name}" turns by {np.rad2deg(turned):.1f} deg in its flexions; what holds it? Its '
