@@ -204,12 +204,22 @@ def test_what_is_left_beside_something_larger_that_does_not_stand_is_no_explanat
 
 
 @pytest.mark.parametrize(
-    ("periods", "patched"),
-    [((30.0,), False), ((30.0, 15.05, 10.0), False), ((30.0, 21.0), False), ((30.0, 26.0, 21.0, 15.0), True)],
+    ("periods", "share", "patched"),
+    [
+        ((30.0,), 0.2, False),
+        ((30.0, 15.05, 10.0), 0.2, False),
+        ((30.0, 21.0), 0.2, False),
+        ((30.0, 26.0, 21.0, 15.0), 0.2, True),
+        ((30.0, 26.0, 21.0, 15.0), 0.01, False),  # beside something that holds the rest
+    ],
 )
-def test_many_periods_that_have_nothing_in_common_are_no_explanation(periods: tuple[float, ...], patched: bool) -> None:
+def test_many_periods_that_have_nothing_in_common_are_no_explanation(
+    periods: tuple[float, ...], share: float, patched: bool
+) -> None:
     station, error = object.__new__(Station), effect("encoder_periodic_error")
-    station.proven = tuple(SimpleNamespace(term=SimpleNamespace(effect=error, shape={"period": p})) for p in periods)
+    station.proven = tuple(
+        SimpleNamespace(term=SimpleNamespace(effect=error, shape={"period": p}), share=share) for p in periods
+    )
     assert station._patched is patched
 
 

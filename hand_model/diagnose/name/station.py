@@ -141,8 +141,9 @@ class Station:
     @property
     def _patched(self) -> bool:
         """Whether a periodic effect has more than two periods that are no harmonics of its longest: they describe a
-        shape that repeats in none of them."""
-        of = [f.term for f in self.proven if f.term.effect.repeats and "period" in f.term.shape]
+        shape that repeats in none of them. A trifle of the explained does not count: it may be the form of a corner."""
+        periodic = [f for f in self.proven if f.term.effect.repeats and "period" in f.term.shape]
+        of = [f.term for f in periodic] if sum(f.share for f in periodic) >= SMALL else []
         for name in {t.effect.name for t in of}:
             periods = np.array([t.shape["period"] for t in of if t.effect.name == name])
             order = periods.max() / periods
