@@ -19,7 +19,7 @@ from .locate.angles import FingerAngles
 from .locate.command import CommandFacts, command_facts, command_findings, refused, sags_beneath
 from .locate.course import FingerCourses
 from .locate.decoupled import TRIFLE, pulls, while_driven, without_excursions
-from .locate.drive import drive_states, drive_trials, frozen_share, opposes, too_short, unread
+from .locate.drive import drive_states, drive_trials, frozen_share, opposes, stand_still, too_short
 from .locate.encoder_error import encoder_corrections
 from .locate.gravity import with_gravity
 from .locate.measurement import echoes_command, is_measured, rests_on_command
@@ -88,7 +88,7 @@ class Heard:
             a: with_gravity(session, self.fingers, states)
             for a, states in drive_states(session, encoder_corrections(self.stations), self.unread, simulated).items()
         }
-        self.notes += [note for states in drives.values() for note in unread(states)]
+        self.notes += [note for states in drives.values() for note in stand_still(states)]
         self.unexplained += [
             _frozen(session, a, share) for a, states in drives.items() if (share := frozen_share(states)) > FROZEN
         ]
@@ -181,20 +181,23 @@ def _distrusted(session: Session) -> dict[str, Stamps]:
 
 
 def _false_stamps(session: Session, actuator: str, judged: Stamps) -> dict[str, Any]:
-    where = {"finger": _finger_of(session, actuator), "joint": None, "actuator": actuator, "signal": "log"}
-    return {
-        "where": where,
-        "share_of_mismatch": 1.0,
-        "shape": f"the rows' time stamps do not follow the motion (off by some {1e3 * judged.wrong_s:.0f} ms, as if given in "
-        "packets): speed, current and encoder against time were not judged",
-    }
+    shape = (
+        f"the rows' time stamps do not follow the motion (off by some {1e3 * judged.wrong_s:.0f} ms, as if given in "
+        "packets): speed, current and encoder against time were not judged"
+    )
+    return _unheard(session, actuator, "log", shape)
 
 
 def _frozen(session: Session, actuator: str, share: float) -> dict[str, Any]:
-    where = {"finger": _finger_of(session, actuator), "joint": None, "actuator": actuator, "signal": "current"}
     shape = (
         f"the current stands still while the motor moves, {100 * share:.0f} % of the time: those readings were left out"
     )
+    return _unheard(session, actuator, "current", shape)
+
+
+def _unheard(session: Session, actuator: str, signal: str, shape: str) -> dict[str, Any]:
+    """A channel of a drive that is not believed, or not all of it, as an entry of what is unexplained."""
+    where = {"finger": _finger_of(session, actuator), "joint": None, "actuator": actuator, "signal": signal}
     return {"where": where, "share_of_mismatch": 1.0, "shape": shape}
 
 

@@ -12,7 +12,9 @@ from .base import Amplitude, Array, DriveState, Effect, Shape, figure
 from .law import Law, Moment
 from .path import lowpass
 
-DRIVER, FOLLOWER, LATE_DRIVER, LATE_FOLLOWER, DRAGGED_DRIVER, DRAGGED_FOLLOWER, STIFF_DRIVER, STIFF_FOLLOWER = range(8)
+DRIVER, FOLLOWER, LATE_DRIVER, LATE_FOLLOWER, DRAGGED_DRIVER, DRAGGED_FOLLOWER, STIFF_DRIVER, STIFF_FOLLOWER = FORMS = (
+    range(8)
+)
 # [s]: a damper that lets a give follow faster is none that a hand's motion shows, and one slower holds it still
 LAG_S = 0.03, 0.6
 PLAIN = 0.4  # probability of each of the two plain forms
@@ -37,7 +39,7 @@ class Compliance(Effect):
         """form 0: give at the driver's end, in its unit; form 1: at the end of what follows, in its unit; forms 2 and 3:
         the same, damped, with a time constant; forms 4 and 5: the same as the first, drag apart; forms 6 and 7: the
         same as the first, stiffening from a load on."""
-        forms = tuple(float(form) for form in range(8)) if all("drag" in s.extra for s in states) else ()
+        forms = tuple(float(form) for form in FORMS) if all("drag" in s.extra for s in states) else ()
         most = max(
             (float(np.percentile(np.abs(s.extra["load"]), 99)) for s in states if "load" in s.extra), default=1.0
         )
@@ -88,7 +90,7 @@ class Compliance(Effect):
     def log_prior(self, parameters: Mapping[str, float]) -> float:
         """Most gives are plain."""
         plain = not (self.hurries(parameters) or stiffens(parameters))
-        return math.log(8 * (PLAIN if plain else (1 - 2 * PLAIN) / 6))
+        return math.log(len(FORMS) * (PLAIN if plain else (1 - 2 * PLAIN) / (len(FORMS) - 2)))
 
     def units(self, shape: Mapping[str, float]) -> Mapping[str, str]:
         """Of what yields: the driver's or the follower's position."""

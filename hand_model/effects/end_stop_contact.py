@@ -10,6 +10,8 @@ import numpy as np
 from .base import Amplitude, Array, DriveState, Effect, Shape, figure, position_range
 from .mjcf import joint_tendon, motor_joint
 
+OUTER = 0.25  # of the range, at either end, in which a stop lies
+
 
 class EndStopContact(Effect):
     """F = k max(0, x - x0) at the upper end, or -k max(0, x0 - x) at the lower.
@@ -25,7 +27,9 @@ class EndStopContact(Effect):
         span = high - low
         return (
             Shape("side", "1", -1.0, 1.0, (-1.0, 1.0)),
-            Shape("inward", states[0].position_unit, 0.015 * span, span / 4, tuple(span * np.linspace(0.03, 0.24, 8))),
+            Shape(
+                "inward", states[0].position_unit, 0.015 * span, OUTER * span, tuple(span * np.linspace(0.03, 0.24, 8))
+            ),
         )
 
     def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, figure, position_range
+from .end_stop_contact import OUTER
 from .law import Law
 from .mjcf import joint_tendon, motor_joint
 
@@ -32,7 +33,7 @@ class NonlinearSpring(Effect):
                 "knee",
                 states[0].position_unit,
                 low + 0.15 * span,
-                high - span / 4,
+                high - OUTER * span,
                 tuple(low + span * np.linspace(0.2, 0.72, 8)),
             ),
         )

@@ -180,7 +180,7 @@ def frozen_share(states: Sequence[DriveState]) -> float:
     return float(np.mean(still[moving])) if moving.any() else 0.0
 
 
-def unread(states: Sequence[DriveState]) -> list[str]:
+def stand_still(states: Sequence[DriveState]) -> list[str]:
     """What is to be said of currents that stand still while their drive moves."""
     out = []
     for state in states:

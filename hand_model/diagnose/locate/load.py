@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ...effects.path import dahl, jenkins
+from ...effects.path import dahl, jenkins, runs
 from .motion import Motion, least_error, smoothings
 
 Array = NDArray[np.float64]
@@ -27,8 +27,8 @@ def transmitted_load(time_s: Array, current: Array, motion: Motion) -> tuple[Arr
     A current's noise would be an error of a regressor, and smoothing it rounds what happens at a reversal, which is
     what tells a give from a play. Speed, friction that builds up after reversals (Dahl's or Jenkins's, whichever the
     current prefers) and position explain nearly all of it; of the rest, what a smoothing with least error leaves: near
-    starts and stops, in steady motion and at rest by a bandwidth of its own. A
-    controller that lets go of the load at rest is told by how much worse rests make the motion fit: they are bridged.
+    starts and stops, in steady motion and at rest by a bandwidth of its own. A controller that lets go of the load at
+    rest is told by how much worse rests make the motion fit: they are bridged.
     """
     span, moving = float(np.ptp(motion.position)), motion.moving
     if span == 0 or moving.sum() < FEWEST:
@@ -63,13 +63,11 @@ def _path(motion: Motion) -> Array:
     """The position (n,) without its noise at rest: that goes back and forth, and would undo what friction has built
     up."""
     out = motion.position.copy()
-    edges = np.flatnonzero(np.diff(motion.moving)) + 1
-    for rest in np.split(np.arange(len(out)), edges):
-        if not motion.moving[rest[0]]:
-            level = float(np.median(out[rest]))
-            off = out[rest] - level
-            noise = JITTER * float(np.median(np.abs(off)))
-            out[rest] = level + np.sign(off) * np.maximum(np.abs(off) - noise, 0.0)
+    for begin, end in runs(~motion.moving):
+        level = float(np.median(out[begin:end]))
+        off = out[begin:end] - level
+        noise = JITTER * float(np.median(np.abs(off)))
+        out[begin:end] = level + np.sign(off) * np.maximum(np.abs(off) - noise, 0.0)
     return out
 
 
