@@ -94,13 +94,25 @@ def _leaves(encoder: Station) -> bool:
     return named is not None and named.term.shape["form"] < 0.5
 
 
+def _held_out(
+    found: tuple[tuple[float, Finding], ...], courses: FingerCourses | None
+) -> tuple[tuple[tuple[float, Finding], ...], FingerCourses | None]:
+    """Findings with the fit of joints that are no plain hinges, and their courses; without them where recordings kept
+    out are no better with those."""
+    if courses is None:
+        return found, None
+    fit = marker_fit(courses, of_chain(courses.plain, courses.body), of_chain(courses.coursed, courses.body), OWN)
+    reduction = fit["ci95_reduction"]
+    if fit["held_out"] and reduction is not None and reduction[0] <= 0:
+        return tuple((w, f) for w, f in found if f.effect not in HINGE), None
+    return tuple((w, replace(f, fit=fit) if f.effect in HINGE else f) for w, f in found), courses
+
+
 def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, float]]) -> FingerReading:
     markers = name_markers(seen)
     found = tuple(marker_findings(seen, markers))
     courses = finger_courses(seen, markers, {(f.effect, f.where["joint"]) for _, f in found if f.effect in HINGE})
-    if courses is not None:
-        fit = marker_fit(courses, of_chain(courses.plain, courses.body), of_chain(courses.coursed, courses.body), OWN)
-        found = tuple((w, replace(f, fit=fit) if f.effect in HINGE else f) for w, f in found)
+    found, courses = _held_out(found, courses)
     names = ", ".join(f.effect for _, f in found) or "consistent"
     lines = [f"{finger.name} markers: {names} (p {markers.p_before:.2g} -> {markers.p_after:.2g})"]
     angles, moments = corrected_angles(seen, markers), steps(markers)

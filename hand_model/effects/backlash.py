@@ -38,13 +38,15 @@ class Backlash(Effect):
                 True,
             ),
             Shape("form", "1", HARD, GRADUAL, (HARD, SOFT, HARD_BEHIND, SOFT_BEHIND, GRADUAL)),
-            Shape("reach", states[0].position_unit, 0.015 * span, 0.2 * span, (0.03 * span, 0.08 * span)),
+            Shape(
+                "reach",
+                states[0].position_unit,
+                0.015 * span,
+                0.2 * span,
+                (0.03 * span, 0.08 * span),
+                forms=(GRADUAL,),
+            ),
         )
-
-    def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
-        """Every reach of what is crossed gradually."""
-        points = super().grid(states)
-        return [p for p in points if p["form"] == GRADUAL or p["reach"] == points[0]["reach"]]
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """No amplitude: the map is fitted anew behind the gap."""

@@ -86,7 +86,7 @@ class DriveState:
 class Shape:
     """A nonlinear parameter of an effect: its unit, bounds, and the starting values that a multi-start fit tries. size:
     it says how much of the effect there is, as an amplitude does. edge: what it moves over matters at times only, so
-    that its likelihood has steps and is searched all along."""
+    that its likelihood has steps and is searched all along. forms: those in which it matters, all where none is told."""
 
     name: str
     unit: str
@@ -95,6 +95,11 @@ class Shape:
     starts: tuple[float, ...]
     size: bool = False
     edge: bool = False
+    forms: tuple[float, ...] = ()
+
+    def matters(self, shape: Mapping[str, float]) -> bool:
+        """Whether it does in the form that a shape has."""
+        return not self.forms or shape.get("form") in self.forms
 
 
 @runtime_checkable
@@ -169,11 +174,11 @@ class Effect:
         return ()
 
     def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
-        """Starting shapes: the product of each shape's starts."""
-        points: list[dict[str, float]] = [{}]
-        for shape in self.shapes(states):
+        """Starting shapes: the product of each shape's starts, one start of what does not matter."""
+        points, shapes = list[dict[str, float]]([{}]), self.shapes(states)
+        for shape in shapes:
             points = [{**point, shape.name: value} for point in points for value in shape.starts]
-        return points
+        return [p for p in points if all(s.matters(p) or p[s.name] == s.starts[0] for s in shapes)]
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """One amplitude of either sign, in effort units."""

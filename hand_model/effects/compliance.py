@@ -15,6 +15,7 @@ from .path import lowpass
 DRIVER, FOLLOWER, LATE_DRIVER, LATE_FOLLOWER, DRAGGED_DRIVER, DRAGGED_FOLLOWER, STIFF_DRIVER, STIFF_FOLLOWER = FORMS = (
     range(8)
 )
+DAMPED, STIFFENING = (LATE_DRIVER, LATE_FOLLOWER), (STIFF_DRIVER, STIFF_FOLLOWER)
 # [s]: a damper that lets a give follow faster is none that a hand's motion shows, and one slower holds it still
 LAG_S = 0.03, 0.6
 PLAIN = 0.4  # probability of each of the two plain forms
@@ -46,14 +47,9 @@ class Compliance(Effect):
         least, greatest = (share * max(most, 1e-9) for share in STIFF)
         return (
             Shape("form", "1", DRIVER, STIFF_FOLLOWER, forms),
-            Shape("lag", "s", *LAG_S, (0.06, 0.15, 0.35)),
-            Shape("stiff", "raw", least, greatest, (2 * least,)),
+            Shape("lag", "s", *LAG_S, (0.06, 0.15, 0.35), forms=DAMPED),
+            Shape("stiff", "raw", least, greatest, (2 * least,), forms=STIFFENING),
         )
-
-    def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
-        """Every time constant of what is damped."""
-        points = super().grid(states)
-        return [p for p in points if damped(p) or p["lag"] == points[0]["lag"]]
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Compliance, and what it is for drag where that is another, always yielding."""
@@ -143,7 +139,7 @@ class _Followed:
 
 def damped(parameters: Mapping[str, float]) -> bool:
     """Whether a give follows its load late."""
-    return parameters.get("form", FOLLOWER) in (LATE_DRIVER, LATE_FOLLOWER)
+    return parameters.get("form", FOLLOWER) in DAMPED
 
 
 def dragged(parameters: Mapping[str, float]) -> bool:
@@ -153,7 +149,7 @@ def dragged(parameters: Mapping[str, float]) -> bool:
 
 def stiffens(parameters: Mapping[str, float]) -> bool:
     """Whether a give yields less to more load."""
-    return parameters.get("form", FOLLOWER) >= STIFF_DRIVER
+    return parameters.get("form", FOLLOWER) in STIFFENING
 
 
 def besides(parameters: Mapping[str, float]) -> str:

@@ -35,13 +35,9 @@ class NonlinearSpring(Effect):
                 low + 0.15 * span,
                 high - OUTER * span,
                 tuple(low + span * np.linspace(0.2, 0.72, 8)),
+                forms=(1.0,),
             ),
         )
-
-    def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
-        """One smooth spring, and every knee."""
-        points = super().grid(states)
-        return [p for p in points if p["form"] > 0.5 or p["knee"] == points[0]["knee"]]
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Quadratic and cubic stiffness, or, with a knee, none and the change of stiffness; either sign."""

@@ -38,13 +38,9 @@ class PreslidingFriction(Effect):
                 0.35 * span,
                 tuple(np.geomspace(1.1 * least, 0.25 * span, 11)),
             ),
-            Shape("bristle_time", "s", 0.0, 0.1, (0.0, 0.03)),
+            Shape("bristle_time", "s", 0.0, 0.1, (0.0, 0.03), forms=(0.0,)),  # what breaks away is not damped
             Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),
         )
-
-    def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
-        """What breaks away is not damped."""
-        return [p for p in super().grid(states) if p["form"] < 0.5 or p["bristle_time"] == 0.0]
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """No amplitude of its own: it is the Coulomb friction."""

@@ -31,20 +31,10 @@ class SpringDecoupling(Effect):
         below, beyond = (tuple(low + span * np.linspace(*ends)) for ends in ((0.03, 0.5, 12), (0.15, 0.8, 14)))
         return (
             Shape("form", "1", WHILES, TIPS, (WHILES, OPEN, TIPS)),
-            Shape("below", unit, low + 0.01 * span, low + 0.6 * span, below),
-            Shape("beyond", unit, low + 0.1 * span, low + 0.85 * span, beyond),
-            Shape("over", unit, 0.03 * span, 0.3 * span, (0.08 * span, 0.2 * span)),
+            Shape("below", unit, low + 0.01 * span, low + 0.6 * span, below, forms=(OPEN,)),
+            Shape("beyond", unit, low + 0.1 * span, low + 0.85 * span, beyond, forms=(TIPS,)),
+            Shape("over", unit, 0.03 * span, 0.3 * span, (0.08 * span, 0.2 * span), forms=(TIPS,)),
         )
-
-    def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
-        """One start for what passes, several for the open end, and for where it tips over."""
-        _, below, beyond, over = (shape.starts for shape in self.shapes(states))
-        places = [
-            (WHILES, below[0], beyond[0], over[0]),
-            *((OPEN, b, beyond[0], over[0]) for b in below),
-            *((TIPS, below[0], b, o) for b in beyond for o in over),
-        ]
-        return [dict(zip(("form", "below", "beyond", "over"), place, strict=True)) for place in places]
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Share of the seen excursion (form 0), angle per position that the finger stays behind (form 1), or angle by

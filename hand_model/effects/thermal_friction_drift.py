@@ -32,22 +32,20 @@ class ThermalFrictionDrift(Effect):
         forms += (LOGGED,) if _warming(states) else ()
         return (
             Shape("form", "1", ELAPSED, LOGGED, forms),
-            Shape("warm_up_time", "s", 5.0, 4 * total, tuple(np.geomspace(max(5.0, 0.04 * total), 2 * total, 7))),
-            Shape("cooling_time", "s", 2.0, 40 * total, (5.0, 25.0, 60.0, 120.0, 400.0)),
+            Shape(
+                "warm_up_time",
+                "s",
+                5.0,
+                4 * total,
+                tuple(np.geomspace(max(5.0, 0.04 * total), 2 * total, 7)),
+                forms=(ELAPSED, WORKED),
+            ),
+            Shape("cooling_time", "s", 2.0, 40 * total, (5.0, 25.0, 60.0, 120.0, 400.0), forms=(WORKED,)),
         )
 
     def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
-        """Nothing cools in form 0, and a logged temperature knows no times; the range of temperatures goes with each
-        point."""
-        points = super().grid(states)
-        first = points[0]
-        return [
-            {**p, **_warming(states)}
-            for p in points
-            if p["form"] == WORKED
-            or p["cooling_time"] == first["cooling_time"]
-            and (p["form"] != LOGGED or p["warm_up_time"] == first["warm_up_time"])
-        ]
+        """The range of temperatures goes with each point."""
+        return [{**p, **_warming(states)} for p in super().grid(states)]
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Friction above the final value when cold; lubricants thin out, yet either sign is allowed."""

@@ -54,7 +54,7 @@ def evidence(balance: Balance, fit: Fit, reference: Fit, which: int = -1, scale:
     )
     if count and brought > 0:
         brought -= 0.5 * count * (1 + np.log(max(2 * brought / count, 1.0)))
-    volume = sum(_occam(balance, fit, which, shape, scale) for shape in shapes if not shape.size)
+    volume = sum(_occam(balance, fit, which, s, scale) for s in shapes if not s.size and s.matters(term.shape))
     return float(brought - volume + oddity(balance, reference) - oddity(balance, fit))
 
 

@@ -75,7 +75,7 @@ def polish(balance: Balance, fit: Fit, which: int) -> Fit:
     """Optimise the shape of one term within its bounds, everything linear refitted at each step; as it was where no
     machine could be like the optimum."""
     term = fit.terms[which]
-    shapes = [s for s in term.effect.shapes(balance.states) if s.name not in DISCRETE]
+    shapes = [s for s in term.effect.shapes(balance.states) if s.name not in DISCRETE and s.matters(term.shape)]
     if not shapes:
         return fit
     others = tuple(t for i, t in enumerate(fit.terms) if i != which)
@@ -119,7 +119,7 @@ def _descended(error: Error, shape: Mapping[str, float], shapes: Sequence[Shape]
         lambda u: error(shaped(u)),
         np.zeros(len(shapes)),
         method="Nelder-Mead",
-        options={"initial_simplex": np.array(step), "maxfev": 30 + 25 * len(shapes), "fatol": 0.02, "xatol": 1e-4},
+        options={"initial_simplex": np.array(step), "maxfev": 30 + 25 * len(shapes), "fatol": 0.02, "xatol": 2e-3},
     )
     return shaped(result.x)
 
