@@ -7,11 +7,12 @@ Regression on two sets of columns is regression of the residual of the one on th
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .least_squares import bounded_least_squares
+from .least_squares import from_products
 
 Array = NDArray[np.float64]
 
@@ -44,6 +45,11 @@ class Projection:
         explained = q.T @ effort
         return cls(q, effort - q @ explained, weight, r, explained, low[acting], high[acting])
 
+    @cached_property
+    def square(self) -> float:
+        """Sum of squares of what the design leaves of the effort."""
+        return float(self.left @ self.left)
+
     @property
     def regular(self) -> bool:
         """Whether every column of the design says something of its own."""
@@ -53,9 +59,10 @@ class Projection:
         """Residual sum of squares of the joint fit of the design and of `columns` (n, j), weighted and whitened, whose
         coefficients are bounded; None where the design's own coefficients would leave their bounds."""
         inside = self.basis.T @ columns
-        beside = columns - self.basis @ inside
-        amplitudes = bounded_least_squares(beside, self.left, low, high)
+        gram = columns.T @ columns - inside.T @ inside  # of what is left of them beside the design
+        right = columns.T @ self.left
+        amplitudes = from_products(gram, right, low, high)
         coefficients = np.linalg.solve(self.triangle, self.explained - inside @ amplitudes)
         if np.any(coefficients < self.low) or np.any(coefficients > self.high):
             return None
-        return float(np.sum((self.left - beside @ amplitudes) ** 2))
+        return float(self.square - 2 * right @ amplitudes + amplitudes @ gram @ amplitudes)
