@@ -23,6 +23,8 @@ ROUGH = 0.2
 QUICK = 0.5  # of the fastest speed, from which what times are wrong by shows in the position
 FEWEST_BLOCKS = 12  # that a smoothing is made of
 DEPARTURES_S = (0.1, 0.25, 0.6, 1.5)  # bandwidths of what departs from a known course
+LASTING_S = 0.3  # over which errors may be alike; what lasts longer is what departs
+FEW = 100  # pairs of readings, below which nothing is said of how long errors last
 
 
 @dataclass(frozen=True)
@@ -88,16 +90,40 @@ def estimate_motion(time_s: Array, position: Array, bandwidth_s: float | None = 
     return Motion(x, v, a, noise, h, moving, *since_rest(time_s, moving))
 
 
-def least_error(time_s: Array, values: Array) -> tuple[Array, Array]:
-    """Values smoothed over time and their rate (n,), at the bandwidth with the least leave-one-out error (Stone
-    1974)."""
-    _, smooth, rate = min(smoothings(time_s, values), key=lambda x: float(np.mean(x[0])))
+def least_error(time_s: Array, values: Array, still: NDArray[np.bool_] | None = None) -> tuple[Array, Array]:
+    """Values smoothed over time and their rate (n,), at the bandwidth with the least leave-one-out error (Stone 1974).
+    still: (n,) where nothing departs further, so that errors alone tell neighbours apart: those that last are followed
+    by a narrow kernel, which the error of what is left out does not show (Hart 1991)."""
+    step = max(float(np.median(np.diff(time_s))), 1e-9)
+    alike = np.zeros(0) if still is None else _lasting(values, still, max(round(LASTING_S / step), 1))
+    _, smooth, rate = min(smoothings(time_s, values, alike), key=lambda x: float(np.mean(x[0])))
     return smooth, rate
 
 
-def smoothings(time_s: Array, values: Array) -> Iterator[tuple[Array, Array, Array]]:
-    """Square of the leave-one-out error, values smoothed and their rate, (n,) each, at every bandwidth."""
+def _lasting(values: Array, still: NDArray[np.bool_], longest: int) -> Array:
+    """Covariance (k,) of errors one to k samples apart, by the variogram (Matheron 1963) over rests; empty where they
+    do not plainly last."""
+    rises, count = [], 0
+    rest = np.cumsum(~still)  # alike within a rest
+    for k in range(1, longest + 1):
+        pair = still[k:] & (rest[k:] == rest[:-k])
+        count = int(pair.sum())
+        if count < FEW:
+            return np.zeros(0)
+        rises.append(0.5 * float(np.mean((values[k:] - values[:-k])[pair] ** 2)))
+    whole = float(np.mean(rises[-max(longest // 4, 1) :]))
+    covariance = whole - np.array(rises)
+    if covariance[0] < SURE * whole * np.sqrt(2.0 / count):
+        return np.zeros(0)
+    faded = np.flatnonzero(covariance <= 0)
+    return covariance[: faded[0]] if len(faded) else covariance
+
+
+def smoothings(time_s: Array, values: Array, alike: Array | None = None) -> Iterator[tuple[Array, Array, Array]]:
+    """Square of the leave-one-out error, values smoothed and their rate, (n,) each, at every bandwidth. alike:
+    covariance (k,) of errors one to k samples apart, none where they are white."""
     step = max(float(np.median(np.diff(time_s))), 1e-9)
+    lag = np.arange(1, 1 if alike is None else 1 + len(alike))
     for bandwidth in DEPARTURES_S:
         # samples averaged first: six to a bandwidth lose nothing; stamps in packets have next to no step
         count = max(1, min(int(bandwidth / step / 6), len(values) // FEWEST_BLOCKS))
@@ -106,9 +132,11 @@ def smoothings(time_s: Array, values: Array) -> Iterator[tuple[Array, Array, Arr
         t, y = np.bincount(block, time_s) / size, np.bincount(block, values) / size
         impulse = np.zeros(len(y))
         impulse[len(y) // 2] = 1 / count
-        own = float(local_quadratic(t, impulse, bandwidth)[0][len(y) // 2])
+        kernel = local_quadratic(t, impulse, bandwidth)[0][len(y) // 2 :]
+        own = float(kernel[0])
+        followed = 0.0 if alike is None else 2 * float(kernel[(lag / count).round().astype(int)] @ alike)
         smooth, rate = (np.interp(time_s, t, x) for x in local_quadratic(t, y, bandwidth)[:2])
-        yield ((values - smooth) / (1 - own)) ** 2, smooth, rate
+        yield ((values - smooth) / (1 - own)) ** 2 + 2 * followed / (1 - own), smooth, rate
 
 
 def position_at(motion: Motion, time_s: Array, then: Array) -> Array:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ...effects.base import sample_interval
 from .least_squares import bounded_least_squares
 
 if TYPE_CHECKING:
@@ -15,7 +16,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 COLOURED = 0.05  # autocorrelation of neighbouring samples from which noise counts as coloured
-LONGEST = 15  # samples over which noise may be correlated; what lasts longer is a misfit
+# samples and seconds over which noise may be correlated; what lasts longer than both is a misfit
+LONGEST, LONGEST_S = 15, 0.25
 
 
 def noise(balance: Balance) -> tuple[float, float]:
@@ -34,14 +36,15 @@ def noise(balance: Balance) -> tuple[float, float]:
     if not len(deviation):
         return max(neighbours, 1e-9), 1.0
     lags = []
-    for k in range(LONGEST + 1):
+    longest = max(LONGEST, round(LONGEST_S / sample_interval(balance.states)))
+    for k in range(longest + 1):
         pair = (
             (balance.stroke[k:] == balance.stroke[: len(r) - k])
             & np.isfinite(deviation[k:])
             & np.isfinite(deviation[: len(r) - k])
         )
         lags.append(float(np.mean((deviation[k:] * deviation[: len(r) - k])[pair])) if pair.sum() > 20 else 0.0)
-    # What still correlates after LONGEST samples is a misfit that does not repeat (an event), no noise.
+    # What still correlates after the longest lag is a misfit that does not repeat (an event), no noise.
     covariance = np.array(lags) - max(float(np.mean(lags[-5:])), 0.0)
     rho = covariance / max(covariance[0], 1e-300)
     if rho[1] < COLOURED:
