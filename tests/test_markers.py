@@ -7,11 +7,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from hand_model.diagnose.locate import markers
 from hand_model.diagnose.locate.blocks import _assembled, present_way, way_of_motion
 from hand_model.diagnose.locate.displacement import CREEP, NO_HINGE
+from hand_model.diagnose.locate.lasting_noise import LastingNoise
 from hand_model.diagnose.locate.markers import MarkerNaming, named_in, tilt
 from hand_model.diagnose.locate.slips import _finding, _turning, unexplained
 from hand_model.identify.chain import Chain
@@ -22,16 +24,20 @@ COUNT, RECORDS = 240, 2
 FLEXED = np.array([0.6, 0.4])  # rad, half of each joint's range
 
 
-def seen(shift, seed: int = 0, body: int = 1) -> MarkerNaming:
+def seen(shift, seed: int = 0, body: int = 1, lasting: float = 0.0) -> MarkerNaming:
     """The naming of two recordings of a finger of two joints whose markers are displaced by shift(share, turn, arm):
     (b, 4, 3) [m] of one segment's markers. share: (b,) of the recording. turn: (b, 3, 3) of the first segment. arm:
-    (4, 3) [m] from the support's middle, at rest."""
+    (4, 3) [m] from the support's middle, at rest. lasting: share of the noise that neighbouring blocks have alike, of a
+    finger that rests between its strokes."""
     rng = np.random.default_rng(seed)
     rest = np.concatenate([rng.normal(0, 0.012, (4, 3)) + [0.03 * k + 0.01, 0, 0.01] for k in range(3)])
     chain = Chain(rest, np.array([[0, 1, 0], [0, 1, 0]], float), np.array([[0.03, 0, 0], [0.06, 0, 0]]))
     share = np.tile(np.linspace(0, 1, COUNT), RECORDS)
     angle = (1 - np.cos(2 * np.pi * 4 * share))[:, None] * FLEXED
     residual = rng.normal(0, 3e-5, (COUNT * RECORDS, 12, 3))
+    if lasting:
+        angle = np.clip(2 * angle - FLEXED, 0, 2 * FLEXED)
+        residual = lfilter([np.sqrt(1 - lasting**2)], [1, -lasting], residual, axis=0)
     turn = Rotation.from_rotvec(angle[:, :1] * chain.axis_palm[0]).as_matrix()
     residual[:, BODY == body] += shift(share, turn, rest[BODY == body] - rest[BODY == body].mean(0))
     record = np.repeat(np.arange(RECORDS), COUNT)
@@ -72,6 +78,16 @@ def places(naming: MarkerNaming) -> set[tuple[str, str | None]]:
 def test_healthy_markers_are_consistent() -> None:
     naming = seen(lambda share, turn, arm: np.zeros((len(share), 4, 3)))
     assert not naming.found and naming.p_before > 0.003
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_noise_that_lasts_is_no_misfit_and_hides_none(monkeypatch, seed: int) -> None:
+    healthy = seen(lambda share, turn, arm: np.zeros((len(share), 4, 3)), seed, lasting=0.5)
+    assert not healthy.found and healthy.p_before > 0.003
+    slipped = seen(slipping(0.4), seed, lasting=0.5)
+    assert slipped.believed and places(slipped) == {("marker_slip", "M4")}
+    monkeypatch.setattr(markers, "lasting_noise", lambda blocks, y: LastingNoise())
+    assert seen(lambda share, turn, arm: np.zeros((len(share), 4, 3)), seed, lasting=0.5).p_before < 1e-6
 
 
 @pytest.mark.parametrize("at", [0.4, 0.7])
@@ -227,9 +243,9 @@ def test_what_no_finger_can_do_is_said_where_nothing_else_explains_the_markers(m
     found = markers._named
     tried: list[int] = []
 
-    def beyond(search, before):
+    def beyond(search, before, lasting):
         tried.append(len(search.candidates))
-        naming = found(search, before)
+        naming = found(search, before, lasting)
         if len(tried) > 1:
             return naming
         return replace(naming, found=tuple(replace(e, effect=NO_HINGE) for e in naming.found))

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
-from hand_model.diagnose.locate.motion import estimate_motion, position_at, sure_acceleration
+from hand_model.diagnose.locate.motion import estimate_motion, least_error, position_at, sure_acceleration
 
 
 def strokes(time_s: np.ndarray, acceleration: float = 900.0, speed: float = 110.0) -> np.ndarray:
@@ -83,3 +84,17 @@ def test_times_that_are_known_less_well_than_told_do_not_take_the_acceleration_a
     found = estimate_motion(t, position + rng.normal(0, 0.03, len(t)), uneven=uneven).acceleration[moving]
     slope = float(true[moving] @ found / (found @ found))
     assert (slope < 0.8) == attenuated and (0.93 < slope < 1.1) == (not attenuated)
+
+
+@pytest.mark.parametrize("rate_hz", [100.0, 240.0])
+def test_noise_that_lasts_is_no_departure(rate_hz: float) -> None:
+    at = np.arange(0.0, 40.0, 1 / rate_hz)
+    still = at % 4.0 < 1.5
+    slow = 0.3 * np.sin(2 * np.pi * at / 20.0)
+    white, lasting = np.random.default_rng(6).normal(0, 1.0, (2, len(at)))
+    lasting = lfilter([np.sqrt(1 - 0.9**2)], [1, -0.9], lasting)
+    noisy = slow + 0.3 * (np.sqrt(0.7) * white + np.sqrt(0.3) * lasting)
+    off, followed = (np.std(least_error(at, noisy, s)[0] - slow) for s in (still, None))
+    assert off < 0.6 * followed
+    plain = slow + 0.3 * white  # of white noise a rest tells nothing further
+    assert np.array_equal(least_error(at, plain, still)[0], least_error(at, plain)[0])
