@@ -115,9 +115,11 @@ class Station:
 
     @property
     def believed_in_part(self) -> bool:
-        """Whether the names would stand but that as many as may be leave something, by the test or of recordings kept
-        out (and make these no worse): in a finger of which much is missing that is to be expected."""
-        many = self.full and (self.naming.after.p < ALPHA or self._short and not self._worse)
+        """Whether the names would stand but that as many as may be, or some that leave recordings kept out within their
+        noise, leave something by the test, or as many as may be of recordings kept out (and make these no worse): in a
+        finger of which much is missing that is to be expected."""
+        fits = self.naming.balance.untouched and self._kept_out[1] <= KEPT_OUT**2
+        many = (self.full or fits) and self.naming.after.p < ALPHA or self.full and self._short and not self._worse
         return self._tells and many and self.explained >= EXPLAINED_PARTLY
 
     @property
