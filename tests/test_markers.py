@@ -165,6 +165,18 @@ def test_a_joint_with_play_tilts_to_the_side_that_its_motion_takes_it() -> None:
     assert amount_of(naming)[0] == pytest.approx(0.012, rel=0.1)
 
 
+def test_a_worn_joint_shifts_to_the_side_that_its_motion_takes_it() -> None:
+    def shift(share, turn, arm):
+        way = np.where(4 * share % 1 < 0.5, 1.0, -1.0)
+        return (way[:, None] * (turn @ np.array([2e-4, 0.0, -1.5e-4])))[:, None] * np.ones((4, 1))
+
+    naming = seen(shift, body=2)
+    assert naming.believed and naming.p_after > 0.003 and naming.found[0].sides
+    assert {e.effect for e in naming.found if not _turning(naming.found, e)} == {"moving_centre"}
+    value, (low, high) = amount_of(naming, "travel")
+    assert value == pytest.approx(5e-4, rel=0.1) and low < 5e-4 < high  # from one side to the other
+
+
 def test_at_rest_a_joint_moves_no_way_and_has_moved_one_before() -> None:
     blocks = seen(slipping(0.4)).blocks
     still = blocks.angle.copy()

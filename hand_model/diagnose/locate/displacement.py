@@ -167,8 +167,7 @@ def _no_hinge(blocks: Blocks, k: int) -> list[Candidate]:
     out = []
     for form in forms:
         out += [candidate("joint_wobble", form, tilts), candidate("joint_wobble", form, tilts + shifts)]
-        if form not in sides:
-            out.append(candidate("moving_centre", form if form is wave else [even, *form], shifts))
+        out.append(candidate("moving_centre", form if form is wave or form in sides else [even, *form], shifts))
     return out
 
 

@@ -122,15 +122,11 @@ def _finding(
     elif name == "joint_wobble":
         tilt, interval = _amount(naming, main)
         parameters["amplitude"] = {"value": tilt, "unit": "rad", "ci95": interval}
-        how = "and back when the motion turns round" if main.sides else "as the angle grows"
-        text = f"{angles.finger.name} {joint}: a second rotation of up to {np.rad2deg(tilt):.2f} deg across the axis, {how}."
+        text = f"{angles.finger.name} {joint}: a second rotation of up to {np.rad2deg(tilt):.2f} deg across the axis, {_how(main)}."
     else:
         travel, interval = _amount(naming, main)
         parameters["travel"] = {"value": travel, "unit": "m", "ci95": interval}
-        text = (
-            f"{angles.finger.name} {joint}: the centre of rotation travels by up to {1e3 * travel:.2f} mm "
-            "as the angle grows."
-        )
+        text = f"{angles.finger.name} {joint}: the centre of rotation travels by up to {1e3 * travel:.2f} mm, {_how(main)}."
     share = sum(e.gain for e in members) / max(sum(e.gain for e in naming.found), 1e-9)
     where = {
         "finger": angles.finger.name,
@@ -155,6 +151,10 @@ def _finding(
     return Finding(
         name, (name,), float(1 - np.exp(-min(main.evidence, 700))), (), where, text, parameters, fit, model, correction
     )
+
+
+def _how(effect: MarkerEffect) -> str:
+    return "and back when the motion turns round" if effect.sides else "as the angle grows"
 
 
 def displacement(members: Sequence[MarkerEffect], main: MarkerEffect) -> float:
@@ -222,14 +222,15 @@ def _shift(members: Sequence[MarkerEffect], main: MarkerEffect) -> Array:
 
 def _amount(naming: MarkerNaming, effect: MarkerEffect) -> tuple[float, list[float]]:
     """Amplitude of a joint's second rotation [rad], or the largest travel of its centre [m], over the recorded angles,
-    with its 95 % interval; of a play that changes sides, what the fitted coefficients' covariance lets it be
-    (parametric bootstrap, Efron & Tibshirani 1993, ch. 6)."""
+    with its 95 % interval; of a play that changes sides (a centre travels from one to the other), what the fitted
+    coefficients' covariance lets it be (parametric bootstrap, Efron & Tibshirani 1993, ch. 6)."""
     if not effect.sides:
         return course_amount(naming, effect)
-    blocks = naming.blocks
+    blocks, shifts = naming.blocks, all(effect.shifts)
 
     def amount(coefficients: Array) -> float:
-        return side_to_side(blocks, effect.body, (effect.columns @ coefficients).reshape(len(blocks.residual), -1, 3))
+        moved = (effect.columns @ coefficients).reshape(len(blocks.residual), -1, 3)
+        return (1 + shifts) * side_to_side(blocks, effect.body, moved, shifts)
 
     rng = np.random.default_rng(0)
     drawn = rng.multivariate_normal(effect.coefficients, effect.covariance, DRAWS, method="eigh")

@@ -51,11 +51,11 @@ def possible(blocks: Blocks, body: int, shift: Array) -> bool:
     return centre_travel(blocks, body, shift) < reach and wobble_amplitude(blocks, body, shift) < np.pi / 4
 
 
-def side_to_side(blocks: Blocks, body: int, shift: Array) -> float:
-    """Half of the tilt [rad] by which a joint's play changes sides with the way of motion. Arguments as in
-    `wobble_amplitude`."""
-    way = way_of_motion(blocks, body - 1)
-    _, along = _course(_tilt(blocks, body, shift), blocks.angle[:, body - 1], [way], False)
+def side_to_side(blocks: Blocks, body: int, shift: Array, shifts: bool = False) -> float:
+    """Half of the tilt [rad] by which a joint's play changes sides with the way of motion, or of the way [m] by which
+    it shifts what the joint carries. Arguments as in `wobble_amplitude`."""
+    moved = _across(blocks, body, shift[:, blocks.body == body].mean(1)) if shifts else _tilt(blocks, body, shift)
+    _, along = _course(moved, blocks.angle[:, body - 1], [way_of_motion(blocks, body - 1)], False)
     return float(np.linalg.norm(along))
 
 
