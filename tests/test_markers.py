@@ -174,7 +174,7 @@ def test_a_worn_joint_shifts_to_the_side_that_its_motion_takes_it() -> None:
     assert naming.believed and naming.p_after > 0.003 and naming.found[0].sides
     assert {e.effect for e in naming.found if not _turning(naming.found, e)} == {"moving_centre"}
     value, (low, high) = amount_of(naming, "travel")
-    assert value == pytest.approx(5e-4, rel=0.1) and low < 5e-4 < high  # from one side to the other
+    assert low < value < high and value == pytest.approx(5e-4, rel=0.1)  # from one side to the other
 
 
 def test_at_rest_a_joint_moves_no_way_and_has_moved_one_before() -> None:
