@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from test_diagnose import drive
 
+from hand_model.diagnose.locate.command import BLIND, _lasting
 from hand_model.diagnose.locate.late_current import _late
 from hand_model.effects.base import DriveState
 
@@ -40,3 +41,16 @@ def test_a_balance_that_plainly_shows_a_shift_is_believed_where_answers_agree(
         for a, states in drives.items()
     }
     assert _late(drives, timed) == {"index": may_be, "ring": False}
+
+
+def test_what_holds_a_drive_at_rest_says_nothing_against_a_late_current() -> None:
+    """Before it moves a drive may press against its friction already; late, that is read as it starts."""
+    (state, *_) = drive(3)
+    moving = state.time_s % 4.0 > 1.0
+    sigma = np.where(state.time_s % 4.0 < 1.2, 15.0, 0.1)
+    state = replace(state, extra={**state.extra, "moving": moving.astype(float), "sigma": sigma})
+    at_rest = np.interp(state.time_s - 0.1, state.time_s, moving.astype(float)) < 1
+    assert (at_rest & moving).sum() > 10
+    sure, unsure = (_lasting(state, 0.1, doubt_s) for doubt_s in (0.01, 0.05))
+    assert np.array_equal(sure[~at_rest], unsure[~at_rest])
+    assert np.array_equal(sure[at_rest], BLIND * unsure[at_rest]) and unsure[at_rest & moving].min() == 15.0

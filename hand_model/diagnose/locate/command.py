@@ -24,6 +24,8 @@ ALIKE = 2.0  # times the loss of speed of the session's least sagging drive: dri
 # channels
 BEYOND_CHANCE = 12.0
 REACTION_S = 0.15  # a person's quickest: a delay counts beside it
+BLIND = 4.0  # times what is not known of a start: what holds a drive at rest is anything within its friction
+PLAINLY_LATE = 3.0  # standard deviations
 UNLIKE = 0.1  # of a delay by which answers may miss it: controllers of other gains rise otherwise
 
 
@@ -126,8 +128,7 @@ def with_lateness(
     out = dict(drives)
     for actuator, late in told.items():
         out[actuator] = tuple(
-            replace(s, extra={**s.extra, "late": np.array(late), "sigma": _lasting(s, late[0])})
-            for s in drives[actuator]
+            replace(s, extra={**s.extra, "late": np.array(late), "sigma": _lasting(s, *late)}) for s in drives[actuator]
         )
     return out
 
@@ -138,12 +139,17 @@ def _weighted(*readings: tuple[float, float]) -> tuple[float, float]:
     return float(precision @ value / precision.sum()), float(precision.sum() ** -0.5)
 
 
-def _lasting(state: DriveState, late_s: float) -> Array:
-    """What is not known of starts and stops (n,), as long as a current that late, or early, may show it."""
+def _lasting(state: DriveState, late_s: float, doubt_s: float) -> Array:
+    """What is not known of starts and stops (n,), as long as a current that late, or early, may show it; of one that is
+    late for sure, next to nothing while it shows what was drawn at rest."""
     sigma = state.extra.get("sigma", np.zeros(len(state.time_s)))
     step = float(np.median(np.diff(state.time_s)))
     shifts = np.sign(late_s) * np.arange(step, abs(late_s) + 0.5 * step, step)
-    return np.maximum.reduce([sigma, *(np.interp(state.time_s - shift, state.time_s, sigma) for shift in shifts)])
+    lasting = np.maximum.reduce([sigma, *(np.interp(state.time_s - shift, state.time_s, sigma) for shift in shifts)])
+    moving = state.extra.get("moving", np.ones(len(sigma)))
+    if abs(late_s) <= max(step, PLAINLY_LATE * doubt_s):
+        return lasting
+    return np.where(np.interp(state.time_s - late_s, state.time_s, moving) < 1, BLIND * lasting, lasting)
 
 
 def _ceiling_finding(actuator: str, finger: str | None, fact: CommandFacts) -> tuple[float, Finding]:
