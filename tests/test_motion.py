@@ -89,12 +89,12 @@ def test_times_that_are_known_less_well_than_told_do_not_take_the_acceleration_a
 @pytest.mark.parametrize("rate_hz", [100.0, 240.0])
 def test_noise_that_lasts_is_no_departure(rate_hz: float) -> None:
     at = np.arange(0.0, 40.0, 1 / rate_hz)
-    still = at % 4.0 < 1.5
+    calm = at % 4.0 < 1.5
     slow = 0.3 * np.sin(2 * np.pi * at / 20.0)
     white, lasting = np.random.default_rng(6).normal(0, 1.0, (2, len(at)))
     lasting = lfilter([np.sqrt(1 - 0.9**2)], [1, -0.9], lasting)
     noisy = slow + 0.3 * (np.sqrt(0.7) * white + np.sqrt(0.3) * lasting)
-    off, followed = (np.std(least_error(at, noisy, s)[0] - slow) for s in (still, None))
+    off, followed = (np.std(least_error(at, noisy, s)[0] - slow) for s in (calm, None))
     assert off < 0.6 * followed
-    plain = slow + 0.3 * white  # of white noise a rest tells nothing further
-    assert np.array_equal(least_error(at, plain, still)[0], least_error(at, plain)[0])
+    plain = slow + 0.3 * white  # of white noise a calm spell tells nothing further
+    assert np.array_equal(least_error(at, plain, calm)[0], least_error(at, plain)[0])

@@ -33,7 +33,7 @@ LEARN_FRAMES = 1500  # of each recording, evenly spaced: enough for a chain, all
 FIRST_SAMPLES, BEGUN = 5, 0.05  # of a recording, and the share of the range from which lost motion is closed
 FARTHEST_M = 6e-3  # a residual beyond is a ghost or a wrong label, no slip
 MOMENT_S = 0.2  # within which a step's moment is known
-STILL = 0.02  # of the fastest speed: slower a drive stands
+SLOW = 0.25  # of the fastest speed: slower, what an angle departs by hardly changes while noise may last
 LEAST_TURN = np.deg2rad(6.0)  # of a joint: a finger that turns less is held, and its axis is noise
 
 
@@ -332,8 +332,8 @@ def _smoothed(
     if expected is not None:
         at, foreseen = expected
         base = base + np.interp(time_s, at, foreseen - np.interp(at, time_s, base))
-    still = np.abs(log.speed) < STILL * float(np.percentile(np.abs(log.speed), 98))
-    departure, rate = least_error(time_s, angle - base, still)
+    slow = np.abs(log.speed) < SLOW * float(np.percentile(np.abs(log.speed), 98))
+    departure, rate = least_error(time_s, angle - base, slow)
     return base + departure, slope * log.speed + rate, slope * log.acceleration, use
 
 

@@ -12,7 +12,7 @@ from ...effects import effect
 from ...effects.base import DriveState
 from ..name.balance import Balance
 from ..name.term import Term
-from .motion import local_quadratic
+from .motion import lasting_errors, local_quadratic
 
 Array = NDArray[np.float64]
 
@@ -42,10 +42,9 @@ def with_excursions(states: Sequence[DriveState]) -> tuple[DriveState, ...]:
     # a clock at another rate lifts the finger where it is fast
     drifting = balance.fit((Term(effect("clock_drift"), {}),))
     residual = _beside_replicates(balance, balance.effort - drifting.prediction)
-    coloured = balance.sigma * np.sqrt(balance.inflation) if balance.inflation > 1 else 0.0
     parts = np.split(residual, np.cumsum([m.sum() for m in balance.masks])[:-1])
     told = [
-        _Told.of(s.time_s[m], r, coloured) if len(r) > FEWEST else None
+        _Told.of(s.time_s[m], r) if len(r) > FEWEST else None
         for s, m, r in zip(states, balance.masks, parts, strict=True)
     ]
     behind = max((_best_window(-t.residual, t.sigma, t.lengths)[0] for t in told if t is not None), default=0.0)
@@ -68,11 +67,13 @@ class _Told:
     lengths: NDArray[np.int64]
 
     @classmethod
-    def of(cls, time_s: Array, residual: Array, coloured: float) -> _Told:
-        """coloured: deviation of one reading that a mean over many has, where noise is not white, else zero."""
+    def of(cls, time_s: Array, residual: Array) -> _Told:
+        """The noise is that of one reading as a mean over many has it."""
         step = float(np.median(np.diff(time_s)))
         steps = 1 + int(np.log(LONGEST_S / SHORTEST_S) / np.log(GROWTH))
         lengths = np.unique(np.geomspace(SHORTEST_S / step, LONGEST_S / step, steps).astype(int))
+        variance, alike = lasting_errors(time_s, residual, np.ones(len(residual), bool))
+        coloured = float(np.sqrt(variance + 2 * alike.sum())) if len(alike) else 0.0
         return cls(time_s, residual, max(float(np.sqrt(np.median(np.diff(residual) ** 2) / 0.9099)), coloured), lengths)
 
 

@@ -90,33 +90,35 @@ def estimate_motion(time_s: Array, position: Array, bandwidth_s: float | None = 
     return Motion(x, v, a, noise, h, moving, *since_rest(time_s, moving))
 
 
-def least_error(time_s: Array, values: Array, still: NDArray[np.bool_] | None = None) -> tuple[Array, Array]:
-    """Values smoothed over time and their rate (n,), at the bandwidth with the least leave-one-out error (Stone 1974).
-    still: (n,) where nothing departs further, so that errors alone tell neighbours apart: those that last are followed
-    by a narrow kernel, which the error of what is left out does not show (Hart 1991)."""
-    step = max(float(np.median(np.diff(time_s))), 1e-9)
-    alike = np.zeros(0) if still is None else _lasting(values, still, max(round(LASTING_S / step), 1))
-    _, smooth, rate = min(smoothings(time_s, values, alike), key=lambda x: float(np.mean(x[0])))
+def least_error(time_s: Array, values: Array, calm: NDArray[np.bool_] | None = None) -> tuple[Array, Array]:
+    """Values smoothed over time and their rate (n,), at the bandwidth with the least leave-one-out error (Stone 1974);
+    zero where that errs least. calm: (n,) where values hardly change, so that errors alone tell neighbours apart: those
+    that last are followed by a narrow kernel, which the error of what is left out does not show (Hart 1991)."""
+    alike = np.zeros(0) if calm is None else lasting_errors(time_s, values, calm)[1]
+    tried = [(values**2, np.zeros(len(values)), np.zeros(len(values))), *smoothings(time_s, values, alike)]
+    _, smooth, rate = min(tried, key=lambda x: float(np.mean(x[0])))
     return smooth, rate
 
 
-def _lasting(values: Array, still: NDArray[np.bool_], longest: int) -> Array:
-    """Covariance (k,) of errors one to k samples apart, by the variogram (Matheron 1963) over rests; empty where they
-    do not plainly last."""
+def lasting_errors(time_s: Array, values: Array, calm: NDArray[np.bool_]) -> tuple[float, Array]:
+    """Variance of the errors of values (n,), and covariance (k,) of those one to k samples apart, by the variogram
+    (Matheron 1963) over calm spells; none where they do not plainly last, and no variance where nothing tells it."""
     rises, count = [], 0
-    rest = np.cumsum(~still)  # alike within a rest
+    spell = np.cumsum(~calm)  # alike within one
+    longest = max(round(LASTING_S / max(float(np.median(np.diff(time_s))), 1e-9)), 1)
     for k in range(1, longest + 1):
-        pair = still[k:] & (rest[k:] == rest[:-k])
+        pair = calm[k:] & (spell[k:] == spell[:-k])
         count = int(pair.sum())
         if count < FEW:
-            return np.zeros(0)
-        rises.append(0.5 * float(np.mean((values[k:] - values[:-k])[pair] ** 2)))
+            return 0.0, np.zeros(0)
+        # by the median, for a finger may jump off its drive
+        rises.append(0.5 * float(np.median(np.abs(values[k:] - values[:-k])[pair]) / 0.6745) ** 2)
     whole = float(np.mean(rises[-max(longest // 4, 1) :]))
     covariance = whole - np.array(rises)
     if covariance[0] < SURE * whole * np.sqrt(2.0 / count):
-        return np.zeros(0)
+        return whole, np.zeros(0)
     faded = np.flatnonzero(covariance <= 0)
-    return covariance[: faded[0]] if len(faded) else covariance
+    return whole, covariance[: faded[0]] if len(faded) else covariance
 
 
 def smoothings(time_s: Array, values: Array, alike: Array | None = None) -> Iterator[tuple[Array, Array, Array]]:
