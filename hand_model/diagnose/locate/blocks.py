@@ -14,7 +14,7 @@ from .angles import FARTHEST_M, FingerAngles
 
 Array = NDArray[np.float64]
 
-BLOCK = 8  # frames averaged into one row block
+BLOCK, BLOCK_S = 8, 1 / 15  # frames averaged into one row block, at least, and how long they last
 # blocks over which the noise is read, and the share of the usual variance from which it is louder
 LOUD_BLOCKS, LOUD = 5, 0.6
 TURNED = 0.02  # of a joint's range: over so much of it play changes sides
@@ -26,7 +26,7 @@ LASTING_S = 2.0  # half of it is how long something must last that is no ghost
 class Blocks:
     """Block means of all flexion recordings of one finger, in order of time.
 
-    residual: (b, m, 3) [m] observed minus chain, palm frame. weight: (b, m) frames behind a mean. pose_columns: (b, 3m,
+    residual: (b, m, 3) [m] observed minus chain, palm frame. weight: (b, m) share of its frames that a mean is of, times BLOCK. pose_columns: (b, 3m,
     6+k) orthonormal basis of what poses explain. chain_columns: (b, 3m, s). rotation: (b, m, 3, 3) body to palm.
     position: (b, m, 3).
     angle: (b, k). record, time_s: (b,). labels, body: of the markers.
@@ -59,17 +59,18 @@ def blocks_of(angles: FingerAngles) -> Blocks:
         sound = np.isfinite(record.angle_rad).all(1)
         far = ~(size < FARTHEST_M) | passing(size > OUTLIER_LIMIT * angles.noise_m, record.mocap.time_s)
         good = np.flatnonzero(~record.ghost & (sound | (~far.any(1) & ~passing(~sound, record.mocap.time_s))))
-        count = len(good) // BLOCK
+        length = max(BLOCK, round(BLOCK_S / float(np.median(np.diff(record.mocap.time_s)))))
+        count = len(good) // length
         if count < 20:
             continue
-        frames = good[: count * BLOCK].reshape(count, BLOCK)
-        frames = frames[(frames[:, -1] - frames[:, 0]) < 3 * BLOCK]
+        frames = good[: count * length].reshape(count, length)
+        frames = frames[(frames[:, -1] - frames[:, 0]) < 3 * length]
         residual[far] = np.nan
         residual = residual[frames.ravel()]
-        residual = residual.reshape(len(frames), BLOCK, len(labels), 3)
+        residual = residual.reshape(len(frames), length, len(labels), 3)
         weight = np.isfinite(residual[..., 0]).sum(1).astype(float)
         mean = np.nansum(residual, axis=1) / np.maximum(weight, 1)[..., None]
-        weight *= _calm(residual - mean[:, None])[:, None]
+        weight *= _calm(residual - mean[:, None])[:, None] * BLOCK / length
         angle = record.pose.angle_rad[frames].mean(1)
         parts.append((mean, weight, angle, np.full(len(frames), index), record.mocap.time_s[frames].mean(1)))
     residual, weight, angle, record_index, time_s = (np.concatenate(p) for p in zip(*parts, strict=True))
