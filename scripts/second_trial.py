@@ -1,8 +1,9 @@
-"""A blind trial on sessions of a second recorder, a third, a fourth or a fifth, that share no code with each other, the
-twin or the diagnosis (`second_recorder/`, `third_recorder/`, `fourth_recorder/`, `fifth_recorder/`).
+"""A blind trial on sessions of a second recorder, a third, a fourth, a fifth or a sixth, that share no code with each
+other, the twin or the diagnosis (`second_recorder/`, `third_recorder/`, `fourth_recorder/`, `fifth_recorder/`,
+`sixth_recorder/`).
 
-    python scripts/second_trial.py FOLDER [--recorder {second,third,fourth,fifth}] [--seed 1] [--single 36] [--none 4]
-    [--pair 10] [--weak 10] [--messy 10] [--outside 10] [--anywhere]
+    python scripts/second_trial.py FOLDER [--recorder {second,third,fourth,fifth,sixth}] [--seed 1] [--single 36]
+    [--none 4] [--pair 10] [--weak 10] [--messy 10] [--outside 10] [--anywhere]
 
 FOLDER must be new. It gets sessions, answers.json (its SHA-256 is printed before any diagnosis starts), findings; the
 score is printed, and, of the second and the fourth recorder's sessions, what was read of their parameters.
@@ -26,6 +27,8 @@ from fourth_recorder.motor import CompilerError as FourthCompilerError
 from fourth_recorder.readings import truth as truth_of_fourth
 from second_recorder.compose import make_set as make_second
 from second_recorder.hand import COUNTS as RANGES
+from sixth_recorder.compose import make_set as make_sixth
+from sixth_recorder.plant import CompilerError as SixthCompilerError
 from third_recorder.compose import make_set as make_third
 from third_recorder.motor import CompilerError as ThirdCompilerError
 
@@ -115,7 +118,7 @@ def options_of_command() -> argparse.Namespace:
     """The command line; ends the process where it makes no sense."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--recorder", choices=("second", "third", "fourth", "fifth"), default="second")
+    parser.add_argument("--recorder", choices=("second", "third", "fourth", "fifth", "sixth"), default="second")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2, help="sessions at a time")
     for kind, count in COUNTS.items():
@@ -123,7 +126,7 @@ def options_of_command() -> argparse.Namespace:
     parser.add_argument(
         "--anywhere",
         action="store_true",
-        help="each session in a laboratory of its own: rates, noise, speeds (second recorder; the third always does so, the fourth and the fifth in half of their sessions)",
+        help="each session in a laboratory of its own: rates, noise, speeds (second recorder; the third and the sixth always do so, the fourth and the fifth in half of their sessions)",
     )
     options = parser.parse_args()
     if options.anywhere and options.recorder != "second":
@@ -142,9 +145,9 @@ def main() -> None:
         make_second(sessions, options.seed, counts, None, options.anywhere)
     else:
         try:
-            makers = {"third": make_third, "fourth": make_fourth, "fifth": make_fifth}
+            makers = {"third": make_third, "fourth": make_fourth, "fifth": make_fifth, "sixth": make_sixth}
             makers[options.recorder](sessions, options.seed, counts)
-        except (ThirdCompilerError, FourthCompilerError, FifthCompilerError) as error:
+        except (ThirdCompilerError, FourthCompilerError, FifthCompilerError, SixthCompilerError) as error:
             sys.exit(str(error))
     apart = sessions.with_name("sessions.answers")
     made = json.loads((apart / "answers.json").read_text())

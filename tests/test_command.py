@@ -301,6 +301,8 @@ def test_a_soft_controller_is_slow_and_not_late() -> None:
     assert late(index=rising(0.0, 0.25, 1), ring=rising(0.0, 0.1, 2)) == set()
     assert late(index=rising(0.08, 0.1, 1), ring=rising(0.0, 0.1, 2)) == {"index"}
     assert late(index=rising(0.2, 0.02, 1, settling=12.0), ring=rising(0.0, 0.02, 2)) == {"index"}
+    # alone, too: a rise says itself when it begins
+    assert late(index=rising(0.0, 0.25, 1)) == set() and late(index=rising(0.08, 0.1, 1)) == {"index"}
 
 
 def test_answers_too_few_say_nothing() -> None:

@@ -18,11 +18,11 @@ from hand_model.check import check
 from hand_model.compile import compile
 from hand_model.compile.course import without_courses
 from hand_model.course import ranges, value
+from hand_model.diagnose import finger as judging
 from hand_model.diagnose.finger import _held_out
 from hand_model.diagnose.locate.angles import finger_angles
 from hand_model.diagnose.locate.course import _chosen, _Observed, _solve, finger_courses
 from hand_model.diagnose.locate.markers import corrected_angles, name_markers
-from hand_model.diagnose.locate.slips import marker_findings
 from hand_model.diagnose.prove.markers import OWN, marker_fit, of_chain
 from hand_model.diagnose.prove.write_course import with_chains, written_courses
 from hand_model.engines import mujoco as engine
@@ -216,7 +216,7 @@ TIP = np.array([0.026, 0.002, 0.003])  # from the last joint's centre
 
 @pytest.mark.parametrize(("effect", "form", "joint"), PLANTED)
 def test_a_planted_course_is_recovered_at_the_tip_through_the_compiled_file(
-    tmp_path, effect: str, form: str, joint: int
+    tmp_path, monkeypatch, effect: str, form: str, joint: int
 ) -> None:
     truth = bebionic("left", 31, ["index"])
     plan = Plan(
@@ -240,11 +240,12 @@ def test_a_planted_course_is_recovered_at_the_tip_through_the_compiled_file(
     fit = marker_fit(courses, of_chain(courses.plain, courses.body), of_chain(courses.coursed, courses.body), OWN)
     assert fit["held_out"] and fit["after"] < 1.05 * fit["noise_floor"]
     assert fit["before"] - fit["after"] > 0.8 * (fit["before"] - fit["noise_floor"])
-    found = tuple(marker_findings(angles, naming))
-    kept, proved = _held_out(found, courses)
-    assert proved is courses and [(f.effect, f.fit) for _, f in kept] == [(effect, fit)]
+    markers, found, proved = _held_out(angles, naming)
+    assert markers is naming and proved.joints == (joint,) and [(f.effect, f.fit) for _, f in found] == [(effect, fit)]
     misled = replace(courses, plain=courses.coursed, coursed=courses.plain)
-    assert _held_out(found, misled) == ((), None)
+    monkeypatch.setattr(judging, "finger_courses", lambda *_: misled)
+    markers, found, proved = _held_out(angles, naming)
+    assert not markers.found and not found and proved is None
 
     finger = truth.fingers[0]
     hand = _true_hand(truth, finger)

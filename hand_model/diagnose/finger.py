@@ -21,9 +21,9 @@ from .locate.angles import (
     linkage_states,
     ranges_of_counts,
 )
-from .locate.course import FingerCourses, finger_courses
+from .locate.course import FingerCourses, finger_courses, follows
 from .locate.decoupled import beside_excursions
-from .locate.markers import HINGE, corrected_angles, name_markers, tilt
+from .locate.markers import HINGE, MarkerNaming, corrected_angles, name_markers, tilt
 from .locate.slips import marker_findings, steps, with_steps
 from .locate.slips import unexplained as unexplained_of
 from .name.station import Station, judged
@@ -95,24 +95,31 @@ def _leaves(encoder: Station) -> bool:
 
 
 def _held_out(
-    found: tuple[tuple[float, Finding], ...], courses: FingerCourses | None
-) -> tuple[tuple[tuple[float, Finding], ...], FingerCourses | None]:
-    """Findings with the fit of joints that are no plain hinges, and their courses; without them where recordings kept
-    out are no better with those."""
+    seen: FingerAngles, markers: MarkerNaming
+) -> tuple[MarkerNaming, tuple[tuple[float, Finding], ...], FingerCourses | None]:
+    """What markers tell, its findings, and courses of joints that are no plain hinges, with their fit; without the joints
+    that follow a course where recordings kept out are no better with it."""
+    found = tuple(marker_findings(seen, markers))
+    courses = finger_courses(seen, markers, {(f.effect, f.where["joint"]) for _, f in found if f.effect in HINGE})
     if courses is None:
-        return found, None
+        return markers, found, None
     fit = marker_fit(courses, of_chain(courses.plain, courses.body), of_chain(courses.coursed, courses.body), OWN)
     reduction = fit["ci95_reduction"]
     if fit["held_out"] and reduction is not None and reduction[0] <= 0:
-        return tuple((w, f) for w, f in found if f.effect not in HINGE), None
-    return tuple((w, replace(f, fit=fit) if f.effect in HINGE else f) for w, f in found), courses
+        left = replace(markers, found=tuple(e for e in markers.found if not follows(e)))
+        return left, tuple(marker_findings(seen, left)), None
+    names = [s.name for s in seen.finger.segments]
+    coursed = {(e.effect, names[e.body - 1]) for e in markers.found if follows(e)}
+    return (
+        markers,
+        tuple((w, replace(f, fit=fit) if (f.effect, f.where["joint"]) in coursed else f) for w, f in found),
+        courses,
+    )
 
 
 def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, float]]) -> FingerReading:
     markers = name_markers(seen)
-    found = tuple(marker_findings(seen, markers))
-    courses = finger_courses(seen, markers, {(f.effect, f.where["joint"]) for _, f in found if f.effect in HINGE})
-    found, courses = _held_out(found, courses)
+    markers, found, courses = _held_out(seen, markers)
     names = ", ".join(f.effect for _, f in found) or "consistent"
     lines = [f"{finger.name} markers: {names} (p {markers.p_before:.2g} -> {markers.p_after:.2g})"]
     angles, moments = corrected_angles(seen, markers), steps(markers)

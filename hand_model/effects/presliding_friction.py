@@ -84,7 +84,8 @@ class PreslidingFriction(Effect):
 def _time(shape: Mapping[str, float]) -> float:
     """Damping over stiffness [s], at most what lets friction turn over at once at full speed: beyond, bristles would
     give nothing, and it is the estimate of starts that is described."""
-    return min(shape.get("bristle_time", 0.0), shape["bristle_length"] / FULL_SPEED)
+    damped = shape.get("form", 0.0) < 0.5  # what breaks away is not
+    return min(shape.get("bristle_time", 0.0), shape["bristle_length"] / FULL_SPEED) if damped else 0.0
 
 
 EFFECT = PreslidingFriction()

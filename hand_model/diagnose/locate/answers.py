@@ -93,7 +93,7 @@ def lateness(answers: Mapping[str, Answers]) -> dict[str, Lateness]:
             and np.mean(late) > LATE * x.step_s
             and np.mean(late > x.step_s) > MOSTLY
         )
-        shift = _shift(x.rise_s, [y.rise_s for a, y in told.items() if a != actuator])
+        shift = _onset(x.rise_s) if alone else _shift(x.rise_s, [y.rise_s for a, y in told.items() if a != actuator])
         slow = total > 0 and shift <= SHIFTED * total
         drive = not slow and (plain or (not alone and _both_late(x, total, behind)))
         channel = max(total - np.nan_to_num(behind, nan=total), 0.0) if drive else max(shift, 0.0) if slow else total
@@ -121,6 +121,15 @@ def _shift(rise_s: Array, others: Sequence[Array]) -> float:
         stretch = float(np.clip(np.ptp(rise_s) / max(float(np.ptp(other)), 1e-9), 1.0, SLOWER))
         shifts.append(float(np.min(rise_s - stretch * other)))
     return min(shifts, default=np.inf)
+
+
+def _onset(rise_s: Array) -> float:
+    """When [s] a rise begins, straight on from its first two shares: a smooth controller is seen late and begins at once.
+    Infinite where nothing is told."""
+    if not np.isfinite(rise_s).all():
+        return np.inf
+    (first, second), (begun, further) = SHARES[:2], rise_s[:2]
+    return float(begun - first * (further - begun) / (second - first))
 
 
 def _ahead(x: Answers, others: Sequence[Answers]) -> tuple[float, float]:

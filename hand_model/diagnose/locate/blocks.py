@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,8 @@ LASTING_S = 2.0  # half of it is how long something must last that is no ghost
 class Blocks:
     """Block means of all flexion recordings of one finger, in order of time.
 
-    residual: (b, m, 3) [m] observed minus chain, palm frame. weight: (b, m) share of its frames that a mean is of, times BLOCK. pose_columns: (b, 3m,
+    residual: (b, m, 3) [m] observed minus chain, palm frame. weight: (b, m) share of its frames that a mean is of, times BLOCK. frames: of a
+    block. pose_columns: (b, 3m,
     6+k) orthonormal basis of what poses explain. chain_columns: (b, 3m, s). rotation: (b, m, 3, 3) body to palm.
     position: (b, m, 3).
     angle: (b, k). record, time_s: (b,). labels, body: of the markers.
@@ -45,6 +46,12 @@ class Blocks:
     time_s: Array
     labels: tuple[str, ...]
     body: NDArray[np.int64]
+    frames: int = BLOCK
+
+
+def frames_of_block(time_s: Array) -> int:
+    """How many frames at times (n,) [s] one block is of."""
+    return max(BLOCK, round(BLOCK_S / max(float(np.median(np.diff(time_s))), 1e-9)))
 
 
 def blocks_of(angles: FingerAngles) -> Blocks:
@@ -59,7 +66,7 @@ def blocks_of(angles: FingerAngles) -> Blocks:
         sound = np.isfinite(record.angle_rad).all(1)
         far = ~(size < FARTHEST_M) | passing(size > OUTLIER_LIMIT * angles.noise_m, record.mocap.time_s)
         good = np.flatnonzero(~record.ghost & (sound | (~far.any(1) & ~passing(~sound, record.mocap.time_s))))
-        length = max(BLOCK, round(BLOCK_S / float(np.median(np.diff(record.mocap.time_s)))))
+        length = frames_of_block(record.mocap.time_s)
         count = len(good) // length
         if count < 20:
             continue
@@ -74,7 +81,8 @@ def blocks_of(angles: FingerAngles) -> Blocks:
         angle = record.pose.angle_rad[frames].mean(1)
         parts.append((mean, weight, angle, np.full(len(frames), index), record.mocap.time_s[frames].mean(1)))
     residual, weight, angle, record_index, time_s = (np.concatenate(p) for p in zip(*parts, strict=True))
-    return _assembled(chain, body, labels, residual, weight, angle, record_index, time_s)
+    blocks = _assembled(chain, body, labels, residual, weight, angle, record_index, time_s)
+    return replace(blocks, frames=frames_of_block(angles.records[0].mocap.time_s))
 
 
 def _calm(scatter: Array) -> Array:

@@ -132,7 +132,7 @@ def finger_courses(
     """Courses of the joints that the marker station names as no plain hinge; None where it names none, or none that
     follows the angle. named: (effect, joint) of its findings."""
     segments = [s.name for s in angles.finger.segments]
-    crooked = [e for e in naming.found if _follows(e) and (e.effect, segments[e.body - 1]) in named]
+    crooked = [e for e in naming.found if follows(e) and (e.effect, segments[e.body - 1]) in named]
     if not crooked:
         return None
     observed = _observed(angles, naming)
@@ -143,7 +143,7 @@ def finger_courses(
         slides = any(e.effect == "moving_centre" or any(e.shifts) for e in mine)
         forms.append(_chosen(angles.chain, observed, forms, body - 1, tilts, slides))
     plain, coursed = (_solve(angles.chain, observed, f).chain for f in ([], forms))
-    slips = replace(naming, found=tuple(e for e in naming.found if not _follows(e)))
+    slips = replace(naming, found=tuple(e for e in naming.found if not follows(e)))
     data = []
     for index, record in enumerate(angles.records):
         shift = shift_at_frames(slips, index, record.mocap.time_s)
@@ -167,7 +167,7 @@ def _observed(angles: FingerAngles, naming: MarkerNaming) -> _Observed:
     )
 
 
-def _follows(effect: MarkerEffect) -> bool:
+def follows(effect: MarkerEffect) -> bool:
     """Whether an effect is a joint's that is no hinge, and in step with its angle: a course holds no more."""
     return effect.effect in HINGE and not effect.sides
 
@@ -176,7 +176,7 @@ def _slipped(naming: MarkerNaming) -> Array:
     """Displacement (b, m, 3) [m] by what is named beside the hinges."""
     out = np.zeros_like(naming.blocks.residual)
     for effect in naming.found:
-        if not _follows(effect):
+        if not follows(effect):
             out += (effect.columns @ effect.coefficients).reshape(out.shape)
     return out
 

@@ -41,7 +41,8 @@ class LastingNoise:
 def lasting_noise(blocks: Blocks, y: Array) -> LastingNoise:
     """How long noise lasts in readings y (b, 3m) [m], poses projected out, by the variogram (Matheron 1963) of blocks
     between which the finger stands still: no misfit by angle tells these apart. Beyond what is alike in neighbours it is
-    taken to fade by the same share from block to block."""
+    taken to fade by the same share from block to block. The inflation is that of long means; those of blocks of many
+    passes vary less, and a test of these is on the safe side."""
     free = y.shape[1] - blocks.pose_basis.shape[-1]
     still = _smoothed(blocks)
     step_s = float(np.median(np.diff(blocks.time_s)[np.diff(blocks.record) == 0]))
@@ -53,7 +54,8 @@ def lasting_noise(blocks: Blocks, y: Array) -> LastingNoise:
         count = int(pair.sum())
         if count * free < FEW:
             return LastingNoise()
-        square.append(float(np.mean(np.sum((y[k:] - y[:-k])[pair] ** 2, axis=1))))
+        # by the median, for what slips at rest is a misfit
+        square.append(float(np.median(np.sum((y[k:] - y[:-k])[pair] ** 2, axis=1))))
     rise = np.array(square) / square[0]
     whole = float(np.mean(rise[-3:]))  # variance, in that of neighbours' differences
     alike, next_alike = whole - rise[0], whole - rise[1]

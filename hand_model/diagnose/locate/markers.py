@@ -239,7 +239,7 @@ def _lack(residual: Array, blocks: Blocks, lasting: LastingNoise) -> tuple[float
             statistic += float(np.sum(mine.mean(0) ** 2 * len(mine) / np.maximum(variance, 1e-300)))
             degrees += z.shape[1]
         worst = min(worst, lasting.chance(statistic, degrees) * (1 + len(angles)))
-        excess = max(excess, statistic / lasting.inflation - degrees)
+        excess = max(excess, statistic - lasting.inflation * degrees)
     return worst, excess
 
 

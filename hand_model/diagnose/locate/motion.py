@@ -24,6 +24,8 @@ QUICK = 0.5  # of the fastest speed, from which what times are wrong by shows in
 FEWEST_BLOCKS = 12  # that a smoothing is made of
 DEPARTURES_S = (0.1, 0.25, 0.6, 1.5)  # bandwidths of what departs from a known course
 LASTING_S = 0.3  # over which errors may be alike; what lasts longer is what departs
+GAP = 3.0  # sample intervals, from which readings are no neighbours
+MEDIAN_ERROR = 1.65  # times that of a mean of squares is the standard error of the variance by a median
 FEW = 100  # pairs of readings, below which nothing is said of how long errors last
 
 
@@ -105,7 +107,9 @@ def lasting_errors(time_s: Array, values: Array, calm: NDArray[np.bool_]) -> tup
     (Matheron 1963) over calm spells; none where they do not plainly last, and no variance where nothing tells it."""
     rises, count = [], 0
     spell = np.cumsum(~calm)  # alike within one
-    longest = max(round(LASTING_S / max(float(np.median(np.diff(time_s))), 1e-9)), 1)
+    step = max(float(np.median(np.diff(time_s))), 1e-9)
+    longest = int(np.clip(LASTING_S / step, 1, max(len(values) // 4, 1)))
+    spell += np.cumsum(np.diff(time_s, prepend=time_s[0]) > GAP * step)
     for k in range(1, longest + 1):
         pair = calm[k:] & (spell[k:] == spell[:-k])
         count = int(pair.sum())
@@ -115,7 +119,7 @@ def lasting_errors(time_s: Array, values: Array, calm: NDArray[np.bool_]) -> tup
         rises.append(0.5 * float(np.median(np.abs(values[k:] - values[:-k])[pair]) / 0.6745) ** 2)
     whole = float(np.mean(rises[-max(longest // 4, 1) :]))
     covariance = whole - np.array(rises)
-    if covariance[0] < SURE * whole * np.sqrt(2.0 / count):
+    if covariance[0] < SURE * MEDIAN_ERROR * whole * np.sqrt(2.0 / count):
         return whole, np.zeros(0)
     faded = np.flatnonzero(covariance <= 0)
     return whole, covariance[: faded[0]] if len(faded) else covariance
@@ -136,7 +140,9 @@ def smoothings(time_s: Array, values: Array, alike: Array | None = None) -> Iter
         impulse[len(y) // 2] = 1 / count
         kernel = local_quadratic(t, impulse, bandwidth)[0][len(y) // 2 :]
         own = float(kernel[0])
-        followed = 0.0 if alike is None else 2 * float(kernel[(lag / count).round().astype(int)] @ alike)
+        at = (lag / count).round().astype(int)
+        within = at < len(kernel)
+        followed = 0.0 if alike is None else 2 * float(kernel[at[within]] @ alike[within])
         smooth, rate = (np.interp(time_s, t, x) for x in local_quadratic(t, y, bandwidth)[:2])
         yield ((values - smooth) / (1 - own)) ** 2 + 2 * followed / (1 - own), smooth, rate
 

@@ -14,7 +14,7 @@ from ...identify.likelihood import OUTLIER_LIMIT
 from ...rotation import kabsch
 from ..findings import UNWRITTEN, Finding, weighed
 from .angles import FingerAngles, Step
-from .blocks import Blocks
+from .blocks import BLOCK, Blocks
 from .course_amount import course_amount
 from .displacement import NO_HINGE, NOT_RIGID, UNNAMED, MarkerEffect
 from .markers import ALPHA, SMALL, UNHINGED, MarkerNaming
@@ -46,7 +46,7 @@ def marker_findings(angles: FingerAngles, naming: MarkerNaming) -> list[tuple[fl
         small = sum(e.gain for e in members) < least
         if name in UNNAMED or small and not any(e.apart for e in members):
             continue
-        readings = max(float(naming.blocks.weight.sum()) * 3, 1.0)
+        readings = max(float(naming.blocks.weight.sum()) * 3 * naming.blocks.frames / BLOCK, 1.0)
         moved = float(np.sqrt(sum(e.gain for e in members) / readings))  # over the noise of one reading
         out.append((weighed(moved, _contrast(angles)), _finding(angles, naming, name, body, label, members)))
     return out

@@ -48,13 +48,13 @@ def evidence(balance: Balance, fit: Fit, reference: Fit, which: int = -1, scale:
     """
     brought = gain(balance, fit, reference, scale)
     term = fit.terms[which]
-    shapes = [shape for shape in term.effect.shapes(balance.states) if shape.name in term.shape]
+    shapes = [s for s in term.effect.shapes(balance.states) if s.name in term.shape and s.matters(term.shape)]
     count = int(np.any(balance.columns(term.effect, term.shape)[balance.train] != 0, axis=0).sum()) + sum(
         s.size for s in shapes
     )
     if count and brought > 0:
         brought -= 0.5 * count * (1 + np.log(max(2 * brought / count, 1.0)))
-    volume = sum(_occam(balance, fit, which, s, scale) for s in shapes if not s.size and s.matters(term.shape))
+    volume = sum(_occam(balance, fit, which, shape, scale) for shape in shapes if not shape.size)
     return float(brought - volume + oddity(balance, reference) - oddity(balance, fit))
 
 

@@ -37,15 +37,19 @@ def noise(balance: Balance) -> tuple[float, float]:
         return max(neighbours, 1e-9), 1.0
     lags = []
     longest = max(LONGEST, round(LONGEST_S / sample_interval(balance.states)))
-    for k in range(longest + 1):
+    for k in range(min(longest, len(r) - 1) + 1):
         pair = (
             (balance.stroke[k:] == balance.stroke[: len(r) - k])
             & np.isfinite(deviation[k:])
             & np.isfinite(deviation[: len(r) - k])
         )
-        lags.append(float(np.mean((deviation[k:] * deviation[: len(r) - k])[pair])) if pair.sum() > 20 else 0.0)
+        if pair.sum() <= 20:
+            break
+        lags.append(float(np.mean((deviation[k:] * deviation[: len(r) - k])[pair])))
+    if len(lags) < 2:
+        return max(neighbours, 1e-9), 1.0
     # What still correlates after the longest lag is a misfit that does not repeat (an event), no noise.
-    covariance = np.array(lags) - max(float(np.mean(lags[-5:])), 0.0)
+    covariance = np.array(lags) - max(float(np.mean(lags[1:][-5:])), 0.0)
     rho = covariance / max(covariance[0], 1e-300)
     if rho[1] < COLOURED:
         return max(neighbours, 1e-9), 1.0

@@ -57,9 +57,12 @@ class Projection:
 
     def rss(self, columns: Array, low: Array, high: Array) -> float | None:
         """Residual sum of squares of the joint fit of the design and of `columns` (n, j), weighted and whitened, whose
-        coefficients are bounded; None where the design's own coefficients would leave their bounds."""
+        coefficients are bounded; None where the design's own coefficients would leave their bounds, or a column hardly
+        says anything beside it."""
         inside = self.basis.T @ columns
         gram = columns.T @ columns - inside.T @ inside  # of what is left of them beside the design
+        if np.any(gram.diagonal() < DEPENDENT * np.sum(columns**2, axis=0)):
+            return None
         right = columns.T @ self.left
         amplitudes = from_products(gram, right, low, high)
         coefficients = np.linalg.solve(self.triangle, self.explained - inside @ amplitudes)

@@ -118,9 +118,11 @@ class Station:
         """Whether the names would stand but that as many as may be, or some that leave recordings kept out within their
         noise, leave something by the test, or as many as may be of recordings kept out (and make these no worse): in a
         finger of which much is missing that is to be expected."""
-        fits = self.naming.balance.untouched and self._kept_out[1] <= KEPT_OUT**2
-        many = (self.full or fits) and self.naming.after.p < ALPHA or self.full and self._short and not self._worse
-        return self._tells and many and self.explained >= EXPLAINED_PARTLY
+        before, after = self._kept_out
+        fits = self.naming.balance.untouched and after <= KEPT_OUT**2 < before
+        left_by_test = self.naming.after.p < ALPHA and (self.full or fits)
+        left_kept_out = self.full and self._short and not self._worse
+        return self._tells and (left_by_test or left_kept_out) and self.explained >= EXPLAINED_PARTLY
 
     @property
     def _tells(self) -> bool:

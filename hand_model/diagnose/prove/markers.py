@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ...identify.chain import Chain, ChainData, propagate
 from ...identify.likelihood import OUTLIER_LIMIT, fit_poses
 from ..locate.angles import FARTHEST_M
-from ..locate.blocks import BLOCK, passing
+from ..locate.blocks import frames_of_block, passing
 from ..locate.course import FingerCourses
 from .replays import reduction
 
@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 COMPILED = "mujoco: kinematics of the compiled file, palm and angles fitted to every frame"
 OWN = "chain and course, palm and angles fitted to every frame"
-LEAST_FRAMES = 6  # of BLOCK, that a mean needs
+LEAST_FRAMES = 0.75  # share of a block's that a mean needs
 SPELL = 12  # means that are drawn together: neighbours are alike
 
 
@@ -65,7 +65,7 @@ def of_folder(folder: Path, finger: str, labels: Sequence[str]) -> Replayed:
 
 
 def marker_fit(courses: FingerCourses, before: Replayed, after: Replayed, engine: str) -> dict[str, Any]:
-    """`fit` of a finding: root mean square of what means over BLOCK frames leave per coordinate [m], and their noise by
+    """`fit` of a finding: root mean square of what means over blocks of frames leave per coordinate [m], and their noise by
     differences of neighbours, on the recordings kept out (on all, where none is)."""
     records = courses.angles.records
     chosen = [i for i, r in enumerate(records) if r.trial.validate] or list(range(len(records)))
@@ -99,7 +99,8 @@ def _left(
     clean = replace(data, position_world=np.where(seen[..., None], data.position_world, np.nan))
     one, other = (_errors(clean, file, FARTHEST_M / OUTLIER_LIMIT) for file in (before, after))
     seen &= (np.linalg.norm(one, axis=-1) < FARTHEST_M) & (np.linalg.norm(other, axis=-1) < FARTHEST_M)
-    one, other = _means(one, seen), _means(other, seen)
+    length = frames_of_block(record.mocap.time_s)
+    one, other = _means(one, seen, length), _means(other, seen, length)
     both = np.isfinite(one) & np.isfinite(other)
     steps = np.diff(other, axis=0)
     spell = np.broadcast_to((np.arange(len(one)) // SPELL)[:, None, None], one.shape)
@@ -112,10 +113,10 @@ def _errors(data: ChainData, file: Replayed, noise_m: float) -> Array:
     return pose.to_palm(data.position_world) - file.positions(pose.angle_rad)
 
 
-def _means(errors: Array, seen: NDArray[np.bool_]) -> Array:
-    """Means (b, m, 3) over BLOCK frames, nan where too few are seen."""
-    count = len(errors) // BLOCK
-    shown = seen[: count * BLOCK].reshape(count, BLOCK, -1)
-    values = np.where(shown[..., None], errors[: count * BLOCK].reshape(count, BLOCK, -1, 3), 0.0)
+def _means(errors: Array, seen: NDArray[np.bool_], length: int) -> Array:
+    """Means (b, m, 3) over blocks of so many frames, nan where too few are seen."""
+    count = len(errors) // length
+    shown = seen[: count * length].reshape(count, length, -1)
+    values = np.where(shown[..., None], errors[: count * length].reshape(count, length, -1, 3), 0.0)
     size = shown.sum(1)[..., None]
-    return np.where(size >= LEAST_FRAMES, values.sum(1) / np.maximum(size, 1), np.nan)
+    return np.where(size >= LEAST_FRAMES * length, values.sum(1) / np.maximum(size, 1), np.nan)
