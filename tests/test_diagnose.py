@@ -194,6 +194,19 @@ def test_noise_and_its_correlation_are_measured_beside_a_misfit() -> None:
     assert 2.0 < red.inflation < 4.2 and abs(red.sigma / 5 - 1) < 0.15  # AR(1), 0.5: (1 + r) / (1 - r) = 3
 
 
+def test_noise_of_strokes_shorter_than_it_may_last_is_no_level_that_does_not_repeat() -> None:
+    """Strokes of a fifth of a second, 240 readings in each, with a level of their own: white noise beside it."""
+    rng = np.random.default_rng(9)
+    step_s, count = 1 / 1200, 240
+    x = np.concatenate([np.linspace(0, 100, count)[:: (-1) ** k] for k in range(60)])
+    v = np.gradient(x) / step_s
+    declared = np.stack([np.sign(v), x, np.ones_like(v)], axis=-1)
+    effort = declared @ [30.0, 0.2, 5.0] + np.repeat(rng.normal(0, 1, 60), count) + rng.normal(0, 1, len(x))
+    state = DriveState("t", "index", step_s * np.arange(len(x)), x, v, 0 * v, effort, declared)
+    balance = Balance((state,))
+    assert balance.inflation < 3.0 and balance.sigma == pytest.approx(1.0, rel=0.25)
+
+
 @pytest.mark.parametrize("seed", [21, 24])
 def test_a_faint_effect_needs_the_word_of_untouched_recordings(seed: int) -> None:
     def half_untouched(states: tuple[DriveState, ...]) -> tuple[DriveState, ...]:

@@ -11,9 +11,9 @@ from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from hand_model.diagnose.locate import markers
-from hand_model.diagnose.locate.blocks import _assembled, present_way, way_of_motion
+from hand_model.diagnose.locate.blocks import _assembled, frames_of_block, present_way, project, way_of_motion
 from hand_model.diagnose.locate.displacement import CREEP, NO_HINGE
-from hand_model.diagnose.locate.lasting_noise import LastingNoise
+from hand_model.diagnose.locate.lasting_noise import LastingNoise, lasting_noise
 from hand_model.diagnose.locate.markers import MarkerNaming, named_in, tilt
 from hand_model.diagnose.locate.slips import _finding, _turning, unexplained
 from hand_model.identify.chain import Chain
@@ -24,19 +24,20 @@ COUNT, RECORDS = 240, 2
 FLEXED = np.array([0.6, 0.4])  # rad, half of each joint's range
 
 
-def seen(shift, seed: int = 0, body: int = 1, lasting: float = 0.0) -> MarkerNaming:
+def seen(shift, seed: int = 0, body: int = 1, lasting: float = 0.0, rests: bool = False) -> MarkerNaming:
     """The naming of two recordings of a finger of two joints whose markers are displaced by shift(share, turn, arm):
     (b, 4, 3) [m] of one segment's markers. share: (b,) of the recording. turn: (b, 3, 3) of the first segment. arm:
-    (4, 3) [m] from the support's middle, at rest. lasting: share of the noise that neighbouring blocks have alike, of a
-    finger that rests between its strokes."""
+    (4, 3) [m] from the support's middle, at rest. lasting: share of the noise that neighbouring blocks have alike; rests:
+    whether the finger rests between its strokes, as it does beside such noise."""
     rng = np.random.default_rng(seed)
     rest = np.concatenate([rng.normal(0, 0.012, (4, 3)) + [0.03 * k + 0.01, 0, 0.01] for k in range(3)])
     chain = Chain(rest, np.array([[0, 1, 0], [0, 1, 0]], float), np.array([[0.03, 0, 0], [0.06, 0, 0]]))
     share = np.tile(np.linspace(0, 1, COUNT), RECORDS)
     angle = (1 - np.cos(2 * np.pi * 4 * share))[:, None] * FLEXED
     residual = rng.normal(0, 3e-5, (COUNT * RECORDS, 12, 3))
-    if lasting:
+    if lasting or rests:
         angle = np.clip(2 * angle - FLEXED, 0, 2 * FLEXED)
+    if lasting:
         residual = lfilter([np.sqrt(1 - lasting**2)], [1, -lasting], residual, axis=0)
     turn = Rotation.from_rotvec(angle[:, :1] * chain.axis_palm[0]).as_matrix()
     residual[:, BODY == body] += shift(share, turn, rest[BODY == body] - rest[BODY == body].mean(0))
@@ -88,6 +89,16 @@ def test_noise_that_lasts_is_no_misfit_and_hides_none(monkeypatch, seed: int) ->
     assert slipped.believed and places(slipped) == {("marker_slip", "M4")}
     monkeypatch.setattr(markers, "lasting_noise", lambda blocks, y: LastingNoise())
     assert seen(lambda share, turn, arm: np.zeros((len(share), 4, 3)), seed, lasting=0.5).p_before < 1e-6
+
+
+def test_what_slips_at_rest_is_no_noise_that_lasts() -> None:
+    naming = seen(slipping(0.5), rests=True)  # at 0.5 the finger is open
+    blocks = naming.blocks
+    y = project(blocks, blocks.residual.reshape(len(blocks.residual), -1, 1))[..., 0]
+    assert lasting_noise(blocks, y) == LastingNoise() and places(naming) == {("marker_slip", "M4")}
+    lasting = seen(slipping(0.5), lasting=0.5).blocks
+    y = project(lasting, lasting.residual.reshape(len(lasting.residual), -1, 1))[..., 0]
+    assert 4.0 < lasting_noise(lasting, y).inflation < 9.0  # of neighbours: (1 + r) / (1 - r) over 1 - r, which is 6
 
 
 @pytest.mark.parametrize("at", [0.4, 0.7])
@@ -267,3 +278,8 @@ def test_what_no_finger_can_do_is_said_where_nothing_else_explains_the_markers(m
     assert len(tried) == 2 and tried[1] < tried[0]
     tried.clear()
     assert places(seen(tilting(lambda share, way: 0.01 * np.sin(2 * np.pi * share)), body=2)) == {(NO_HINGE, None)}
+
+
+@pytest.mark.parametrize(("rate_hz", "frames"), [(50.0, 8), (120.0, 8), (240.0, 16), (960.0, 64)])
+def test_a_block_lasts_as_long_at_any_high_rate(rate_hz: float, frames: int) -> None:
+    assert frames_of_block(np.arange(100) / rate_hz) == frames

@@ -49,7 +49,7 @@ def noise(balance: Balance) -> tuple[float, float]:
     if len(lags) < 2:
         return max(neighbours, 1e-9), 1.0
     # What still correlates after the longest lag is a misfit that does not repeat (an event), no noise.
-    covariance = np.array(lags) - max(float(np.mean(lags[1:][-5:])), 0.0)
+    covariance = np.array(lags) - max(float(np.mean(lags[1:][-max(len(lags) // 3, 5) :])), 0.0)
     rho = covariance / max(covariance[0], 1e-300)
     if rho[1] < COLOURED:
         return max(neighbours, 1e-9), 1.0
