@@ -43,6 +43,23 @@ def test_a_balance_that_plainly_shows_a_shift_is_believed_where_answers_agree(
     assert _late(drives, timed) == {"index": may_be, "ring": False}
 
 
+@pytest.mark.parametrize("told_s", [-0.006, 0.006])
+def test_a_delay_that_a_simulation_tells_to_a_fraction_of_a_sample_must_show_in_the_balance(told_s: float) -> None:
+    """A controller that is not quite as taken for bends elsewhere."""
+    told = {"index": (told_s, 0.001), "ring": (0.0, 0.001)}
+
+    def may_be(shift_s: float) -> dict[str, bool]:
+        drives = {"index": shifted(drive(3), shift_s) if shift_s else drive(3), "ring": drive(4)}
+        timed = {
+            a: tuple(replace(s, extra={**s.extra, "late": np.array(told[a])}) for s in states)
+            for a, states in drives.items()
+        }
+        return _late(drives, timed)
+
+    assert may_be(0.0) == {"index": False, "ring": False}
+    assert may_be(told_s) == {"index": True, "ring": False}
+
+
 def test_what_holds_a_drive_at_rest_says_nothing_against_a_late_current() -> None:
     """Before it moves a drive may press against its friction already; late, that is read as it starts."""
     (state, *_) = drive(3)

@@ -16,6 +16,7 @@ from .simulated import SimulatedDrive
 EARLY = 3.0  # standard deviations by which answers that come before the command say so for sure
 # log likelihood that a shift of a drive's current must bring: less, and its drive tells none (two standard deviations)
 DELAY_TOLD = 2.0
+SEEN = 0.5  # the same of a shift that is told otherwise (one standard deviation)
 ALIKE = 2.0  # standard deviations of answers within which they and the balance say the same
 
 
@@ -35,7 +36,7 @@ def _late(drives: dict[str, tuple[DriveState, ...]], timed: dict[str, tuple[Driv
     """Whether each drive's current may be delayed: a delay that all drives of a session share is how the log is read.
     Answers to commands tell a late or an early current better than the balance does, and must bear it out. timed: the
     drives with what these answers tell, which says nothing yet to the balance."""
-    best, brought = dict[str, float](), dict[str, float]()
+    best, brought, nearest = dict[str, float](), dict[str, float](), dict[str, float]()
     for actuator, states in drives.items():
         balance = Balance(states)
         delay = next(e for e in catalogue("drive") if e.warps)
@@ -43,7 +44,8 @@ def _late(drives: dict[str, tuple[DriveState, ...]], timed: dict[str, tuple[Driv
         polished = None if fit is None else polish(balance, fit, 0)
         brought[actuator] = 0.0 if polished is None else gain(balance, polished, balance.fit())
         told = polished is not None and brought[actuator] > DELAY_TOLD
-        best[actuator] = polished.terms[0].shape["delay"] if told else 0.0
+        nearest[actuator] = 0.0 if polished is None else polished.terms[0].shape["delay"]
+        best[actuator] = nearest[actuator] if told else 0.0
     step = {a: float(np.median(np.diff(s[0].time_s))) for a, s in drives.items()}
     # a lone drive cannot tell how the log is read from what its own channel does: twice as much is asked of it
     common, least = (min(best.values(), key=abs), 0.75) if len(best) > 1 else (0.0, 2.0)
@@ -56,7 +58,10 @@ def _late(drives: dict[str, tuple[DriveState, ...]], timed: dict[str, tuple[Driv
         if (told_to := least_delay(timed[actuator])) < bound:
             told, doubt = late[actuator].tolist()  # and to the side to which the balance would shift it
             plain = brought[actuator] > BEYOND_CHANCE and abs(told - best[actuator]) < ALIKE * doubt
-            return max(abs(told), abs(best[actuator]) if plain else 0.0) > told_to and told * best[actuator] >= 0
+            # less than a sample: what a simulation says the balance must see, if barely
+            seen = abs(told) > bound or told * nearest[actuator] > 0 and brought[actuator] > SEEN
+            most = max(abs(told), abs(best[actuator]) if plain else 0.0)
+            return seen and most > told_to and told * best[actuator] >= 0
         if late[actuator][0] < -max(bound, EARLY * late[actuator][1]):
             return True
         if x >= -bound:
