@@ -65,6 +65,9 @@ READINGS: dict[str, Callable[[dict[str, Any], dict[str, float]], dict[str, float
     "linkage_backlash": lambda s, m: {"segment_gap": float(np.rad2deg(2 * s["linkage_play"]))},
     "drive_backlash": lambda s, m: {"segment_gap": float(np.rad2deg(2 * s["drive_play"]))},
 }  # fmt: skip
+# recorders written after the second, and what each raises without a C compiler
+MAKERS = {"third": make_third, "fourth": make_fourth, "fifth": make_fifth, "sixth": make_sixth}
+COMPILER_ERRORS = ThirdCompilerError, FourthCompilerError, FifthCompilerError, SixthCompilerError
 COUNTS = {"single": 36, "none": 4, "pair": 10, "weak": 10, "messy": 10, "outside": 10}
 
 
@@ -118,7 +121,7 @@ def options_of_command() -> argparse.Namespace:
     """The command line; ends the process where it makes no sense."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--recorder", choices=("second", "third", "fourth", "fifth", "sixth"), default="second")
+    parser.add_argument("--recorder", choices=("second", *MAKERS), default="second")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2, help="sessions at a time")
     for kind, count in COUNTS.items():
@@ -145,9 +148,8 @@ def main() -> None:
         make_second(sessions, options.seed, counts, None, options.anywhere)
     else:
         try:
-            makers = {"third": make_third, "fourth": make_fourth, "fifth": make_fifth, "sixth": make_sixth}
-            makers[options.recorder](sessions, options.seed, counts)
-        except (ThirdCompilerError, FourthCompilerError, FifthCompilerError, SixthCompilerError) as error:
+            MAKERS[options.recorder](sessions, options.seed, counts)
+        except COMPILER_ERRORS as error:
             sys.exit(str(error))
     apart = sessions.with_name("sessions.answers")
     made = json.loads((apart / "answers.json").read_text())

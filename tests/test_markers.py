@@ -266,9 +266,9 @@ def test_what_no_finger_can_do_is_said_where_nothing_else_explains_the_markers(m
     found = markers._named
     tried: list[int] = []
 
-    def beyond(search, before, lasting):
+    def beyond(search, before):
         tried.append(len(search.candidates))
-        naming = found(search, before, lasting)
+        naming = found(search, before)
         if len(tried) > 1:
             return naming
         return replace(naming, found=tuple(replace(e, effect=NO_HINGE) for e in naming.found))

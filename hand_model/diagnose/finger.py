@@ -118,8 +118,7 @@ def _held_out(
 
 
 def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, float]]) -> FingerReading:
-    markers = name_markers(seen)
-    markers, found, courses = _held_out(seen, markers)
+    markers, found, courses = _held_out(seen, name_markers(seen))
     names = ", ".join(f.effect for _, f in found) or "consistent"
     lines = [f"{finger.name} markers: {names} (p {markers.p_before:.2g} -> {markers.p_after:.2g})"]
     angles, moments = corrected_angles(seen, markers), steps(markers)

@@ -26,11 +26,10 @@ LASTING_S = 2.0  # half of it is how long something must last that is no ghost
 class Blocks:
     """Block means of all flexion recordings of one finger, in order of time.
 
-    residual: (b, m, 3) [m] observed minus chain, palm frame. weight: (b, m) share of its frames that a mean is of, times BLOCK. frames: of a
-    block. pose_columns: (b, 3m,
-    6+k) orthonormal basis of what poses explain. chain_columns: (b, 3m, s). rotation: (b, m, 3, 3) body to palm.
-    position: (b, m, 3).
-    angle: (b, k). record, time_s: (b,). labels, body: of the markers.
+    residual: (b, m, 3) [m] observed minus chain, palm frame. weight: (b, m) share of its frames that a mean is of, times
+    BLOCK. pose_basis: (b, 3m, 6+k) orthonormal basis of what poses explain. chain_columns: (b, 3m, s). rotation: (b, m,
+    3, 3) body to palm. position: (b, m, 3). angle: (b, k). record, time_s: (b,). labels, body: of the markers. frames:
+    of a block.
     """
 
     residual: Array

@@ -146,9 +146,9 @@ def _lasting(state: DriveState, late_s: float, doubt_s: float) -> Array:
     step = float(np.median(np.diff(state.time_s)))
     shifts = np.sign(late_s) * np.arange(step, abs(late_s) + 0.5 * step, step)
     lasting = np.maximum.reduce([sigma, *(np.interp(state.time_s - shift, state.time_s, sigma) for shift in shifts)])
-    moving = state.extra.get("moving", np.ones(len(sigma)))
     if abs(late_s) <= max(step, PLAINLY_LATE * doubt_s):
         return lasting
+    moving = state.extra.get("moving", np.ones(len(sigma)))
     return np.where(np.interp(state.time_s - late_s, state.time_s, moving) < 1, BLIND * lasting, lasting)
 
 

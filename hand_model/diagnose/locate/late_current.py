@@ -36,16 +36,15 @@ def _late(drives: dict[str, tuple[DriveState, ...]], timed: dict[str, tuple[Driv
     """Whether each drive's current may be delayed: a delay that all drives of a session share is how the log is read.
     Answers to commands tell a late or an early current better than the balance does, and must bear it out. timed: the
     drives with what these answers tell, which says nothing yet to the balance."""
-    best, brought, nearest = dict[str, float](), dict[str, float](), dict[str, float]()
+    nearest, brought = dict[str, float](), dict[str, float]()
     for actuator, states in drives.items():
         balance = Balance(states)
         delay = next(e for e in catalogue("drive") if e.warps)
         fit = scan(balance, delay, ())
         polished = None if fit is None else polish(balance, fit, 0)
         brought[actuator] = 0.0 if polished is None else gain(balance, polished, balance.fit())
-        told = polished is not None and brought[actuator] > DELAY_TOLD
         nearest[actuator] = 0.0 if polished is None else polished.terms[0].shape["delay"]
-        best[actuator] = nearest[actuator] if told else 0.0
+    best = {a: delay_s if brought[a] > DELAY_TOLD else 0.0 for a, delay_s in nearest.items()}
     step = {a: float(np.median(np.diff(s[0].time_s))) for a, s in drives.items()}
     # a lone drive cannot tell how the log is read from what its own channel does: twice as much is asked of it
     common, least = (min(best.values(), key=abs), 0.75) if len(best) > 1 else (0.0, 2.0)

@@ -76,21 +76,21 @@ def named_in(blocks: Blocks) -> MarkerNaming:
     if p_before > SKIP_P:
         return MarkerNaming(blocks, (), sigma, p_before, p_before, excess_before, excess_before)
     candidates, before = candidates_of(blocks), (p_before, excess_before)
-    naming = _named(Stepwise(blocks, candidates, y, shared, sigma), before, lasting)
+    naming = _named(Stepwise(blocks, candidates, y, shared, sigma, lasting), before)
     beyond = {e.body for e in naming.found if e.effect == NO_HINGE}
     if not beyond:
         return naming
     candidates = [c for c in candidates if c.effect not in UNHINGED or c.body not in beyond]
-    other = _named(Stepwise(blocks, candidates, y, shared, sigma), before, lasting)
+    other = _named(Stepwise(blocks, candidates, y, shared, sigma, lasting), before)
     explained = bool(other.found) and other.p_after >= ALPHA
     return other if explained and all(e.effect != NO_HINGE for e in other.found) else naming
 
 
-def _named(search: Stepwise, before: tuple[float, float], lasting: LastingNoise) -> MarkerNaming:
+def _named(search: Stepwise, before: tuple[float, float]) -> MarkerNaming:
     """The naming among the candidates of a search; slips of one place are a creep where an even motion says as much.
     before: lack of fit and excess without any."""
     blocks, candidates, y, shared, sigma = search.blocks, search.candidates, search.y, search.shared, search.sigma
-    found, refused = _selected(search, lasting)
+    found, refused = _selected(search)
     for place in dict.fromkeys((e.body, e.label) for e in found if e.begin is not None):
         others = [e for e in found if e.begin is None or (e.body, e.label) != place]
         slips = [c for c in candidates if c.step and c.lasting and (c.body, c.label) == place]
@@ -103,7 +103,7 @@ def _named(search: Stepwise, before: tuple[float, float], lasting: LastingNoise)
     coefficients = inverse @ right
     residual = y - every @ coefficients[:, None]
     covariance = inverse * sigma**2 * _inflation(residual, blocks)
-    p, excess = _lack(residual, blocks, lasting)
+    p, excess = _lack(residual, blocks, search.lasting)
     start = blocks.chain_columns.shape[-1]
     done = []
     for effect in found:
@@ -121,7 +121,7 @@ def _possible(blocks: Blocks, effect: MarkerEffect) -> bool:
     return possible(blocks, effect.body, (effect.columns @ effect.coefficients).reshape(len(blocks.residual), -1, 3))
 
 
-def _selected(search: Stepwise, lasting: LastingNoise) -> tuple[list[MarkerEffect], MarkerEffect | None]:
+def _selected(search: Stepwise) -> tuple[list[MarkerEffect], MarkerEffect | None]:
     """What stepwise selection finds, and the likeliest further effect, that did not bring enough."""
     found: list[MarkerEffect] = []
     while len(found) < MOST:
@@ -129,24 +129,24 @@ def _selected(search: Stepwise, lasting: LastingNoise) -> tuple[list[MarkerEffec
         # what stays correlated beside the best candidate weighs all of them down
         best = replace(best, evidence=_borne(search, [*found, best], best.gain, best))
         if best.evidence < EVIDENCE_LEAST:
-            larger = found if _within_noise(search, found, lasting) else _ahead(search, found, lasting)
+            larger = found if _within_noise(search, found) else _ahead(search, found)
             return larger, best if larger is found else None
         found = search.settled([*found, best])
     return found, None
 
 
-def _within_noise(search: Stepwise, found: list[MarkerEffect], lasting: LastingNoise) -> bool:
-    return _lack(search.residual(found), search.blocks, lasting)[0] >= ALPHA
+def _within_noise(search: Stepwise, found: list[MarkerEffect]) -> bool:
+    return _lack(search.residual(found), search.blocks, search.lasting)[0] >= ALPHA
 
 
-def _ahead(search: Stepwise, found: list[MarkerEffect], lasting: LastingNoise) -> list[MarkerEffect]:
+def _ahead(search: Stepwise, found: list[MarkerEffect]) -> list[MarkerEffect]:
     """A larger set of effects that leaves nothing but noise, where `found` leaves more: several together may do what
     each of them alone, the others still hidden in what it leaves, does not. `found` where there is no such set."""
     larger = found
     while len(larger) < MOST and (best := search.next(larger)).evidence > 0:
         larger = search.settled([*larger, best])
     larger = _pruned(search, larger)
-    return larger if larger and _within_noise(search, larger, lasting) else found
+    return larger if larger and _within_noise(search, larger) else found
 
 
 def _pruned(search: Stepwise, found: list[MarkerEffect]) -> list[MarkerEffect]:

@@ -26,6 +26,7 @@ DEPARTURES_S = (0.1, 0.25, 0.6, 1.5)  # bandwidths of what departs from a known 
 LASTING_S = 0.3  # over which errors may be alike; what lasts longer is what departs
 GAP = 3.0  # sample intervals, from which readings are no neighbours
 MEDIAN_ERROR = 1.65  # times that of a mean of squares is the standard error of the variance by a median
+WHITE: Array = np.zeros(0)  # covariance of errors of which none lasts
 FEW = 100  # pairs of readings, below which nothing is said of how long errors last
 
 
@@ -96,7 +97,7 @@ def least_error(time_s: Array, values: Array, calm: NDArray[np.bool_] | None = N
     """Values smoothed over time and their rate (n,), at the bandwidth with the least leave-one-out error (Stone 1974);
     zero where that errs least. calm: (n,) where values hardly change, so that errors alone tell neighbours apart: those
     that last are followed by a narrow kernel, which the error of what is left out does not show (Hart 1991)."""
-    alike = np.zeros(0) if calm is None else lasting_errors(time_s, values, calm)[1]
+    alike = WHITE if calm is None else lasting_errors(time_s, values, calm)[1]
     tried = [(values**2, np.zeros(len(values)), np.zeros(len(values))), *smoothings(time_s, values, alike)]
     _, smooth, rate = min(tried, key=lambda x: float(np.mean(x[0])))
     return smooth, rate
@@ -114,22 +115,22 @@ def lasting_errors(time_s: Array, values: Array, calm: NDArray[np.bool_]) -> tup
         pair = calm[k:] & (spell[k:] == spell[:-k])
         count = int(pair.sum())
         if count < FEW:
-            return 0.0, np.zeros(0)
+            return 0.0, WHITE
         # by the median, for a finger may jump off its drive
         rises.append(0.5 * float(np.median(np.abs(values[k:] - values[:-k])[pair]) / 0.6745) ** 2)
     whole = float(np.mean(rises[-max(longest // 4, 1) :]))
     covariance = whole - np.array(rises)
     if covariance[0] < SURE * MEDIAN_ERROR * whole * np.sqrt(2.0 / count):
-        return whole, np.zeros(0)
+        return whole, WHITE
     faded = np.flatnonzero(covariance <= 0)
     return whole, covariance[: faded[0]] if len(faded) else covariance
 
 
-def smoothings(time_s: Array, values: Array, alike: Array | None = None) -> Iterator[tuple[Array, Array, Array]]:
+def smoothings(time_s: Array, values: Array, alike: Array = WHITE) -> Iterator[tuple[Array, Array, Array]]:
     """Square of the leave-one-out error, values smoothed and their rate, (n,) each, at every bandwidth. alike:
     covariance (k,) of errors one to k samples apart, none where they are white."""
     step = max(float(np.median(np.diff(time_s))), 1e-9)
-    lag = np.arange(1, 1 if alike is None else 1 + len(alike))
+    lag = np.arange(1, 1 + len(alike))
     for bandwidth in DEPARTURES_S:
         # samples averaged first: six to a bandwidth lose nothing; stamps in packets have next to no step
         count = max(1, min(int(bandwidth / step / 6), len(values) // FEWEST_BLOCKS))
@@ -142,7 +143,7 @@ def smoothings(time_s: Array, values: Array, alike: Array | None = None) -> Iter
         own = float(kernel[0])
         at = (lag / count).round().astype(int)
         within = at < len(kernel)
-        followed = 0.0 if alike is None else 2 * float(kernel[at[within]] @ alike[within])
+        followed = 2 * float(kernel[at[within]] @ alike[within])
         smooth, rate = (np.interp(time_s, t, x) for x in local_quadratic(t, y, bandwidth)[:2])
         yield ((values - smooth) / (1 - own)) ** 2 + 2 * followed / (1 - own), smooth, rate
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from .blocks import Blocks, project
 from .displacement import NO_HINGE, Candidate, MarkerEffect
+from .lasting_noise import LastingNoise
 
 Array = NDArray[np.float64]
 
@@ -88,11 +89,19 @@ class Stepwise:
     """Trials of candidates in the readings of one finger.
 
     y: (b, 3m, 1) readings [m], poses projected out; shared: (b, 3m, s) columns of the chain, likewise; sigma: noise [m]
-    of a reading.
+    of a reading; lasting: how much of it lasts.
     """
 
-    def __init__(self, blocks: Blocks, candidates: Sequence[Candidate], y: Array, shared: Array, sigma: float) -> None:
-        self.blocks, self.candidates, self.y, self.sigma = blocks, candidates, y, sigma
+    def __init__(
+        self,
+        blocks: Blocks,
+        candidates: Sequence[Candidate],
+        y: Array,
+        shared: Array,
+        sigma: float,
+        lasting: LastingNoise,
+    ) -> None:
+        self.blocks, self.candidates, self.y, self.sigma, self.lasting = blocks, candidates, y, sigma, lasting
         self.shared = shared
         self.readings = max(int((blocks.weight > 0).sum() * 2), 2)
         self.starts = _cells(blocks.record)

@@ -34,7 +34,7 @@ def centre_travel(blocks: Blocks, body: int, shift: Array) -> float:
     """Farthest distance [m] from where it began, over the joint's range, of the travelling centre that describes the
     displacement best:
     proportional to the angle, to its square, or along an ellipse. Arguments as in `wobble_amplitude`."""
-    moved = _across(blocks, body, shift[:, blocks.body == body].mean(1))
+    moved = _carried(blocks, body, shift)
     angle, u = blocks.angle[:, body - 1], share_of_range(blocks, body - 1)
     at = np.linspace(0, 1, 101)
     forms = (lambda x: [x], lambda x: [x**2], lambda x: [np.sin(np.pi * x), 1 - np.cos(np.pi * x)])
@@ -54,9 +54,14 @@ def possible(blocks: Blocks, body: int, shift: Array) -> bool:
 def side_to_side(blocks: Blocks, body: int, shift: Array, shifts: bool = False) -> float:
     """Half of the tilt [rad] by which a joint's play changes sides with the way of motion, or of the way [m] by which
     it shifts what the joint carries. Arguments as in `wobble_amplitude`."""
-    moved = _across(blocks, body, shift[:, blocks.body == body].mean(1)) if shifts else _tilt(blocks, body, shift)
+    moved = (_carried if shifts else _tilt)(blocks, body, shift)
     _, along = _course(moved, blocks.angle[:, body - 1], [way_of_motion(blocks, body - 1)], False)
     return float(np.linalg.norm(along))
+
+
+def _carried(blocks: Blocks, body: int, shift: Array) -> Array:
+    """Mean displacement (b, 2) [m] of a segment across its joint's axis."""
+    return _across(blocks, body, shift[:, blocks.body == body].mean(1))
 
 
 def _tilt(blocks: Blocks, body: int, shift: Array) -> Array:
