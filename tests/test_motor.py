@@ -16,7 +16,7 @@ from hand_model.identify.motor.channel import channel_delay
 from hand_model.identify.motor.drive import run, simulate
 from hand_model.identify.motor.fit import fit_motor
 from hand_model.identify.motor.moves import levelled, moves_from_rest, speed_levels
-from hand_model.identify.motor.noise import white_noise
+from hand_model.identify.motor.noise import reading_noise, white_noise
 from hand_model.identify.motor.parameters import BOUNDS
 from hand_model.identify.motor.predict import predict, reference, replay_table
 from hand_model.identify.motor.profile import profile
@@ -270,6 +270,19 @@ def test_current_of_the_last_sample_before_a_command_belongs_to_no_move(trials) 
 def test_friction_state_sticks() -> None:
     z = friction_state(np.r_[0.0, 10.0, 10.0, 10.0, 9.99], 0.5)
     assert z[1] == pytest.approx(1.0, abs=1e-6) and z[1] == z[2] == z[3] and 0.9 < z[4] < 1.0
+
+
+def test_the_noise_of_a_reading_does_not_depend_on_its_unit() -> None:
+    """Whole counts leave a third of one, decimals of a degree a third of their last digit."""
+    rng = np.random.default_rng(0)
+    t = np.arange(0, 20, 0.01)
+    at_rest = np.where(np.sin(t) > 0.5, 200 * np.sin(t), 100.0)
+    for noise in (0.02, 2.0):
+        counts = np.round(at_rest + rng.normal(0, noise, len(t)))
+        found = reading_noise([(counts, t)])
+        assert found == pytest.approx(max(noise, 0.3), rel=0.1)
+        assert reading_noise([(0.0137 * (counts - 3000), t)]) == pytest.approx(0.0137 * found)
+    assert reading_noise([(at_rest, t)]) > 0  # a reading that stands still in most samples is no exact one
 
 
 def test_white_noise_estimate() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..hand import Coupling, EncoderMap
+from ..session import between_rows
 from .finger import FingerFit
 from .polynomial import cycles, fit_polynomial
 
@@ -51,10 +52,7 @@ def counts_at(log_time_s: Array, counts: Array, time_s: Array) -> Array:
     stretches."""
     kept = np.isfinite(counts) & np.isfinite(log_time_s)
     s, c = log_time_s[kept], counts[kept]
-    out = np.interp(time_s, s, c, left=np.nan, right=np.nan)
-    right = np.clip(np.searchsorted(s, time_s), 1, len(s) - 1)
-    gap = s[right] - s[right - 1]
-    return np.where(gap > 10 * np.median(np.diff(s)), np.nan, out)
+    return np.where(between_rows(s, time_s), np.interp(time_s, s, c), np.nan)
 
 
 def encoder_maps(fit: FingerFit, data: Aligned) -> tuple[EncoderMap, ...]:

@@ -1,7 +1,7 @@
 """Recording sessions (`hand-session/1`): what a laboratory hands over, read and checked, nothing interpreted."""
 
 from .check import check_session, moves
-from .log import Log, read_log
+from .log import Log, between_rows, read_log
 from .manifest import read_session
 from .mocap import Mocap, read_mocap
 from .session import Actuator, Finger, PalmMarkers, Probe, Rig, Segment, Session, Trial
@@ -17,6 +17,7 @@ __all__ = [
     "Segment",
     "Session",
     "Trial",
+    "between_rows",
     "check_session",
     "moves",
     "read_log",

@@ -20,6 +20,7 @@ COLUMNS = ("time", "position", "current", "setpoint", "speed", "current_limit", 
 # A recorder hiccups now and then. A log in which more than this share of the rows is out of order, or repeats a time,
 # is not one recording.
 TOLERATED_SHARE = 0.1
+LOST = 3.0  # usual intervals between two rows, beyond which rows were lost
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,15 @@ def build_log(time_s: Array, columns: Mapping[str, Array], path: Path, notes: It
     for array in (times, *picked.values()):
         array.setflags(write=False)
     return Log(times, picked, path, tuple(notes), packet)
+
+
+def between_rows(time_s: Array, then: Array) -> NDArray[np.bool_]:
+    """Times (m,) [s] within a log of rows at (n,), two or more, where none are lost: what the drive does there nobody
+    knows. Rows that come in packets leave many far apart, so that is usual there."""
+    interval = np.diff(time_s)
+    known = interval <= LOST * float(np.percentile(interval, 90))
+    row = (np.searchsorted(time_s, then, side="right") - 1).clip(0, len(interval) - 1)
+    return (then >= time_s[0]) & (then <= time_s[-1]) & known[row]
 
 
 def _copied(time_s: Array, columns: Mapping[str, Array], keep: NDArray[np.intp]) -> bool:

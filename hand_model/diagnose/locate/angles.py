@@ -19,7 +19,7 @@ from ...identify.finger import REST_S, observations, sound_frames
 from ...identify.likelihood import OUTLIER_LIMIT, fit_chain, fit_poses
 from ...identify.repair import Swap
 from ...identify.start import start_chain
-from ...session import Finger, Mocap, Session, Trial
+from ...session import Finger, Mocap, Session, Trial, between_rows
 from ..name.naming import Naming
 from .drive import count_range
 from .excursions import with_excursions
@@ -265,7 +265,7 @@ def encoder_states(angles: FingerAngles, low: float, high: float, steps: Sequenc
 @dataclass(frozen=True)
 class _Log:
     """A log at mocap frames: counts, speed, acceleration (where it is sure) [counts, s], load and what of it
-    grows with speed [raw] or None, inside: where it was running. (n,)."""
+    grows with speed [raw] or None, inside: where it was running and lost no rows. (n,)."""
 
     counts: Array
     speed: Array
@@ -297,8 +297,8 @@ def _at_frames(record: FlexionAngles, time_s: Array, drifting: bool = True) -> _
         known = np.isfinite(current[seen])
         passed = transmitted_load(at, np.interp(at, at[known], current[seen][known]), motion)
         load, drag = (np.interp(then, at, part) for part in passed)
-    v, a = (np.interp(then, at, y) for y in (motion.velocity, sure_acceleration(motion, at)))
-    return _Log(position_at(motion, at, then), v, a, load, drag, (then > at[0]) & (then < at[-1]))
+    v, a = (np.interp(then, at, y) for y in (motion.velocity, sure_acceleration(motion)))
+    return _Log(position_at(motion, at, then), v, a, load, drag, between_rows(at, then))
 
 
 def expected_angles(naming: Naming) -> dict[str, tuple[Array, Array]]:

@@ -132,7 +132,7 @@ def _prepare(
         extra["smoothed"] = np.full(len(time_s), float(motion.smoothed))
         declared = np.stack(
             [
-                sure_acceleration(motion, time_s),
+                sure_acceleration(motion),
                 motion.velocity,
                 np.sign(motion.velocity),
                 motion.position,

@@ -17,6 +17,7 @@ from ...effects.path import runs
 Array = NDArray[np.float64]
 
 SURE = 3.0  # standard deviations
+WIDER = (1.0, 1.6, 2.5, 4.0, 6.0)  # times a kernel, of which the acceleration's is one
 WIDENED = 4  # times a kernel may be widened
 # of the acceleration of fast motion, at most, is noise: as an error of a regressor it takes its square off the inertia
 ROUGH = 0.2
@@ -35,7 +36,7 @@ class Motion:
     """position, velocity, acceleration: (n,). noise: standard deviation of the raw position; bandwidth_s: of the kernel
     [s]. moving: (n,) bool;
     since_start_s, until_stop_s: (n,) [s] to the nearest rest before and after (inf where none). smoothed: whether by
-    the kernel; else simulated."""
+    the kernel; else simulated. acceleration_noise: standard deviation of what the noise of the position makes of it."""
 
     position: Array
     velocity: Array
@@ -46,6 +47,7 @@ class Motion:
     since_start_s: Array
     until_stop_s: Array
     smoothed: bool = True
+    acceleration_noise: float = 0.0
 
 
 def local_quadratic(time_s: Array, values: Array, bandwidth_s: float) -> Array:
@@ -90,7 +92,31 @@ def estimate_motion(time_s: Array, position: Array, bandwidth_s: float | None = 
         h *= 1.4
     moving = np.abs(v) > max(5 * velocity_noise, 0.03 * fastest)
     moving = _drop_short(moving, 3)
-    return Motion(x, v, a, noise, h, moving, *since_rest(time_s, moving))
+    a, rough_a = _sure_enough(time_s, position, h, noise, a, moving)
+    return Motion(x, v, a, noise, h, moving, *since_rest(time_s, moving), acceleration_noise=rough_a)
+
+
+def _sure_enough(
+    time_s: Array, position: Array, bandwidth_s: float, noise: float, acceleration: Array, moving: NDArray[np.bool_]
+) -> tuple[Array, float]:
+    """Acceleration (n,), and the noise that the position's makes of it, by a kernel widened until that is a fifth of
+    the whole in motion; no wider than where the leave-one-out error of the position is least (Stone 1974), for there
+    what bends is smeared."""
+    step = float(np.median(np.diff(time_s)))
+    found, rough = acceleration, _acceleration_noise(noise, step, bandwidth_s)
+    least, impulse = np.inf, np.zeros(len(position))
+    impulse[len(position) // 2] = 1.0
+    for wider in WIDER:
+        if not moving.any() or rough < ROUGH * float(np.sqrt(np.mean(found[moving] ** 2))):
+            break
+        h = wider * bandwidth_s
+        x, _, a = local_quadratic(time_s, position, h)
+        own = local_quadratic(time_s, impulse, h)[0][len(position) // 2]
+        error = float(np.mean(((position - x)[moving] / (1 - own)) ** 2))
+        if error > least:
+            break
+        least, found, rough = error, a, _acceleration_noise(noise, step, h)
+    return found, rough
 
 
 def least_error(time_s: Array, values: Array, calm: NDArray[np.bool_] | None = None) -> tuple[Array, Array]:
@@ -159,19 +185,16 @@ def position_at(motion: Motion, time_s: Array, then: Array) -> Array:
     return spline(np.clip(then, time_s[0], time_s[-1]))
 
 
-def sure_acceleration(motion: Motion, time_s: Array) -> Array:
+def sure_acceleration(motion: Motion) -> Array:
     """Acceleration (n,) without what may be noise of the position: that would be found again, with the other sign, in
     whatever the position is held against, and as an error of a regressor would take off its coefficient (Fuller 1987).
-    The noise is that of the kernel's second derivative, step / h^5 int ((u^2 - 1) phi)^2 du = 0.2116 step / h^5; what
-    exceeds it stays as it is."""
-    if not motion.smoothed:
-        return motion.acceleration
-    noise = _acceleration_noise(motion.noise, float(np.median(np.diff(time_s))), motion.bandwidth_s)
-    return np.where(np.abs(motion.acceleration) > SURE * noise, motion.acceleration, 0.0)
+    What exceeds the noise stays as it is."""
+    return np.where(np.abs(motion.acceleration) > SURE * motion.acceleration_noise, motion.acceleration, 0.0)
 
 
 def _acceleration_noise(noise: float, step_s: float, bandwidth_s: float) -> float:
-    """Standard deviation of the second derivative that a kernel makes of so noisy a position."""
+    """Standard deviation of the second derivative that a kernel makes of so noisy a position: its square is that of
+    the noise times step / h^5 int ((u^2 - 1) phi)^2 du = 0.2116 step / h^5."""
     return noise * float(np.sqrt(0.2116 * step_s / bandwidth_s**5))
 
 

@@ -65,7 +65,7 @@ def simulated_drive(session: Session, actuator: str) -> SimulatedDrive | None:
         delay_s, doubt_s = channel_delay(fit.output_error, BOUNDS) if fit.predictive else (0.0, np.inf)
         logs = {t.name: t.log() for t in drive_trials(session)[actuator]}
         runs_ = {name: _along(fit, name, log) for name, log in logs.items()}
-        motions = {name: None if run is None else _motion(run, fit) for name, run in runs_.items()}
+        motions = {name: None if run is None else _motion(run) for name, run in runs_.items()}
         in_time = abs(delay_s) <= IN_TIME * doubt_s + DIFFERENCE_S and all(log.packet == 1 for log in logs.values())
         ceiling = _ceiling(fit, [run for run in runs_.values() if run is not None]) if in_time else None
     except (HandModelError, np.linalg.LinAlgError):  # a drive that cannot be simulated is judged by its recorded motion
@@ -94,20 +94,20 @@ def _along(fit: MotorFit, name: str, log: Log) -> Run | None:
     return Run(trial, float(first), tuple(data), own, state, _slow(trial.time_s, trial.position - state[0]))
 
 
-def _motion(run: Run, fit: MotorFit) -> tuple[Array, Array, Array, Array] | None:
+def _motion(run: Run) -> tuple[Array, Array, Array, Array] | None:
     """Time, position, velocity and acceleration of a log's simulated moves; None where they are farther from the
     recorded ones than noise."""
     trial = run.trial
     away = trial.position - run.simulated[0] - run.slow[0]
-    if np.sqrt(np.nanmean(away**2)) > TRUE_TO * _encoder_noise(run, fit):
+    if np.sqrt(np.nanmean(away**2)) > TRUE_TO * _encoder_noise(run):
         return None
     return (trial.time_s + run.first_s, *(run.simulated + run.slow))
 
 
-def _encoder_noise(run: Run, fit: MotorFit) -> float:
-    from ...identify.motor.noise import white_noise
+def _encoder_noise(run: Run) -> float:
+    from ...identify.motor.noise import reading_noise
 
-    return float(max(white_noise(run.trial.position, run.trial.time_s), 0.3 / fit.scale.counts_per_percent))
+    return reading_noise([(run.trial.position, run.trial.time_s)])
 
 
 def _ceiling(fit: MotorFit, runs_: list[Run]) -> Ceiling | None:
@@ -118,7 +118,7 @@ def _ceiling(fit: MotorFit, runs_: list[Run]) -> Ceiling | None:
     if not runs_ or found is None or found.controller != "profile":  # else no reference is known beforehand
         return None
     sensed = float(np.mean([white_noise(run.trial.current, run.trial.time_s) for run in runs_]))
-    asked = found.values["gain"] * float(np.mean([_encoder_noise(run, fit) for run in runs_]))
+    asked = found.values["gain"] * float(np.mean([_encoder_noise(run) for run in runs_]))
     return ceiling_of(fit, runs_, float(np.hypot(sensed, asked)))
 
 

@@ -19,7 +19,7 @@ from .controller import find_controller
 from .creep import begins, creeping
 from .drive import STRIBECK
 from .moves import MoveData, moves_from_rest
-from .noise import rest_noise, white_noise
+from .noise import reading_noise, rest_noise
 from .output_error import FINE, OutputErrorFit
 from .parameters import BOUNDS, UNITS
 from .published import PublishedFit, fit_published, smear_share
@@ -110,8 +110,8 @@ def identify_motors(session: Session) -> tuple[tuple[Motor, ...], tuple[str, ...
 def fit_motor(trials: Sequence[MotorTrial], scale: Scale, actuator: str = "motor") -> MotorFit:
     """Identify a motor from checked trials: regression first, then output error from the commands where these explain
     the motion."""
-    sigma_p = max(float(np.median([white_noise(t.position, t.time_s) for t in trials])), 0.3 / scale.counts_per_percent)
-    sigma_u = max(float(np.median([white_noise(t.current, t.time_s) for t in trials])), 0.3)
+    sigma_p = reading_noise([(t.position, t.time_s) for t in trials])
+    sigma_u = reading_noise([(t.current, t.time_s) for t in trials])
     sigma_u = max(sigma_u, rest_noise(trials, (sigma_p, sigma_u), scale.speed_full))
     plain, curved = fit_regressions(trials, sigma_p, sigma_u)
     published, alike = fit_published(trials), fit_published(trials, both_sides=True)

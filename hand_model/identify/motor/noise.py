@@ -12,6 +12,9 @@ from .recording import MotorTrial
 
 Array = NDArray[np.float64]
 
+ROUNDED = 0.3  # standard deviation of what rounding leaves, over its step: 1 / sqrt(12)
+SHARPEST = 2e-5  # of its range: a reading that stands still at rest has some error all the same
+
 
 def white_noise(values: Array, time_s: Array) -> float:
     """Standard deviation of white noise on a smooth signal (n,): from each sample's distance to the line of its
@@ -23,6 +26,22 @@ def white_noise(values: Array, time_s: Array) -> float:
     w = (t1 - t0) / (t2 - t0)
     d = (values[1:-1] - (1 - w) * values[:-2] - w * values[2:]) / np.sqrt(1 + (1 - w) ** 2 + w**2)
     return float(1.4826 * np.median(np.abs(d)))
+
+
+def resolution(values: Array) -> float:
+    """Smallest step between two readings (n,) of a channel that differ, 0 where none do: one for whole counts."""
+    steps = np.diff(np.unique(values))
+    return float(steps.min()) if len(steps) else 0.0
+
+
+def reading_noise(readings: Sequence[tuple[Array, Array]]) -> float:
+    """Standard deviation of a channel's white noise, the median of its recordings, and no less than rounding leaves.
+
+    readings: values and times (n,) [s] of each recording.
+    """
+    noise = float(np.median([white_noise(values, time_s) for values, time_s in readings]))
+    rounded = ROUNDED * min(resolution(values) for values, _ in readings)
+    return max(noise, rounded, SHARPEST * max(float(np.ptp(values)) for values, _ in readings))
 
 
 def rest_noise(trials: Sequence[MotorTrial], sigma: tuple[float, float], speed_full: float) -> float:
