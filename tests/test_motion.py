@@ -117,6 +117,17 @@ def test_where_rows_of_a_log_were_lost_nobody_knows_the_motion() -> None:
     assert between_rows(packets, np.linspace(0.01, packets[-1] - 0.01, 500)).all()
 
 
+def test_a_drive_may_have_stopped_where_rows_were_lost() -> None:
+    at = stamps(10, 0.013)
+    stop = int(np.searchsorted(at, 9.4))  # in full motion, which ends and goes back before rows are logged again
+    lost = np.delete(at, np.s_[stop : stop + 110])
+    motion = estimate_motion(lost, strokes(lost))
+    assert strokes(lost)[stop] > strokes(lost)[0] + 10
+    assert motion.since_start_s[stop] == 0.0
+    assert motion.until_stop_s[stop - 1] == 0.0
+    assert motion.since_start_s[stop + 3] < 0.1
+
+
 @pytest.mark.parametrize(("uneven", "attenuated"), [(True, False), (False, True)])
 def test_times_that_are_known_less_well_than_told_do_not_take_the_acceleration_away(
     uneven: bool, attenuated: bool

@@ -267,6 +267,16 @@ def test_current_of_the_last_sample_before_a_command_belongs_to_no_move(trials) 
         assert np.array_equal(a.current, b.current) and np.array_equal(a.own, b.own)
 
 
+def test_a_command_among_rows_that_were_lost_begins_no_move(trials) -> None:
+    t, moves = trials[0], moves_from_rest(trials[0], (0.06, 5.0), 255.0)
+    begun = moves[1].index
+    kept = np.r_[0 : begun + 1, begun + 60 : len(t.time_s)]
+    names = ("time_s", "position", "current", "setpoint", "speed", "limit")
+    lost = dataclasses.replace(t, **{n: None if getattr(t, n) is None else getattr(t, n)[kept] for n in names})
+    left = moves_from_rest(lost, (0.06, 5.0), 255.0)
+    assert [m.own.tolist() for m in left] == [m.own.tolist() for i, m in enumerate(moves) if i != 1]
+
+
 def test_friction_state_sticks() -> None:
     z = friction_state(np.r_[0.0, 10.0, 10.0, 10.0, 9.99], 0.5)
     assert z[1] == pytest.approx(1.0, abs=1e-6) and z[1] == z[2] == z[3] and 0.9 < z[4] < 1.0

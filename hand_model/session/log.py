@@ -23,7 +23,7 @@ TOLERATED_SHARE = 0.1
 LOST = 3.0  # usual intervals between two rows, beyond which rows were lost
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Log:
     """Columns of an actuator log on its own clock.
 
@@ -87,13 +87,18 @@ def build_log(time_s: Array, columns: Mapping[str, Array], path: Path, notes: It
     return Log(times, picked, path, tuple(notes), packet)
 
 
+def rows_lost(time_s: Array) -> NDArray[np.bool_]:
+    """Whether rows were lost between one and the next (n - 1,), by how far apart rows (n,) [s] are. Those that come in
+    packets leave many far apart, so that is usual there."""
+    interval = np.diff(time_s)
+    return interval > LOST * float(np.percentile(interval, 90))
+
+
 def between_rows(time_s: Array, then: Array) -> NDArray[np.bool_]:
     """Times (m,) [s] within a log of rows at (n,), two or more, where none are lost: what the drive does there nobody
-    knows. Rows that come in packets leave many far apart, so that is usual there."""
-    interval = np.diff(time_s)
-    known = interval <= LOST * float(np.percentile(interval, 90))
-    row = (np.searchsorted(time_s, then, side="right") - 1).clip(0, len(interval) - 1)
-    return (then >= time_s[0]) & (then <= time_s[-1]) & known[row]
+    knows."""
+    row = (np.searchsorted(time_s, then, side="right") - 1).clip(0, len(time_s) - 2)
+    return (then >= time_s[0]) & (then <= time_s[-1]) & ~rows_lost(time_s)[row]
 
 
 def _copied(time_s: Array, columns: Mapping[str, Array], keep: NDArray[np.intp]) -> bool:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...effects.path import runs
+from ...session import rows_lost
 
 Array = NDArray[np.float64]
 
@@ -91,9 +92,15 @@ def estimate_motion(time_s: Array, position: Array, bandwidth_s: float | None = 
             break
         h *= 1.4
     moving = np.abs(v) > max(5 * velocity_noise, 0.03 * fastest)
-    moving = _drop_short(moving, 3)
+    moving = _drop_short(moving & ~_beside_lost_rows(time_s), 3)
     a, rough_a = _sure_enough(time_s, position, h, noise, a, moving)
     return Motion(x, v, a, noise, h, moving, *since_rest(time_s, moving), acceleration_noise=rough_a)
+
+
+def _beside_lost_rows(time_s: Array) -> NDArray[np.bool_]:
+    """Samples (n,) beside which rows were lost: the drive may have stopped between them."""
+    lost = rows_lost(time_s)
+    return np.r_[lost, False] | np.r_[False, lost]
 
 
 def _sure_enough(

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ...session import rows_lost
 from .grid import NEVER
 from .recording import MotorTrial
 
@@ -75,12 +76,14 @@ def moves_from_rest(trial: MotorTrial, sigma: tuple[float, float], speed_full: f
     )
     speed_sd = 1 / (np.sqrt(12) * speed_full) if whole else 1e-4
     change = np.flatnonzero(np.diff(trial.setpoint) != 0)
+    lost = rows_lost(t)  # a command among them came nobody knows when
     ends = np.append(change[1:] - 1, len(t) - 1)
     found = []
     for i, j in zip(change, ends, strict=True):
         look = slice(max(0, i - BEFORE + 1), i + 1)
         if (
             j - i < 8
+            or lost[i]
             or trial.setpoint[i + 1] == trial.setpoint[i]
             or (rest := _rest(t[look], p[look], sigma_position)) is None
         ):
