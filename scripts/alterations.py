@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from hand_model.session import Mocap, read_session
@@ -155,6 +156,19 @@ def _held(columns: Columns, rng: Draw) -> Columns:
     return {name: values[row] if name in ("position", "current") else values for name, values in columns.items()}
 
 
+def _stamped_late(columns: Columns, rng: Draw) -> Columns:
+    """Rows read at even intervals and stamped when the answer arrives, 2 ms off at random."""
+    known = np.isfinite(columns["position"]) & np.isfinite(columns["current"])
+    columns = _rows(columns, known)
+    t = columns["time"]
+    even = np.arange(t[0], t[-1], float(np.median(np.diff(t))))
+    row = np.searchsorted(t, even, side="right") - 1
+    out = {name: values[row] for name, values in columns.items()}
+    out["position"] = np.round(CubicSpline(t, columns["position"])(even))
+    out["current"] = np.round(np.interp(even, t, columns["current"]) + 0.9 * rng.standard_normal(len(even)))
+    return {**out, "time": np.sort(even + 2e-3 * rng.standard_normal(len(even)))}
+
+
 def _in_units(columns: Columns, _: Draw) -> Columns:
     """Degrees from another zero instead of counts, milliamperes instead of raw units."""
     zero = 3000.0
@@ -207,6 +221,7 @@ ALTERATIONS: Mapping[str, Alteration] = {
     "pause": Alteration(log=_pause),
     "held": Alteration(log=_held),
     "cells": Alteration(log=_empty_cells),
+    "stamps": Alteration(log=_stamped_late),
     "units": Alteration(log=_in_units),
     "bare": Alteration(log=lambda c, rng: {n: c[n] for n in ("time", "position", "current")}),
     "few": Alteration(manifest=_few),

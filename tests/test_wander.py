@@ -11,7 +11,7 @@ import pytest
 from test_diagnose import drive, planted
 
 from hand_model.diagnose.locate.measurement import echoes_command, frozen, is_measured, rests_on_command
-from hand_model.diagnose.locate.stamps import stamps
+from hand_model.session.stamps import stamps
 from hand_model.diagnose.name.balance import Balance
 from hand_model.diagnose.name.selection import name_effects
 from hand_model.diagnose.name.station import judged

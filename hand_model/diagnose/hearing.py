@@ -24,7 +24,6 @@ from .locate.encoder_error import encoder_corrections
 from .locate.gravity import with_gravity
 from .locate.measurement import echoes_command, is_measured, rests_on_command
 from .locate.simulated import SimulatedDrive
-from .locate.stamps import Stamps, stamps
 from .magnitude import magnitude
 from .name.balance import Balance
 from .name.evidence import typical_coefficients
@@ -32,6 +31,7 @@ from .name.station import Station, judged
 from .weight import with_weights
 
 REASON = 0.5  # of the size at which friction by load is plain: a soft controller falls behind by so much
+WRONG_STAMPS = 0.1  # of the step between rows, by which times may be wrong: a speed is by a fiftieth then
 FROZEN = 0.02  # of the time in motion: a current that stands still for more is no slip of a bus
 
 
@@ -174,16 +174,22 @@ def _no_measurement(logs: list[Log]) -> str:
     return "" if any(moves(log.column("position")) for log in logs) else "it never moves"
 
 
-def _distrusted(session: Session) -> dict[str, Stamps]:
-    """Actuators whose logs' time stamps do not belong to their rows: no dynamics can be read from them."""
-    judged = {a: stamps([t.log() for t in trials]) for a, trials in drive_trials(session).items()}
-    return {a: s for a, s in judged.items() if s is not None and not s.believed}
+def _distrusted(session: Session) -> dict[str, float]:
+    """Actuators the times of whose rows are wrong by so much of a step [s], even where they were evened, that no
+    dynamics can be read from them."""
+    wrong = {}
+    for actuator, trials in drive_trials(session).items():
+        logs = [t.log() for t in trials]
+        left = float(np.median([log.stamps_wrong_s for log in logs]))
+        if left > WRONG_STAMPS * float(np.median([np.median(np.diff(log.time_s)) for log in logs])):
+            wrong[actuator] = left
+    return wrong
 
 
-def _false_stamps(session: Session, actuator: str, judged: Stamps) -> dict[str, Any]:
+def _false_stamps(session: Session, actuator: str, wrong_s: float) -> dict[str, Any]:
     shape = (
-        f"the rows' time stamps do not follow the motion (off by some {1e3 * judged.wrong_s:.0f} ms, as if given in "
-        "packets): speed, current and encoder against time were not judged"
+        f"the rows' time stamps do not follow the motion (off by some {1e3 * wrong_s:.0f} ms even where they are evened): "
+        "speed, current and encoder against time were not judged"
     )
     return _unheard(session, actuator, "log", shape)
 

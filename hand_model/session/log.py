@@ -29,7 +29,8 @@ class Log:
 
     time_s: (n,) [s], increasing, irregular. columns: name -> (n,), raw units as the session format states,
     nan where a sample was lost. path: the file. notes: what was mended, one sentence each. packet: rows that came at
-    once, on average; more than one, and their times are no more than spread evenly.
+    once, on average; more than one, and their times are no more than spread evenly. stamps_wrong_s: standard deviation
+    [s] by which times that were evened may be wrong still.
     The arrays are read-only: readings are shared.
     """
 
@@ -38,6 +39,12 @@ class Log:
     path: Path
     notes: tuple[str, ...] = ()
     packet: float = 1.0
+    stamps_wrong_s: float = 0.0
+
+    @property
+    def uneven(self) -> bool:
+        """Whether times are known less well than they are told."""
+        return self.packet > 1 or self.stamps_wrong_s > 0
 
     def column(self, name: str) -> Array:
         """One column (n,); raises SessionError naming the file and a near name where it is missing."""

@@ -15,6 +15,7 @@ from ..errors import SessionError, did_you_mean
 from .log import Log, read_log
 from .mocap import Mocap, read_mocap
 from .repeats import without_repeats
+from .stamps import evened
 
 Array = NDArray[np.float64]
 
@@ -110,12 +111,12 @@ class Trial:
         return read_mocap(self.mocap_path)
 
     def log(self) -> Log:
-        """Read the actuator log, a hand's without rows that repeat what was read before them; raises SessionError where
-        the trial has none."""
+        """Read the actuator log, a hand's without rows that repeat what was read before them and with times that its
+        motion follows; raises SessionError where the trial has none."""
         if self.log_path is None:
             raise SessionError(f'trial "{self.name}" ({self.kind}) has no log')
         log = read_log(self.log_path, self.actuator)
-        return log if self.kind == "motion" else without_repeats(log)
+        return log if self.kind == "motion" else evened(without_repeats(log))
 
 
 @dataclass(frozen=True)

@@ -290,7 +290,7 @@ def _at_frames(record: FlexionAngles, time_s: Array, drifting: bool = True) -> _
     if not drifting:
         middle = 0.5 * (time_s[0] + time_s[-1])
         then = time_s + float(clock.log_time(np.array([middle]))[0]) - middle
-    motion = estimate_motion(at, counts, uneven=log.packet > 1)
+    motion = estimate_motion(at, counts, uneven=log.uneven)
     current = log.columns.get("current")
     load = drag = None
     if current is not None and np.isfinite(current[seen]).sum() > 20:

@@ -106,7 +106,7 @@ def _prepare(
             continue
         time_s, position = log.time_s[seen], 100 * (counts[seen] - low) / (high - low)
         believed = position if correct is None else correct(position)
-        motion = estimate_motion(time_s, believed, uneven=log.packet > 1)
+        motion = estimate_motion(time_s, believed, uneven=log.uneven)
         if simulated is not None and trial.name in simulated.motions:
             motion = with_simulated(motion, time_s, simulated.motions[trial.name]) or motion
         extra = {

@@ -66,7 +66,7 @@ def simulated_drive(session: Session, actuator: str) -> SimulatedDrive | None:
         logs = {t.name: t.log() for t in drive_trials(session)[actuator]}
         runs_ = {name: _along(fit, name, log) for name, log in logs.items()}
         motions = {name: None if run is None else _motion(run) for name, run in runs_.items()}
-        in_time = abs(delay_s) <= IN_TIME * doubt_s + DIFFERENCE_S and all(log.packet == 1 for log in logs.values())
+        in_time = abs(delay_s) <= IN_TIME * doubt_s + DIFFERENCE_S and not any(log.uneven for log in logs.values())
         ceiling = _ceiling(fit, [run for run in runs_.values() if run is not None]) if in_time else None
     except (HandModelError, np.linalg.LinAlgError):  # a drive that cannot be simulated is judged by its recorded motion
         return None
