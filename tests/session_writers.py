@@ -268,7 +268,7 @@ def write_log(path, seed=0, n=300, moving=True):
     """CSV log with irregular sampling, one lost sample and one column nobody knows."""
     rng = np.random.default_rng(seed)
     time_s = 1000.0 + np.cumsum(rng.uniform(0.012, 0.024, n))
-    position = 12000 + (800 * np.sin(np.arange(n) / 40) if moving else 0) + rng.normal(0, 3, n)
+    position = 12000 + (800 * np.sin((time_s - 1000.0) / 0.72) if moving else 0) + rng.normal(0, 3, n)
     current = rng.normal(0, 20, n)
     rows = [f"{t:.5f},{p:.0f},{c:.0f},12000,1" for t, p, c in zip(time_s, position, current, strict=True)]
     cells = rows[5].split(",")
