@@ -14,9 +14,10 @@ from hand_model.diagnose.locate.motion import estimate_motion, local_quadratic
 from hand_model.diagnose.name.balance import Balance
 from hand_model.diagnose.name.interval import Reading, _quantile, held_out, parameter_intervals, undisturbed
 from hand_model.diagnose.name.least_squares import bounded_least_squares
+from hand_model.diagnose.name.naming import ALPHA
 from hand_model.diagnose.name.selection import name_effects
 from hand_model.diagnose.name.shapes import polish
-from hand_model.diagnose.name.station import judged
+from hand_model.diagnose.name.station import Station, judged
 from hand_model.diagnose.name.term import Term, doubled
 from hand_model.effects import catalogue, effect
 from hand_model.effects.base import DriveState
@@ -367,3 +368,26 @@ def test_two_waves_of_nearly_one_period_are_one() -> None:
 
     assert doubled(waves(30.277, 9.9, 30.278), 90.0) and doubled(waves(8.0, 8.1), 100.0)
     assert not doubled(waves(30.0, 15.0, 10.0), 90.0) and not doubled(waves(8.0), 100.0)
+
+
+def test_a_recording_kept_out_that_is_louder_is_held_against_its_own_noise() -> None:
+    """A true effect leaves it no farther above its noise than the others."""
+    states = drive(21, planted("torque_ripple", {"period": 9.0}, [2.0, 1.5]), noise=4.0)
+    hiss = np.random.default_rng(5).normal(0, 3.0, len(states[-1].effort))
+    louder = replace(states[-1], effort=states[-1].effort + hiss)
+    station = judged("current", "index", "index", None, (*states[:-1], louder), (effect("torque_ripple"),))
+    before, after = station._kept_out
+    assert after < 1.05 < before
+    assert station.believed and [f.term.effect.name for f in station.kept] == ["torque_ripple"]
+
+
+@pytest.mark.parametrize(("after", "believed"), [(1.37, False), (1.02, True)])
+def test_names_that_leave_a_recording_kept_out_above_its_noise_are_not_believed(
+    after: float, believed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither where the test of cells sees nothing: what comes now and then is at no place, speed and direction."""
+    states = drive(21, planted("torque_ripple", {"period": 5.0}, [0.75, 0.56]), noise=4.0)
+    station = judged("current", "index", "index", None, states, (effect("torque_ripple"),))
+    assert station.naming.before.p >= ALPHA and station.proven  # else this test tells nothing
+    monkeypatch.setattr(Station, "_kept_out", (1.44, after))
+    assert station.believed == believed

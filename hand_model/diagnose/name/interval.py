@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from .balance import Balance, Fit
 from .evidence import gain, oddity
 from .naming import Naming
+from .noise import loudness
 from .shapes import likeliest, polish, refit
 from .term import DISCRETE, Term
 
@@ -280,9 +281,11 @@ def sized(reading: Reading, which: int) -> bool:
 
 
 def variance_ratio(naming: Naming, fit: Fit) -> float:
-    """Residual variance over the pure-error variance on validation recordings (all, where there are none)."""
+    """Residual variance over the pure-error variance on validation recordings (all, where there are none): of one that
+    is louder than the others, over its own."""
     balance = naming.balance
     use = ~balance.train & balance.steady
     if not use.any():
         use = balance.steady
-    return float(np.mean(((balance.effort - fit.prediction)[use] / balance.sigma) ** 2))
+    residual = balance.effort - fit.prediction
+    return float(np.mean((residual / (balance.sigma * loudness(balance, residual)))[use] ** 2))

@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 COLOURED = 0.05  # autocorrelation of neighbouring samples from which noise counts as coloured
 # samples and seconds over which noise may be correlated; what lasts longer than both is a misfit
 LONGEST, LONGEST_S = 15, 0.25
+FEW = 100  # neighbours, below which a recording's own noise is not told
 
 
 def noise(balance: Balance) -> tuple[float, float]:
@@ -77,6 +78,20 @@ def replicate_deviation(balance: Balance, residual: Array, use: NDArray[np.bool_
         out[mine] = residual[mine] - means.mean()
         shares.append(np.full(len(mine), 1 - 1 / len(mine)))
     return (out, float(np.concatenate(shares).mean())) if shares else (np.zeros(0), 1.0)
+
+
+def loudness(balance: Balance, residual: Array) -> Array:
+    """Noise of the recording of each sample (n,) over that of all, by how neighbouring residuals (n,) differ; one at
+    least."""
+    recording = balance.gather(lambda s: np.full(len(s.time_s), s.trial))
+    near = (balance.stroke[1:] == balance.stroke[:-1]) & balance.steady[1:] & balance.steady[:-1]
+    square = np.diff(residual) ** 2
+    out = np.ones(len(residual))
+    for name in np.unique(recording):
+        own = near & (recording[1:] == name)
+        if own.sum() > FEW:
+            out[recording == name] = max(float(np.sqrt(np.mean(square[own]) / np.mean(square[near]))), 1.0)
+    return out
 
 
 def _plain_fit(balance: Balance, use: NDArray[np.bool_]) -> Array:

@@ -165,10 +165,9 @@ class Station:
     @property
     def _short(self) -> bool:
         """Whether the names leave recordings kept out plainly above their noise, and more than a third of what was, or
-        make them worse: something else is missing. Of steady motion: what acts at starts and stops is not asked."""
-        if self.naming.before.p >= ALPHA or any(
-            f.term.effect.warps or f.term.effect.replaces for f in self.naming.found
-        ):
+        make them worse: something else is missing, whether or not the test of cells sees it. Of steady motion: what acts
+        at starts and stops is not asked."""
+        if any(f.term.effect.warps or f.term.effect.replaces for f in self.naming.found):
             return False
         before, after = self._kept_out
         floor = 1 + self.wander**2
