@@ -32,20 +32,22 @@ UNIT = {"current": 17.3, "position": 0.0137, "setpoint": 0.0137}
 @dataclass(frozen=True)
 class Alteration:
     """markers: (n, m, 3) [m], the recording and what is drawn -> the same, nan where lost; log: columns with `time` and
-    what is drawn -> the same; manifest: its text -> the same. step: of how many frames one is kept."""
+    what is drawn -> the same; manifest: its text -> the same. step: of how many frames one is kept. turned: whether
+    the world is another."""
 
     markers: Callable[[Array, Mocap, Draw], Array] = lambda p, mocap, rng: p
     log: Callable[[Columns, Draw], Columns] = lambda c, rng: c
     manifest: Callable[[str], str] = lambda text: text
     step: int = 1
+    turned: bool = False
 
 
 def altered(source: Path, target: Path, alteration: Alteration, ending: str, seed: int) -> None:
     """Write the session `source`, altered, to the new folder `target`, its markers in files of `ending`."""
     rng = np.random.default_rng(seed)
     session = read_session(source)
-    turn = Rotation.random(random_state=seed) if alteration is TURNED else Rotation.identity()
-    away = rng.standard_normal(3) if alteration is TURNED else np.zeros(3)
+    turn = Rotation.random(random_state=seed) if alteration.turned else Rotation.identity()
+    away = rng.standard_normal(3) if alteration.turned else np.zeros(3)
     for folder in ("mocap", "log"):
         (target / folder).mkdir(parents=True)
     for file in sorted((source / "mocap").iterdir()):
@@ -113,7 +115,7 @@ def _hum(columns: Columns, rng: Draw) -> Columns:
 
 def _coarse(columns: Columns, _: Draw) -> Columns:
     """An encoder of 400 steps over the range, a current of a few."""
-    step = max(round(float(np.ptp(columns["position"])) / 400), 1)
+    step = max(round(float(np.nanmax(columns["position"]) - np.nanmin(columns["position"])) / 400), 1)
 
     def rounded(values: Array) -> Array:
         return np.round(values / step) * step
@@ -204,9 +206,8 @@ def _few(text: str) -> str:
     return re.sub(r"(?m)^purpose.*\n", "", "".join(b for b in blocks if not re.search(r"excitation_\w+_[23]", b)))
 
 
-TURNED = Alteration(log=lambda c, rng: {**c, "time": c["time"] - CLOCK_S})
 ALTERATIONS: Mapping[str, Alteration] = {
-    "turned": TURNED,
+    "turned": Alteration(log=lambda c, rng: {**c, "time": c["time"] - CLOCK_S}, turned=True),
     "slow": Alteration(log=lambda c, rng: _rows(c, np.arange(0, len(c["time"]), 2)), step=2),
     "noisy": Alteration(lambda p, mocap, rng: p + 0.15e-3 * rng.standard_normal(p.shape), _noisy_log),
     "outliers": Alteration(_outliers, _spikes),

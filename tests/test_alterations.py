@@ -32,3 +32,11 @@ def test_an_altered_session_holds_the_same_motion(number: int, name: str, tmp_pa
     seen = np.isfinite(ours.column("position"))
     then = np.interp(ours.time_s[seen] + start, theirs.time_s, theirs.column("position"))
     assert np.corrcoef(ours.column("position")[seen], then)[0, 1] > 0.999
+    same_log = (
+        len(ours.time_s) == len(theirs.time_s)
+        and ours.columns.keys() == theirs.columns.keys()
+        and all(np.array_equal(ours.columns[k], theirs.columns[k], equal_nan=True) for k in theirs.columns)
+    )
+    before_m, after_m = (t.mocap().position_world for t in (twin, moved))
+    same_markers = before_m.shape == after_m.shape and np.allclose(before_m, after_m, atol=1e-6, equal_nan=True)
+    assert not (same_log and same_markers and len(after.trials) == len(before.trials))

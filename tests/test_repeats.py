@@ -32,9 +32,25 @@ def test_rows_that_were_read_before_are_dropped() -> None:
     moving = np.minimum(*(np.abs(np.diff(columns["setpoint"], prepend=0, append=0))[k : k + 3000] for k in (0, 1))) > 6
     assert not kept[moving & ~fresh].any()
     assert kept[moving & fresh].all()
-    assert not kept[~fresh].any()  # at rest neither position nor current is new
+    assert np.mean(kept[~fresh]) < 0.1  # of what is the same for long some stays
     assert np.array_equal(log.column("current"), columns["current"][kept])
     assert "dropped" in log.notes[-1]
+    assert without_repeats(log) is log
+
+
+def test_a_long_rest_in_which_nothing_changes_is_no_gap() -> None:
+    columns, _ = recorded(0.5)
+    columns["current"] = np.where(np.abs(np.gradient(columns["setpoint"])) < 1, 0.0, columns["current"])
+    log = without_repeats(log_of(columns))
+    assert len(log.time_s) < len(columns["time"])
+    assert np.diff(log.time_s).max() < 0.35
+
+
+def test_a_coarse_encoder_with_one_odd_reading_keeps_its_rows() -> None:
+    columns, _ = recorded(0.0, steps=20.0)
+    position = np.round(columns["position"] / 16) * 16
+    position[500] += 1
+    log = log_of({**columns, "position": position})
     assert without_repeats(log) is log
 
 

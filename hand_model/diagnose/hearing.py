@@ -188,7 +188,7 @@ def _distrusted(session: Session) -> dict[str, float]:
 
 def _false_stamps(session: Session, actuator: str, wrong_s: float) -> dict[str, Any]:
     shape = (
-        f"the rows' time stamps do not follow the motion (off by some {1e3 * wrong_s:.0f} ms even where they are evened): "
+        f"the rows' time stamps do not follow the motion (off by some {1e3 * wrong_s:.2g} ms even where they are evened): "
         "speed, current and encoder against time were not judged"
     )
     return _unheard(session, actuator, "log", shape)

@@ -31,7 +31,8 @@ class Log:
     nan where a sample was lost. path: the file. notes: what was mended, one sentence each. packet: rows that came at
     once, on average; more than one, and their times are no more than spread evenly. stamps_wrong_s: standard deviation
     [s] by which times that were evened may be wrong still.
-    The arrays are read-only: readings are shared.
+    The arrays are read-only: readings are shared. A log is equal to itself alone, so that what is made of it can be
+    kept.
     """
 
     time_s: Array
@@ -94,10 +95,19 @@ def build_log(time_s: Array, columns: Mapping[str, Array], path: Path, notes: It
     return Log(times, picked, path, tuple(notes), packet)
 
 
+def resolution(values: Array) -> float:
+    """Step between two readings (n,) of a channel that differ by least, but for a few; 0 where none differ: one for
+    whole counts."""
+    steps = np.diff(np.unique(values[np.isfinite(values)]))
+    return float(np.percentile(steps, 5)) if len(steps) else 0.0
+
+
 def rows_lost(time_s: Array) -> NDArray[np.bool_]:
     """Whether rows were lost between one and the next (n - 1,), by how far apart rows (n,) [s] are. Those that come in
     packets leave many far apart, so that is usual there."""
     interval = np.diff(time_s)
+    if not len(interval):
+        return np.zeros(0, bool)
     return interval > LOST * float(np.percentile(interval, 90))
 
 

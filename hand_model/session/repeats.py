@@ -8,11 +8,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from .log import Log
+from .log import Log, resolution
 
-AROUND = 3  # rows on either side by which a row's travel is told
 FAST = 5.0  # steps of the encoder from row to row, from which no position is read twice by chance
-FEWEST = 30  # rows so fast
+SLOWED = 0.5  # of the speed before: slower, and a drive comes to rest
+FEWEST = 30  # rows so fast, before and after
 OFTEN = 0.05  # share of them that repeat a position, from which a log is such a one
 
 
@@ -38,17 +38,26 @@ def without_repeats(log: Log) -> Log:
 
 def _repeated(log: Log) -> NDArray[np.bool_]:
     """Rows (n,) that repeat; none of a log in which few do."""
+    position = log.columns.get("position", np.zeros(0))
     none = np.zeros(len(log.time_s), bool)
-    position = log.columns.get("position")
-    if position is None or len(position) <= 2 * AROUND:
+    step = resolution(position)
+    new = np.r_[True, np.diff(position) != 0][: len(position)]
+    first = np.flatnonzero(new)
+    if step == 0 or len(first) < 3:
         return none
-    steps = np.diff(np.unique(position[np.isfinite(position)]))
-    if not len(steps):
+    rows = np.diff(first)  # that hold a position
+    speed = np.abs(np.diff(position[first])) / rows  # until the next
+    # before and after, and without coming to rest meanwhile
+    fast = np.r_[False, (speed[:-1] > FAST * step) & (speed[1:] > np.maximum(FAST * step, SLOWED * speed[:-1]))]
+    held = int((rows - 1)[fast].sum())
+    if rows[fast].sum() < FEWEST or held < OFTEN * rows[fast].sum():
         return none
-    fast = none.copy()
-    travel = np.abs(position[AROUND:] - position[:-AROUND]) / AROUND > FAST * steps.min()
-    fast[AROUND:-AROUND] = travel[AROUND:] & travel[:-AROUND]  # before and after: else it comes to rest
-    same = np.r_[False, np.diff(position) == 0]
-    if fast.sum() < FEWEST or same[fast].mean() < OFTEN:
-        return none
-    return same & (fast | np.r_[False, np.diff(log.columns.get("current", position)) == 0])
+    row = np.arange(len(position))
+    since_new = row - np.maximum.accumulate(np.where(new, row, 0))
+    # at rest readings may be the same for long: one stays of more than repeat in motion
+    longest = 2 * int(np.percentile((rows - 1)[fast & (rows > 1)], 98))
+    in_motion = np.repeat(np.r_[fast & (rows - 1 <= longest), False], np.diff(np.r_[first, len(position)]))
+    same = since_new > 0
+    if "current" in log.columns:
+        same &= in_motion | np.r_[False, np.diff(log.columns["current"]) == 0]
+    return same & (since_new % (longest + 1) > 0)

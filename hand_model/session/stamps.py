@@ -21,8 +21,11 @@ REACH = 12  # samples on either side over which a cruise is judged
 CRUISE = 0.3  # of the fastest speed; and of the speed: how far the halves of a cruise may differ
 BELIEVED = 0.8  # share of the variation of time steps that must be in the motion too
 FEWEST = 60  # steps within cruises
+FAR = 2.0  # usual steps, from which rows were lost between two
+PACKED = 0.5  # the share that must be in the motion of rows that came in packets, and were spread evenly already
 EVENED = (6.0, 12.0, 24.0, 48.0)  # rows: standard deviations of the kernels by which times are evened
 BESIDE = 5  # rows on either side of a pause, by which it is told from an unsteady stamp
+WORTH = 0.9  # of what a narrower kernel leaves: a wider one must leave less
 SLIGHT = 0.02  # of the step between rows: times that are wrong by less do no harm
 
 
@@ -71,6 +74,7 @@ def stamps(logs: Sequence[Log]) -> Stamps | None:
             np.abs(before - after) < CRUISE * np.abs(speed)
         )
         usual = float(np.median(np.diff(t)))
+        cruise &= t[i + 1] - t[i] < FAR * usual  # among lost rows the drive may have stopped
         steps.append((t[i + 1] - t[i])[cruise] - usual)
         travels.append(((x[i + 1] - x[i])[cruise] / speed[cruise]) - usual)
     step, travel = (np.concatenate(v) if v else np.zeros(0) for v in (steps, travels))
@@ -85,30 +89,41 @@ def stamps(logs: Sequence[Log]) -> Stamps | None:
 @lru_cache(maxsize=128)
 def evened(log: Log) -> Log:
     """The log of one drive with even times where the motion knows nothing of their unrest, with a note; itself where it
-    does. `stamps_wrong_s` says by how much a row's time may be wrong still. A second call returns the same object.
+    does. `stamps_wrong_s` says by how much a row's time may be wrong still; times of rows that came in packets stay, and
+    only that is said.
 
     A row's time is the local line of the stamps over the turns at which rows were read, and of what a stamp is off that
     as much as the motion follows (shrinkage; James & Stein 1961).
     """
-    judged = stamps([log]) if "position" in log.columns and log.packet == 1 else None
+    judged = stamps([log]) if "position" in log.columns else None
     usual = float(np.median(np.diff(log.time_s)))
     if judged is None or judged.believed or judged.wrong_s < SLIGHT * usual:
         return log
-    turn = _turns(log.time_s, usual)
-    guessed, left = judged.wrong_s * float(np.sqrt(judged.kept)), 0.0
-    out = log
+    if log.packet > 1:
+        packed = judged.followed + 3 * judged.sd < PACKED
+        return replace(log, stamps_wrong_s=judged.wrong_s) if packed else log
+    out, least = log, np.inf
     for width in EVENED:  # rows that are stamped together need a wider one
-        line = _line(turn, log.time_s, width)
-        time_s = np.maximum.accumulate(line + judged.kept * (log.time_s - line))
-        time_s = time_s + 1e-9 * np.arange(len(time_s))  # each row at a time of its own
-        time_s.setflags(write=False)
-        out = replace(log, time_s=time_s)
-        again = stamps([out])
+        tried = _evened(log, judged.kept, width, usual)
+        again = stamps([tried])
         left = 0.0 if again is None or again.believed else again.wrong_s
+        if not left < WORTH * least:
+            break
+        out, least = tried, left
         if left < SLIGHT * usual:
             break
     note = f"time stamps were off by some {1e3 * judged.wrong_s:.1g} ms, as the motion shows: rows were spread evenly"
-    return replace(out, notes=(*log.notes, note), stamps_wrong_s=float(np.hypot(guessed, left)))
+    guessed = judged.wrong_s * float(np.sqrt(judged.kept))
+    return replace(out, notes=(*log.notes, note), stamps_wrong_s=float(np.hypot(guessed, least)))
+
+
+def _evened(log: Log, kept: float, width: float, usual_s: float) -> Log:
+    line = _line(_turns(log.time_s, usual_s), log.time_s, width)
+    time_s = np.maximum.accumulate(line + kept * (log.time_s - line))
+    apart = max(1e-9, 2 * float(np.spacing(np.abs(time_s).max())))
+    time_s = time_s + apart * np.arange(len(time_s))  # each row at a time of its own
+    time_s.setflags(write=False)
+    return replace(log, time_s=time_s)
 
 
 def _turns(time_s: Array, usual_s: float) -> Array:
@@ -116,20 +131,27 @@ def _turns(time_s: Array, usual_s: float) -> Array:
     stay so."""
     early = time_s - usual_s * np.arange(len(time_s))
     lost = np.zeros(len(time_s))
-    for i in np.flatnonzero(np.diff(time_s) > 1.5 * usual_s) + 1:
-        after, before = early[i : i + BESIDE], early[max(i - BESIDE, 0) : i]
+    far = np.flatnonzero(np.diff(time_s) > 1.5 * usual_s) + 1
+    for i, next_far in zip(far, np.append(far, len(time_s))[1:], strict=True):
+        after, before = early[i : min(i + BESIDE, next_far)], early[max(i - BESIDE, 0) : i]
         lost[i] = max(round(float(np.median(after) - np.median(before)) / usual_s), 0)
+        early[i:] -= lost[i] * usual_s
     return np.arange(len(time_s)) + np.cumsum(lost)
 
 
 def _line(at: Array, values: Array, width: float) -> Array:
-    """Values (n,) by Gaussian-weighted local lines over `at` (n,), increasing by one or more."""
-    reach = int(3.5 * width)
-    index = np.arange(len(at))[:, None] + np.arange(-reach, reach + 1)[None]
-    inside = (index >= 0) & (index < len(at))
-    index = index.clip(0, len(at) - 1)
-    d = at[index] - at[:, None]
-    w = np.exp(-0.5 * (d / width) ** 2) * inside
-    y = values[index] - values[:, None]
-    s0, s1, s2 = (np.sum(w * d**k, axis=1) for k in range(3))
-    return values + (s2 * np.sum(w * y, axis=1) - s1 * np.sum(w * d * y, axis=1)) / (s0 * s2 - s1**2)
+    """Values (n,) by Gaussian-weighted local lines over `at` (n,), increasing by one or more; as they are where a row is
+    alone."""
+    s0, s1, s2, y0, y1 = np.ones(len(at)), *np.zeros((4, len(at)))
+    for k in range(1, int(3.5 * width) + 1):
+        d, y = at[k:] - at[:-k], values[k:] - values[:-k]
+        w = np.exp(-0.5 * (d / width) ** 2)
+        for mine, sign in ((slice(None, -k), 1.0), (slice(k, None), -1.0)):  # the row after, and the row before
+            s0[mine] += w
+            s1[mine] += sign * w * d
+            s2[mine] += w * d**2
+            y0[mine] += sign * w * y
+            y1[mine] += w * d * y
+    determinant = s0 * s2 - s1**2
+    alone = determinant < 1e-6 * s0**2
+    return values + np.where(alone, 0.0, (s2 * y0 - s1 * y1) / np.where(alone, 1.0, determinant))

@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 
 SURE = 3.0  # standard deviations
 WIDER = (1.0, 1.6, 2.5, 4.0, 6.0)  # times a kernel, of which the acceleration's is one
+OWN = 0.6  # weight of a sample in its own value, times bandwidth over step: 3 / 2 phi(0)
 WIDENED = 4  # times a kernel may be widened
 # of the acceleration of fast motion, at most, is noise: as an error of a regressor it takes its square off the inertia
 ROUGH = 0.2
@@ -111,16 +112,14 @@ def _sure_enough(
     what bends is smeared."""
     step = float(np.median(np.diff(time_s)))
     found, rough = acceleration, _acceleration_noise(noise, step, bandwidth_s)
-    least, impulse = np.inf, np.zeros(len(position))
-    impulse[len(position) // 2] = 1.0
+    least = np.inf
     for wider in WIDER:
         if not moving.any() or rough < ROUGH * float(np.sqrt(np.mean(found[moving] ** 2))):
             break
         h = wider * bandwidth_s
         x, _, a = local_quadratic(time_s, position, h)
-        own = local_quadratic(time_s, impulse, h)[0][len(position) // 2]
-        error = float(np.mean(((position - x)[moving] / (1 - own)) ** 2))
-        if error > least:
+        error = float(np.mean(((position - x)[moving] / (1 - OWN * step / h)) ** 2))
+        if not error < least:
             break
         least, found, rough = error, a, _acceleration_noise(noise, step, h)
     return found, rough

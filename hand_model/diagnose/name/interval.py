@@ -287,5 +287,5 @@ def variance_ratio(naming: Naming, fit: Fit) -> float:
     use = ~balance.train & balance.steady
     if not use.any():
         use = balance.steady
-    residual = balance.effort - fit.prediction
-    return float(np.mean((residual / (balance.sigma * loudness(balance, residual)))[use] ** 2))
+    noise = balance.sigma * loudness(balance, balance.effort - naming.fit.prediction)
+    return float(np.mean(((balance.effort - fit.prediction) / noise)[use] ** 2))

@@ -18,7 +18,8 @@ Array = NDArray[np.float64]
 COLOURED = 0.05  # autocorrelation of neighbouring samples from which noise counts as coloured
 # samples and seconds over which noise may be correlated; what lasts longer than both is a misfit
 LONGEST, LONGEST_S = 15, 0.25
-FEW = 100  # neighbours, below which a recording's own noise is not told
+# neighbours, below which a recording's own noise is not told, and standard errors by which it must be another
+FEW, LOUDER = 100, 3.0
 
 
 def noise(balance: Balance) -> tuple[float, float]:
@@ -81,16 +82,17 @@ def replicate_deviation(balance: Balance, residual: Array, use: NDArray[np.bool_
 
 
 def loudness(balance: Balance, residual: Array) -> Array:
-    """Noise of the recording of each sample (n,) over that of all, by how neighbouring residuals (n,) differ; one at
-    least."""
+    """Noise of the recording of each sample (n,) over that of all, by how neighbouring residuals (n,) differ; one where
+    it is no louder than by chance."""
     recording = balance.gather(lambda s: np.full(len(s.time_s), s.trial))
     near = (balance.stroke[1:] == balance.stroke[:-1]) & balance.steady[1:] & balance.steady[:-1]
     square = np.diff(residual) ** 2
     out = np.ones(len(residual))
     for name in np.unique(recording):
         own = near & (recording[1:] == name)
-        if own.sum() > FEW:
-            out[recording == name] = max(float(np.sqrt(np.mean(square[own]) / np.mean(square[near]))), 1.0)
+        usual = float(np.mean(square[near])) if own.sum() > FEW else 0.0
+        if usual > 0 and (louder := float(np.mean(square[own])) / usual) > 1 + LOUDER * np.sqrt(3 / own.sum()):
+            out[recording == name] = np.sqrt(louder)
     return out
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ...session import resolution
 from .moves import BEFORE, moves_from_rest
 from .recording import MotorTrial
 
@@ -28,19 +29,14 @@ def white_noise(values: Array, time_s: Array) -> float:
     return float(1.4826 * np.median(np.abs(d)))
 
 
-def resolution(values: Array) -> float:
-    """Smallest step between two readings (n,) of a channel that differ, 0 where none do: one for whole counts."""
-    steps = np.diff(np.unique(values))
-    return float(steps.min()) if len(steps) else 0.0
-
-
 def reading_noise(readings: Sequence[tuple[Array, Array]]) -> float:
     """Standard deviation of a channel's white noise, the median of its recordings, and no less than rounding leaves.
 
     readings: values and times (n,) [s] of each recording.
     """
     noise = float(np.median([white_noise(values, time_s) for values, time_s in readings]))
-    rounded = ROUNDED * min(resolution(values) for values, _ in readings)
+    steps = [step for values, _ in readings if (step := resolution(values)) > 0]
+    rounded = ROUNDED * min(steps, default=0.0)
     return max(noise, rounded, SHARPEST * max(float(np.ptp(values)) for values, _ in readings))
 
 
