@@ -23,6 +23,7 @@ UNREST = 0.3  # of the noise: wander that every machine is granted; more is no e
 WORSE = 1.5  # times the mean square of training recordings
 # times the noise of recordings kept out, and the share of what is above it that true names take
 KEPT_OUT, EXPLAINED_MOST = 1.05, 2 / 3
+CHANCE = 3.0  # standard errors
 SAME_PERIOD = 0.02  # by which a harmonic's may differ
 PATCHES = 2  # periods beside the first that are none of its harmonics: more than a second gear
 MAIN = 0.5  # of what names explain together: what one of them must hold where they do not do
@@ -171,13 +172,23 @@ class Station:
             return False
         before, after = self._kept_out
         floor = 1 + self.wander**2
-        return self._worse or after > KEPT_OUT**2 * floor and before - after < EXPLAINED_MOST * (before - floor)
+        return self._worse or after > self._noisy * floor and before - after < EXPLAINED_MOST * (before - floor)
+
+    @property
+    def _noisy(self) -> float:
+        """Mean square of recordings kept out, in that of the noise, which these may have and be within it: where no test
+        of cells sees anything, by chance, too."""
+        if self.naming.before.p < ALPHA:
+            return KEPT_OUT**2
+        balance = self.naming.balance
+        count = np.count_nonzero(~balance.train & balance.steady) / balance.inflation
+        return KEPT_OUT**2 * (1 + CHANCE * float(np.sqrt(2 / max(count, 2.0))))
 
     @property
     def _worse(self) -> bool:
         """Whether the names make recordings kept out worse, and leave them above their noise."""
         before, after = self._kept_out
-        return after > max(before, KEPT_OUT**2)
+        return after > max(before, self._noisy)
 
     @property
     def _kept_out(self) -> tuple[float, float]:
