@@ -23,7 +23,7 @@ UNREST = 0.3  # of the noise: wander that every machine is granted; more is no e
 WORSE = 1.5  # times the mean square of training recordings
 # times the noise of recordings kept out, and the share of what is above it that true names take
 KEPT_OUT, EXPLAINED_MOST = 1.05, 2 / 3
-CHANCE = 3.0  # standard errors
+CHANCE = 2.0  # standard errors
 SAME_PERIOD = 0.02  # by which a harmonic's may differ
 PATCHES = 2  # periods beside the first that are none of its harmonics: more than a second gear
 MAIN = 0.5  # of what names explain together: what one of them must hold where they do not do
