@@ -177,10 +177,10 @@ class Station:
     @property
     def _noisy(self) -> float:
         """Mean square of recordings kept out, in that of the noise, which these may have and be within it: where no test
-        of cells sees anything, by chance, too."""
-        if self.naming.before.p < ALPHA:
-            return KEPT_OUT**2
+        of cells sees anything, by chance, too (all recordings together are too many for that)."""
         balance = self.naming.balance
+        if self.naming.before.p < ALPHA or not balance.untouched:
+            return KEPT_OUT**2
         count = np.count_nonzero(~balance.train & balance.steady) / balance.inflation
         return KEPT_OUT**2 * (1 + CHANCE * float(np.sqrt(2 / max(count, 2.0))))
 
