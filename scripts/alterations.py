@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 Columns = dict[str, Array]
 Draw = np.random.Generator
 
+ENDINGS = (".tsv", ".trc", ".csv", ".c3d")  # of marker files, by turns
 CLOCK_S, SMALL = 3000.0, 0.6
 SEGMENT = re.compile(r"[PD]2$")  # of each segment one marker
 UNIT = {"current": 17.3, "position": 0.0137, "setpoint": 0.0137}

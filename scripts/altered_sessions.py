@@ -14,11 +14,9 @@ import json
 import sys
 from pathlib import Path
 
-from alterations import ALTERATIONS, altered
+from alterations import ALTERATIONS, ENDINGS, altered
 
 from hand_model import diagnose
-
-ENDINGS = (".tsv", ".trc", ".csv", ".c3d")
 
 
 def main() -> int:

@@ -12,9 +12,8 @@ from hand_model.session import read_session
 from hand_model.session.log import read_log
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
-from alterations import ALTERATIONS, altered
+from alterations import ALTERATIONS, ENDINGS, altered
 
-ENDINGS = (".tsv", ".trc", ".csv", ".c3d")
 SOURCE = Path(__file__).parents[1] / "assets" / "sessions" / "left"
 
 

@@ -65,9 +65,7 @@ def test_what_the_simulation_lacks_is_not_smoothed_away(session: Session) -> Non
         )
         for hz in (0.15, 6.0)
     )
-    told = [
-        run is not None and _motion(run) is not None for run in (_along(fit, "flexion", x) for x in (slow, fast))
-    ]
+    told = [run is not None and _motion(run) is not None for run in (_along(fit, "flexion", x) for x in (slow, fast))]
     assert told == [True, False]
 
 

@@ -40,9 +40,14 @@ class Stamps:
     wrong_s: float
 
     @property
+    def most(self) -> float:
+        """The share that the motion may follow at most, by three standard deviations."""
+        return self.followed + 3 * self.sd
+
+    @property
     def believed(self) -> bool:
         """False where clearly less than four fifths of the variation of the time steps are real."""
-        return self.followed + 3 * self.sd > BELIEVED
+        return self.most > BELIEVED
 
     @property
     def kept(self) -> float:
@@ -100,11 +105,11 @@ def evened(log: Log) -> Log:
     if judged is None or judged.believed or judged.wrong_s < SLIGHT * usual:
         return log
     if log.packet > 1:
-        packed = judged.followed + 3 * judged.sd < PACKED
-        return replace(log, stamps_wrong_s=judged.wrong_s) if packed else log
+        return replace(log, stamps_wrong_s=judged.wrong_s) if judged.most < PACKED else log
+    turn = _turns(log.time_s, usual)
     out, least = log, np.inf
     for width in EVENED:  # rows that are stamped together need a wider one
-        tried = _evened(log, judged.kept, width, usual)
+        tried = _evened(log, turn, judged.kept, width)
         again = stamps([tried])
         left = 0.0 if again is None or again.believed else again.wrong_s
         if not left < WORTH * least:
@@ -117,8 +122,8 @@ def evened(log: Log) -> Log:
     return replace(out, notes=(*log.notes, note), stamps_wrong_s=float(np.hypot(guessed, least)))
 
 
-def _evened(log: Log, kept: float, width: float, usual_s: float) -> Log:
-    line = _line(_turns(log.time_s, usual_s), log.time_s, width)
+def _evened(log: Log, turn: Array, kept: float, width: float) -> Log:
+    line = _line(turn, log.time_s, width)
     time_s = np.maximum.accumulate(line + kept * (log.time_s - line))
     apart = max(1e-9, 2 * float(np.spacing(np.abs(time_s).max())))
     time_s = time_s + apart * np.arange(len(time_s))  # each row at a time of its own

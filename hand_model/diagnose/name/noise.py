@@ -87,11 +87,12 @@ def loudness(balance: Balance, residual: Array) -> Array:
     recording = balance.gather(lambda s: np.full(len(s.time_s), s.trial))
     near = (balance.stroke[1:] == balance.stroke[:-1]) & balance.steady[1:] & balance.steady[:-1]
     square = np.diff(residual) ** 2
+    usual = float(np.mean(square[near])) if near.any() else 0.0
     out = np.ones(len(residual))
-    for name in np.unique(recording):
+    for name in np.unique(recording) if usual > 0 else ():
         own = near & (recording[1:] == name)
-        usual = float(np.mean(square[near])) if own.sum() > FEW else 0.0
-        if usual > 0 and (louder := float(np.mean(square[own])) / usual) > 1 + LOUDER * np.sqrt(3 / own.sum()):
+        count = int(own.sum())
+        if count > FEW and (louder := float(np.mean(square[own])) / usual) > 1 + LOUDER * np.sqrt(3 / count):
             out[recording == name] = np.sqrt(louder)
     return out
 
