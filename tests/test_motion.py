@@ -15,6 +15,7 @@ from hand_model.diagnose.locate.motion import (
     local_quadratic,
     position_at,
     sure_acceleration,
+    told_between,
 )
 from hand_model.session import between_rows
 
@@ -156,3 +157,34 @@ def test_noise_that_lasts_is_no_departure(rate_hz: float) -> None:
     assert off < 0.6 * followed
     plain = slow + 0.3 * white  # of white noise a calm spell tells nothing further
     assert np.array_equal(least_error(at, plain, calm)[0], least_error(at, plain)[0])
+
+
+def few_rows(rate_hz: float) -> tuple[np.ndarray, np.ndarray, float, float]:
+    """Of a log of strokes: where its rows tell the position, times of strokes' beginnings and ends apart; the largest
+    error there is, and the largest of what is told [%]."""
+    rng = np.random.default_rng(3)
+    fine = np.arange(0.0, 60.0, 5e-3)
+    truth = strokes(fine)
+    rows = np.arange(1.0, 60.0 * rate_hz - 1) / rate_hz
+    rows = rows + rng.uniform(-0.1, 0.1, len(rows)) / rate_hz
+    position = np.interp(rows, fine, truth) + 0.1 * rng.standard_normal(len(rows))
+    motion = estimate_motion(rows, position)
+    within = (fine > rows[4]) & (fine < rows[-5])
+    told = told_between(motion, rows, position, fine)[within]
+    error = np.abs(position_at(motion, rows, fine) - truth)[within]
+    turns = np.any([np.abs(fine[within] % 4.0 - t) < 0.25 for t in (1.0, 1.8, 2.8, 3.6)], axis=0)
+    return told, turns, float(error.max()), float(np.percentile(error[told], 99.5))
+
+
+def test_few_rows_do_not_tell_how_a_stroke_begins() -> None:
+    told, turns, worst, left = few_rows(11.0)
+    assert told[~turns].mean() > 0.85
+    assert told[turns].mean() < 0.4
+    assert worst > 1.0
+    assert left < 0.6 * worst
+
+
+def test_rows_that_follow_a_stroke_tell_all_of_it() -> None:
+    told, _, worst, _ = few_rows(80.0)
+    assert told.mean() > 0.98
+    assert worst < 0.6

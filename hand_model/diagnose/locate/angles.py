@@ -19,13 +19,13 @@ from ...identify.finger import REST_S, observations, sound_frames
 from ...identify.likelihood import OUTLIER_LIMIT, fit_chain, fit_poses
 from ...identify.repair import Swap
 from ...identify.start import start_chain
-from ...session import Finger, Mocap, Session, Trial, between_rows
+from ...session import Finger, Mocap, Session, Trial
 from ..name.naming import Naming
 from .drive import count_range
 from .excursions import with_excursions
 from .ghosts import ghosts
 from .load import transmitted_load
-from .motion import estimate_motion, least_error, position_at, sure_acceleration
+from .motion import estimate_motion, least_error, position_at, sure_acceleration, told_between
 
 Array = NDArray[np.float64]
 
@@ -265,7 +265,7 @@ def encoder_states(angles: FingerAngles, low: float, high: float, steps: Sequenc
 @dataclass(frozen=True)
 class _Log:
     """A log at mocap frames: counts, speed, acceleration (where it is sure) [counts, s], load and what of it
-    grows with speed [raw] or None, inside: where it was running and lost no rows. (n,)."""
+    grows with speed [raw] or None, inside: where it was running and its rows tell the position. (n,)."""
 
     counts: Array
     speed: Array
@@ -298,7 +298,7 @@ def _at_frames(record: FlexionAngles, time_s: Array, drifting: bool = True) -> _
         passed = transmitted_load(at, np.interp(at, at[known], current[seen][known]), motion)
         load, drag = (np.interp(then, at, part) for part in passed)
     v, a = (np.interp(then, at, y) for y in (motion.velocity, sure_acceleration(motion)))
-    return _Log(position_at(motion, at, then), v, a, load, drag, between_rows(at, then))
+    return _Log(position_at(motion, at, then), v, a, load, drag, told_between(motion, at, counts, then))
 
 
 def expected_angles(naming: Naming) -> dict[str, tuple[Array, Array]]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...effects.path import runs
-from ...session import rows_lost
+from ...session import between_rows, resolution, rows_lost
 
 Array = NDArray[np.float64]
 
@@ -31,6 +31,10 @@ GAP = 3.0  # sample intervals, from which readings are no neighbours
 MEDIAN_ERROR = 1.65  # times that of a mean of squares is the standard error of the variance by a median
 WHITE: Array = np.zeros(0)  # covariance of errors of which none lasts
 FEW = 100  # pairs of readings, below which nothing is said of how long errors last
+# times the error between two rows is that of a row left out, where the acceleration jumps: it grows with the interval
+# squared
+LEFT_OUT = 4.0
+FEWEST_CALM = 12  # readings at rest that tell their noise
 
 
 @dataclass(frozen=True)
@@ -189,6 +193,30 @@ def position_at(motion: Motion, time_s: Array, then: Array) -> Array:
     again = local_quadratic(time_s, motion.position, motion.bandwidth_s)
     spline = CubicHermiteSpline(time_s, 2 * motion.position - again[0], 2 * motion.velocity - again[1])
     return spline(np.clip(then, time_s[0], time_s[-1]))
+
+
+def told_between(motion: Motion, time_s: Array, position: Array, then: Array) -> NDArray[np.bool_]:
+    """Whether rows (n,) at times [s] tell where a drive is at the times (m,) [s]: within the log, where no rows are
+    lost, and where a row that is left out is met by the cubic through the two on each side of it so well that between
+    rows the error is within the noise of one reading. A few rows to a stroke do not tell how it begins and ends."""
+    inside = between_rows(time_s, then)
+    if len(time_s) < 5:
+        return inside
+    calm = ~motion.moving[3:] & ~motion.moving[:-3]
+    apart = np.abs(np.diff(position, 3)) / 0.6745 / np.sqrt(20.0)
+    noise = float(np.median(apart[calm])) if calm.sum() >= FEWEST_CALM else motion.noise
+    noise = max(noise, resolution(position) / np.sqrt(12.0))
+    near = [time_s[2 + k : len(time_s) - 2 + k] for k in (-2, -1, 1, 2)]
+    left, amplified = -position[2:-2], np.ones(len(time_s) - 4)
+    for i, k in enumerate((-2, -1, 1, 2)):
+        others = [x for j, x in enumerate(near) if j != i]
+        share = np.prod([(time_s[2:-2] - x) / (near[i] - x) for x in others], axis=0)
+        left = left + share * position[2 + k : len(position) - 2 + k]
+        amplified += share**2
+    bent = np.zeros(len(time_s), bool)
+    bent[2:-2] = np.abs(left) > noise * np.maximum(LEFT_OUT, SURE * np.sqrt(amplified))
+    row = (np.searchsorted(time_s, then, side="right") - 1).clip(0, len(time_s) - 2)
+    return inside & ~(bent[row] | bent[row + 1])
 
 
 def sure_acceleration(motion: Motion) -> Array:
