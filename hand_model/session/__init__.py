@@ -1,7 +1,7 @@
 """Recording sessions (`hand-session/1`): what a laboratory hands over, read and checked, nothing interpreted."""
 
 from .check import check_session, moves
-from .log import Log, between_rows, read_log, resolution, rows_lost
+from .log import Log, between_rows, read_log, resolution, row_before, rows_lost
 from .manifest import read_session
 from .mocap import Mocap, read_mocap
 from .session import Actuator, Finger, PalmMarkers, Probe, Rig, Segment, Session, Trial
@@ -24,5 +24,6 @@ __all__ = [
     "read_mocap",
     "read_session",
     "resolution",
+    "row_before",
     "rows_lost",
 ]

@@ -114,8 +114,12 @@ def rows_lost(time_s: Array) -> NDArray[np.bool_]:
 def between_rows(time_s: Array, then: Array) -> NDArray[np.bool_]:
     """Times (m,) [s] within a log of rows at (n,), two or more, where none are lost: what the drive does there nobody
     knows."""
-    row = (np.searchsorted(time_s, then, side="right") - 1).clip(0, len(time_s) - 2)
-    return (then >= time_s[0]) & (then <= time_s[-1]) & ~rows_lost(time_s)[row]
+    return (then >= time_s[0]) & (then <= time_s[-1]) & ~rows_lost(time_s)[row_before(time_s, then)]
+
+
+def row_before(time_s: Array, then: Array) -> NDArray[np.intp]:
+    """Row (m,) after which times (m,) come, of rows at (n,), two or more; there is always one after it, too."""
+    return (np.searchsorted(time_s, then, side="right") - 1).clip(0, len(time_s) - 2)
 
 
 def _copied(time_s: Array, columns: Mapping[str, Array], keep: NDArray[np.intp]) -> bool:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...effects.path import runs
-from ...session import between_rows, resolution, rows_lost
+from ...session import between_rows, resolution, row_before, rows_lost
 
 Array = NDArray[np.float64]
 
@@ -81,7 +81,7 @@ def estimate_motion(time_s: Array, position: Array, bandwidth_s: float | None = 
     2 % of the fastest speed. uneven: times are known less well than they are told, so that a fast position is known
     less well than one at rest, and its acceleration must be known, too."""
     step = float(np.median(np.diff(time_s)))
-    apart = np.abs(np.diff(position, 3)) / 0.6745 / np.sqrt(20.0)
+    apart = _apart(position)
     noise = wrong = float(np.median(apart))
     h = 1.5 * step if bandwidth_s is None else bandwidth_s
     for _ in range(WIDENED):
@@ -100,6 +100,11 @@ def estimate_motion(time_s: Array, position: Array, bandwidth_s: float | None = 
     moving = _drop_short(moving & ~_beside_lost_rows(time_s), 3)
     a, rough_a = _sure_enough(time_s, position, h, noise, a, moving)
     return Motion(x, v, a, noise, h, moving, *since_rest(time_s, moving), acceleration_noise=rough_a)
+
+
+def _apart(position: Array) -> Array:
+    """Sizes (n - 3,) of third differences, whose median is the standard deviation of white noise on a slow motion."""
+    return np.abs(np.diff(position, 3)) / 0.6745 / np.sqrt(20.0)
 
 
 def _beside_lost_rows(time_s: Array) -> NDArray[np.bool_]:
@@ -203,20 +208,27 @@ def told_between(motion: Motion, time_s: Array, position: Array, then: Array) ->
     if len(time_s) < 5:
         return inside
     calm = ~motion.moving[3:] & ~motion.moving[:-3]
-    apart = np.abs(np.diff(position, 3)) / 0.6745 / np.sqrt(20.0)
-    noise = float(np.median(apart[calm])) if calm.sum() >= FEWEST_CALM else motion.noise
+    noise = float(np.median(_apart(position)[calm])) if calm.sum() >= FEWEST_CALM else motion.noise
     noise = max(noise, resolution(position) / np.sqrt(12.0))
-    near = [time_s[2 + k : len(time_s) - 2 + k] for k in (-2, -1, 1, 2)]
-    left, amplified = -position[2:-2], np.ones(len(time_s) - 4)
-    for i, k in enumerate((-2, -1, 1, 2)):
-        others = [x for j, x in enumerate(near) if j != i]
-        share = np.prod([(time_s[2:-2] - x) / (near[i] - x) for x in others], axis=0)
-        left = left + share * position[2 + k : len(position) - 2 + k]
-        amplified += share**2
+    missed, doubt = _left_out(time_s, position)
     bent = np.zeros(len(time_s), bool)
-    bent[2:-2] = np.abs(left) > noise * np.maximum(LEFT_OUT, SURE * np.sqrt(amplified))
-    row = (np.searchsorted(time_s, then, side="right") - 1).clip(0, len(time_s) - 2)
+    bent[2:-2] = np.abs(missed) > noise * np.maximum(LEFT_OUT, SURE * doubt)
+    row = row_before(time_s, then)
     return inside & ~(bent[row] | bent[row + 1])
+
+
+def _left_out(time_s: Array, position: Array) -> tuple[Array, Array]:
+    """By how much the cubic (Lagrange) through the two rows on each side misses a row, (n - 4,), and the standard deviation
+    of that for noise of one."""
+    rows = len(time_s) - 4
+    sides = (0, 1, 3, 4)
+    missed, variance = -position[2:-2], np.ones(rows)
+    for side in sides:
+        others = [time_s[k : k + rows] for k in sides if k != side]
+        share = np.prod([(time_s[2:-2] - t) / (time_s[side : side + rows] - t) for t in others], axis=0)
+        missed = missed + share * position[side : side + rows]
+        variance += share**2
+    return missed, np.sqrt(variance)
 
 
 def sure_acceleration(motion: Motion) -> Array:
