@@ -9,7 +9,16 @@ import pytest
 from test_diagnose import drive, planted
 
 from hand_model.diagnose.assemble import SIGNALS
-from hand_model.diagnose.magnitude import LEAST, MOST, PLAIN, Channel, channel_figures, magnitude, sure_magnitude
+from hand_model.diagnose.magnitude import (
+    LEAST,
+    MOST,
+    PLAIN,
+    Channel,
+    channel_figures,
+    likely_magnitude,
+    magnitude,
+    sure_magnitude,
+)
 from hand_model.effects import catalogue
 
 RAW = {
@@ -63,6 +72,16 @@ def test_what_is_sure_of_a_magnitude_is_that_of_the_end_of_its_interval(entry, s
     assert sure_magnitude("detent_load", {"load": entry}, channel_figures(drive(0))) == pytest.approx(
         max(share * plain, LEAST)
     )
+
+
+@pytest.mark.parametrize(
+    ("interval", "travel"),
+    [([0.2e-3, 3.2e-3], 0.8e-3), ([0.2e-3, 0.3e-3], 0.3e-3), (None, 0.3e-3), ([-0.2e-3, 3.2e-3], 0.3e-3)],
+)
+def test_what_is_told_as_at_least_so_large_is_likely_larger(interval, travel) -> None:
+    """Between the ends of its interval by order of magnitude, and never less than the value."""
+    figures = {"travel": {"value": 0.3e-3, "ci95": interval}}
+    assert likely_magnitude("moving_centre", figures) == pytest.approx(magnitude("moving_centre", {"travel": travel}))
 
 
 def test_intervals_of_several_figures_take_less_together_than_each_at_its_worst() -> None:

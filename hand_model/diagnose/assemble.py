@@ -15,7 +15,7 @@ from .findings import Finding, Findings
 from .locate.displacement import NO_HINGE, NOT_RIGID
 from .locate.markers import HINGE, SLIPS
 from .locate.preload import COMPARISON, usual_spring
-from .magnitude import SLIGHT, channel_figures, magnitude, sure_magnitude
+from .magnitude import SLIGHT, Channel, channel_figures, likely_magnitude, magnitude, sure_magnitude
 from .name.distinguishability import protocol_pairs
 from .name.entries import (
     channel_of,
@@ -94,11 +94,7 @@ def assemble(
     unexplained += [outsider_of(s, f) for s, f in strange if (f.term.effect.part_of, s.finger) not in named]
     unexplained += [unrepeated_of(s) for s in stations if _wanders(s, stations)]
     ranked = _without_shadows(_one_clock(_of_hinges(ranked, unexplained)), stations)
-    # how far a hinge that is none moves is told only beside what another hinge would explain: that it is none is sure
-    # all the same
-    sized = [
-        (_magnitude(f, stations, sure=f.effect not in HINGE), weight * _counted(f, stations), f) for weight, f in ranked
-    ]
+    sized = [(_ranking_magnitude(f, stations), weight * _counted(f, stations), f) for weight, f in ranked]
     ranked = sorted(((float((m**3 * weight) ** 0.25), f) for m, weight, f in sized), key=lambda item: -item[0])
     ranked = _heaviest(ranked, _same_place)
     trifles = _trifles(ranked, {id(f): m for m, _, f in sized})
@@ -158,16 +154,25 @@ def _leave_something(station: Station, stations: Sequence[Station]) -> bool:
     return station.signal != "current" and any(s.naming.after.p < ALPHA and s.explained < NEARLY_ALL for s in angles)
 
 
-def _magnitude(finding: Finding, stations: Sequence[Station], sure: bool = False) -> float:
-    """How large a finding is for its kind, measured by the channel in which effects of its kind show; or how large it
-    is for sure."""
-    shown = next(
+def _magnitude(finding: Finding, stations: Sequence[Station]) -> float:
+    """How large a finding is for its kind."""
+    values = {name: entry["value"] for name, entry in finding.parameters.items()}
+    return magnitude(finding.effect, values, _shown_in(finding, stations))
+
+
+def _ranking_magnitude(finding: Finding, stations: Sequence[Station]) -> float:
+    """How large a finding is for its kind for sure. How far a hinge that is none moves is told only beside what another
+    hinge would explain, its value the least: that it is none is sure all the same, and how far likely more."""
+    size = likely_magnitude if finding.effect in HINGE else sure_magnitude
+    return size(finding.effect, finding.parameters, _shown_in(finding, stations))
+
+
+def _shown_in(finding: Finding, stations: Sequence[Station]) -> Channel | None:
+    """The channel in which effects of a finding's kind show; None where its finger has none."""
+    station = next(
         (s for s in stations if s.signal == SHOWN_IN.get(finding.effect) and s.finger == finding.where["finger"]), None
     )
-    channel = None if shown is None else channel_figures(shown.naming.balance.states, *_accounts(shown, stations))
-    if sure:
-        return sure_magnitude(finding.effect, finding.parameters, channel)
-    return magnitude(finding.effect, {name: entry["value"] for name, entry in finding.parameters.items()}, channel)
+    return None if station is None else channel_figures(station.naming.balance.states, *_accounts(station, stations))
 
 
 def _accounts(station: Station, stations: Sequence[Station]) -> tuple[Mapping[str, float], ...]:

@@ -106,6 +106,18 @@ def sure_magnitude(effect: str, figures: Mapping[str, Mapping[str, Any]], channe
     return max(size - float(np.sqrt(lost)), LEAST)
 
 
+def likely_magnitude(effect: str, figures: Mapping[str, Mapping[str, Any]], channel: Channel | None = None) -> float:
+    """The magnitude of an effect of which recordings tell at least how large it is, and at most: at the middle of each
+    interval by order of magnitude, where that is more than the least. figures: as of `sure_magnitude`."""
+    values = {name: entry["value"] for name, entry in figures.items()}
+    middle = dict(values)
+    for name, entry in figures.items():
+        interval = entry.get("ci95")
+        if interval is not None and None not in interval and min(interval) > 0:
+            middle[name] = float(np.sqrt(interval[0] * interval[1]))
+    return max(magnitude(effect, values, channel), magnitude(effect, middle, channel))
+
+
 Rule = Callable[[Mapping[str, float], Channel], float]
 
 
