@@ -96,7 +96,7 @@ def course_amount(naming: MarkerNaming, effect: MarkerEffect) -> tuple[float, li
         fitted = [f for f in fitted if not _beside(f, best, step, turn)]
         fitted += [f for c in near for f in readings.fit(c, best.direction_rad + finer * turn, ZOOM)]
         step, turn = step * ZOOM, turn * ZOOM
-    return _averaged(fitted, effect)
+    return _averaged(fitted, readings.loudness(effect, max(f.gain for f in fitted)))
 
 
 class _Readings:
@@ -118,6 +118,14 @@ class _Readings:
 
     def _free(self, columns: Array) -> Array:
         return columns - self.basis @ (self.basis.T @ columns)
+
+    def loudness(self, effect: MarkerEffect, gain: float) -> float:
+        """Variance, over that of the noise, of what the effect's own columns explain and no course does; at least one.
+        gain: what the best course brings, beside the same others."""
+        free = self._free(_flat(project(self.blocks, effect.columns)))
+        basis, sizes, _ = np.linalg.svd(free / np.maximum(np.linalg.norm(free, axis=0), 1e-300), full_matrices=False)
+        own = basis[:, sizes > 1e-6 * sizes[0]].T @ self.y / self.sigma
+        return max((float(own @ own) - gain) / len(own), 1.0)
 
     def fit(self, course: _Course, directions_rad: Array, share: float = 1.0) -> list[_Fitted]:
         """The course about each direction. share: of the grid's cell that each stands for."""
@@ -177,10 +185,9 @@ def _beside(fitted: _Fitted, best: _Fitted, step: float, turn: float) -> bool:
     return (a.kind, a.own) == (b.kind, b.own) and abs(a.order - b.order) < 1.01 * step and apart < 1.01 * turn
 
 
-def _averaged(fitted: Sequence[_Fitted], effect: MarkerEffect) -> tuple[float, list[float]]:
+def _averaged(fitted: Sequence[_Fitted], loud: float) -> tuple[float, list[float]]:
+    """Median and interval of the size. loud: variance over that of the noise: what no course explains counts as noise."""
     best = max(f.gain for f in fitted)
-    # what no course of the family explains counts as noise
-    loud = max((effect.gain - best) / max(effect.everywhere.shape[-1], 1), 1.0)
     rng, sizes, weights = np.random.default_rng(0), [], []
     for f in fitted:
         if 0.5 * (best - f.gain) > FAR * loud:
