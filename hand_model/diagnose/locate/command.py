@@ -90,12 +90,16 @@ def command_findings(
 
 def _sags(fact: CommandFacts, others: Sequence[CommandFacts]) -> bool:
     """Whether a drive loses speed for sure, more than controllers do, also once it has settled, and plainly more than
-    the session's other drives lose, or seem to gain: one without much feedback loses more under load."""
-    usual = min((abs(f.lost) for f in others if np.isfinite(f.lost)), default=0.0)
+    the session's other drives lose, or seem to gain, by either reading: one without much feedback loses more under load."""
     told = sorted((fact.sag / fact.sag_se, fact.settled / fact.settled_se))
     least = LEAST_SURE_LOSS if told[0] > SURE_T else LEAST_LOSS
-    sure = told[0] > LIKELY_T and told[1] > SURE_T and min(fact.lost, fact.settled) > least
-    return bool(sure and fact.lost > ALIKE * usual and fact.lost - usual > least)
+    if not (told[0] > LIKELY_T and told[1] > SURE_T and min(fact.lost, fact.settled) > least):
+        return False
+    for loss, theirs in ((fact.lost, [f.lost for f in others]), (fact.settled, [f.settled for f in others])):
+        usual = min((abs(x) for x in theirs if np.isfinite(x)), default=0.0)
+        if loss <= ALIKE * usual or loss - usual <= least:
+            return False
+    return True
 
 
 def sags_beneath(facts: Mapping[str, CommandFacts], actuator: str, limit: float) -> bool:

@@ -289,7 +289,8 @@ def _plain_at_ends(naming: Naming, named: Named, least: float) -> bool:
     """Whether the only effect is that plain that it needs no steady motion to be told from zero: some act where motion
     starts and stops, as a stop of the open hand. What no table names and only starts and stops show may be how these
     are read."""
-    return len(naming.found) == 1 and named.term.effect.listed and _stands(naming, named, 0, least + EVIDENCE_LEAST)
+    lasting = named.term.effect.listed and named.term.effect.of_the_hand
+    return len(naming.found) == 1 and lasting and _stands(naming, named, 0, least + EVIDENCE_LEAST)
 
 
 def _elsewhere(naming: Naming) -> bool:
