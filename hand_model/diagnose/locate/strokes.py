@@ -17,9 +17,7 @@ Array = NDArray[np.float64]
 RUN_IN_S, RUN_OUT_S = 0.3, 0.25  # a stroke's part at steady speed begins and ends this far from rest
 PIECE_S = 0.15  # of strokes, that are compared
 RUNNING = 0.7  # of its median speed: slower at either end, a stroke still starts or stops
-# of the speed, over the recorded loads: less is within what controllers do (the most of 560 healthy drives 0.029); and
-# where both readings are sure (the most of 480 healthy drives 0.010)
-LEAST_LOSS, LEAST_SURE_LOSS = 0.035, 0.02
+LEAST_LOSS = 0.035  # of the speed: less is within what controllers do (the most of 560 healthy drives 0.029)
 NEARLY_MOST = 0.9  # quantile of the speed that is lost beyond a limit
 NEAR = 0.95  # of a limit: a reading there may be cut
 FULL_SPEED = 0.9  # of the way, in which strokes of one commanded speed are no faster than at full speed
