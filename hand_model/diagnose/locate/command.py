@@ -18,10 +18,10 @@ from .strokes import Stroke, beneath, ceiling, sag, settled_sag, strokes_of
 
 Array = NDArray[np.float64]
 
-ALIKE = 2.0  # times the loss of speed of the session's least sagging drive: drives of one kind may differ by as much
-# of the speed, by which a drive must lose more than that one for sure (standard errors): of 250 healthy drives of four
-# recorders one seems to by 0.0005, and three of messy sessions by 0.005 or more
-LEAST_BEYOND, SURE = 0.01, 3.0
+ALIKE = 2.0  # times the loss of speed that the session's other drives have (median): one kind's may differ by as much
+# of the speed, by which a drive must lose more than those for sure (standard errors): the most of 256 healthy drives of
+# four recorders is 0.005, of one that has little feedback
+LEAST_BEYOND, SURE = 0.01, 4.0
 USUAL_LOSS = 0.0175  # of the speed, that controllers may lose where no other drive says how much
 # log likelihood that a limit must bring: for an effect, for the limits that are tried, and for as many names of as many
 # channels
@@ -92,12 +92,14 @@ def command_findings(
 
 
 def _sags(fact: CommandFacts, others: Sequence[CommandFacts]) -> bool:
-    """Whether a drive loses speed for sure, more than controllers do, also once it has settled, and plainly more than
-    the session's other drives lose, or seem to gain, by either reading: one without much feedback loses more under load."""
-    by_strokes = fact.lost, fact.sag_se * fact.load_range, [f.lost for f in others]
-    by_pieces = fact.settled, fact.settled_se, [f.settled for f in others]
-    for loss, doubt, theirs in (by_strokes, by_pieces):
-        usual = min((abs(x) for x in theirs if np.isfinite(x)), default=USUAL_LOSS)
+    """Whether a drive loses speed, also once it has settled, surely and plainly more than the session's other drives
+    lose, or seem to gain: controllers with little feedback lose more under load."""
+    for loss, doubt, theirs in (
+        (fact.lost, fact.sag_se * fact.load_range, [f.lost for f in others]),
+        (fact.settled, fact.settled_se, [f.settled for f in others]),
+    ):
+        known = [abs(x) for x in theirs if np.isfinite(x)]
+        usual = float(np.median(known)) if known else USUAL_LOSS
         if not (loss > ALIKE * usual and loss - usual - SURE * doubt > LEAST_BEYOND):
             return False
     return True
