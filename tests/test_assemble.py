@@ -11,6 +11,7 @@ import pytest
 from hand_model.diagnose.assemble import (
     COMPARED,
     _counted,
+    _echoes,
     _leave_something,
     _of_hinges,
     _shared,
@@ -40,6 +41,24 @@ def test_a_ripple_at_a_harmonic_of_the_same_encoders_error_is_its_shadow(
 ) -> None:
     error, ripple = periodic("encoder_periodic_error", "index", 10.79), periodic("torque_ripple", motor, period)
     assert _without_shadows([error, ripple], []) == ([error, ripple] if stays else [error])
+
+
+@pytest.mark.parametrize(("amplitude", "stays"), [(9.5, True), (0.3, False)])
+def test_a_ripple_larger_than_an_encoders_error_makes_is_no_shadow_of_it(amplitude: float, stays: bool) -> None:
+    def sized(effect: str, amplitude: float) -> tuple[float, Finding]:
+        weight, finding = periodic(effect, "index", 11.0)
+        return weight, replace(
+            finding, parameters={**finding.parameters, "amplitude": {"value": amplitude, "unit": ""}}
+        )
+
+    # half of 0.2 % at 45 %/s makes 0.1 (0.2 + 0.2 w + 0.015 w^2) raw, w = 2 pi 45 / 11 /s: 1.5
+    velocity = np.full(9, 45.0)
+    declared = {"spring": 0.2, "viscous": 0.2, "inertia": 0.015}
+    balance = SimpleNamespace(gather=lambda read: read(SimpleNamespace(velocity=velocity)))
+    naming = SimpleNamespace(balance=balance, fit=SimpleNamespace(declared=declared))
+    station = SimpleNamespace(signal="current", finger="index", actuator="index", naming=naming)
+    error, ripple = sized("encoder_periodic_error", 0.2), sized("torque_ripple", amplitude)
+    assert _echoes(ripple[1], error[1], [station]) is not stays
 
 
 def test_a_better_sensor_alone_does_not_put_an_effect_first() -> None:

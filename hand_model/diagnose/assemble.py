@@ -258,22 +258,33 @@ def _one_clock(ranked: list[tuple[float, Finding]]) -> list[tuple[float, Finding
 def _without_shadows(ranked: list[tuple[float, Finding]], stations: Sequence[Station]) -> list[tuple[float, Finding]]:
     """Without what a motor's encoder error leaves in its current after it was put right: a position that errs by a
     percent errs by many percent in speed. Effects that are small there and for their kind, and ripples at the error's
-    period or a harmonic of it, are no evidence."""
-    wrong = {
-        f.where["actuator"]: (weight, f.parameters["period"]["value"])
-        for weight, f in ranked
-        if f.effect == "encoder_periodic_error"
-    }
+    period or a harmonic of it that are no larger than half of it makes, are no evidence."""
+    wrong = {f.where["actuator"]: (weight, f) for weight, f in ranked if f.effect == "encoder_periodic_error"}
 
     def shadow(weight: float, finding: Finding) -> bool:
         if finding.where["actuator"] not in wrong or finding.where["signal"] != "current":
             return False
-        error, period = wrong[finding.where["actuator"]]
-        order = period / finding.parameters["period"]["value"] if finding.effect == "torque_ripple" else np.nan
-        harmonic = 0.5 < order < HARMONICS + 0.5 and abs(order / round(order) - 1) < SAME_PERIOD
-        return harmonic or weight < SHADOW * error and _magnitude(finding, stations) < SHADOW
+        error_weight, error = wrong[finding.where["actuator"]]
+        small = weight < SHADOW * error_weight and _magnitude(finding, stations) < SHADOW
+        return small or finding.effect == "torque_ripple" and _echoes(finding, error, stations)
 
     return [item for item in ranked if not shadow(*item)]
+
+
+def _echoes(ripple: Finding, error: Finding, stations: Sequence[Station]) -> bool:
+    """Whether a ripple is at the period of an encoder's error, or a harmonic of it, and no larger than what half of that
+    error makes of the current: position, speed and acceleration err, by A, A w and A w^2 at w = 2 pi speed / period."""
+    order = error.parameters["period"]["value"] / ripple.parameters["period"]["value"]
+    if not 0.5 < order < HARMONICS + 0.5 or abs(order / round(order) - 1) >= SAME_PERIOD:
+        return False
+    station = next((s for s in stations if s.signal == "current" and s.actuator == ripple.where["actuator"]), None)
+    if station is None:  # nothing says how much
+        return True
+    balance, declared = station.naming.balance, station.naming.fit.declared
+    velocity = balance.gather(lambda s: s.velocity)
+    rate = 2 * np.pi * float(np.sqrt(np.mean(velocity**2))) / ripple.parameters["period"]["value"]
+    made = sum(abs(declared.get(name, 0.0)) * rate**k for k, name in enumerate(("spring", "viscous", "inertia")))
+    return bool(ripple.parameters["amplitude"]["value"] < SHADOW * made * error.parameters["amplitude"]["value"])
 
 
 def _of_hinges(
