@@ -15,7 +15,7 @@ from .findings import Finding, Findings
 from .locate.displacement import NO_HINGE, NOT_RIGID
 from .locate.markers import HINGE, SLIPS
 from .locate.preload import COMPARISON, usual_spring
-from .magnitude import SLIGHT, Channel, channel_figures, likely_magnitude, magnitude, sure_magnitude
+from .magnitude import SLIGHT, Channel, channel_figures, likely_magnitude, magnitude, sure_magnitude, values_of
 from .name.distinguishability import protocol_pairs
 from .name.entries import (
     channel_of,
@@ -156,8 +156,7 @@ def _leave_something(station: Station, stations: Sequence[Station]) -> bool:
 
 def _magnitude(finding: Finding, stations: Sequence[Station]) -> float:
     """How large a finding is for its kind."""
-    values = {name: entry["value"] for name, entry in finding.parameters.items()}
-    return magnitude(finding.effect, values, _shown_in(finding, stations))
+    return magnitude(finding.effect, values_of(finding.parameters), _shown_in(finding, stations))
 
 
 def _ranking_magnitude(finding: Finding, stations: Sequence[Station]) -> float:
@@ -168,11 +167,15 @@ def _ranking_magnitude(finding: Finding, stations: Sequence[Station]) -> float:
 
 
 def _shown_in(finding: Finding, stations: Sequence[Station]) -> Channel | None:
-    """The channel in which effects of a finding's kind show; None where its finger has none."""
-    station = next(
-        (s for s in stations if s.signal == SHOWN_IN.get(finding.effect) and s.finger == finding.where["finger"]), None
-    )
+    """The figures of the station that shows effects of a finding's kind; None where its finger has none."""
+    station = _showing(finding, stations)
     return None if station is None else channel_figures(station.naming.balance.states, *_accounts(station, stations))
+
+
+def _showing(finding: Finding, stations: Sequence[Station]) -> Station | None:
+    """The station of a finding's finger in which effects of its kind show; None where there is none."""
+    signal, finger = SHOWN_IN.get(finding.effect), finding.where["finger"]
+    return next((s for s in stations if s.signal == signal and s.finger == finger), None)
 
 
 def _accounts(station: Station, stations: Sequence[Station]) -> tuple[Mapping[str, float], ...]:
@@ -277,7 +280,7 @@ def _echoes(ripple: Finding, error: Finding, stations: Sequence[Station]) -> boo
     order = error.parameters["period"]["value"] / ripple.parameters["period"]["value"]
     if not 0.5 < order < HARMONICS + 0.5 or abs(order / round(order) - 1) >= SAME_PERIOD:
         return False
-    station = next((s for s in stations if s.signal == "current" and s.actuator == ripple.where["actuator"]), None)
+    station = _showing(ripple, stations)
     if station is None:  # nothing says how much
         return True
     balance, declared = station.naming.balance, station.naming.fit.declared

@@ -24,7 +24,7 @@ from .locate.encoder_error import encoder_corrections
 from .locate.gravity import with_gravity
 from .locate.measurement import echoes_command, is_measured, rests_on_command
 from .locate.simulated import SimulatedDrive
-from .magnitude import magnitude
+from .magnitude import magnitude, values_of
 from .name.balance import Balance
 from .name.evidence import typical_coefficients
 from .name.station import Station, judged
@@ -156,13 +156,9 @@ def _without_settled_sags(
         and not sags_beneath(facts, s.actuator, f.term.shape["limit"])
         or f.term.effect.name == "drive_sag"
         or f.term.effect.name == "load_dependent_friction"
-        and magnitude("load_dependent_friction", _values(s.parameters[which])) > REASON
+        and magnitude("load_dependent_friction", values_of(s.parameters[which])) > REASON
     }
     return [i for i in found if i[1].effect != "drive_sag" or i[1].where["actuator"] not in settled]
-
-
-def _values(parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, float]:
-    return {name: entry["value"] for name, entry in parameters.items()}
 
 
 def _no_measurement(logs: list[Log]) -> str:

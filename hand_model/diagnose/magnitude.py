@@ -90,11 +90,16 @@ def magnitude(effect: str, parameters: Mapping[str, float], channel: Channel | N
     return float(np.clip(size, LEAST, MOST)) if np.isfinite(size) else 1.0
 
 
+def values_of(figures: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """name -> value of figures, as a finding's parameters."""
+    return {name: entry["value"] for name, entry in figures.items()}
+
+
 def sure_magnitude(effect: str, figures: Mapping[str, Mapping[str, Any]], channel: Channel | None = None) -> float:
     """The magnitude less what the 95 % intervals of its figures leave open, as if their errors were independent (square
     root of the sum of squares). figures: name -> entry with `value` and, where there is one, `ci95`, as a finding's
     parameters."""
-    values = {name: entry["value"] for name, entry in figures.items()}
+    values = values_of(figures)
     size, lost = magnitude(effect, values, channel), 0.0
     for name, entry in figures.items():
         interval = entry.get("ci95")
@@ -109,7 +114,7 @@ def sure_magnitude(effect: str, figures: Mapping[str, Mapping[str, Any]], channe
 def likely_magnitude(effect: str, figures: Mapping[str, Mapping[str, Any]], channel: Channel | None = None) -> float:
     """The magnitude of an effect of which recordings tell at least how large it is, and at most: at the middle of each
     interval by order of magnitude, where that is more than the least. figures: as of `sure_magnitude`."""
-    values = {name: entry["value"] for name, entry in figures.items()}
+    values = values_of(figures)
     middle = dict(values)
     for name, entry in figures.items():
         interval = entry.get("ci95")

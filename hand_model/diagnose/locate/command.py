@@ -57,6 +57,11 @@ class CommandFacts:
         """Share of its speed that the drive loses over the recorded loads; nan where strokes do not tell."""
         return self.sag * self.load_range
 
+    @property
+    def lost_se(self) -> float:
+        """Its standard error."""
+        return self.sag_se * self.load_range
+
 
 def command_facts(states: tuple[DriveState, ...], currents: tuple[Array, ...]) -> CommandFacts:
     """Facts of one drive. currents: raw current (n,) of each state (its `effort` is masked at rest)."""
@@ -95,7 +100,7 @@ def _sags(fact: CommandFacts, others: Sequence[CommandFacts]) -> bool:
     """Whether a drive loses speed, also once it has settled, surely and plainly more than the session's other drives
     lose, or seem to gain: controllers with little feedback lose more under load."""
     for loss, doubt, theirs in (
-        (fact.lost, fact.sag_se * fact.load_range, [f.lost for f in others]),
+        (fact.lost, fact.lost_se, [f.lost for f in others]),
         (fact.settled, fact.settled_se, [f.settled for f in others]),
     ):
         known = [abs(x) for x in theirs if np.isfinite(x)]
@@ -275,7 +280,7 @@ def _sag_finding(actuator: str, finger: str | None, fact: CommandFacts) -> tuple
         "unit": "1",
         "before": loss,
         "after": 0.0,
-        "noise_floor": fact.sag_se * fact.load_range,
+        "noise_floor": fact.lost_se,
         "ci95_reduction": None,
         "held_out": [],
         "engine": "strokes",

@@ -108,10 +108,7 @@ class _Readings:
         others = [e.columns for e in naming.found if (e.body, e.effect) != (effect.body, effect.effect)]
         others += [effect.columns[..., list(effect.shifts)]] if effect.effect == "joint_wobble" else []
         beside = _flat(project(blocks, np.concatenate([blocks.chain_columns, *others], axis=-1)))
-        beside = beside / np.maximum(np.linalg.norm(beside, axis=0), 1e-300)
-        values, vectors = np.linalg.eigh(beside.T @ beside)
-        known = values > 1e-9 * values[-1]
-        self.basis = beside @ (vectors[:, known] / np.sqrt(values[known]))
+        self.basis = _orthonormal(beside, beside)
         self.y = self._free(_flat(project(blocks, blocks.residual.reshape(len(blocks.residual), -1, 1))))[:, 0]
         self.u = share_of_range(blocks, effect.body - 1)
         self.ways = {own: _ways(blocks, effect.body, effect.effect == "joint_wobble", own) for own in (False, True)}
@@ -122,9 +119,8 @@ class _Readings:
     def loudness(self, effect: MarkerEffect, gain: float) -> float:
         """Variance, over that of the noise, of what the effect's own columns explain and no course does; at least one.
         gain: what the best course brings, beside the same others."""
-        free = self._free(_flat(project(self.blocks, effect.columns)))
-        basis, sizes, _ = np.linalg.svd(free / np.maximum(np.linalg.norm(free, axis=0), 1e-300), full_matrices=False)
-        own = basis[:, sizes > 1e-6 * sizes[0]].T @ self.y / self.sigma
+        columns = _flat(project(self.blocks, effect.columns))
+        own = _orthonormal(self._free(columns), columns).T @ self.y / self.sigma
         return max((float(own @ own) - gain) / len(own), 1.0)
 
     def fit(self, course: _Course, directions_rad: Array, share: float = 1.0) -> list[_Fitted]:
@@ -203,6 +199,15 @@ def _averaged(fitted: Sequence[_Fitted], loud: float) -> tuple[float, list[float
     below = np.cumsum(weight[order]) / weight.sum()
     low, middle, high = (float(size[order][min(int(np.searchsorted(below, q)), len(size) - 1)]) for q in QUANTILES)
     return middle, [low, high]
+
+
+def _orthonormal(columns: Array, whole: Array) -> Array:
+    """Orthonormal columns that span others (n, k). whole: (n, k) what is left of which these are: less than rounding
+    leaves is nothing."""
+    scaled = columns / np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
+    values, vectors = np.linalg.eigh(scaled.T @ scaled)
+    known = values > 1e-9 * values[-1]
+    return scaled @ (vectors[:, known] / np.sqrt(values[known]))
 
 
 def _flat(columns: Array) -> Array:

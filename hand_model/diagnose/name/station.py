@@ -287,10 +287,11 @@ def _stands(naming: Naming, named: Named, which: int, least: float) -> bool:
 
 def _plain_at_ends(naming: Naming, named: Named, least: float) -> bool:
     """Whether the only effect is that plain that it needs no steady motion to be told from zero: some act where motion
-    starts and stops, as a stop of the open hand. What no table names and only starts and stops show may be how these
-    are read."""
-    lasting = named.term.effect.listed and named.term.effect.of_the_hand
-    return len(naming.found) == 1 and lasting and _stands(naming, named, 0, least + EVIDENCE_LEAST)
+    starts and stops, as a stop of the open hand. What no table names, or one recording alone has, and only starts and
+    stops show may be how these are read."""
+    kind = named.term.effect
+    alone = len(naming.found) == 1 and kind.listed and kind.of_the_hand
+    return alone and _stands(naming, named, 0, least + EVIDENCE_LEAST)
 
 
 def _elsewhere(naming: Naming) -> bool:
