@@ -302,14 +302,16 @@ def test_nothing_runs_ahead_in_noise() -> None:
 @pytest.mark.parametrize("covered", [0.0, 2.0])
 def test_a_driver_is_as_quiet_as_its_encoder_where_nothing_is_expected_yet(covered: float) -> None:
     """The encoder's station does not tell of the rest before a first motion; what it expects later is no jump."""
-    from hand_model.diagnose.locate.angles import _Log, _smoothed
+    from hand_model.diagnose.locate.driver_angle import LogAtFrames, driver_angle, foresee, lasting
 
     x, v = strokes((45.0, 27.0), rest_s=2.0)
     t = np.arange(len(x)) / 100.0
     truth = np.polynomial.Polynomial(MAP)(x / 100) + 0.8 * np.sin(x / 20)  # no cubic
-    log = _Log(x, v, 0 * v, None, None, np.ones(len(x), bool))
+    log = LogAtFrames(x, v, 0 * v, None, None, np.ones(len(x), bool))
     told = (t >= covered) & (x > 0.05 * np.ptp(x) * (covered > 0))
-    driver, *_ = _smoothed(t, truth + np.random.default_rng(4).normal(0, 1.0, len(x)), log, (t[told], truth[told]))
+    seen = truth + np.random.default_rng(4).normal(0, 1.0, len(x))
+    foreseen = foresee(t, seen, log, (t[told], truth[told]))
+    driver, *_ = driver_angle(t, seen, log, foreseen, lasting([(t, foreseen)]))
     assert np.std((driver - truth)[t > 2.5]) < 0.1  # of 1 deg a frame
 
 

@@ -12,10 +12,10 @@ from scipy.spatial.transform import Rotation
 
 from hand_model.diagnose.locate import markers
 from hand_model.diagnose.locate.blocks import _assembled, frames_of_block, present_way, project, way_of_motion
-from hand_model.diagnose.locate.displacement import CREEP, NO_HINGE
+from hand_model.diagnose.locate.displacement import CREEP, NO_HINGE, WITH_FINGER, YIELDING
 from hand_model.diagnose.locate.lasting_noise import LastingNoise, lasting_noise
 from hand_model.diagnose.locate.markers import MarkerNaming, named_in, tilt
-from hand_model.diagnose.locate.slips import _finding, _turning, unexplained
+from hand_model.diagnose.locate.slips import _finding, _turning, palm_bends, unexplained
 from hand_model.identify.chain import Chain
 
 BODY = np.repeat([0, 1, 2], 4)
@@ -131,6 +131,29 @@ def test_a_support_that_turns_all_the_time_does_not_slip() -> None:
         and told["shape"] == "a support moves all the time"
         and NO_HINGE not in told["shape"]
     )
+
+
+@pytest.mark.parametrize(
+    ("body", "course"), [(0, "pull"), (1, "speed"), (2, "pull")], ids=["palm plate", "soft mount", "thin segment"]
+)
+def test_a_marker_that_moves_as_the_finger_does_is_no_joint_and_no_slip(body: int, course: str) -> None:
+    """By 0.1 mm: with friction's way and the spring, as what carries it bends, or with the speed, as its mount does."""
+
+    def shift(share, turn, arm):
+        phase = 2 * np.pi * 4 * share
+        pull = np.sign(np.sin(phase)) + 0.5 * (1 - np.cos(phase))
+        way = np.array([6e-5, 2e-5, -8e-5]) * (pull if course == "pull" else np.sin(phase))[:, None]
+        out = np.zeros((len(share), 4, 3))
+        out[:, 1] = way if body == 0 else np.einsum("bij,bj->bi", turn, way)
+        return out
+
+    naming, label = seen(shift, body=body), LABELS[4 * body + 1]
+    assert naming.believed and naming.p_after > 0.003 and places(naming) == {(YIELDING, label)}
+    assert palm_bends(naming) == (body == 0)
+    finger = SimpleNamespace(name="index", segments=(SimpleNamespace(name="proximal"), SimpleNamespace(name="distal")))
+    (told,) = unexplained(SimpleNamespace(finger=finger), naming)
+    assert told["shape"] == f"{label} {WITH_FINGER}"
+    assert told["where"]["joint"] == (None, "proximal", "distal")[body]
 
 
 def tilting(amount):

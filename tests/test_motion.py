@@ -11,6 +11,7 @@ from scipy.signal import lfilter
 from hand_model.diagnose.locate.motion import (
     Motion,
     estimate_motion,
+    lasting_errors,
     least_error,
     local_quadratic,
     position_at,
@@ -153,10 +154,22 @@ def test_noise_that_lasts_is_no_departure(rate_hz: float) -> None:
     white, lasting = np.random.default_rng(6).normal(0, 1.0, (2, len(at)))
     lasting = lfilter([np.sqrt(1 - 0.9**2)], [1, -0.9], lasting)
     noisy = slow + 0.3 * (np.sqrt(0.7) * white + np.sqrt(0.3) * lasting)
-    off, followed = (np.std(least_error(at, noisy, s)[0] - slow) for s in (calm, None))
+    alike = lasting_errors(at, noisy, calm)[1]
+    off, followed = (np.std(least_error(at, noisy, *a)[0] - slow) for a in ((alike,), ()))
     assert off < 0.6 * followed
-    plain = slow + 0.3 * white  # of white noise a calm spell tells nothing further
-    assert np.array_equal(least_error(at, plain, calm)[0], least_error(at, plain)[0])
+    assert not len(lasting_errors(at, slow + 0.3 * white, calm)[1])  # of white noise a calm spell tells nothing further
+
+
+def test_noise_of_which_little_lasts_is_told_by_many_neighbours() -> None:
+    at = np.arange(0.0, 100.0, 1 / 120.0)
+    white, lasting = np.random.default_rng(6).normal(0, 1.0, (2, len(at)))
+    lasting = lfilter([np.sqrt(1 - 0.9**2)], [1, -0.9], lasting)
+    jumping = 5.0 * (at % 30.0 > 29.0)  # a finger that jumps off its drive
+    variance, alike = lasting_errors(
+        at, np.sqrt(0.9) * white + np.sqrt(0.1) * lasting + jumping, np.ones(len(at), bool)
+    )
+    assert variance == pytest.approx(1.0, rel=0.1)
+    assert np.mean(alike[:6]) == pytest.approx(np.mean(0.1 * 0.9 ** np.arange(1, 7)), rel=0.35)
 
 
 def few_rows(rate_hz: float) -> tuple[np.ndarray, np.ndarray, float, float]:

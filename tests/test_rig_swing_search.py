@@ -15,6 +15,7 @@ from hand_model.rig.swing.compete import PARTS, Variant, _folds, fit_stages
 from hand_model.rig.swing.diagnose import _figures, _searched, _standing, _starts
 from hand_model.rig.swing.fit import Fitted, Task
 from hand_model.rig.swing.simulation import INDEX, PARAMETERS, Lane, Swing, simulate, vector
+from hand_model.rig.swing.variants import asked, begun, variants
 
 
 def test_effects_that_help_only_together_stand_together() -> None:
@@ -33,6 +34,19 @@ def test_effects_that_help_only_together_stand_together() -> None:
         assert "".join(v.key for v, _ in kept) == order
         assert [r["effect"] for r in rejected] == gone
         assert links[-1].error == min(table.values())
+
+
+@pytest.mark.parametrize(("left", "names"), [(0.2, "ab"), (0.3, "a")])
+def test_what_takes_most_of_what_is_left_stands_however_little_that_is(left: float, names: str) -> None:
+    """Less than half of one percent of the declared model's squared error: more than half of what an earlier effect
+    leaves."""
+    table = {"": 10.0, "a": 0.5, "ab": left, "b": 9.9}
+
+    def chain(some: list) -> list[SimpleNamespace]:
+        return [SimpleNamespace(error=table["".join(v.key for v, _ in some[:k])]) for k in range(len(some) + 1)]
+
+    kept, _, _ = _standing([(SimpleNamespace(key=k), None) for k in "ab"], chain)
+    assert "".join(v.key for v, _ in kept) == names
 
 
 def test_an_effect_whose_size_cannot_be_told_leaves_its_place_to_the_next() -> None:
@@ -178,6 +192,31 @@ def test_what_one_effect_hides_is_sought_beside_another(monkeypatch: pytest.Monk
     ]
 
 
+def test_a_second_effect_is_sought_beside_other_forms_of_the_first() -> None:
+    """Friction by the load of the gear and a drive that sags: with the form of friction that alone makes up for the sag,
+    the sag is sought beside the true one."""
+    line = {"inertia": 0.017, "gain": 0.24, "back_emf": 0.21, "damping": 0.018, "coulomb": 0.034}
+    t, random = np.arange(0, 4, 4e-3), np.random.default_rng(0)
+    volts = [3 * np.sin(2.1 * t + k) + 2.5 * np.sin(4.7 * t + 2 * k) for k in range(6)]
+    none, seen = np.zeros(len(t)), np.ones(len(t))
+    lanes = tuple(Lane(f"run_{k}", False, u, 1.0, none, (0.0, 0.0), none, seen) for k, u in enumerate(volts))
+    blank = Swing(lanes, 0.7, 0.0, line, True, 4e-3)
+    q = simulate(blank, np.repeat(vector({**line, "load_gear": 0.08, "sag": 0.12})[None], 6, 0), np.arange(6))
+    q += 1e-3 * random.standard_normal(q.shape)
+    swing = replace(blank, lanes=tuple(replace(lane, position=q[:, k]) for k, lane in enumerate(lanes)))
+    squared = next(v for v in variants(swing) if v.name == "load squared, low speed")
+    start = begun(vector(line), squared)
+    current = fit_stages([swing], [Task(asked(swing, (squared,)), start, (), True)], 12)[0]
+    test, folds = _folds(swing, list(swing.train()))
+    rivals = swing_compete._otherwise([swing], squared, current, test, folds, frozenset())
+    best = min(rivals, key=lambda r: float(r.error.sum()))
+    assert best.variant.key == "drive_sag" and best.fit.theta[INDEX["sag"]] == pytest.approx(0.12, rel=0.1)
+    assert [v.effect for v in best.instead or ()] == ["load_dependent_friction"] and best.instead != (squared,)
+    assert best.fit.cost < 0.5 * current.cost
+    without = swing_compete._otherwise([swing], squared, current, test, folds, frozenset({"drive_sag"}))
+    assert all(r.variant.effect != "drive_sag" for r in without)
+
+
 @pytest.mark.parametrize(("error", "names"), [(3.0, ["stribeck_friction"]), (1.0, [])])
 def test_a_fit_within_the_noise_is_held_to_what_it_predicts(
     monkeypatch: pytest.MonkeyPatch, error: float, names: list[str]
@@ -200,6 +239,7 @@ def test_a_fit_within_the_noise_is_held_to_what_it_predicts(
     monkeypatch.setattr(swing_compete, "freed", lambda swing, theta: swing)
     monkeypatch.setattr(swing_compete, "swings_free", lambda swing: False)
     monkeypatch.setattr(swing_compete, "_exchanged", lambda stages, taken, fit: (taken, fit))
+    monkeypatch.setattr(swing_compete, "_otherwise", lambda *_: [])
     monkeypatch.setattr(
         swing_compete,
         "_folds",

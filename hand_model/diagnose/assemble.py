@@ -27,6 +27,7 @@ from .name.entries import (
 from .name.interval import variance_ratio
 from .name.naming import ALPHA, Named
 from .name.station import SAME_PERIOD, UNREST, Station
+from .name.wander import estimate_wander
 
 UNLIKE_OTHERS = 2.0  # times the wander of the calmest finger
 HARMONICS = 4
@@ -239,13 +240,15 @@ def _shared(ranked: list[tuple[float, Finding]]) -> tuple[Finding, ...]:
 
 
 def _wanders(station: Station, stations: Sequence[Station]) -> bool:
-    """Whether one finger repeats itself clearly less well than the others do: how all of them are is how this hand
-    is."""
-    wander = station.naming.wander
-    if wander is None or not wander.real:
+    """Whether one finger repeats itself clearly less well than the others do, also if its noise lasts as long as theirs:
+    how all of them are is how this hand is."""
+    naming, others = station.naming, [s for s in stations if s.signal == station.signal and s.joint == station.joint]
+    if naming.wander is None or not naming.wander.real:
         return False
-    others = [s.wander for s in stations if (s.signal, s.joint) == (station.signal, station.joint) and s is not station]
-    return station.wander > max(UNREST, UNLIKE_OTHERS * min(others, default=0.0))
+    calmest = min((s.wander for s in others if s is not station), default=0.0)
+    longest = max(s.naming.balance.inflation for s in others)
+    chance = estimate_wander(naming.balance.with_inflation(longest), naming.fit.prediction)
+    return chance is not None and chance.real and station.wander > max(UNREST, UNLIKE_OTHERS * calmest)
 
 
 def _one_clock(ranked: list[tuple[float, Finding]]) -> list[tuple[float, Finding]]:

@@ -22,10 +22,11 @@ from ...identify.start import start_chain
 from ...session import Finger, Mocap, Session, Trial
 from ..name.naming import Naming
 from .drive import count_range
+from .driver_angle import LogAtFrames, driver_angle, foresee, lasting
 from .excursions import with_excursions
 from .ghosts import ghosts
 from .load import transmitted_load
-from .motion import estimate_motion, least_error, position_at, sure_acceleration, told_between
+from .motion import estimate_motion, position_at, sure_acceleration, told_between
 
 Array = NDArray[np.float64]
 
@@ -33,7 +34,6 @@ LEARN_FRAMES = 1500  # of each recording, evenly spaced: enough for a chain, all
 FIRST_SAMPLES, BEGUN = 5, 0.05  # of a recording, and the share of the range from which lost motion is closed
 FARTHEST_M = 6e-3  # a residual beyond is a ghost or a wrong label, no slip
 MOMENT_S = 0.2  # within which a step's moment is known
-SLOW = 0.25  # of the fastest speed: slower, what an angle departs by hardly changes while noise may last
 LEAST_TURN = np.deg2rad(6.0)  # of a joint: a finger that turns less is held, and its axis is noise
 
 
@@ -169,11 +169,11 @@ def linkage_states(
 ) -> tuple[DriveState, ...]:
     """Balance of a follower: its angle [deg] against a quartic of its driver's angle [deg], one state per recording.
 
-    The driver's angle is smoothed (see `_smoothed`): noise in a regressor would bend the map and hide small departures.
+    The driver's angle is smoothed (see `driver_angle`): noise in a regressor would bend the map and hide small departures.
     expected: trial -> times [s] and angles [deg] of the driver as its own station has it (`expected_angles`). logged:
     whether the logs' clocks are believed; the markers tell alone otherwise.
     """
-    states = []
+    states, told = [], []
     name = angles.finger.segments[joint].name
     scale = max(float(np.rad2deg(np.nanmax(np.abs(r.angle_rad[:, joint - 1])))) for r in angles.records)
     for index, record in enumerate(angles.records):
@@ -182,9 +182,11 @@ def linkage_states(
             continue
         t, q = record.mocap.time_s[good], np.rad2deg(record.angle_rad[good])
         log = _at_frames(record, t) if logged else None
-        driver, velocity, acceleration, sure = _smoothed(
-            t, q[:, joint - 1], log, (expected or {}).get(record.trial.name)
-        )
+        foreseen = (expected or {}).get(record.trial.name)
+        told.append((index, record, t, q, log, None if log is None else foresee(t, q[:, joint - 1], log, foreseen)))
+    alike = lasting([(t, course) for _, _, t, _, _, course in told if course is not None])
+    for index, record, t, q, log, course in told:
+        driver, velocity, acceleration, sure = driver_angle(t, q[:, joint - 1], log, course, alike)
         stepped, more = _stepped(index, t, steps)
         declared = np.concatenate([np.stack([(driver / scale) ** k for k in range(5)], axis=-1), stepped], axis=1)
         follower = np.where(sure & _begun(driver) & ~_near(index, t, steps), q[:, joint], np.nan)
@@ -262,20 +264,7 @@ def encoder_states(angles: FingerAngles, low: float, high: float, steps: Sequenc
     return with_excursions(states)
 
 
-@dataclass(frozen=True)
-class _Log:
-    """A log at mocap frames: counts, speed, acceleration (where it is sure) [counts, s], load and what of it
-    grows with speed [raw] or None, inside: where it was running and its rows tell the position. (n,)."""
-
-    counts: Array
-    speed: Array
-    acceleration: Array
-    load: Array | None
-    drag: Array | None
-    inside: NDArray[np.bool_]
-
-
-def _at_frames(record: FlexionAngles, time_s: Array, drifting: bool = True) -> _Log | None:
+def _at_frames(record: FlexionAngles, time_s: Array, drifting: bool = True) -> LogAtFrames | None:
     """The log of a recording at mocap times (n,) [s]; None without a log. drifting: with the clock's own rate, where it
     has one."""
     from ...identify.clock import align
@@ -298,7 +287,7 @@ def _at_frames(record: FlexionAngles, time_s: Array, drifting: bool = True) -> _
         passed = transmitted_load(at, np.interp(at, at[known], current[seen][known]), motion)
         load, drag = (np.interp(then, at, part) for part in passed)
     v, a = (np.interp(then, at, y) for y in (motion.velocity, sure_acceleration(motion)))
-    return _Log(position_at(motion, at, then), v, a, load, drag, told_between(motion, at, counts, then))
+    return LogAtFrames(position_at(motion, at, then), v, a, load, drag, told_between(motion, at, counts, then))
 
 
 def expected_angles(naming: Naming) -> dict[str, tuple[Array, Array]]:
@@ -308,33 +297,6 @@ def expected_angles(naming: Naming) -> dict[str, tuple[Array, Array]]:
         out[state.trial] = state.time_s[mask], naming.fit.prediction[start : start + mask.sum()]
         start += int(mask.sum())
     return out
-
-
-def _smoothed(
-    time_s: Array, angle: Array, log: _Log | None, expected: tuple[Array, Array] | None
-) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
-    """Angle, velocity, acceleration (n,) of a joint with little noise, and where they are sure.
-
-    With a log: what is expected of the encoder, which is far quieter than one frame's markers (else a cubic of it),
-    plus what the angle departs from that, smoothed. Without: the angle by local quadratics, sure only while it moves
-    (at rest its noise would be all there is).
-    """
-    if log is None:
-        motion = estimate_motion(time_s, angle)
-        return motion.position, motion.velocity, motion.acceleration, motion.moving
-    use = log.inside
-    middle, half = float(np.mean(log.counts[use])), float(np.ptp(log.counts[use])) / 2
-    u = (log.counts - middle) / half
-    fitted = np.polynomial.Polynomial.fit(u[use], angle[use], 3)
-    slope = fitted.deriv()(u) / half
-    base = fitted(u)
-    # of what it does not cover, a recording's rest at first, the cubic tells how the angle goes on
-    if expected is not None:
-        at, foreseen = expected
-        base = base + np.interp(time_s, at, foreseen - np.interp(at, time_s, base))
-    slow = np.abs(log.speed) < SLOW * float(np.percentile(np.abs(log.speed), 98))
-    departure, rate = least_error(time_s, angle - base, slow)
-    return base + departure, slope * log.speed + rate, slope * log.acceleration, use
 
 
 def _stepped(record: int, time_s: Array, steps: Sequence[Step]) -> tuple[Array, tuple[str, ...]]:

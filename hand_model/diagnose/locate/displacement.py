@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .angles import Step
-from .blocks import Blocks, across_axis, present_way, share_of_range, way_of_motion
+from .blocks import Blocks, across_axis, present_way, share_of_range, turning_rate, way_of_motion
 
 Array = NDArray[np.float64]
 
@@ -17,7 +17,9 @@ BOTH = (True, False)
 NO_HINGE = "no plain hinge"  # a joint whose markers leave the hinge in step with its angle, by none of the known ways
 NOT_RIGID = "markers leave their rigid segments, by no effect known here"
 CREEP = "creep"  # of a marker or support that moves all the time; a slip has a moment
-UNNAMED = (NO_HINGE, CREEP)  # what no table of effects names
+YIELDING = "yielding"  # of a marker that moves on its segment as the finger moves: a soft mount, a plate that bends
+WITH_FINGER = "moves on what carries it as the finger moves"  # after the marker's name
+UNNAMED = (NO_HINGE, CREEP, YIELDING)  # what no table of effects names
 
 
 @dataclass(frozen=True)
@@ -97,6 +99,7 @@ def candidates_of(blocks: Blocks) -> list[Candidate]:
             columns[:, j] = frame
             flat = columns.reshape(b, 3 * m, 3)
             out += [Candidate(name, int(blocks.body[j]), label, flat, True, lasting) for lasting in BOTH]
+        out += _yielding(blocks, j)
     for k in range(1, int(blocks.body.max()) + 1):
         mine = np.flatnonzero(blocks.body == k)
         arm = blocks.position[:, mine] - blocks.position[:, mine].mean(1, keepdims=True)
@@ -137,6 +140,19 @@ def _frames(blocks: Blocks, body: int, marker: int) -> list[Array]:
     b = len(blocks.residual)
     fixed = np.broadcast_to(np.eye(3), (b, 3, 3))
     return [fixed] if body == 0 else [blocks.rotation[:, marker], fixed]
+
+
+def _yielding(blocks: Blocks, marker: int) -> list[Candidate]:
+    """A marker that moves on its segment with the speed of its joint, the first one for the palm's, or with the motor's
+    pull: friction, which changes sides with the way of motion, and a spring, which grows with the angle."""
+    body = int(blocks.body[marker])
+    joint, own = max(body - 1, 0), _frames(blocks, body, marker)[0]
+    courses = (turning_rate(blocks, joint), present_way(blocks, joint), share_of_range(blocks, joint))
+    columns = np.zeros((*blocks.weight.shape, 3, 9))
+    columns[:, marker] = np.concatenate([own * course[:, None, None] for course in courses], axis=-1)
+    flat = columns.reshape(len(own), -1, 9)
+    picks = ((0, 1, 2), (3, 4, 5), (3, 4, 5, 6, 7, 8))
+    return [Candidate(YIELDING, body, blocks.labels[marker], flat, False, pick=pick) for pick in picks]
 
 
 def _no_hinge(blocks: Blocks, k: int) -> list[Candidate]:

@@ -28,7 +28,7 @@ FEWEST_BLOCKS = 12  # that a smoothing is made of
 DEPARTURES_S = (0.1, 0.25, 0.6, 1.5)  # bandwidths of what departs from a known course
 LASTING_S = 0.3  # over which errors may be alike; what lasts longer is what departs
 GAP = 3.0  # sample intervals, from which readings are no neighbours
-MEDIAN_ERROR = 1.65  # times that of a mean of squares is the standard error of the variance by a median
+FAR, SPREAD, FAR_ERROR = 3.0, 0.9733, 1.05  # deviations, the variance of what is nearer, and its error over that of all
 WHITE: Array = np.zeros(0)  # covariance of errors of which none lasts
 FEW = 100  # pairs of readings, below which nothing is said of how long errors last
 # times the error between two rows is that of a row left out, where the acceleration jumps: it grows with the interval
@@ -134,11 +134,10 @@ def _sure_enough(
     return found, rough
 
 
-def least_error(time_s: Array, values: Array, calm: NDArray[np.bool_] | None = None) -> tuple[Array, Array]:
+def least_error(time_s: Array, values: Array, alike: Array = WHITE) -> tuple[Array, Array]:
     """Values smoothed over time and their rate (n,), at the bandwidth with the least leave-one-out error (Stone 1974);
-    zero where that errs least. calm: (n,) where values hardly change, so that errors alone tell neighbours apart: those
-    that last are followed by a narrow kernel, which the error of what is left out does not show (Hart 1991)."""
-    alike = WHITE if calm is None else lasting_errors(time_s, values, calm)[1]
+    zero where that errs least. alike: covariance (k,) of errors one to k samples apart (`lasting_errors`): those that
+    last are followed by a narrow kernel, which the error of what is left out does not show (Hart 1991)."""
     tried = [(values**2, np.zeros(len(values)), np.zeros(len(values))), *smoothings(time_s, values, alike)]
     _, smooth, rate = min(tried, key=lambda x: float(np.mean(x[0])))
     return smooth, rate
@@ -146,7 +145,9 @@ def least_error(time_s: Array, values: Array, calm: NDArray[np.bool_] | None = N
 
 def lasting_errors(time_s: Array, values: Array, calm: NDArray[np.bool_]) -> tuple[float, Array]:
     """Variance of the errors of values (n,), and covariance (k,) of those one to k samples apart, by the variogram
-    (Matheron 1963) over calm spells; none where they do not plainly last, and no variance where nothing tells it."""
+    (Matheron 1963) over calm spells; none where they do not plainly last, and no variance where nothing tells it.
+    Whether they last is asked of the mean over the first one, two, four, ... samples: what fades slowly is small at
+    each."""
     rises, count = [], 0
     spell = np.cumsum(~calm)  # alike within one
     step = max(float(np.median(np.diff(time_s))), 1e-9)
@@ -157,11 +158,15 @@ def lasting_errors(time_s: Array, values: Array, calm: NDArray[np.bool_]) -> tup
         count = int(pair.sum())
         if count < FEW:
             return 0.0, WHITE
-        # by the median, for a finger may jump off its drive
-        rises.append(0.5 * float(np.median(np.abs(values[k:] - values[:-k])[pair]) / 0.6745) ** 2)
-    whole = float(np.mean(rises[-max(longest // 4, 1) :]))
+        apart = np.abs(values[k:] - values[:-k])[pair]
+        near = apart[apart <= FAR * float(np.median(apart)) / 0.6745]  # for a finger may jump off its drive
+        rises.append(0.5 * float(np.mean(near**2)) / SPREAD)
+    last = max(longest // 4, 1)
+    whole = float(np.mean(rises[-last:]))
     covariance = whole - np.array(rises)
-    if covariance[0] < SURE * MEDIAN_ERROR * whole * np.sqrt(2.0 / count):
+    first = 2 ** np.arange(last.bit_length())  # counts of samples up to as many as tell the whole
+    lasting = np.array([float(np.mean(covariance[:m])) for m in first])
+    if not np.any(lasting > SURE * FAR_ERROR * whole * np.sqrt(2.0 / count * (1.0 / first + 1.0 / last))):
         return whole, WHITE
     faded = np.flatnonzero(covariance <= 0)
     return whole, covariance[: faded[0]] if len(faded) else covariance

@@ -16,8 +16,9 @@ from ..findings import UNWRITTEN, Finding, weighed
 from .angles import FingerAngles, Step
 from .blocks import BLOCK, Blocks
 from .course_amount import course_amount
-from .displacement import NO_HINGE, NOT_RIGID, UNNAMED, MarkerEffect
+from .displacement import NO_HINGE, NOT_RIGID, UNNAMED, WITH_FINGER, YIELDING, MarkerEffect
 from .markers import ALPHA, SMALL, UNHINGED, MarkerNaming
+from .stepwise import HINGE
 from .wobble import side_to_side
 
 Array = NDArray[np.float64]
@@ -30,6 +31,7 @@ CORRECTION = {
 }
 IN_STEP = "the markers leave the hinge's motion in step with the angle"
 DRAWS = 60  # of coefficients, for an interval
+BENDS = 0.1  # of the gain of all that is found: the share of palm markers from which the palm is known to bend
 SWAP_FRAMES = 5  # shorter exchanges are ghosts
 
 
@@ -41,15 +43,23 @@ def marker_findings(angles: FingerAngles, naming: MarkerNaming) -> list[tuple[fl
     groups: dict[tuple[str, int, str | None], list[MarkerEffect]] = {}
     for effect in (e for e in naming.found if not _turning(naming.found, e)):
         groups.setdefault((effect.effect, effect.body, effect.label), []).append(effect)
-    least = _least(naming)
+    least, bends = _least(naming), palm_bends(naming)
     for (name, body, label), members in groups.items():
         small = sum(e.gain for e in members) < least
         if name in UNNAMED or small and not any(e.apart for e in members):
+            continue
+        if bends and name in HINGE and body == 1:  # it carries the first joint's axis with it
             continue
         readings = max(float(naming.blocks.weight.sum()) * 3 * naming.blocks.frames / BLOCK, 1.0)
         moved = float(np.sqrt(sum(e.gain for e in members) / readings))  # over the noise of one reading
         out.append((weighed(moved, _contrast(angles)), _finding(angles, naming, name, body, label, members)))
     return out
+
+
+def palm_bends(naming: MarkerNaming) -> bool:
+    """Whether the palm is not rigid: its markers move on it as the finger does, by a share of all that is found."""
+    yields = sum(e.gain for e in naming.found if e.effect == YIELDING and e.body == 0)
+    return naming.believed and yields > BENDS * sum(e.gain for e in naming.found)
 
 
 def _turning(found: Sequence[MarkerEffect], effect: MarkerEffect) -> bool:
@@ -61,6 +71,15 @@ def _turning(found: Sequence[MarkerEffect], effect: MarkerEffect) -> bool:
 def _least(naming: MarkerNaming) -> float:
     """Gain below which effects are no more than the form of a larger one being another."""
     return max([SMALL * sum(e.gain for e in naming.found), *(e.gain for e in naming.found if e.effect in UNNAMED)])
+
+
+def _shape(effect: MarkerEffect) -> str:
+    """What is said of an effect that no table names."""
+    if effect.effect == NO_HINGE:
+        return f"{NO_HINGE}: {IN_STEP}"
+    if effect.effect == YIELDING:
+        return f"{effect.label} {WITH_FINGER}"
+    return f"{effect.label or 'a support'} moves all the time"
 
 
 def _contrast(angles: FingerAngles) -> float:
@@ -81,16 +100,12 @@ def unexplained(angles: FingerAngles, naming: MarkerNaming) -> list[dict[str, An
         }
 
     if naming.believed:
-        total = sum(e.gain for e in naming.found)
-        return [
-            entry(
-                angles.finger.segments[e.body - 1].name if e.body > 0 else None,
-                e.gain / total,
-                f"{NO_HINGE}: {IN_STEP}" if e.effect == NO_HINGE else f"{e.label or 'a support'} moves all the time",
-            )
-            for e in naming.found
-            if e.effect in UNNAMED
-        ]
+        total, shares = sum(e.gain for e in naming.found), dict[tuple[str | None, str], float]()
+        for e in naming.found:
+            if e.effect in UNNAMED:
+                place = angles.finger.segments[e.body - 1].name if e.body > 0 else None, _shape(e)
+                shares[place] = shares.get(place, 0.0) + e.gain / total
+        return [entry(joint, share, shape) for (joint, shape), share in shares.items()]
     if naming.p_before >= ALPHA:
         return []
     joints = [e.body - 1 for e in (*naming.found, naming.refused) if e is not None and e.effect in UNHINGED]

@@ -97,6 +97,10 @@ class Balance:
         """The same balance with a random level per while in its noise, where that is real."""
         return self._with(wander=wander if wander is not None and wander.real else None)
 
+    def with_inflation(self, inflation: float) -> Balance:
+        """The same balance with noise that lasts as long as an integrated autocorrelation says."""
+        return self._with(inflation=inflation)
+
     def remapped(self, fit: Fit) -> Balance:
         """The same balance with the slope of its map as it is in a fit, for what yields moves along that; of a balance
         without one, itself."""

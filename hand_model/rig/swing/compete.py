@@ -44,11 +44,13 @@ class Round:
 
 @dataclass(frozen=True)
 class _Rival:
-    """A variant added to those taken, its fit and the errors (blocks,) of what is left out."""
+    """A variant added to those taken, its fit and the errors (blocks,) of what is left out. instead: of those taken,
+    where one is in another form."""
 
     variant: Variant
     fit: Fitted
     error: Array
+    instead: tuple[Variant, ...] | None = None
 
 
 def _blocks(swing: Swing, theta: Array, lanes: Sequence[int]) -> Array:
@@ -114,6 +116,8 @@ def compete_swing(
         # a wrong law may fit to within the noise; what it predicts shows it
         if max(current.cost, np.mean(none**2)) <= floor**2:
             break
+        if len(taken) == 1 and stages[-1].driven:
+            rivals = [*rivals, *_otherwise(stages, taken[0], current, test, folds, without)]
         found = _judged(current, none, rivals, test, folds, floor)
         # what one leaves may hide it, as a late drive hides friction: two at once
         if found is None and rivals and not taken:
@@ -131,7 +135,8 @@ def compete_swing(
         if found is None:
             break
         won = rivals[found[0]]
-        taken, current = _exchanged(stages, (*taken, won.variant), won.fit)
+        stand = taken if won.instead is None else won.instead
+        taken, current = _exchanged(stages, (*stand, won.variant), won.fit)
         rounds.append(replace(found[1], fit=current, taken=taken))
     zero = None if ZERO in taken or not swings_free(stages[-1]) else _zero(stages, taken, current, test, folds, floor)
     if zero is not None:
@@ -168,6 +173,29 @@ def _round(stages: Sequence[Swing], taken: tuple[Variant, ...], current: Fitted,
         swing, test, folds, (same, current), [(tasks[k], f) for k, f in zip(order, best, strict=True)]
     )
     return current, none, [_Rival(others[k], f, s) for k, f, s in zip(order, best, scores, strict=True)]
+
+
+def _otherwise(stages: Sequence[Swing], first: Variant, current: Fitted, test: Swing, folds: list,
+               without: frozenset[str]) -> list[_Rival]:  # fmt: skip
+    """The best of another form of the first effect, with no more parameters, and a second effect: alone the form came
+    nearest that makes up for what is still missing."""
+    swing = stages[-1]
+    train, size = tuple(int(i) for i in swing.train()), len(swing.train())
+    every = variants(swing)
+    plain = np.where(np.isin(PARAMETERS, list(first.start)), vector({}), current.theta)
+    forms = [v for v in every if v.effect == first.effect and v.key != first.key and len(v.start) <= len(first.start)]
+    alone = fit_stages(stages, [Task(asked(swing, (v,)), begun(plain, v), (), True) for v in forms], 8)
+    near = sorted(range(len(forms)), key=lambda k: _bic(alone[k], size))[:ALIKE]
+    pairs = [(k, v) for k in near for v in every if v.effect != first.effect and v.effect not in without]
+    tasks = [Task(asked(swing, (forms[k], v)), begun(alone[k].theta, v), (), True) for k, v in pairs]
+    if not tasks:
+        return []
+    fits = fit_stages(stages, tasks, 8)
+    order = _shortlist([v for _, v in pairs], fits)
+    best = _several(swing, [Task(tasks[k].free, fits[k].theta, train) for k in order])
+    none = Task(asked(swing, (first,)), current.theta, train), current
+    scores = _left_out(swing, test, folds, none, [(tasks[k], f) for k, f in zip(order, best, strict=True)])[1]
+    return [_Rival(pairs[k][1], f, s, (forms[pairs[k][0]],)) for k, f, s in zip(order, best, scores, strict=True)]
 
 
 @dataclass(frozen=True)

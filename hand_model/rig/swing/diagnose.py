@@ -31,6 +31,7 @@ from .variants import Variant, all_free, begun, free_declared
 RESAMPLES = 500
 MOST_SEARCHES = 2
 SMALL = 0.005  # of the declared squared error: less beside an earlier effect may be its form being another
+HALVED = 0.5  # of the error before: what leaves less says more than that
 Taken = tuple[Variant, Round]
 Ends = Mapping[str, tuple[float, float]]
 
@@ -211,8 +212,8 @@ def _falls(chain: Sequence[Link]) -> list[bool]:
 
 def _better(one: Link, other: Link, declared: Link) -> bool:
     """Whether one model predicts the recordings held out better than another; beside earlier effects only what takes a
-    share of the declared model's squared error is more than their form being another."""
-    least = 0.0 if other is declared else SMALL * declared.error**2
+    share of the declared model's squared error, or most of what they left, is more than their form being another."""
+    least = 0.0 if other is declared or one.error < HALVED * other.error else SMALL * declared.error**2
     return one.error < (1.0 - LEAST_GAIN) * other.error and other.error**2 - one.error**2 >= least
 
 
