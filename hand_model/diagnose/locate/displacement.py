@@ -17,7 +17,8 @@ BOTH = (True, False)
 NO_HINGE = "no plain hinge"  # a joint whose markers leave the hinge in step with its angle, by none of the known ways
 NOT_RIGID = "markers leave their rigid segments, by no effect known here"
 CREEP = "creep"  # of a marker or support that moves all the time; a slip has a moment
-YIELDING = "yielding"  # of a marker that moves on its segment as the finger moves: a soft mount, a plate that bends
+# of a marker or support that moves on its segment as the finger moves: a soft mount, a plate that bends
+YIELDING = "yielding"
 WITH_FINGER = "moves on what carries it as the finger moves"  # after the marker's name
 UNNAMED = (NO_HINGE, CREEP, YIELDING)  # what no table of effects names
 
@@ -103,13 +104,17 @@ def candidates_of(blocks: Blocks) -> list[Candidate]:
     for k in range(1, int(blocks.body.max()) + 1):
         mine = np.flatnonzero(blocks.body == k)
         arm = blocks.position[:, mine] - blocks.position[:, mine].mean(1, keepdims=True)
-        for frame in _frames(blocks, k, int(mine[0])):
+        own, fixed = _frames(blocks, k, int(mine[0]))
+        for frame in (own, fixed):
             turned = np.stack([np.cross(frame[:, None, :, i], arm) for i in range(3)], axis=-1)
             columns = np.zeros((b, m, 3, 6))
             columns[:, mine, :, :3] = frame[:, None]
             columns[:, mine, :, 3:] = turned
             flat = columns.reshape(b, 3 * m, 6)
             out += [Candidate("support_slip", k, None, flat, True, lasting) for lasting in BOTH]
+            if frame is not fixed:  # a soft support leans as fast as it is carried
+                leaning = flat * turning_rate(blocks, k - 1)[:, None, None]
+                out.append(Candidate(YIELDING, k, None, leaning, False))
         out += [*_no_hinge(blocks, k), *_any_motion(blocks, k)]
     return out
 

@@ -78,7 +78,7 @@ def _shape(effect: MarkerEffect) -> str:
     if effect.effect == NO_HINGE:
         return f"{NO_HINGE}: {IN_STEP}"
     if effect.effect == YIELDING:
-        return f"{effect.label} {WITH_FINGER}"
+        return f"{effect.label or 'a support'} {WITH_FINGER}"
     return f"{effect.label or 'a support'} moves all the time"
 
 

@@ -15,13 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .blocks import Blocks, project
-from .displacement import NO_HINGE, Candidate, MarkerEffect
+from .displacement import NO_HINGE, YIELDING, Candidate, MarkerEffect
 from .lasting_noise import LastingNoise
 
 Array = NDArray[np.float64]
 
 HINGE = ("joint_wobble", "moving_centre")
 REACH = 0.06  # m: the other axis of a wobble passes nearer to its joint; farther, its centre travels
+SLIGHT = 0.05  # of what is found
 MOSTLY = 0.7  # share of what any motion in step with the angle explains
 CELLS = 300  # moments that are tried first
 PROMISING = 0.5  # of the best candidate's evidence: those whose moment is settled block by block
@@ -139,12 +140,15 @@ class Stepwise:
 
     def next(self, found: Sequence[MarkerEffect], known: bool = False) -> MarkerEffect:
         """The likeliest further effect. Any motion in step with the angle is what no known form explains: where one
-        takes most of it, it is that one, seen to first order. known: only what has a form."""
+        takes most of it, it is that one, seen to first order. What a marker yields that is small beside the others may be
+        no more than their form being another. known: only what has a form."""
         beside = self._beside(found)
         hinges = {e.body for e in found if e.effect in HINGE}
         tried = self._tried(
             beside, [c for c in self.candidates if c.effect != NO_HINGE or not (known or c.body in hinges)]
         )
+        least = SLIGHT * sum(e.gain for e in found)
+        tried = [t for t in tried if t.candidate.effect != YIELDING or t.gain >= least]
         best = max(tried, key=lambda t: t.evidence)
         if best.candidate.effect == NO_HINGE:
             named = max(
