@@ -27,6 +27,7 @@ CELLS = 3.0  # of a grid in which what is likely lies: fewer, and a finer one is
 FAR = 40.0  # log likelihood below the best, from which a course counts for nothing
 DRAWS = 200  # of each course's amplitudes
 QUANTILES = (0.025, 0.5, 0.975)
+WITHIN = 3.84  # twice the log likelihood that a size may bring less than the likeliest, at 95 %
 
 
 @dataclass(frozen=True)
@@ -63,13 +64,19 @@ class _Course:
 @dataclass(frozen=True)
 class _Fitted:
     """A course about one direction [rad]: twice the log likelihood that it brings, its coefficients (f,) and their
-    precision (f, f)."""
+    precision (f, f); how likely it is before that."""
 
     course: _Course
     direction_rad: float
     gain: float
     coefficients: Array
     precision: Array
+    prior: float
+
+    @property
+    def likely(self) -> float:
+        """Twice the log likelihood, with what is held of it before."""
+        return self.gain + 2 * float(np.log(self.prior))
 
 
 def course_amount(naming: MarkerNaming, effect: MarkerEffect) -> tuple[float, list[float]]:
@@ -83,8 +90,8 @@ def course_amount(naming: MarkerNaming, effect: MarkerEffect) -> tuple[float, li
     directions, turn = np.linspace(0, np.pi, DIRECTIONS, endpoint=False), np.pi / DIRECTIONS
     fitted = [f for c in orders for f in readings.fit(c, directions)]
     for _ in range(ZOOMS):
-        best = max(fitted, key=lambda f: f.gain)
-        likely = np.exp(0.5 * (np.array([f.gain for f in fitted if f.course == best.course]) - best.gain))
+        best = max(fitted, key=lambda f: f.likely)
+        likely = np.exp(0.5 * (np.array([f.likely for f in fitted if f.course == best.course]) - best.likely))
         if likely.sum() > CELLS:
             break
         # the likeliest place of the grid and its neighbours give way to a finer grid
@@ -96,7 +103,12 @@ def course_amount(naming: MarkerNaming, effect: MarkerEffect) -> tuple[float, li
         fitted = [f for f in fitted if not _beside(f, best, step, turn)]
         fitted += [f for c in near for f in readings.fit(c, best.direction_rad + finer * turn, ZOOM)]
         step, turn = step * ZOOM, turn * ZOOM
-    return _averaged(fitted, readings.loudness(effect, max(f.gain for f in fitted)))
+    loud = readings.loudness(effect, max(f.likely for f in fitted))
+    value, interval = _averaged(fitted, loud)
+    if effect.effect == "joint_wobble":
+        return value, interval
+    low, high = _told([*fitted, *_finer(readings, orders, fitted)], loud)
+    return value, [min(low, interval[0]), max(high, interval[1])]
 
 
 class _Readings:
@@ -139,8 +151,8 @@ class _Readings:
             precision = turned.T @ square @ turned
             precision += 1e-9 * np.trace(precision) * np.eye(len(precision))
             found = np.linalg.solve(precision, turned.T @ right)
-            gain = float(found @ turned.T @ right) + 2 * float(np.log(course.prior * share))
-            out.append(_Fitted(course, direction, gain, found, precision))
+            gain = float(found @ turned.T @ right)
+            out.append(_Fitted(course, direction, gain, found, precision, course.prior * share))
         return out
 
 
@@ -183,22 +195,55 @@ def _beside(fitted: _Fitted, best: _Fitted, step: float, turn: float) -> bool:
 
 def _averaged(fitted: Sequence[_Fitted], loud: float) -> tuple[float, list[float]]:
     """Median and interval of the size. loud: variance over that of the noise: what no course explains counts as noise."""
-    best = max(f.gain for f in fitted)
-    rng, sizes, weights = np.random.default_rng(0), [], []
-    for f in fitted:
-        if 0.5 * (best - f.gain) > FAR * loud:
-            continue
-        drawn = rng.multivariate_normal(f.coefficients, loud * np.linalg.inv(f.precision), DRAWS, method="eigh")
+    best = max(f.likely for f in fitted)
+    sizes, weights = [], []
+    for f, drawn in _drawn([f for f in fitted if 0.5 * (best - f.likely) <= FAR * loud], loud):
         size, k = f.course.size(drawn), len(f.coefficients)
         prior = size**-1.0 if k == 1 else 1.0 / (2 * np.pi * size * np.linalg.norm(drawn, axis=-1))
         volume = 0.5 * k * np.log(2 * np.pi * loud) - 0.5 * np.linalg.slogdet(f.precision)[1]
-        weights.append(np.exp(0.5 * (f.gain - best) / loud + volume) * prior)
+        weights.append(np.exp(0.5 * (f.likely - best) / loud + volume) * prior)
         sizes.append(size)
     size, weight = np.concatenate(sizes), np.concatenate(weights)
     order = np.argsort(size)
     below = np.cumsum(weight[order]) / weight.sum()
     low, middle, high = (float(size[order][min(int(np.searchsorted(below, q)), len(size) - 1)]) for q in QUANTILES)
     return middle, [low, high]
+
+
+def _told(fitted: Sequence[_Fitted], loud: float) -> tuple[float, float]:
+    """Least and greatest size that some course has within 95 % by likelihood alone (Wilks 1938): what travels evenly and
+    what goes out and back explain the same readings, for another centre takes most of the former up, and how much is
+    held of either before decides nothing."""
+    best, sizes = max(f.gain for f in fitted), []
+    for f, drawn in _drawn([f for f in fitted if best - f.gain <= WITHIN * loud], loud):
+        off = drawn - f.coefficients
+        lost = (best - f.gain + np.einsum("di,ij,dj->d", off, f.precision, off)) / loud
+        sizes.append(f.course.size(drawn[lost <= WITHIN]))
+    size = np.concatenate(sizes)
+    return float(size.min()), float(size.max())
+
+
+def _finer(readings: _Readings, courses: Sequence[_Course], fitted: Sequence[_Fitted]) -> list[_Fitted]:
+    """Every course about directions near its likeliest one, which the grid may miss by more than readings allow."""
+    out = []
+    for course in courses:
+        best = max((f for f in fitted if f.course == course), key=lambda f: f.gain)
+        for zoom in range(ZOOMS):
+            turns = np.linspace(-1.0, 1.0, int(2 / ZOOM) + 1) * np.pi / DIRECTIONS * ZOOM**zoom
+            near = readings.fit(course, best.direction_rad + turns)
+            best = max(near, key=lambda f: f.gain)
+            out += near
+    return out
+
+
+def _drawn(fitted: Sequence[_Fitted], loud: float) -> list[tuple[_Fitted, Array]]:
+    """Courses with coefficients (1 + DRAWS, f) of each: its own, and some drawn about them."""
+    rng, out = np.random.default_rng(0), []
+    for f in fitted:
+        covariance = loud * np.linalg.inv(f.precision)
+        drawn = rng.multivariate_normal(f.coefficients, covariance, DRAWS, method="eigh")
+        out.append((f, np.concatenate([f.coefficients[None], drawn])))
+    return out
 
 
 def _orthonormal(columns: Array, whole: Array) -> Array:
