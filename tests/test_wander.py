@@ -5,11 +5,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from test_diagnose import drive, planted
 
+from hand_model.diagnose.assemble import _wanders
 from hand_model.diagnose.locate.measurement import echoes_command, frozen, is_measured, rests_on_command
 from hand_model.diagnose.name.balance import Balance
 from hand_model.diagnose.name.selection import name_effects
@@ -248,3 +250,19 @@ def test_a_current_that_stands_still_in_motion_was_not_read(level: float | None,
     at_rest = current.copy()
     at_rest[160:190] = 25.0  # a controller holds
     assert not frozen(at_rest, moving)[150:200].any()
+
+
+def test_one_finger_wanders_only_if_noise_that_lasts_as_in_the_others_does_not_say_as_much():
+    def station(finger: str, seed: int, inflation: float, extra=lambda s: 0.0) -> SimpleNamespace:
+        balance = Balance(drive(seed, extra)).with_inflation(inflation)
+        fit = balance.fit()
+        naming = SimpleNamespace(balance=balance, fit=fit, wander=estimate_wander(balance, fit.prediction))
+        wander = naming.wander.deviation / balance.sigma
+        return SimpleNamespace(finger=finger, signal="current", joint=None, naming=naming, wander=wander)
+
+    restless, calm = station("index", 3, 1.0, walk(3, 3.0)), station("ring", 4, 1.0)
+    assert restless.naming.wander.real and _wanders(restless, [restless, calm])
+    assert _wanders(restless, [restless, station("ring", 4, 1.5)])
+    assert not _wanders(calm, [restless, calm])
+    lasting = station("ring", 4, 300.0)  # so long that it says all
+    assert not _wanders(restless, [restless, lasting])
