@@ -311,7 +311,7 @@ def test_a_driver_is_as_quiet_as_its_encoder_where_nothing_is_expected_yet(cover
     told = (t >= covered) & (x > 0.05 * np.ptp(x) * (covered > 0))
     seen = truth + np.random.default_rng(4).normal(0, 1.0, len(x))
     foreseen = foresee(t, seen, log, (t[told], truth[told]))
-    driver, *_ = driver_angle(t, seen, log, foreseen, lasting([(t, foreseen)]))
+    driver, *_ = driver_angle(t, seen, foreseen, lasting([(t, foreseen)]))
     assert np.std((driver - truth)[t > 2.5]) < 0.1  # of 1 deg a frame
 
 

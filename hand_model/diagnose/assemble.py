@@ -242,11 +242,11 @@ def _shared(ranked: list[tuple[float, Finding]]) -> tuple[Finding, ...]:
 def _wanders(station: Station, stations: Sequence[Station]) -> bool:
     """Whether one finger repeats itself clearly less well than the others do, also if its noise lasts as long as theirs:
     how all of them are is how this hand is."""
-    naming, others = station.naming, [s for s in stations if s.signal == station.signal and s.joint == station.joint]
+    naming, same = station.naming, [s for s in stations if s.signal == station.signal and s.joint == station.joint]
     if naming.wander is None or not naming.wander.real:
         return False
-    calmest = min((s.wander for s in others if s is not station), default=0.0)
-    longest = max(s.naming.balance.inflation for s in others)
+    calmest = min((s.wander for s in same if s is not station), default=0.0)
+    longest = max(s.naming.balance.inflation for s in same)
     chance = estimate_wander(naming.balance.with_inflation(longest), naming.fit.prediction)
     return chance is not None and chance.real and station.wander > max(UNREST, UNLIKE_OTHERS * calmest)
 

@@ -182,11 +182,13 @@ def linkage_states(
             continue
         t, q = record.mocap.time_s[good], np.rad2deg(record.angle_rad[good])
         log = _at_frames(record, t) if logged else None
-        foreseen = (expected or {}).get(record.trial.name)
-        told.append((index, record, t, q, log, None if log is None else foresee(t, q[:, joint - 1], log, foreseen)))
+        course = None
+        if log is not None:
+            course = foresee(t, q[:, joint - 1], log, (expected or {}).get(record.trial.name))
+        told.append((index, record, t, q, log, course))
     alike = lasting([(t, course) for _, _, t, _, _, course in told if course is not None])
     for index, record, t, q, log, course in told:
-        driver, velocity, acceleration, sure = driver_angle(t, q[:, joint - 1], log, course, alike)
+        driver, velocity, acceleration, sure = driver_angle(t, q[:, joint - 1], course, alike)
         stepped, more = _stepped(index, t, steps)
         declared = np.concatenate([np.stack([(driver / scale) ** k for k in range(5)], axis=-1), stepped], axis=1)
         follower = np.where(sure & _begun(driver) & ~_near(index, t, steps), q[:, joint], np.nan)

@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 DIRECTIONS = 24  # across the axis, over half a turn
 WAVES = (0.75, 6.0, 43)  # half waves over the range: least, most, how many between
 ZOOM, ZOOMS = 0.2, 4  # what is told better than the grids: how much finer, how often at most
+FINER = np.linspace(-1.0, 1.0, int(2 / ZOOM) + 1)  # places of a finer grid, in steps of the coarser
 CELLS = 3.0  # of a grid in which what is likely lies: fewer, and a finer one is needed
 FAR = 40.0  # log likelihood below the best, from which a course counts for nothing
 DRAWS = 200  # of each course's amplitudes
@@ -95,13 +96,12 @@ def course_amount(naming: MarkerNaming, effect: MarkerEffect) -> tuple[float, li
         if likely.sum() > CELLS:
             break
         # the likeliest place of the grid and its neighbours give way to a finer grid
-        finer = np.linspace(-1.0, 1.0, int(2 / ZOOM) + 1)
         near = [best.course]
         if best.course.kind == "wave":
             weight = best.course.prior * ZOOM
-            near = [_Course("wave", best.course.order + s * step, best.course.own, weight, (0.0, 0.0)) for s in finer]
+            near = [_Course("wave", best.course.order + s * step, best.course.own, weight, (0.0, 0.0)) for s in FINER]
         fitted = [f for f in fitted if not _beside(f, best, step, turn)]
-        fitted += [f for c in near for f in readings.fit(c, best.direction_rad + finer * turn, ZOOM)]
+        fitted += [f for c in near for f in readings.fit(c, best.direction_rad + FINER * turn, ZOOM)]
         step, turn = step * ZOOM, turn * ZOOM
     loud = readings.loudness(effect, max(f.likely for f in fitted))
     value, interval = _averaged(fitted, loud)
@@ -229,8 +229,8 @@ def _finer(readings: _Readings, courses: Sequence[_Course], fitted: Sequence[_Fi
     for course in courses:
         best = max((f for f in fitted if f.course == course), key=lambda f: f.gain)
         for zoom in range(ZOOMS):
-            turns = np.linspace(-1.0, 1.0, int(2 / ZOOM) + 1) * np.pi / DIRECTIONS * ZOOM**zoom
-            near = readings.fit(course, best.direction_rad + turns)
+            turn = np.pi / DIRECTIONS * ZOOM**zoom
+            near = readings.fit(course, best.direction_rad + FINER * turn)
             best = max(near, key=lambda f: f.gain)
             out += near
     return out

@@ -102,19 +102,10 @@ def candidates_of(blocks: Blocks) -> list[Candidate]:
             out += [Candidate(name, int(blocks.body[j]), label, flat, True, lasting) for lasting in BOTH]
         out += _yielding(blocks, j)
     for k in range(1, int(blocks.body.max()) + 1):
-        mine = np.flatnonzero(blocks.body == k)
-        arm = blocks.position[:, mine] - blocks.position[:, mine].mean(1, keepdims=True)
-        own, fixed = _frames(blocks, k, int(mine[0]))
-        for frame in (own, fixed):
-            turned = np.stack([np.cross(frame[:, None, :, i], arm) for i in range(3)], axis=-1)
-            columns = np.zeros((b, m, 3, 6))
-            columns[:, mine, :, :3] = frame[:, None]
-            columns[:, mine, :, 3:] = turned
-            flat = columns.reshape(b, 3 * m, 6)
-            out += [Candidate("support_slip", k, None, flat, True, lasting) for lasting in BOTH]
-            if frame is not fixed:  # a soft support leans as fast as it is carried
-                leaning = flat * turning_rate(blocks, k - 1)[:, None, None]
-                out.append(Candidate(YIELDING, k, None, leaning, False))
+        own, fixed = _support_motions(blocks, k)
+        out += [Candidate("support_slip", k, None, flat, True, lasting) for flat in (own, fixed) for lasting in BOTH]
+        # a soft support leans as fast as it is carried
+        out.append(Candidate(YIELDING, k, None, own * turning_rate(blocks, k - 1)[:, None, None], False))
         out += [*_no_hinge(blocks, k), *_any_motion(blocks, k)]
     return out
 
@@ -145,6 +136,20 @@ def _frames(blocks: Blocks, body: int, marker: int) -> list[Array]:
     b = len(blocks.residual)
     fixed = np.broadcast_to(np.eye(3), (b, 3, 3))
     return [fixed] if body == 0 else [blocks.rotation[:, marker], fixed]
+
+
+def _support_motions(blocks: Blocks, k: int) -> list[Array]:
+    """Shifts and turns (b, 3m, 6) of a segment's support about its middle, in each frame of `_frames`."""
+    b, m = blocks.weight.shape
+    mine = np.flatnonzero(blocks.body == k)
+    arm = blocks.position[:, mine] - blocks.position[:, mine].mean(1, keepdims=True)
+    out = []
+    for frame in _frames(blocks, k, int(mine[0])):
+        columns = np.zeros((b, m, 3, 6))
+        columns[:, mine, :, :3] = frame[:, None]
+        columns[:, mine, :, 3:] = np.stack([np.cross(frame[:, None, :, i], arm) for i in range(3)], axis=-1)
+        out.append(columns.reshape(b, 3 * m, 6))
+    return out
 
 
 def _yielding(blocks: Blocks, marker: int) -> list[Candidate]:

@@ -32,13 +32,15 @@ class LogAtFrames:
 
 @dataclass(frozen=True)
 class Foreseen:
-    """The course of a joint's angle as far as its encoder tells it. base: angle (n,) [deg]; slope: (n,) deg per count;
-    departure: (n,) [deg] of the angle from that; slow: (n,) where it hardly changes."""
+    """The course (n,) of a joint's angle as far as its encoder tells it: angle, rate, acceleration [deg, s]. departure:
+    of the seen angle from that; slow: where it hardly changes; sure: where the encoder tells."""
 
-    base: Array
-    slope: Array
+    angle: Array
+    rate: Array
+    acceleration: Array
     departure: Array
     slow: NDArray[np.bool_]
+    sure: NDArray[np.bool_]
 
 
 def foresee(time_s: Array, angle: Array, log: LogAtFrames, expected: tuple[Array, Array] | None) -> Foreseen:
@@ -47,13 +49,13 @@ def foresee(time_s: Array, angle: Array, log: LogAtFrames, expected: tuple[Array
     middle, half = float(np.mean(log.counts[use])), float(np.ptp(log.counts[use])) / 2
     u = (log.counts - middle) / half
     fitted = np.polynomial.Polynomial.fit(u[use], angle[use], 3)
-    base = fitted(u)
+    base, slope = fitted(u), fitted.deriv()(u) / half
     # of what it does not cover, a recording's rest at first, the cubic tells how the angle goes on
     if expected is not None:
         at, foreseen = expected
         base = base + np.interp(time_s, at, foreseen - np.interp(at, time_s, base))
     slow = np.abs(log.speed) < SLOW * float(np.percentile(np.abs(log.speed), 98))
-    return Foreseen(base, fitted.deriv()(u) / half, angle - base, slow)
+    return Foreseen(base, slope * log.speed, slope * log.acceleration, angle - base, slow, use)
 
 
 def lasting(told: Sequence[tuple[Array, Foreseen]]) -> Array:
@@ -69,20 +71,15 @@ def lasting(told: Sequence[tuple[Array, Foreseen]]) -> Array:
 
 
 def driver_angle(
-    time_s: Array, angle: Array, log: LogAtFrames | None, course: Foreseen | None, alike: Array
+    time_s: Array, angle: Array, course: Foreseen | None, alike: Array
 ) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
     """Angle, velocity, acceleration (n,) of a joint with little noise, and where they are sure.
 
-    With a log: its course plus what the angle departs from that, smoothed (alike: covariance (k,) of its errors).
-    Without: the angle by local quadratics, sure only while it moves (at rest its noise would be all there is).
+    With a course: that plus what the angle departs from it, smoothed (alike: covariance (k,) of its errors).
+    Without one: the angle by local quadratics, sure only while it moves (at rest its noise would be all there is).
     """
-    if log is None or course is None:
+    if course is None:
         motion = estimate_motion(time_s, angle)
         return motion.position, motion.velocity, motion.acceleration, motion.moving
     departure, rate = least_error(time_s, course.departure, alike)
-    return (
-        course.base + departure,
-        course.slope * log.speed + rate,
-        course.slope * log.acceleration,
-        log.inside,
-    )
+    return course.angle + departure, course.rate + rate, course.acceleration, course.sure

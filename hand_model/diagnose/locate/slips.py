@@ -59,7 +59,7 @@ def marker_findings(angles: FingerAngles, naming: MarkerNaming) -> list[tuple[fl
 def palm_bends(naming: MarkerNaming) -> bool:
     """Whether the palm is not rigid: its markers move on it as the finger does, by a share of all that is found."""
     yields = sum(e.gain for e in naming.found if e.effect == YIELDING and e.body == 0)
-    return naming.believed and yields > BENDS * sum(e.gain for e in naming.found)
+    return yields > BENDS * sum(e.gain for e in naming.found)
 
 
 def _turning(found: Sequence[MarkerEffect], effect: MarkerEffect) -> bool:
@@ -77,9 +77,7 @@ def _shape(effect: MarkerEffect) -> str:
     """What is said of an effect that no table names."""
     if effect.effect == NO_HINGE:
         return f"{NO_HINGE}: {IN_STEP}"
-    if effect.effect == YIELDING:
-        return f"{effect.label or 'a support'} {WITH_FINGER}"
-    return f"{effect.label or 'a support'} moves all the time"
+    return f"{effect.label or 'a support'} {WITH_FINGER if effect.effect == YIELDING else 'moves all the time'}"
 
 
 def _contrast(angles: FingerAngles) -> float:

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 HINGE = ("joint_wobble", "moving_centre")
 REACH = 0.06  # m: the other axis of a wobble passes nearer to its joint; farther, its centre travels
-SLIGHT = 0.05  # of what is found
+SLIGHT = 0.05  # of what all found effects bring: what a marker yields counts from there
 MOSTLY = 0.7  # share of what any motion in step with the angle explains
 CELLS = 300  # moments that are tried first
 PROMISING = 0.5  # of the best candidate's evidence: those whose moment is settled block by block

@@ -180,8 +180,7 @@ def _otherwise(stages: Sequence[Swing], first: Variant, current: Fitted, test: S
     """The best of another form of the first effect, with no more parameters, and a second effect: alone the form came
     nearest that makes up for what is still missing."""
     swing = stages[-1]
-    train, size = tuple(int(i) for i in swing.train()), len(swing.train())
-    every = variants(swing)
+    size, every = len(swing.train()), variants(swing)
     plain = np.where(np.isin(PARAMETERS, list(first.start)), vector({}), current.theta)
     forms = [v for v in every if v.effect == first.effect and v.key != first.key and len(v.start) <= len(first.start)]
     alone = fit_stages(stages, [Task(asked(swing, (v,)), begun(plain, v), (), True) for v in forms], 8)
@@ -190,12 +189,22 @@ def _otherwise(stages: Sequence[Swing], first: Variant, current: Fitted, test: S
     tasks = [Task(asked(swing, (forms[k], v)), begun(alone[k].theta, v), (), True) for k, v in pairs]
     if not tasks:
         return []
+    best = _nearest(stages, swing, tasks, [v for _, v in pairs], (first,), current, test, folds)
+    return [_Rival(pairs[k][1], fit, error, (forms[pairs[k][0]],)) for k, fit, error in best]
+
+
+def _nearest(stages: Sequence[Swing], swing: Swing, tasks: Sequence[Task], added: Sequence[Variant],
+             taken: tuple[Variant, ...], current: Fitted, test: Swing, folds: list,
+             ) -> list[tuple[int, Fitted, Array]]:  # fmt: skip
+    """Which of the tasks fit best, one after the other on stages (added: what each adds), their last fit to `swing` and
+    the errors (blocks,) of what is left out, beside those taken (current: fit of them)."""
+    train = tuple(int(i) for i in swing.train())
     fits = fit_stages(stages, tasks, 8)
-    order = _shortlist([v for _, v in pairs], fits)
+    order = _shortlist(added, fits)
     best = _several(swing, [Task(tasks[k].free, fits[k].theta, train) for k in order])
-    none = Task(asked(swing, (first,)), current.theta, train), current
+    none = Task(asked(swing, taken), current.theta, train), current
     scores = _left_out(swing, test, folds, none, [(tasks[k], f) for k, f in zip(order, best, strict=True)])[1]
-    return [_Rival(pairs[k][1], f, s, (forms[pairs[k][0]],)) for k, f, s in zip(order, best, scores, strict=True)]
+    return list(zip(order, best, scores, strict=True))
 
 
 @dataclass(frozen=True)
@@ -216,17 +225,12 @@ def _pairs(stages: Sequence[Swing], rivals: Sequence[_Rival], current: Fitted, t
     found += [(near[0], v) for v in variants(swing) if v.effect not in without and v not in [r.variant for r in near]]
     apart = [(a, v) for a, v in found if v.effect != a.variant.effect and not set(v.start) & set(a.variant.start)]
     tasks = [Task(asked(swing, (a.variant, v)), begun(a.fit.theta, v), (), True) for a, v in apart]
-    fits = fit_stages([freed(s, near[0].fit.theta) for s in stages], tasks, 8)
     together = [Variant(f"{a.variant.effect} and {v.effect}", f"{a.variant.key} and {v.key}", {**a.variant.start, **v.start})
                 for a, v in apart]  # fmt: skip
-    order = _shortlist(together, fits)
-    train = tuple(int(i) for i in swing.train())
-    best = _several(swing, [Task(tasks[k].free, fits[k].theta, train) for k in order])
-    none = Task(asked(swing, ()), current.theta, train), current
-    scores = _left_out(swing, test, folds, none, [(tasks[k], f) for k, f in zip(order, best, strict=True)])[1]
+    best = _nearest([freed(s, near[0].fit.theta) for s in stages], swing, tasks, together, (), current, test, folds)
     return [
-        _Two((apart[k][0].variant, apart[k][1]), _Rival(together[k], f, s), apart[k][0].fit)
-        for k, f, s in zip(order, best, scores, strict=True)
+        _Two((apart[k][0].variant, apart[k][1]), _Rival(together[k], fit, error), apart[k][0].fit)
+        for k, fit, error in best
     ]
 
 
