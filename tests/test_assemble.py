@@ -24,6 +24,7 @@ from hand_model.diagnose.locate.answers import Answers
 from hand_model.diagnose.locate.command import CommandFacts
 from hand_model.diagnose.locate.displacement import NO_HINGE
 from hand_model.diagnose.locate.preload import COMPARISON
+from hand_model.diagnose.locate.strokes import Loss
 from hand_model.effects import effect
 
 
@@ -243,7 +244,7 @@ def test_a_loss_of_speed_is_named_once_and_not_where_the_current_is_cut_or_frict
     term = SimpleNamespace(effect=effect(named), shape={"limit": 60.0})
     naming = SimpleNamespace(fit=SimpleNamespace(terms=(term,)))
     kept = [SimpleNamespace(term=term)]
-    facts = {"index": CommandFacts(Answers(np.zeros(0), np.zeros(0), 0.018), *[float("nan")] * 5)}
+    facts = {"index": CommandFacts(Answers(np.zeros(0), np.zeros(0), 0.018), *[Loss(*[float("nan")] * 3)] * 2)}
     station = SimpleNamespace(actuator="index", believed=believed, kept=kept, naming=naming, parameters={0: figures})
     mine, other = (
         (1.0, finding("drive_sag", "index", "command", sag=0.1)),

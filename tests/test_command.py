@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from hand_model.diagnose.locate.answers import Answers, lateness
-from hand_model.diagnose.locate.command import command_facts, command_findings, sags_beneath, with_lateness
+from hand_model.diagnose.locate.command import command_facts, command_findings, delays, sags_beneath, with_lateness
 from hand_model.diagnose.locate.simulated import SimulatedDrive
+from hand_model.diagnose.locate.strokes import Loss, later, strokes_of
 from hand_model.effects.base import DriveState
 
 STEP_S, VISCOUS, LIMIT = 0.018, 0.15, 66.0
+LOADS = 30.0  # range [raw]
 COMMANDED = {40.0: 25.0, 120.0: 60.0, 255.0: 100.0}  # raw -> %/s
 
 
@@ -125,29 +127,52 @@ def test_drives_that_lose_speed_alike_are_of_a_kind_and_one_that_loses_more_sags
     assert sags(index=sagging, ring=hastier) == set()  # controllers of this hand err by as much
 
 
+def test_what_a_slow_controller_still_settles_is_no_sag() -> None:
+    """Under load it falls behind as a stroke begins, by less and less as it goes."""
+
+    def settling(x: float, full: float) -> float:
+        return full * (1 - 0.008 * load(x) * np.exp(-x / 12))
+
+    assert sags(index=settling, ring=healthy) == set()
+
+
+def test_of_the_later_half_of_strokes_the_speed_is_read_there() -> None:
+    state, current = strokes(healthy, 0)
+    whole = strokes_of((state,), (current,))
+    halves = later(whole)
+    assert len(halves) == len(whole)
+    for half, stroke in zip(halves, whole, strict=True):
+        assert half.time_s[-1] == stroke.time_s[-1] and half.position[-1] == stroke.position[-1]
+        assert len(half.time_s) == pytest.approx(len(stroke.time_s) / 2, abs=1)
+    assert (
+        later([replace(s, time_s=s.time_s[:8], position=s.position[:8]) for s in whole]) == []
+    )  # four rows tell no speed
+
+
 @pytest.mark.parametrize(
-    ("lost", "sag_t", "settled_t", "usual", "told"),
+    ("lost", "sag_t", "later_t", "usual", "told"),
     [
         (0.1, 8, 16, 0.0, True),
         (0.1, 16, 8, 0.0, True),
         (0.1, 3, 30, 0.0, False),  # one of the readings may be chance
         (0.028, 24, 15, 0.0, True),
         (0.028, 7, 30, 0.0, True),
-        (0.028, 24, 15, 0.013, False),  # such controllers lose as much
-        (0.012, 24, 15, 0.0, False),  # any controller may lose as much
+        (0.028, 24, 15, 0.015, False),  # such controllers lose as much
+        (0.006, 24, 15, 0.0, False),  # any controller may lose as much
         (0.028, 24, 15, None, False),  # nothing says what controllers of this hand lose
         (0.05, 24, 15, None, True),
     ],
 )
 def test_a_sag_is_surely_more_by_both_readings_than_the_other_drives_lose(
-    lost: float, sag_t: float, settled_t: float, usual: float | None, told: bool
+    lost: float, sag_t: float, later_t: float, usual: float | None, told: bool
 ) -> None:
     state, current = strokes(sagging, 0, noise=1.0)
     facts = command_facts((state,), (current,))
-    sag = lost / facts.load_range
-    session = {"index": replace(facts, sag=sag, sag_se=sag / sag_t, settled=lost, settled_se=lost / settled_t)}
+    sag, usually = lost / LOADS, Loss(np.nan if usual is None else usual / LOADS, 0.0, LOADS)
+    losses = {"loss": Loss(sag, sag / sag_t, LOADS), "later": Loss(sag, sag / later_t, LOADS)}
+    session = {"index": replace(facts, **losses)}
     if usual is not None:
-        session["ring"] = replace(facts, sag=usual / facts.load_range, settled=usual)
+        session["ring"] = replace(facts, loss=usually, later=usually)
     found = command_findings(session, {name: name for name in session}, {})
     assert {f.where["actuator"] for _, f in found} == ({"index"} if told else set())
 
@@ -261,6 +286,22 @@ def test_a_drive_that_answers_late_in_both_has_a_punctual_channel() -> None:
     told = lateness({"index": late_answers(5, 5, 3), "ring": late_answers(0, 0, 4)})
     assert np.mean(told["index"].drive_s) == pytest.approx(5 * STEP_S, abs=STEP_S)
     assert told["index"].channel_s < 2 * told["index"].doubt_s
+
+
+def test_a_late_drive_whose_motion_is_later_still_may_have_an_early_current() -> None:
+    """Or it breaks loose slowly: what its balance says decides, and then how late the drive is."""
+    facts = {
+        name: replace(command_facts(*((x,) for x in answering(0.0, seed))), answers=late_answers(*late, seed))
+        for seed, (name, late) in enumerate({"index": (4, 8), "ring": (0, 0)}.items())
+    }
+    told = lateness({name: f.answers for name, f in facts.items()})["index"]
+    assert len(told.drive_s) and -4 * STEP_S - told.doubt_s < told.channel_s < told.doubt_s
+    assert abs(told.channel_s + 4 * STEP_S) < 1.5 * told.doubt_s
+    fingers = {name: name for name in facts}
+    ((_, late),) = delays(facts, fingers)
+    ((_, right),) = delays(facts, fingers, {"index": -4 * STEP_S})
+    assert late.parameters["delay"]["value"] == pytest.approx(4 * STEP_S, abs=0.5 * STEP_S)
+    assert right.parameters["delay"]["value"] == pytest.approx(late.parameters["delay"]["value"] + 4 * STEP_S)
 
 
 def test_a_lone_drive_is_held_against_a_usual_one() -> None:

@@ -16,7 +16,7 @@ from ..session import Log, Session, check_session, moves
 from .findings import Finding
 from .finger import FingerReading, finger_calls
 from .locate.angles import FingerAngles
-from .locate.command import CommandFacts, command_facts, command_findings, refused, sags_beneath
+from .locate.command import CommandFacts, command_facts, command_findings, delays, refused, sags_beneath
 from .locate.course import FingerCourses
 from .locate.decoupled import TRIFLE, pulls, while_driven, without_excursions
 from .locate.drive import drive_states, drive_trials, frozen_share, opposes, stand_still, too_short
@@ -138,6 +138,18 @@ class Heard:
         for _, finding in odd:
             self.tell(finding.statement)
         self.found = _without_settled_sags([*self.found, *odd], self.stations, facts)
+        self._put_delays_right(facts)
+
+    def _put_delays_right(self, facts: Mapping[str, CommandFacts]) -> None:
+        """How late a drive is was told by its current: not by as much, where that itself is late."""
+        channel_s = {
+            s.actuator: float(s.parameters[s.naming.fit.terms.index(f.term)]["delay"]["value"])
+            for s in self.stations
+            if s.actuator in facts and (f := s.standing("current_channel_delay")) is not None
+        }
+        if channel_s:
+            late = delays(facts, {a: _finger_of(self.session, a) for a in facts}, channel_s)
+            self.found = [i for i in self.found if i[1].effect != "command_delay"] + late
 
 
 def _without_settled_sags(

@@ -107,6 +107,9 @@ def lateness(answers: Mapping[str, Answers]) -> dict[str, Lateness]:
             out[actuator] = Lateness(np.zeros(0), ahead - half, float(np.linalg.norm([unlike, scatter, half])))
             continue
         unsure = total - channel if slow else 0.0
+        if drive and behind - total > USUAL_START * x.step_s:  # it breaks loose slowly, or its current is early
+            unsure = 0.5 * (behind - total)
+            channel = -unsure
         doubt = float(np.hypot(unlike + between + unsure, np.std(x.current_s) / np.sqrt(len(x.current_s))))
         out[actuator] = Lateness(late if drive else np.zeros(0), channel, doubt)
     return out

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -14,14 +15,14 @@ from ..findings import UNWRITTEN, Finding, weighed
 from .answers import Answers, answers_of, lateness
 from .ceiling import Ceiling
 from .simulated import SimulatedDrive
-from .strokes import Stroke, beneath, ceiling, sag, settled_sag, strokes_of
+from .strokes import Loss, Stroke, beneath, ceiling, later, sag, strokes_of
 
 Array = NDArray[np.float64]
 
 ALIKE = 2.0  # times the loss of speed that the session's other drives have (median): one kind's may differ by as much
-# of the speed, by which a drive must lose more than those for sure (standard errors): the most of 256 healthy drives of
-# four recorders is 0.005, of one that has little feedback
-LEAST_BEYOND, SURE = 0.01, 4.0
+# of the speed, by which a drive must lose more than those for sure (standard errors): of 172 healthy drives of four
+# recorders none loses any more than that
+LEAST_BEYOND, SURE = 0.005, 4.0
 USUAL_LOSS = 0.0175  # of the speed, that controllers may lose where no other drive says how much
 # log likelihood that a limit must bring: for an effect, for the limits that are tried, and for as many names of as many
 # channels
@@ -34,33 +35,18 @@ UNLIKE = 0.1  # of a delay by which answers may miss it: controllers of other ga
 
 @dataclass(frozen=True)
 class CommandFacts:
-    """answers: to commands. sag, sag_se, load_range: loss of speed per load [1/raw], its standard error [1/raw] and the
-    range of loads [raw]; nan where strokes do not tell. settled, settled_se: share of the speed that is lost over the
-    loads where strokes are compared at equal times after their starts, and its standard error. ceiling: current [raw]
-    at which the drive is at its limit, or nan; cut: the weight of what it takes away; share_cut: of the time at steady
-    speed in which more would be needed. strokes: that tell the sag. trials: names of the recordings."""
+    """answers: to commands. loss: of speed under load; later: the same in the later half of strokes. ceiling: current
+    [raw] at which the drive is at its limit, or nan; cut: the weight of what it takes away; share_cut: of the time at
+    steady speed in which more would be needed. strokes: that tell the loss. trials: names of the recordings."""
 
     answers: Answers
-    sag: float
-    sag_se: float
-    load_range: float
-    settled: float
-    settled_se: float
+    loss: Loss
+    later: Loss
     ceiling: float = float("nan")
     cut: float = 0.0
     share_cut: float = 0.0
     strokes: tuple[Stroke, ...] = ()
     trials: tuple[str, ...] = ()
-
-    @property
-    def lost(self) -> float:
-        """Share of its speed that the drive loses over the recorded loads; nan where strokes do not tell."""
-        return self.sag * self.load_range
-
-    @property
-    def lost_se(self) -> float:
-        """Its standard error."""
-        return self.sag_se * self.load_range
 
 
 def command_facts(states: tuple[DriveState, ...], currents: tuple[Array, ...]) -> CommandFacts:
@@ -68,8 +54,8 @@ def command_facts(states: tuple[DriveState, ...], currents: tuple[Array, ...]) -
     strokes = strokes_of(states, currents)
     return CommandFacts(
         answers_of(states, currents),
-        *sag(strokes),
-        *settled_sag(strokes),
+        sag(strokes),
+        sag(later(strokes)),
         *ceiling(strokes),
         tuple(strokes),
         tuple(s.trial for s in states),
@@ -81,12 +67,9 @@ def command_findings(
 ) -> list[tuple[float, Finding]]:
     """Delays, sags and limits of the session's drives; the least delayed, and the least sagging one, show what a
     healthy one does."""
-    out = []
+    out = delays(facts, fingers)
     asked = {a: d.ceiling for a, d in simulated.items() if d.ceiling is not None and d.ceiling.likelier > BEYOND_CHANCE}
-    late = lateness({a: f.answers for a, f in facts.items()})
     for actuator, fact in facts.items():
-        if actuator in late and len(late[actuator].drive_s):
-            out.append(_delay(actuator, fingers.get(actuator), fact, late[actuator].drive_s))
         if actuator in asked:
             out.append(_limit_finding(actuator, fingers.get(actuator), fact, asked[actuator]))
         elif np.isfinite(fact.ceiling):
@@ -96,16 +79,27 @@ def command_findings(
     return out
 
 
+def delays(
+    facts: Mapping[str, CommandFacts],
+    fingers: Mapping[str, str | None],
+    channel_s: Mapping[str, float] = MappingProxyType({}),
+) -> list[tuple[float, Finding]]:
+    """Findings of drives that act late; by how much is told by their current. channel_s: actuator -> by how much [s]
+    that itself is late (negative: early)."""
+    return [
+        _delay(a, fingers.get(a), facts[a], x.drive_s - channel_s.get(a, 0.0))
+        for a, x in lateness({a: f.answers for a, f in facts.items()}).items()
+        if len(x.drive_s)
+    ]
+
+
 def _sags(fact: CommandFacts, others: Sequence[CommandFacts]) -> bool:
-    """Whether a drive loses speed, also once it has settled, surely and plainly more than the session's other drives
-    lose, or seem to gain: controllers with little feedback lose more under load."""
-    for loss, doubt, theirs in (
-        (fact.lost, fact.lost_se, [f.lost for f in others]),
-        (fact.settled, fact.settled_se, [f.settled for f in others]),
-    ):
-        known = [abs(x) for x in theirs if np.isfinite(x)]
+    """Whether a drive loses speed, and goes on to, surely and plainly more than the session's other drives lose, or seem
+    to gain: controllers with little feedback lose more under load."""
+    for loss, theirs in ((fact.loss, [f.loss for f in others]), (fact.later, [f.later for f in others])):
+        known = [abs(x.share) for x in theirs if np.isfinite(x.share)]
         usual = float(np.median(known)) if known else USUAL_LOSS
-        if not (loss > ALIKE * usual and loss - usual - SURE * doubt > LEAST_BEYOND):
+        if not (loss.share > ALIKE * usual and loss.share - usual - SURE * loss.share_se > LEAST_BEYOND):
             return False
     return True
 
@@ -114,7 +108,7 @@ def sags_beneath(facts: Mapping[str, CommandFacts], actuator: str, limit: float)
     """Whether a drive loses speed in strokes whose current stays below a limit [raw] of its reading: such a reading
     says little of the load of others."""
     strokes = beneath(facts[actuator].strokes, limit)
-    fact = CommandFacts(facts[actuator].answers, *sag(strokes), *settled_sag(strokes))
+    fact = CommandFacts(facts[actuator].answers, sag(strokes), sag(later(strokes)))
     return _sags(fact, [f for a, f in facts.items() if a != actuator])
 
 
@@ -267,25 +261,21 @@ def _delay(actuator: str, finger: str | None, fact: CommandFacts, late_s: Array)
 
 
 def _sag_finding(actuator: str, finger: str | None, fact: CommandFacts) -> tuple[float, Finding]:
-    loss = fact.lost
+    loss, doubt = fact.loss.share, 1.96 * fact.loss.sag_se
     parameters = {
-        "sag": {
-            "value": fact.sag,
-            "unit": "1/raw",
-            "ci95": [fact.sag - 1.96 * fact.sag_se, fact.sag + 1.96 * fact.sag_se],
-        }
+        "sag": {"value": fact.loss.sag, "unit": "1/raw", "ci95": [fact.loss.sag - doubt, fact.loss.sag + doubt]}
     }
     fit = {
         "metric": "speed_loss",
         "unit": "1",
         "before": loss,
         "after": 0.0,
-        "noise_floor": fact.lost_se,
+        "noise_floor": fact.loss.share_se,
         "ci95_reduction": None,
         "held_out": [],
         "engine": "strokes",
     }
     text = f"The {actuator} motor loses {100 * loss:.1f} % of its speed over the recorded loads."
-    per_stroke = fact.sag / fact.sag_se / np.sqrt(len(fact.strokes))
+    per_stroke = fact.loss.sag / fact.loss.sag_se / np.sqrt(len(fact.strokes))
     where, weight = _where(actuator, finger), weighed(per_stroke, per_stroke / max(loss, 1e-9))
     return weight, Finding("drive_sag", ("drive_sag",), 0.999, (), where, text, parameters, fit, dict(UNWRITTEN))

@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 
 RUN_IN_S, RUN_OUT_S = 0.3, 0.25  # a stroke's part at steady speed begins and ends this far from rest
 PIECE_S = 0.15  # of strokes, that are compared
+LEAST_LATER = 5  # rows of half of a stroke: fewer, and it tells no speed
 RUNNING = 0.7  # of its median speed: slower at either end, a stroke still starts or stops
 LEAST_LOSS = 0.035  # of the speed: less is within what controllers do (the most of 560 healthy drives 0.029)
 NEARLY_MOST = 0.9  # quantile of the speed that is lost beyond a limit
@@ -42,6 +43,26 @@ class Stroke:
     position: Array
     velocity: Array
     current: Array
+
+
+@dataclass(frozen=True)
+class Loss:
+    """Loss of log speed per load, `sag` [1/raw], its standard error [1/raw] and the range of loads [raw]; nan where
+    strokes do not tell."""
+
+    sag: float
+    sag_se: float
+    load_range: float
+
+    @property
+    def share(self) -> float:
+        """Share of its speed that the drive loses over the recorded loads."""
+        return self.sag * self.load_range
+
+    @property
+    def share_se(self) -> float:
+        """Its standard error."""
+        return self.sag_se * self.load_range
 
 
 def strokes_of(states: tuple[DriveState, ...], currents: tuple[Array, ...]) -> list[Stroke]:
@@ -78,7 +99,7 @@ def beneath(strokes: Sequence[Stroke], limit: float) -> list[Stroke]:
     return [s for s in strokes if np.quantile(np.abs(s.current), NEARLY_MOST) < NEAR * limit]
 
 
-def _load_rise(strokes: list[Stroke]) -> dict[float, np.poly1d]:
+def _load_rise(strokes: Sequence[Stroke]) -> dict[float, np.poly1d]:
     """Rise of the load over position [raw/%] flexing and extending, as polynomials of position: current = cubic in
     position + viscous velocity, each of its own for the two ways."""
     scale = 100.0 ** -np.arange(4)
@@ -90,60 +111,42 @@ def _load_rise(strokes: list[Stroke]) -> dict[float, np.poly1d]:
     return out
 
 
-def sag(strokes: list[Stroke]) -> tuple[float, float, float]:
-    """Loss of log speed per load, its standard error and the range of loads. Strokes of one commanded speed are
-    compared; a reference that a proportional controller follows falls behind by the rise of the load, which is no
-    sag."""
+def sag(strokes: Sequence[Stroke]) -> Loss:
+    """Loss of speed under load. Strokes of one commanded speed are compared. A reference that a proportional controller
+    follows is ahead by what the motor's voltage asks for, a sum of load and speed; what it gains while either rises is
+    no sag."""
     if len(strokes) < 12 or {s.way for s in strokes} != {1.0, -1.0}:
-        return np.nan, np.nan, np.nan
+        return Loss(np.nan, np.nan, np.nan)
     rise = _load_rise(strokes)
     y = np.log([max(s.way * float(np.mean(s.velocity)), 1e-9) for s in strokes])
     load = np.array([s.way * float(np.mean(s.current)) for s in strokes])
     levels = np.array(
         [[float(s.commanded == level) for level in sorted({s.commanded for s in strokes})] for s in strokes]
     )
-    rises = np.array([float(np.mean(rise[s.way](s.position))) for s in strokes])
-    design = np.concatenate([levels, rises[:, None], load[:, None]], axis=1)
+    rises = np.array([[float(np.mean(rise[s.way](s.position))), *_changes(s)] for s in strokes])
+    design = np.concatenate([levels, rises, load[:, None]], axis=1)
     beta = np.linalg.lstsq(design, y, rcond=None)[0]
     spread = np.median(np.abs(y - design @ beta)) / 0.6745
     covariance = np.linalg.pinv(design.T @ design) * spread**2
-    return -float(beta[-1]), float(np.sqrt(covariance[-1, -1])), float(np.ptp(load))
+    return Loss(-float(beta[-1]), float(np.sqrt(covariance[-1, -1])), float(np.ptp(load)))
 
 
-def settled_sag(strokes: list[Stroke]) -> tuple[float, float]:
-    """Loss of log speed over the loads, and its standard error, where what strokes of one commanded speed do at the
-    same time after their start is compared: a slow controller still settles then. Pieces of one stroke err together
-    (Liang & Zeger 1986)."""
-    if len(strokes) < 12 or {s.way for s in strokes} != {1.0, -1.0}:
-        return np.nan, np.nan
-    rise = _load_rise(strokes)
-    pieces = [p for i, s in enumerate(strokes) for p in _pieces(s, rise[s.way], i)]
-    speed, since, climb, load, y, stroke = np.array(pieces).T
-    _, kind, times = np.unique(np.stack([speed, since]), axis=1, return_inverse=True, return_counts=True)
-    shared = times[kind.ravel()] >= 3
-    if shared.sum() < 12:
-        return np.nan, np.nan
-    kind, stroke = (np.unique(v[shared], return_inverse=True)[1] for v in (kind.ravel(), stroke))
-    load, y = load[shared], y[shared]
-    design = np.concatenate([np.eye(kind.max() + 1)[kind], np.stack([climb[shared], load], axis=1)], axis=1)
-    beta = np.linalg.lstsq(design, y, rcond=None)[0]
-    score = np.zeros((stroke.max() + 1, design.shape[1]))
-    np.add.at(score, stroke, design * (y - design @ beta)[:, None])
-    doubt = float(np.linalg.norm(score @ np.linalg.pinv(design.T @ design)[-1]))
-    return -float(beta[-1]) * float(np.ptp(load)), doubt * float(np.ptp(load))
+def _changes(stroke: Stroke) -> tuple[float, float]:
+    """By how much load [raw/%] and speed [1/s] have risen at the end of a stroke, for its way."""
+    first, last = stroke.time_s <= stroke.time_s[0] + PIECE_S, stroke.time_s >= stroke.time_s[-1] - PIECE_S
+    way = max(abs(float(stroke.position[-1] - stroke.position[0])), 1e-9)
+    load, speed = (float(np.mean(v[last]) - np.mean(v[first])) for v in (stroke.current, stroke.velocity))
+    return stroke.way * load / way, stroke.way * speed / way
 
 
-def _pieces(stroke: Stroke, rise: np.poly1d, number: int) -> list[tuple[float, ...]]:
-    """Commanded speed, time after its start [PIECE_S], rise of the load, load, log speed and number of each piece of a
-    stroke."""
-    out, at = [], (stroke.time_s // PIECE_S).astype(int)
-    for piece in np.unique(at):
-        mine = at == piece
-        speed = max(stroke.way * float(np.mean(stroke.velocity[mine])), 1e-9)
-        load = stroke.way * float(np.mean(stroke.current[mine]))
-        climb = float(np.mean(rise(stroke.position[mine])))
-        out.append((stroke.commanded, float(piece), climb, load, float(np.log(speed)), float(number)))
-    return out
+def later(strokes: Sequence[Stroke]) -> list[Stroke]:
+    """The later half of each: what a slow controller still settles fades, and a loss of speed stays."""
+    halves = ((s, s.time_s >= 0.5 * (s.time_s[0] + s.time_s[-1])) for s in strokes)
+    return [
+        Stroke(s.way, s.commanded, s.time_s[k], s.position[k], s.velocity[k], s.current[k])
+        for s, k in halves
+        if k.sum() >= LEAST_LATER
+    ]
 
 
 def ceiling(strokes: list[Stroke]) -> tuple[float, float, float]:
