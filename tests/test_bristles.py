@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from test_diagnose import drive
 
-from hand_model.diagnose.locate.drive import gives
+from hand_model.diagnose.locate.drive import gives, with_gives
 from hand_model.diagnose.name.balance import Balance
 from hand_model.diagnose.name.bristles import bristled, with_bristles
 from hand_model.diagnose.name.shapes import refit
@@ -21,6 +21,7 @@ from hand_model.effects.path import dahl
 from hand_model.hand import Hand
 
 BRISTLES = Term(effect("presliding_friction"), {"bristle_length": 6.0, "bristle_time": 0.0, "form": 0.0})
+READ = {"position_noise": 0.02, "steady": 1.0, "smoothed": 1.0}  # of a motion
 OF_A_DRIVE = [*catalogue("drive"), *outsiders("drive")]
 
 
@@ -92,18 +93,33 @@ def test_a_written_motor_has_the_bristles_that_were_named() -> None:
     assert after.parameters["presliding"].value == BRISTLES.shape["bristle_length"]
 
 
+def rubbing(seed: int, coulomb: float, length: float, late_s: float = 0.0) -> tuple[DriveState, ...]:
+    """A drive with bristles of that length, whose current is read late."""
+
+    def one(state: DriveState) -> DriveState:
+        effort = state.declared @ np.array([0.0, 0.15, 0.0, 0.22, 10.0]) + coulomb * dahl(state.position, length)
+        effort = np.interp(state.time_s - late_s, state.time_s, effort)
+        noise = np.random.default_rng(seed).normal(0, 1.0, len(effort))
+        extra = {name: np.full(len(effort), value) for name, value in READ.items()}
+        read = np.where(np.isfinite(state.effort), effort + noise, np.nan)
+        return replace(state, effort=read, extra={**state.extra, **extra})
+
+    return tuple(one(s) for s in drive(seed))
+
+
+@pytest.mark.parametrize(("late_s", "own"), [(0.0, False), (0.036, True)])
+def test_a_late_current_leaves_its_drive_the_bristles_it_has(late_s: float, own: bool) -> None:
+    """They are as long as another's where its current is early, and may be."""
+    found = with_gives({"ring": rubbing(1, 25.0, 0.1, late_s), "index": rubbing(2, 25.0, 0.4)}, ["index"])
+    give, granted = (found["ring"][0].extra[name][0] for name in ("give", "granted"))
+    assert granted == found["index"][0].extra["granted"][0] == pytest.approx(1.6 * 0.4, rel=0.1)
+    assert give == pytest.approx(0.1, rel=0.5) if own else give == granted
+
+
 @pytest.mark.parametrize(("friction", "granted"), [(50.0, True), (25.0, False)])
 def test_bristles_may_be_as_long_as_anothers_or_as_stiff(friction: float, granted: bool) -> None:
     """Twice the friction turns over within twice the way on bristles of one stiffness; as much within twice the way is
     presliding."""
-
-    def rubbing(seed: int, coulomb: float, length: float) -> tuple[DriveState, ...]:
-        def one(state: DriveState) -> DriveState:
-            effort = state.declared @ np.array([0.0, 0.15, 0.0, 0.22, 10.0]) + coulomb * dahl(state.position, length)
-            noise = np.random.default_rng(seed).normal(0, 1.0, len(effort))
-            return replace(state, effort=np.where(np.isfinite(state.effort), effort + noise, np.nan))
-
-        return tuple(one(s) for s in drive(seed))
 
     found, _ = gives({"ring": rubbing(1, friction, 0.83), "index": rubbing(2, 25.0, 0.4)})
     assert found["index"].length == pytest.approx(0.4, rel=0.1)

@@ -21,8 +21,8 @@ Array = NDArray[np.float64]
 
 ALIKE = 2.0  # times the loss of speed that the session's other drives have (median): one kind's may differ by as much
 # of the speed, by which a drive must lose more than those for sure (standard errors): of 172 healthy drives of four
-# recorders none loses any more than that
-LEAST_BEYOND, SURE = 0.005, 4.0
+# recorders none loses any more than those for sure; one that meets a stop loses 0.006
+LEAST_BEYOND, SURE = 0.01, 4.0
 USUAL_LOSS = 0.0175  # of the speed, that controllers may lose where no other drive says how much
 # log likelihood that a limit must bring: for an effect, for the limits that are tried, and for as many names of as many
 # channels

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...effects.base import DriveState
+from ...effects.base import DriveState, sample_interval
+from ...effects.current_channel_delay import EFFECT as DELAY
 from ...effects.path import from_rest, runs
 from ...session import Log, Session, Trial
 from ..name.bristles import bristled
@@ -22,12 +23,17 @@ Array = NDArray[np.float64]
 KINDS = ("flexion", "excitation")
 LEAST_ROWS = 50  # of a recording: fewer, and no motion is read from it
 GIVE_LEAST, GIVE_MOST = 0.02, 1.2  # [%] of the declared Coulomb friction's bristles; beyond, give is presliding
+LENGTHS = np.geomspace(GIVE_LEAST, GIVE_MOST, 12).tolist()
 ALIKE = 1.6  # times the bristles of the drive that gives least, at most, another healthy one's are
 GIVE_UNSEEN = 0.12  # [%] differences of bristles below this are within what starts tell
 SETTLE_SAMPLES = (14, 13)  # after a start and before a stop: where acceleration is smeared by the kernel
 
 UNFOLLOWED = 0.25  # of the range: commands that end farther than this from where the motion does are not its own
 ROUNDS = 4  # in which the effort required and its square settle
+LATE_SAMPLES = range(1, 4)  # by which a current may be late
+# times smaller must the misfit be beside a late current: of 600 drives it is so where the current is late or the drive
+# gives long before it slides, and smaller by 1.046 once elsewhere
+LATE_BETTER = 1.05
 SETTLE_TRAVEL = 4.0  # [%] some six bristle lengths of a healthy drive
 
 
@@ -79,11 +85,12 @@ def with_gives(
     drives: Mapping[str, tuple[DriveState, ...]], trusted: Collection[str]
 ) -> dict[str, tuple[DriveState, ...]]:
     """The states with each drive's bristle length, and what the `trusted` ones say that any drive of the session may
-    have."""
+    have: that is the length of another, unless its own is told beside a late current."""
     own, granted = gives({a: states for a, states in drives.items() if a in trusted})
-    found = {a: own.get(a, Give(granted, granted)) for a in drives}
+    beside = {a: _beside_late(states) for a, states in drives.items() if a not in own}
+    own |= {a: Give(granted if x is None else min(x[-1], granted), granted) for a, x in beside.items()}
     return {
-        a: with_required(with_doubt(tuple(with_coulomb(s, found[a].length, found[a].granted) for s in states)))
+        a: with_required(with_doubt(tuple(with_coulomb(s, own[a].length, own[a].granted) for s in states)))
         for a, states in drives.items()
     }
 
@@ -278,8 +285,7 @@ def gives(prepared: Mapping[str, Sequence[DriveState]]) -> tuple[dict[str, Give]
     may be as long as its own, or as stiff, so that they are as much longer as friction is larger (Canudas de Wit 1995).
     What a drive gives clearly beyond that is presliding, an effect.
     """
-    lengths = np.geomspace(GIVE_LEAST, GIVE_MOST, 12)
-    fits = {a: min((*_misfit(states, x), x) for x in lengths.tolist()) for a, states in prepared.items()}
+    fits = {a: min((*_misfit(states, x, (0,)), x) for x in LENGTHS) for a, states in prepared.items()}
     best = {a: (length, max(friction, 0.0)) for a, (_, friction, length) in fits.items()}
     least = min((length for length, _ in best.values()), default=GIVE_LEAST)
     softness = min((length / f for length, f in best.values() if f > 0), default=0.0)  # of the stiffest drive [%/raw]
@@ -290,13 +296,23 @@ def gives(prepared: Mapping[str, Sequence[DriveState]]) -> tuple[dict[str, Give]
     return {a: Give(min(x, granted(f)), granted(f)) for a, (x, f) in best.items()}, granted(0.0)
 
 
-def _misfit(states: Sequence[DriveState], give: float) -> tuple[float, float]:
-    """Squared error of the declared balance with bristles of that length [%], and its Coulomb friction."""
-    columns, efforts = [], []
-    for state in states:
-        seen = np.isfinite(state.effort)
-        columns.append(bristled(state, give).declared[seen])
-        efforts.append(state.effort[seen])
-    a, y = np.concatenate(columns), np.concatenate(efforts)
-    found = coefficients(a, y)
-    return float(np.sum((y - a @ found) ** 2)), float(found[2])
+def _beside_late(states: Sequence[DriveState]) -> tuple[float, float, float] | None:
+    """Squared error, Coulomb friction and the likeliest bristle length [%] beside a late current; None where that is not
+    plainly likelier than a prompt one."""
+    prompt, late = (min((*_misfit(states, x, delays), x) for x in LENGTHS) for delays in ((0,), LATE_SAMPLES))
+    return late if prompt[0] > LATE_BETTER * late[0] else None
+
+
+def _misfit(states: Sequence[DriveState], give: float, delays: Sequence[int]) -> tuple[float, float]:
+    """Squared error of the declared balance with bristles of that length [%], and its Coulomb friction, with a current
+    that is late by the likeliest of `delays` [sample intervals]."""
+    bent = [bristled(state, give) for state in states]
+    effort = np.concatenate([s.effort for s in bent])
+    seen, step = np.isfinite(effort), sample_interval(bent)
+    fits = []
+    for samples in delays:
+        late = {"form": 0.0, "delay": samples * step}
+        declared = np.concatenate([DELAY.warp(s, s.declared, late) if samples else s.declared for s in bent])[seen]
+        found = coefficients(declared, effort[seen])
+        fits.append((float(np.sum((effort[seen] - declared @ found) ** 2)), float(found[2])))
+    return min(fits)
