@@ -40,7 +40,7 @@ def preload_findings(stations: Sequence[Station]) -> list[tuple[float, Finding]]
     without its name.
     """
     drives = _drives(stations)
-    spread = shape, scale = _spread([s.naming.fit.declared for s in drives if not _lacks(s)])
+    spread = shape, scale = _spread([s.naming.fit.declared for s in drives if s.believed or not s.missing])
     motors = [s.naming.fit.declared for s in drives]
     kin = kinship(motors)
     out = []
@@ -91,7 +91,7 @@ def expected(stations: Sequence[Station], station: Station, name: str) -> tuple[
     if usual <= 0:
         return None
     changed = float(np.median([abs(n.fit.declared[name] - n.declared.declared[name]) for n in rest]))
-    shape, scale = _spread([s.naming.fit.declared for s in drives if not _lacks(s)])
+    shape, scale = _spread([s.naming.fit.declared for s in drives if s.believed or not s.missing])
     return usual, float(np.hypot(np.sqrt(2) * scale / shape * usual, changed))
 
 
