@@ -87,8 +87,8 @@ def with_gives(
     """The states with each drive's bristle length, and what the `trusted` ones say that any drive of the session may
     have: that is the length of another, unless its own is told beside a late current."""
     own, granted = gives({a: states for a, states in drives.items() if a in trusted})
-    beside = {a: _beside_late(states) for a, states in drives.items() if a not in own}
-    own |= {a: Give(granted if x is None else min(x[-1], granted), granted) for a, x in beside.items()}
+    others = {a: states for a, states in drives.items() if a not in own}
+    own |= {a: Give(min(_beside_late(states), granted), granted) for a, states in others.items()}
     return {
         a: with_required(with_doubt(tuple(with_coulomb(s, own[a].length, own[a].granted) for s in states)))
         for a, states in drives.items()
@@ -296,11 +296,11 @@ def gives(prepared: Mapping[str, Sequence[DriveState]]) -> tuple[dict[str, Give]
     return {a: Give(min(x, granted(f)), granted(f)) for a, (x, f) in best.items()}, granted(0.0)
 
 
-def _beside_late(states: Sequence[DriveState]) -> tuple[float, float, float] | None:
-    """Squared error, Coulomb friction and the likeliest bristle length [%] beside a late current; None where that is not
-    plainly likelier than a prompt one."""
+def _beside_late(states: Sequence[DriveState]) -> float:
+    """Likeliest length [%] of a drive's bristles beside a late current; infinite where that is not plainly likelier than a
+    prompt one."""
     prompt, late = (min((*_misfit(states, x, delays), x) for x in LENGTHS) for delays in ((0,), LATE_SAMPLES))
-    return late if prompt[0] > LATE_BETTER * late[0] else None
+    return late[-1] if prompt[0] > LATE_BETTER * late[0] else float("inf")
 
 
 def _misfit(states: Sequence[DriveState], give: float, delays: Sequence[int]) -> tuple[float, float]:
