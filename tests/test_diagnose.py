@@ -391,3 +391,11 @@ def test_names_that_leave_a_recording_kept_out_above_its_noise_are_not_believed(
     assert station.naming.before.p >= ALPHA and station.proven  # else this test tells nothing
     monkeypatch.setattr(Station, "_kept_out", (1.44, after))
     assert station.believed == believed
+
+
+def test_what_relaxes_while_a_motion_starts_is_no_spring() -> None:
+    """A branch that relaxes within a few samples is viscous friction, told apart only where instants are doubtful."""
+    states = drive(1, trials=2)
+    step = float(np.median(np.diff(states[0].time_s)))
+    (relaxation,) = effect("viscoelastic_spring").shapes(states)
+    assert relaxation.low > 14 * step and min(relaxation.starts) > relaxation.low

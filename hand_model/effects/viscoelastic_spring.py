@@ -12,6 +12,8 @@ from .base import Amplitude, Array, DriveState, Effect, Shape, figure, sample_in
 from .law import Law, Moment
 from .path import lowpass
 
+SOONEST = 15  # samples
+
 
 class ViscoelasticSpring(Effect):
     """F = k1 (x - y), dy/dt = (x - y) / tau."""
@@ -20,10 +22,11 @@ class ViscoelasticSpring(Effect):
     drifting = True
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """Relaxation time between five samples and the length of the longest trial."""
+        """Relaxation time between fifteen samples, for which a motion is not known well after a start, and the length of
+        the longest trial: a branch that relaxes sooner is viscous friction."""
         step = sample_interval(states)
         longest = max(float(s.time_s[-1] - s.time_s[0]) for s in states)
-        low, high = 5 * step, max(longest, 20 * step)
+        low, high = SOONEST * step, max(longest, 4 * SOONEST * step)
         return (Shape("relaxation_time", "s", low, high, tuple(np.geomspace(1.5 * low, 0.7 * high, 9))),)
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
