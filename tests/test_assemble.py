@@ -14,6 +14,7 @@ from hand_model.diagnose.assemble import (
     _echoes,
     _leave_something,
     _of_hinges,
+    _one_clock,
     _shared,
     _without_shadows,
     assemble,
@@ -25,7 +26,7 @@ from hand_model.diagnose.locate.command import CommandFacts
 from hand_model.diagnose.locate.displacement import NO_HINGE
 from hand_model.diagnose.locate.preload import COMPARISON
 from hand_model.diagnose.locate.strokes import Loss
-from hand_model.effects import effect
+from hand_model.effects import effect, outsiders
 
 
 def periodic(effect: str, actuator: str, period: float) -> tuple[float, Finding]:
@@ -252,6 +253,17 @@ def test_a_loss_of_speed_is_named_once_and_not_where_the_current_is_cut_or_frict
     )
     late = (1.0, finding("command_delay", "index", "command", delay=0.05))
     assert _without_settled_sags([mine, other, late], [station], facts) == ([mine] if stays else []) + [other, late]
+
+
+def test_a_log_whose_clock_jumps_in_one_finger_drifts_in_none() -> None:
+    drifts = [(1.0, finding("clock_drift", name, "log", rate_minus_one=3e-3)) for name in ("index", "ring")]
+    late = (2.0, finding("current_channel_delay", "ring", "current", delay=0.05))
+    wander, vibration = (
+        SimpleNamespace(term=SimpleNamespace(effect=next(e for e in outsiders(station) if e.name == name)))
+        for station, name in (("encoder", "clock_wander"), ("drive", "vibration"))
+    )
+    assert [f.effect for _, f in _one_clock([*drifts, late], [vibration])] == ["current_channel_delay", "clock_drift"]
+    assert _one_clock([*drifts, late], [vibration, wander]) == [late]
 
 
 def test_a_session_without_a_balance_claims_no_figures() -> None:

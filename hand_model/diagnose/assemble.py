@@ -94,7 +94,7 @@ def assemble(
     named = {(f.effect, f.where["finger"]) for _, f in ranked}
     unexplained += [outsider_of(s, f) for s, f in strange if (f.term.effect.part_of, s.finger) not in named]
     unexplained += [unrepeated_of(s) for s in stations if _wanders(s, stations)]
-    ranked = _without_shadows(_one_clock(_of_hinges(ranked, unexplained)), stations)
+    ranked = _without_shadows(_one_clock(_of_hinges(ranked, unexplained), [f for _, f in strange]), stations)
     sized = [(_ranking_magnitude(f, stations), weight * _counted(f, stations), f) for weight, f in ranked]
     ranked = sorted(((float((m**3 * weight) ** 0.25), f) for m, weight, f in sized), key=lambda item: -item[0])
     ranked = _heaviest(ranked, _same_place)
@@ -251,8 +251,11 @@ def _wanders(station: Station, stations: Sequence[Station]) -> bool:
     return chance is not None and chance.real and station.wander > max(UNREST, UNLIKE_OTHERS * calmest)
 
 
-def _one_clock(ranked: list[tuple[float, Finding]]) -> list[tuple[float, Finding]]:
-    """A drift that several fingers show is the log's one clock: one finding, of no finger in particular."""
+def _one_clock(ranked: list[tuple[float, Finding]], strange: Sequence[Named]) -> list[tuple[float, Finding]]:
+    """A drift that several fingers show is the log's one clock: one finding, of no finger in particular. It is none where
+    in any of them that clock does what no table names. strange: what stands of that kind."""
+    beyond = {name for f in strange if f.term.effect.signal == "log" for name in f.term.effect.covers}
+    ranked = [i for i in ranked if i[1].effect not in beyond]
     drifts = sorted((i for i in ranked if i[1].effect == "clock_drift"), key=lambda i: -i[0])
     if len(drifts) > 1:
         weight, first = drifts[0]
