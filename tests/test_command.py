@@ -302,6 +302,7 @@ def test_a_late_drive_whose_motion_is_later_still_may_have_an_early_current() ->
     ((_, right),) = delays(facts, fingers, {"index": -4 * STEP_S})
     assert late.parameters["delay"]["value"] == pytest.approx(4 * STEP_S, abs=0.5 * STEP_S)
     assert right.parameters["delay"]["value"] == pytest.approx(late.parameters["delay"]["value"] + 4 * STEP_S)
+    assert not delays(facts, fingers, {"index": 6 * STEP_S})
 
 
 def test_a_lone_drive_is_held_against_a_usual_one() -> None:

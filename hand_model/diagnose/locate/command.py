@@ -85,11 +85,11 @@ def delays(
     channel_s: Mapping[str, float] = MappingProxyType({}),
 ) -> list[tuple[float, Finding]]:
     """Findings of drives that act late; by how much is told by their current. channel_s: actuator -> by how much [s]
-    that itself is late (negative: early)."""
+    that itself is late (negative: early); a drive whose current is late by as much is in time."""
     return [
         _delay(a, fingers.get(a), facts[a], x.drive_s - channel_s.get(a, 0.0))
         for a, x in lateness({a: f.answers for a, f in facts.items()}).items()
-        if len(x.drive_s)
+        if len(x.drive_s) and float(np.mean(x.drive_s)) > channel_s.get(a, 0.0)
     ]
 
 
