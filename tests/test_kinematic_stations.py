@@ -288,6 +288,18 @@ def test_a_lifted_finger_is_decoupled_and_its_whiles_are_found() -> None:
         assert any(a < begin + 0.35 < b for a, b in spans["log/0.csv"])
 
 
+@pytest.mark.parametrize("corner", [0.2, 3.5])
+def test_a_finger_goes_slack_within_a_corner_and_leads_nowhere(corner: float) -> None:
+    """Below 20 % it stays behind; that a sharp corner misses is no finger that tips over further on, nor an encoder's
+    error."""
+    states = joint(6, add=lambda t, x, v: 0.12 * corner * np.logaddexp(0.0, (20.0 - x) / corner))
+    found = named(states, "encoder")
+    assert list(found) == ["spring_decoupling"]
+    values = found["spring_decoupling"]
+    assert values["form"] == 1.0 and values["lead"] == pytest.approx(0.12, rel=0.3)
+    assert values["below"] == pytest.approx(20.0, abs=1.5 * max(corner, 1.0))
+
+
 def test_a_reading_at_the_wrong_time_lifts_no_finger() -> None:
     def late(t, x, v):
         return 4.0 * ((t > 8.13) & (t < 8.22))

@@ -145,7 +145,7 @@ def test_only_a_finger_that_is_plainly_pulled_off_its_drive_keeps_its_drive_from
     below: float, accused: list[str]
 ) -> None:
     states = tuple(replace(s, effort=80.0 * s.position / 100, effort_unit="deg") for s in drive(11))
-    term = Term(effect("spring_decoupling"), {"form": 1.0, "below": below})
+    term = Term(effect("spring_decoupling"), {"form": 1.0, "below": below, "corner": 0.1})
     naming = SimpleNamespace(balance=SimpleNamespace(states=states), fit=SimpleNamespace(terms=(term,)))
     named = SimpleNamespace(
         signal="encoder",

@@ -24,14 +24,16 @@ class SpringDecoupling(Effect):
     )
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """form 0: for a while, "ahead" in `extra`; form 1: below an encoder position, at which the finger stays behind;
-        form 2: beyond one, the whole lead reached over a way of its own."""
+        """form 0: for a while, "ahead" in `extra`; form 1: below an encoder position, at which the finger stays behind, as a
+        tendon goes slack: within a corner of some width; form 2: beyond one, the whole lead reached over a way of its
+        own."""
         low, high = position_range(states)
         span, unit = high - low, states[0].position_unit
         below, beyond = (tuple(low + span * np.linspace(*ends)) for ends in ((0.03, 0.5, 12), (0.15, 0.8, 14)))
         return (
             Shape("form", "1", WHILES, TIPS, (WHILES, OPEN, TIPS)),
             Shape("below", unit, low + 0.01 * span, low + 0.6 * span, below, forms=(OPEN,)),
+            Shape("corner", unit, 1e-3 * span, 0.06 * span, (1e-3 * span, 0.03 * span), forms=(OPEN,)),
             Shape("beyond", unit, low + 0.1 * span, low + 0.85 * span, beyond, forms=(TIPS,)),
             Shape("over", unit, 0.03 * span, 0.3 * span, (0.08 * span, 0.2 * span), forms=(TIPS,)),
         )
@@ -49,16 +51,17 @@ class SpringDecoupling(Effect):
         self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]
     ) -> dict[str, float]:
         """The lead, and where."""
-        where = ("beyond", "over") if tips_over(shape) else ("below",)
+        where = ("beyond", "over") if tips_over(shape) else ("below", "corner")
         return {**{name: shape[name] for name in ("form", *where)}, **amplitude}
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """The excursions, or max(0, below - x), or the share of the way over which it tips, (n, 1)."""
+        """The excursions, or max(0, below - x) with a rounded corner, or the share of the way over which it tips, (n, 1)."""
         if shape["form"] == WHILES:
             return state.extra.get("ahead", np.zeros(len(state.time_s)))[:, None]
         if tips_over(shape):
             return np.clip((state.position - shape["beyond"]) / shape["over"], 0.0, 1.0)[:, None]
-        return np.maximum(shape["below"] - state.position, 0.0)[:, None]
+        width = shape["corner"]
+        return width * np.logaddexp(0.0, (shape["below"] - state.position) / width)[:, None]
 
     def region(self, states: tuple[DriveState, ...], shape: Mapping[str, float]) -> dict[str, Any] | None:
         """The whiles [s] by trial, or from the open end to where it follows again, or from where it tips over on."""
