@@ -264,6 +264,11 @@ def test_a_current_ahead_of_its_time_is_early_and_the_prompt_drive_beside_it_is_
     told = lateness({name: f.answers for name, f in facts.items()})
     assert told["index"].channel_s == pytest.approx(-0.1, abs=STEP_S) and abs(told["ring"].channel_s) < 0.5 * STEP_S
     assert not command_findings(facts, {"index": "index", "ring": "ring"}, {})
+    states = {"index": (early,), "ring": (prompt,)}  # whatever two simulated drives say of it
+    simulated = {name: SimulatedDrive(name, 0.0, 1.5e-3) for name in states}
+    timed = with_lateness(states, facts, simulated)
+    assert timed["index"][0].extra["late"][0] == told["index"].channel_s
+    assert abs(timed["ring"][0].extra["late"][0]) < 0.5 * STEP_S
 
 
 def late_answers(current: float, motion: float, seed: int) -> Answers:

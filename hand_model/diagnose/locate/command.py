@@ -119,13 +119,17 @@ def with_lateness(
 ) -> dict[str, tuple[DriveState, ...]]:
     """The states with what is known of their current channel: "late" (2,) [s], by how much and its doubt, by the
     simulated drive or by answers to commands, or by both where no other drive was simulated: how the log is read is in
-    its lateness then, and may be a sample. A late current shows starts and stops late as well, whatever model it is held
-    against."""
+    its lateness then, and may be a sample. A current that plainly answers before its commands is early whatever is
+    simulated. A late current shows starts and stops late as well, whatever model it is held against."""
     told = {
         a: (x.channel_s, float(np.hypot(x.doubt_s, UNLIKE * x.channel_s)))
         for a, x in lateness({a: f.answers for a, f in facts.items()}).items()
     }
-    by_simulation = {a: (d.delay_s, d.doubt_s) for a, d in simulated.items() if a in drives and np.isfinite(d.doubt_s)}
+    by_simulation = {
+        a: (d.delay_s, d.doubt_s)
+        for a, d in simulated.items()
+        if a in drives and np.isfinite(d.doubt_s) and not _earlier(told.get(a, (0.0, 0.0)), d)
+    }
     if len(by_simulation) == 1 < len(drives) and by_simulation.keys() <= told.keys():
         ((actuator, (delay_s, doubt_s)),) = by_simulation.items()
         doubt_s = float(np.hypot(doubt_s, facts[actuator].answers.step_s))
@@ -137,6 +141,14 @@ def with_lateness(
             replace(s, extra={**s.extra, "late": np.array(late), "sigma": _lasting(s, *late)}) for s in drives[actuator]
         )
     return out
+
+
+def _earlier(told: tuple[float, float], simulated: SimulatedDrive) -> bool:
+    """Whether answers to commands say a current early, and earlier than it is in simulation, each by three standard
+    deviations."""
+    late_s, doubt_s = told
+    apart = simulated.delay_s - late_s > PLAINLY_LATE * float(np.hypot(doubt_s, simulated.doubt_s))
+    return apart and late_s < -PLAINLY_LATE * doubt_s
 
 
 def _weighted(*readings: tuple[float, float]) -> tuple[float, float]:
