@@ -245,7 +245,7 @@ def test_a_loss_of_speed_is_named_once_and_not_where_the_current_is_cut_or_frict
     term = SimpleNamespace(effect=effect(named), shape={"limit": 60.0})
     naming = SimpleNamespace(fit=SimpleNamespace(terms=(term,)))
     kept = [SimpleNamespace(term=term)]
-    facts = {"index": CommandFacts(Answers(np.zeros(0), np.zeros(0), 0.018), *[Loss(*[float("nan")] * 3)] * 2)}
+    facts = {"index": CommandFacts(Answers(np.zeros(0), np.zeros(0), 0.018), Loss(), Loss())}
     station = SimpleNamespace(actuator="index", believed=believed, kept=kept, naming=naming, parameters={0: figures})
     mine, other = (
         (1.0, finding("drive_sag", "index", "command", sag=0.1)),

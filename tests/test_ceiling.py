@@ -70,8 +70,9 @@ def test_a_sensor_that_errs_otherwise_tells_no_limit() -> None:
 
 def test_a_likely_limit_is_a_finding_of_its_motor_and_an_unlikely_one_none() -> None:
     from hand_model.diagnose.locate.answers import Answers
+    from hand_model.diagnose.locate.strokes import Loss
 
-    facts = CommandFacts(Answers(np.zeros(0), np.zeros(0), 0.018), *[float("nan")] * 5)
+    facts = CommandFacts(Answers(np.zeros(0), np.zeros(0), 0.018), Loss(), Loss())
     for likelier, count in ((BEYOND_CHANCE + 1, 1), (BEYOND_CHANCE - 1, 0)):
         drive = SimulatedDrive("ring", 0.0, 1e-3, ceiling=Ceiling(70.0, 0.02, 0.3, likelier))
         found = command_findings({"ring": facts}, {"ring": "ring"}, {"ring": drive})

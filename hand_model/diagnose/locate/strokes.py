@@ -50,9 +50,9 @@ class Loss:
     """Loss of log speed per load, `sag` [1/raw], its standard error [1/raw] and the range of loads [raw]; nan where
     strokes do not tell."""
 
-    sag: float
-    sag_se: float
-    load_range: float
+    sag: float = float("nan")
+    sag_se: float = float("nan")
+    load_range: float = float("nan")
 
     @property
     def share(self) -> float:
@@ -116,7 +116,7 @@ def sag(strokes: Sequence[Stroke]) -> Loss:
     follows is ahead by what the motor's voltage asks for, a sum of load and speed; what it gains while either rises is
     no sag."""
     if len(strokes) < 12 or {s.way for s in strokes} != {1.0, -1.0}:
-        return Loss(np.nan, np.nan, np.nan)
+        return Loss()
     rise = _load_rise(strokes)
     y = np.log([max(s.way * float(np.mean(s.velocity)), 1e-9) for s in strokes])
     load = np.array([s.way * float(np.mean(s.current)) for s in strokes])
