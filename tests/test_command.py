@@ -144,9 +144,8 @@ def test_of_the_later_half_of_strokes_the_speed_is_read_there() -> None:
     for half, stroke in zip(halves, whole, strict=True):
         assert half.time_s[-1] == stroke.time_s[-1] and half.position[-1] == stroke.position[-1]
         assert len(half.time_s) == pytest.approx(len(stroke.time_s) / 2, abs=1)
-    assert (
-        later([replace(s, time_s=s.time_s[:8], position=s.position[:8]) for s in whole]) == []
-    )  # four rows tell no speed
+    short = [replace(s, time_s=s.time_s[:8], position=s.position[:8]) for s in whole]
+    assert later(short) == []  # four rows tell no speed
 
 
 @pytest.mark.parametrize(
@@ -157,7 +156,7 @@ def test_of_the_later_half_of_strokes_the_speed_is_read_there() -> None:
         (0.1, 3, 30, 0.0, False),  # one of the readings may be chance
         (0.028, 24, 15, 0.0, True),
         (0.028, 7, 30, 0.0, True),
-        (0.028, 24, 15, 0.015, False),  # such controllers lose as much
+        (0.028, 24, 15, 0.013, False),  # such controllers lose as much
         (0.012, 24, 15, 0.0, False),  # any controller may lose as much
         (0.028, 24, 15, None, False),  # nothing says what controllers of this hand lose
         (0.05, 24, 15, None, True),

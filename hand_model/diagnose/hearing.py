@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -24,10 +24,10 @@ from .locate.encoder_error import encoder_corrections
 from .locate.gravity import with_gravity
 from .locate.measurement import echoes_command, is_measured, rests_on_command
 from .locate.simulated import SimulatedDrive
-from .magnitude import magnitude, values_of
+from .magnitude import magnitude
 from .name.balance import Balance
 from .name.evidence import typical_coefficients
-from .name.station import Station, judged
+from .name.station import Station, judged, told
 from .weight import with_weights
 
 REASON = 0.5  # of the size at which friction by load is plain: a soft controller falls behind by so much
@@ -115,7 +115,7 @@ class Heard:
     ) -> dict[str, CommandFacts]:
         """What the drives did of what they were told."""
         facts = _command(self.session, drives)
-        self.found += command_findings(facts, {a: _finger_of(self.session, a) for a in facts}, simulated)
+        self.found += command_findings(facts, self._fingers(facts), simulated)
         for _, finding in self.found:
             self.tell(finding.statement)
         return facts
@@ -140,15 +140,19 @@ class Heard:
         self.found = _without_settled_sags([*self.found, *odd], self.stations, facts)
         self._put_delays_right(facts)
 
+    def _fingers(self, actuators: Iterable[str]) -> dict[str, str | None]:
+        """Actuator -> its finger."""
+        return {a: _finger_of(self.session, a) for a in actuators}
+
     def _put_delays_right(self, facts: Mapping[str, CommandFacts]) -> None:
         """How late a drive is was told by its current: not by as much, where that itself is late."""
         channel_s = {
-            s.actuator: float(s.parameters[s.naming.fit.terms.index(f.term)]["delay"]["value"])
+            s.actuator: float(told(s, f)["delay"])
             for s in self.stations
             if s.actuator in facts and (f := s.standing("current_channel_delay")) is not None
         }
         if channel_s:
-            late = delays(facts, {a: _finger_of(self.session, a) for a in facts}, channel_s)
+            late = delays(facts, self._fingers(facts), channel_s)
             self.found = [i for i in self.found if i[1].effect != "command_delay"] + late
 
 
@@ -163,12 +167,12 @@ def _without_settled_sags(
         s.actuator
         for s in stations
         if s.believed
-        for which, f in ((s.naming.fit.terms.index(f.term), f) for f in s.kept)
+        for f in s.kept
         if f.term.effect.clips
         and not sags_beneath(facts, s.actuator, f.term.shape["limit"])
         or f.term.effect.name == "drive_sag"
         or f.term.effect.name == "load_dependent_friction"
-        and magnitude("load_dependent_friction", values_of(s.parameters[which])) > REASON
+        and magnitude("load_dependent_friction", told(s, f)) > REASON
     }
     return [i for i in found if i[1].effect != "drive_sag" or i[1].where["actuator"] not in settled]
 

@@ -290,6 +290,11 @@ def figure(value: float) -> str:
     return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
 
 
+def rounded(x: Array, corner: float) -> Array:
+    """max(0, x) with a corner of that width: corner ln(1 + exp(x / corner))."""
+    return corner * np.logaddexp(0.0, x / corner)
+
+
 def sample_interval(states: Sequence[DriveState]) -> float:
     """Median time [s] between neighbouring samples of all states."""
     return float(np.median(np.concatenate([np.diff(s.time_s) for s in states])))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
+from .base import Amplitude, Array, DriveState, Effect, Shape, position_range, rounded
 from .driven import driven
 from .input import map_of, write_bound
 
@@ -37,7 +37,7 @@ class CouplingDeadband(Effect):
     def declared(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """The coupling's columns of the angle that passes."""
         until, corner = shape["until"], shape["corner"]
-        return driven(state, lambda q: until + corner * np.logaddexp(0.0, (q - until) / corner))
+        return driven(state, lambda q: until + rounded(q - until, corner))
 
     def region(self, states: tuple[DriveState, ...], shape: Mapping[str, float]) -> dict[str, Any] | None:
         """From the start of the range to where it moves."""

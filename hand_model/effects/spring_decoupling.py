@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .base import Amplitude, Array, DriveState, Effect, Shape, figure, position_range
+from .base import Amplitude, Array, DriveState, Effect, Shape, figure, position_range, rounded
 from .path import runs
 
 WHILES, OPEN, TIPS = 0.0, 1.0, 2.0
@@ -60,8 +60,7 @@ class SpringDecoupling(Effect):
             return state.extra.get("ahead", np.zeros(len(state.time_s)))[:, None]
         if tips_over(shape):
             return np.clip((state.position - shape["beyond"]) / shape["over"], 0.0, 1.0)[:, None]
-        width = shape["corner"]
-        return width * np.logaddexp(0.0, (shape["below"] - state.position) / width)[:, None]
+        return rounded(shape["below"] - state.position, shape["corner"])[:, None]
 
     def region(self, states: tuple[DriveState, ...], shape: Mapping[str, float]) -> dict[str, Any] | None:
         """The whiles [s] by trial, or from the open end to where it follows again, or from where it tips over on."""

@@ -30,6 +30,7 @@ BEYOND_CHANCE = 12.0
 REACTION_S = 0.15  # a person's quickest: a delay counts beside it
 BLIND = 4.0  # times what is not known of a start: what holds a drive at rest is anything within its friction
 PLAINLY_LATE = 3.0  # standard deviations
+EARLY = 3.0  # standard deviations by which answers that come before the command say so for sure
 UNLIKE = 0.1  # of a delay by which answers may miss it: controllers of other gains rise otherwise
 
 
@@ -148,7 +149,7 @@ def _earlier(told: tuple[float, float], simulated: SimulatedDrive) -> bool:
     deviations."""
     late_s, doubt_s = told
     apart = simulated.delay_s - late_s > PLAINLY_LATE * float(np.hypot(doubt_s, simulated.doubt_s))
-    return apart and late_s < -PLAINLY_LATE * doubt_s
+    return apart and late_s < -EARLY * doubt_s
 
 
 def _weighted(*readings: tuple[float, float]) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from ...effects.spring_decoupling import spans
 from ...errors import IdentificationError
 from ...identify.clock import align
 from ..magnitude import SLIGHT, channel_figures, magnitude
-from ..name.station import Station
+from ..name.station import Station, told
 from .angles import FingerAngles
 
 Array = NDArray[np.float64]
@@ -30,8 +30,7 @@ def pulls(station: Station, least: float = SLIGHT) -> bool:
     named = station.standing("spring_decoupling")
     if named is None:
         return False
-    values = {k: v["value"] for k, v in station.parameters[station.naming.fit.terms.index(named.term)].items()}
-    return magnitude("spring_decoupling", values, channel_figures(station.naming.balance.states)) >= least
+    return magnitude("spring_decoupling", told(station, named), channel_figures(station.naming.balance.states)) >= least
 
 
 def while_driven(states: Sequence[DriveState], below: float) -> tuple[DriveState, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,7 +30,7 @@ SETTLE_SAMPLES = (14, 13)  # after a start and before a stop: where acceleration
 
 UNFOLLOWED = 0.25  # of the range: commands that end farther than this from where the motion does are not its own
 ROUNDS = 4  # in which the effort required and its square settle
-LATE_SAMPLES = range(1, 4)  # by which a current may be late
+LATE_SAMPLES = 3  # by which a current may be late, at most
 # times smaller must the misfit be beside a late current: of 600 drives it is so where the current is late or the drive
 # gives long before it slides, and smaller by 1.046 once elsewhere
 LATE_BETTER = 1.05
@@ -285,7 +285,7 @@ def gives(prepared: Mapping[str, Sequence[DriveState]]) -> tuple[dict[str, Give]
     may be as long as its own, or as stiff, so that they are as much longer as friction is larger (Canudas de Wit 1995).
     What a drive gives clearly beyond that is presliding, an effect.
     """
-    fits = {a: min((*_misfit(states, x, (0,)), x) for x in LENGTHS) for a, states in prepared.items()}
+    fits = {a: min((*_misfits(states, x)[0], x) for x in LENGTHS) for a, states in prepared.items()}
     best = {a: (length, max(friction, 0.0)) for a, (_, friction, length) in fits.items()}
     least = min((length for length, _ in best.values()), default=GIVE_LEAST)
     softness = min((length / f for length, f in best.values() if f > 0), default=0.0)  # of the stiffest drive [%/raw]
@@ -299,20 +299,22 @@ def gives(prepared: Mapping[str, Sequence[DriveState]]) -> tuple[dict[str, Give]
 def _beside_late(states: Sequence[DriveState]) -> float:
     """Likeliest length [%] of a drive's bristles beside a late current; infinite where that is not plainly likelier than a
     prompt one."""
-    prompt, late = (min((*_misfit(states, x, delays), x) for x in LENGTHS) for delays in ((0,), LATE_SAMPLES))
-    return late[-1] if prompt[0] > LATE_BETTER * late[0] else float("inf")
+    fits = [(_misfits(states, x, range(LATE_SAMPLES + 1)), x) for x in LENGTHS]
+    prompt = min(error for ((error, _), *_), _ in fits)
+    late, length = min((min(rest)[0], x) for (_, *rest), x in fits)
+    return length if prompt > LATE_BETTER * late else float("inf")
 
 
-def _misfit(states: Sequence[DriveState], give: float, delays: Sequence[int]) -> tuple[float, float]:
+def _misfits(states: Sequence[DriveState], give: float, delays: Iterable[int] = (0,)) -> list[tuple[float, float]]:
     """Squared error of the declared balance with bristles of that length [%], and its Coulomb friction, with a current
-    that is late by the likeliest of `delays` [sample intervals]."""
+    that is late by each of `delays` [sample intervals]."""
     bent = [bristled(state, give) for state in states]
     effort = np.concatenate([s.effort for s in bent])
     seen, step = np.isfinite(effort), sample_interval(bent)
-    fits = []
+    out = []
     for samples in delays:
         late = {"form": 0.0, "delay": samples * step}
         declared = np.concatenate([DELAY.warp(s, s.declared, late) if samples else s.declared for s in bent])[seen]
         found = coefficients(declared, effort[seen])
-        fits.append((float(np.sum((effort[seen] - declared @ found) ** 2)), float(found[2])))
-    return min(fits)
+        out.append((float(np.sum((effort[seen] - declared @ found) ** 2)), float(found[2])))
+    return out

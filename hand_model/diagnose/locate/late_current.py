@@ -9,11 +9,10 @@ from ...effects.base import DriveState, least_delay
 from ..name.balance import Balance
 from ..name.evidence import gain
 from ..name.shapes import polish, scan
-from .command import BEYOND_CHANCE, CommandFacts, with_lateness
+from .command import BEYOND_CHANCE, EARLY, CommandFacts, with_lateness
 from .drive import with_gives
 from .simulated import SimulatedDrive
 
-EARLY = 3.0  # standard deviations by which answers that come before the command say so for sure
 # log likelihood that a shift of a drive's current must bring: less, and its drive tells none (two standard deviations)
 DELAY_TOLD = 2.0
 SEEN = 0.5  # the same of a shift that is told otherwise (one standard deviation)

@@ -9,7 +9,7 @@ import numpy as np
 from ..findings import UNWRITTEN, Finding, weighed
 from .interval import held_out
 from .naming import Named
-from .station import Station
+from .station import Station, told
 
 # How before and after were computed, said in the findings: no compiled file is involved until one is replayed.
 ENGINE = {
@@ -72,9 +72,8 @@ def finding_of(station: Station, named: Named, share: float, size: float) -> tup
 
 def outsider_of(station: Station, named: Named) -> dict[str, Any]:
     """The unexplained entry of what no table of effects names, with what it looks like."""
-    values = {k: v["value"] for k, v in station.parameters[station.naming.fit.terms.index(named.term)].items()}
     entry = unexplained_of(station, named.share * station.claimed)
-    said = named.term.effect.statement(entry["where"], values).removesuffix(".")
+    said = named.term.effect.statement(entry["where"], told(station, named)).removesuffix(".")
     return {**entry, "shape": f"no known effect, but {said}"}
 
 

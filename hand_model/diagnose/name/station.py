@@ -268,6 +268,12 @@ class Station:
         return f"{place}: {names} (p {self.naming.before.p:.2g} -> {self.naming.after.p:.2g})"
 
 
+def told(station: Station, named: Named) -> dict[str, Any]:
+    """name -> value of the parameters of what was named at a station."""
+    figures = station.parameters[station.naming.fit.terms.index(named.term)]
+    return {name: figure["value"] for name, figure in figures.items()}
+
+
 def _related(one: Named, other: Named) -> bool:
     """Whether both are of one family."""
     return one.term.effect.family is not None and one.term.effect.family == other.term.effect.family
