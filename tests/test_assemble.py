@@ -283,6 +283,17 @@ def test_what_only_other_motors_tell_ranks_behind_what_the_recordings_show(engin
     assert assemble([], found, []).findings[0].effect == first
 
 
+def test_what_only_other_motors_tell_must_be_sure_in_a_hand_of_which_something_else_is_missing() -> None:
+    def named(probability: float, *others: str) -> list[str]:
+        odd = replace(finding("asymmetric_friction", "index", "current"), fit={"engine": COMPARISON})
+        found = [(0.5, finding(name, "index", "markers")) for name in others]
+        return [f.effect for f in assemble([], [*found, (1.0, replace(odd, probability=probability))], []).findings]
+
+    assert named(0.97) == ["asymmetric_friction"]
+    assert named(0.97, "marker_slip") == ["marker_slip"]
+    assert named(0.999, "marker_slip") == ["marker_slip", "asymmetric_friction"]
+
+
 def test_what_only_other_drives_size_hardly_counts_in_the_ranking() -> None:
     own = Finding("gravity_load", ("gravity_load",), 1.0, (), {"finger": "index"}, "", {}, {"engine": "mujoco"}, None)
     station = SimpleNamespace(compared=("gravity_load",), names=lambda finding: finding.where["finger"] == "index")

@@ -175,6 +175,17 @@ def test_readings_cut_at_a_limit_are_named_so_however_many_they_are(share: float
     assert naming.found[0].term.shape["limit"] == pytest.approx(limit, rel=0.02)
 
 
+@pytest.mark.parametrize("share", [0.05, 0.2, 0.3])
+def test_a_reading_that_clips_at_its_lower_end_only_is_told(share: float) -> None:
+    states = drive(3)
+    limit = float(-np.nanquantile(np.concatenate([s.effort for s in states]), share))
+    cut = tuple(replace(s, effort=np.maximum(s.effort, -limit)) for s in states)
+    naming = name_effects(cut, catalogue("drive"))
+    assert [f.term.effect.name for f in naming.found] == ["current_saturation"]
+    assert naming.found[0].term.shape["form"] == 2.0
+    assert naming.found[0].term.shape["limit"] == pytest.approx(limit, rel=0.05)
+
+
 def test_two_effects_are_both_named() -> None:
     one = planted("stribeck_friction", {"stribeck_speed": 20.0}, [20.0])
     two = planted("detent_load", {"form": 0.0, "centre": 60.0, "width": 6.0}, [-12.0])

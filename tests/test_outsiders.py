@@ -226,10 +226,12 @@ def test_many_periods_that_have_nothing_in_common_are_no_explanation(
     assert station._patched is patched
 
 
-def test_the_share_that_a_ceiling_cuts_is_what_the_motion_requires_beyond_it() -> None:
+@pytest.mark.parametrize(("form", "cut"), [(0.0, np.abs), (1.0, np.positive), (2.0, np.negative)])
+def test_the_share_that_a_ceiling_cuts_is_what_the_motion_requires_beyond_it(form: float, cut: np.ufunc) -> None:
     states = with_required(drive(2))
-    required = np.concatenate([np.abs(s.extra["required"][np.isfinite(s.effort)]) for s in states])
-    entry = effect("current_saturation").further(states, {"limit": {"value": float(np.quantile(required, 0.8))}})
+    required = cut(np.concatenate([s.extra["required"][np.isfinite(s.effort)] for s in states]))
+    told = {"form": {"value": form}, "limit": {"value": float(np.quantile(required, 0.8))}}
+    entry = effect("current_saturation").further(states, told)
     assert abs(entry["share_cut"]["value"] - 0.2) < 0.01
 
 

@@ -43,6 +43,8 @@ TINY = 0.05  # the same where that test nearly sees something, and speaks of no 
 # of a weight counts where the declared model takes up what is named, so that nothing of the mismatch is its: only the
 # hand's other motors speak for it
 COMPARED = 0.01
+SECOND = 0.99  # probability of what a comparison alone says in a hand of which something else is missing
+DOUBT = "only the hand's other motors speak for it, and in a hand of which something else is missing it may be chance"
 MANY = 3  # names of a finger, beside which a channel of it may be explained in part
 NEARLY_ALL = 0.95  # of a mismatch: names that take as much leave nothing worth a word
 UNSEEN = 0.01  # probability from which the test sees nothing
@@ -95,6 +97,9 @@ def assemble(
     unexplained += [outsider_of(s, f) for s, f in strange if (f.term.effect.part_of, s.finger) not in named]
     unexplained += [unrepeated_of(s) for s in stations if _wanders(s, stations)]
     ranked = _without_shadows(_one_clock(_of_hinges(ranked, unexplained), [f for _, f in strange]), stations)
+    doubted = _doubted([f for _, f in ranked])
+    rejected += [{"effect": f.effect, "where": str(f.where["finger"]), "reason": DOUBT} for f in doubted]
+    ranked = [(w, f) for w, f in ranked if all(f is not doubtful for doubtful in doubted)]
     sized = [(_ranking_magnitude(f, stations), weight * _counted(f, stations), f) for weight, f in ranked]
     ranked = sorted(((float((m**3 * weight) ** 0.25), f) for m, weight, f in sized), key=lambda item: -item[0])
     ranked = _heaviest(ranked, _same_place)
@@ -223,6 +228,14 @@ def _trifles(ranked: list[tuple[float, Finding]], magnitudes: Mapping[int, float
                 (finding, f"a trifle beside {main.effect.replace('_', ' ')}, whose form may be slightly another")
             )
     return out
+
+
+def _doubted(found: Sequence[Finding]) -> list[Finding]:
+    """What a comparison of the hand's drives alone says, and not surely, where something else is missing of that hand:
+    few have a second thing."""
+    if all(f.fit.get("engine") == COMPARISON for f in found):
+        return []
+    return [f for f in found if f.fit.get("engine") == COMPARISON and f.probability < SECOND]
 
 
 def _shared(ranked: list[tuple[float, Finding]]) -> tuple[Finding, ...]:

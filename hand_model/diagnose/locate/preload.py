@@ -123,9 +123,10 @@ def _lacks(station: Station) -> bool:
 
 
 def _tells(station: Station) -> bool:
-    """Whether a drive's preload can be spoken of: of one that does not repeat itself, or of which something unknown is
-    missing, it cannot."""
-    return station.wander <= RESTLESS and (station.believed or not station.missing)
+    """Whether a drive's preload can be spoken of: of one that does not repeat itself, of which something unknown is
+    missing, or whose reading clips at one end, it cannot."""
+    lopsided = any(f.term.effect.clips and f.term.shape.get("form") for f in station.kept)
+    return not lopsided and station.wander <= RESTLESS and (station.believed or not station.missing)
 
 
 def _settled(station: Station) -> bool:
@@ -159,9 +160,10 @@ def _by_chance(own: float, error: float, usual: float, spread: tuple[float, floa
 
 
 def _standard_error(station: Station) -> float:
-    """Of the preload [raw], beside what was named."""
-    balance = station.naming.balance
-    matrix = balance.design(station.naming.fit.terms)[0] * (balance.weight * balance.train)[:, None]
+    """Of the preload [raw], beside what was named, of which readings that clip say nothing."""
+    balance, fit = station.naming.balance, station.naming.fit
+    told = balance.weight * balance.train * balance.unclipped_by(fit)
+    matrix = balance.design(fit.terms)[0] * told[:, None]
     at = balance.names.index("preload")
     return float(np.sqrt(np.linalg.pinv(matrix.T @ matrix)[at, at] * balance.inflation))
 

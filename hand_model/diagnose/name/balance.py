@@ -433,7 +433,7 @@ class Balance:
             if t.effect.clips
             for sign in (1, -1)
         ]
-        return ~np.any([np.isclose(free, level) for level in levels], axis=0)
+        return ~np.any([np.isclose(free, level) for level in levels], axis=0) if levels else np.ones(len(free), bool)
 
     def _own_nuisances(self, matrix: Array, coefficients: Array, w: Array, low: Array) -> Array:
         """Coefficients of columns that act in validation recordings only (their own clock offset, a step in them, an
