@@ -11,7 +11,6 @@ import numpy as np
 from .base import Amplitude, Array, DriveState, Effect, Shape, figure
 from .mjcf import motor_joint, motor_sensor
 
-
 BOTH, ABOVE, BELOW = range(3)
 ONE_SIDED = 0.1  # probability of each of the two ways in which one end alone clips, as of an amplifier's offset
 
