@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
 
 from ...effects.base import DriveState
 from ..findings import weighed
@@ -29,6 +30,8 @@ CEILING_LEFT, CEILING_T = 0.1, 6.0
 # of the current beyond a limit over what is needed, from which it is none: a drive that slows down needs less
 FLAT, SLOPES_T = 0.3, 3.0
 BEYOND_T = 2.0  # standard deviations of the current, of what is beyond a limit
+RISES_OF_LOAD = 2  # columns: over the places of a stroke, and from its begin to its end
+TAKEN = 1e-12  # of log speed per raw/%: less, and a drive is slowed by no rise
 ROUNDS = 3  # of telling where a limit is and what is beyond
 
 
@@ -113,8 +116,8 @@ def _load_rise(strokes: Sequence[Stroke]) -> dict[float, np.poly1d]:
 
 def sag(strokes: Sequence[Stroke]) -> Loss:
     """Loss of speed under load. Strokes of one commanded speed are compared. A reference that a proportional controller
-    follows is ahead by what the motor's voltage asks for, a sum of load and speed; what it gains while either rises is
-    no sag."""
+    follows is ahead by what the motor's voltage asks for, a sum of load and speed; what it loses while the load rises, and
+    what either way it does while the speed changes, is no sag."""
     if len(strokes) < 12 or {s.way for s in strokes} != {1.0, -1.0}:
         return Loss()
     rise = _load_rise(strokes)
@@ -125,8 +128,12 @@ def sag(strokes: Sequence[Stroke]) -> Loss:
     )
     rises = np.array([[float(np.mean(rise[s.way](s.position))), *_changes(s)] for s in strokes])
     design = np.concatenate([levels, rises, load[:, None]], axis=1)
-    beta = np.linalg.lstsq(design, y, rcond=None)[0]
+    most = np.full(design.shape[1], np.inf)
+    at = levels.shape[1] + np.arange(RISES_OF_LOAD)
+    most[at] = 0.0
+    beta = lsq_linear(design, y, (-np.inf, most), method="bvls").x
     spread = np.median(np.abs(y - design @ beta)) / 0.6745
+    design = np.delete(design, at[beta[at] > -TAKEN], axis=1)
     covariance = np.linalg.pinv(design.T @ design) * spread**2
     return Loss(-float(beta[-1]), float(np.sqrt(covariance[-1, -1])), float(np.ptp(load)))
 
