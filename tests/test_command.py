@@ -133,7 +133,11 @@ def test_what_a_slow_controller_still_settles_is_no_sag() -> None:
     def settling(x: float, full: float) -> float:
         return full * (1 - 0.008 * load(x) * np.exp(-x / 12))
 
+    def catching_up(x: float, full: float) -> float:
+        return full * (1 + 0.25 * np.exp(-x / 12))
+
     assert sags(index=settling, ring=healthy) == set()
+    assert sags(index=catching_up, ring=healthy) == set()
 
 
 def test_of_the_later_half_of_strokes_the_speed_is_read_there() -> None:
@@ -352,6 +356,20 @@ def test_a_soft_controller_is_slow_and_not_late() -> None:
     assert late(index=rising(0.2, 0.02, 1, settling=12.0), ring=rising(0.0, 0.02, 2)) == {"index"}
     # alone, too: a rise says itself when it begins
     assert late(index=rising(0.0, 0.25, 1)) == set() and late(index=rising(0.08, 0.1, 1)) == {"index"}
+
+
+@pytest.mark.parametrize(("begins_s", "late_s"), [(0.021, 0.043), (0.06, 0.011)])
+def test_a_drive_that_moves_before_its_current_rises_has_a_late_current_and_no_slow_one(
+    begins_s: float, late_s: float
+) -> None:
+    def answering_at(current_s: float, motion_s: float, *rise_s: float) -> Answers:
+        return Answers(np.full(30, current_s), np.full(30, motion_s), 0.0235, np.array(rise_s))
+
+    answers = {
+        "index": answering_at(0.043, begins_s, 0.02, 0.028, 0.032),
+        "ring": answering_at(0.0, 0.021, 0.003, 0.003, 0.003),
+    }
+    assert lateness(answers)["index"].channel_s == pytest.approx(late_s, abs=1e-3)
 
 
 def test_answers_too_few_say_nothing() -> None:

@@ -94,7 +94,7 @@ def lateness(answers: Mapping[str, Answers]) -> dict[str, Lateness]:
             and np.mean(late > x.step_s) > MOSTLY
         )
         shift = _onset(x.rise_s) if alone else _shift(x.rise_s, [y.rise_s for a, y in told.items() if a != actuator])
-        slow = total > 0 and shift <= SHIFTED * total
+        slow = total > 0 and shift <= SHIFTED * total and not _moves_first(x, total - behind)
         drive = not slow and (plain or (not alone and _both_late(x, total, behind)))
         channel = max(total - np.nan_to_num(behind, nan=total), 0.0) if drive else max(shift, 0.0) if slow else total
         # Neither clearly the one nor the other: the motion's own scatter decides between the two.
@@ -113,6 +113,14 @@ def lateness(answers: Mapping[str, Answers]) -> dict[str, Lateness]:
         doubt = float(np.hypot(unlike + between + unsure, np.std(x.current_s) / np.sqrt(len(x.current_s))))
         out[actuator] = Lateness(late if drive else np.zeros(0), channel, doubt)
     return out
+
+
+def _moves_first(x: Answers, apart_s: float) -> bool:
+    """Whether a drive is seen to move before its current rises, which a current that is only slow does not let it;
+    apart_s: by how much [s] more than another drive, whose friction may be as little."""
+    if len(x.motion_s) < LEAST_ANSWERS:
+        return False
+    return bool(min(float(np.mean(x.current_s) - np.mean(x.motion_s)), apart_s) > UNLIKE * x.step_s)
 
 
 def _shift(rise_s: Array, others: Sequence[Array]) -> float:
