@@ -116,6 +116,13 @@ def test_a_late_current_leaves_its_drive_the_bristles_it_has(late_s: float, own:
     assert give == pytest.approx(0.1, rel=0.5) if own else give == granted
 
 
+def test_beside_a_current_that_is_known_to_be_late_a_drive_has_the_bristles_that_go_with_it() -> None:
+    """Also where they are not plainly likelier than those that stand for the delay."""
+    drives = {"ring": rubbing(1, 25.0, 0.1, 0.006), "index": rubbing(2, 25.0, 0.4)}
+    known = with_gives(drives, ["index"], {"ring": 0.006})["ring"][0].extra["give"][0]
+    assert known == pytest.approx(0.1, rel=0.5) and with_gives(drives, ["index"])["ring"][0].extra["give"][0] > 0.6
+
+
 @pytest.mark.parametrize(("friction", "granted"), [(50.0, True), (25.0, False)])
 def test_bristles_may_be_as_long_as_anothers_or_as_stiff(friction: float, granted: bool) -> None:
     """Twice the friction turns over within twice the way on bristles of one stiffness; as much within twice the way is

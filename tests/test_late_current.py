@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from test_diagnose import drive
 
+from hand_model.diagnose.locate.answers import Lateness
 from hand_model.diagnose.locate.command import BLIND, _lasting
 from hand_model.diagnose.locate.late_current import _late
 from hand_model.effects.base import DriveState
@@ -40,24 +41,27 @@ def test_a_balance_that_plainly_shows_a_shift_is_believed_where_answers_agree(
         a: tuple(replace(s, extra={**s.extra, "late": np.array(told[a])}) for s in states)
         for a, states in drives.items()
     }
-    assert _late(drives, timed) == {"index": may_be, "ring": False}
+    assert _late(drives, timed, {}) == {"index": may_be, "ring": False}
 
 
 @pytest.mark.parametrize("told_s", [-0.006, 0.006])
-def test_a_delay_that_a_simulation_tells_to_a_fraction_of_a_sample_must_show_in_the_balance(told_s: float) -> None:
-    """A controller that is not quite as taken for bends elsewhere."""
+def test_a_delay_that_a_simulation_tells_to_a_fraction_of_a_sample_must_show_elsewhere(told_s: float) -> None:
+    """In the balance, or in answers to commands: a controller that is not quite as taken for bends elsewhere."""
     told = {"index": (told_s, 0.001), "ring": (0.0, 0.001)}
 
-    def may_be(shift_s: float) -> dict[str, bool]:
+    def may_be(shift_s: float, **answered: Lateness) -> dict[str, bool]:
         drives = {"index": shifted(drive(3), shift_s) if shift_s else drive(3), "ring": drive(4)}
         timed = {
             a: tuple(replace(s, extra={**s.extra, "late": np.array(told[a])}) for s in states)
             for a, states in drives.items()
         }
-        return _late(drives, timed)
+        return _late(drives, timed, answered)
 
     assert may_be(0.0) == {"index": False, "ring": False}
     assert may_be(told_s) == {"index": True, "ring": False}
+    for share, doubt_s, so in ((1.2, 0.004, True), (1.2, 0.006, False), (-1.0, 0.004, False), (4.0, 0.004, False)):
+        answers = Lateness(np.zeros(0), share * told_s, doubt_s)
+        assert may_be(0.0, index=answers) == {"index": so, "ring": False}
 
 
 def test_what_holds_a_drive_at_rest_says_nothing_against_a_late_current() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,7 @@ GIVE_UNSEEN = 0.12  # [%] differences of bristles below this are within what sta
 SETTLE_SAMPLES = (14, 13)  # after a start and before a stop: where acceleration is smeared by the kernel
 
 UNFOLLOWED = 0.25  # of the range: commands that end farther than this from where the motion does are not its own
+SPRING = ("spring", "preload")  # declared columns of what a drive holds at rest
 ROUNDS = 4  # in which the effort required and its square settle
 LATE_SAMPLES = 3  # by which a current may be late, at most
 # times smaller must the misfit be beside a late current: of 600 drives it is so where the current is late or the drive
@@ -82,13 +84,16 @@ def drive_states(
 
 
 def with_gives(
-    drives: Mapping[str, tuple[DriveState, ...]], trusted: Collection[str]
+    drives: Mapping[str, tuple[DriveState, ...]],
+    trusted: Collection[str],
+    late_s: Mapping[str, float] = MappingProxyType({}),
 ) -> dict[str, tuple[DriveState, ...]]:
     """The states with each drive's bristle length, and what the `trusted` ones say that any drive of the session may
-    have: that is the length of another, unless its own is told beside a late current."""
+    have: that is the length of another, unless its own is told beside a late current. late_s: of those of which it is
+    known how late [s]."""
     own, granted = gives({a: states for a, states in drives.items() if a in trusted})
     others = {a: states for a, states in drives.items() if a not in own}
-    own |= {a: Give(min(_beside_late(states), granted), granted) for a, states in others.items()}
+    own |= {a: Give(min(_beside_late(states, late_s.get(a)), granted), granted) for a, states in others.items()}
     return {
         a: with_required(with_doubt(tuple(with_coulomb(s, own[a].length, own[a].granted) for s in states)))
         for a, states in drives.items()
@@ -254,20 +259,25 @@ def with_coulomb(state: DriveState, give: float, granted: float) -> DriveState:
 
 def with_required(states: tuple[DriveState, ...]) -> tuple[DriveState, ...]:
     """The states with the effort "required" (n,) by the declared model fitted to all of them, and by what a drive that
-    sags asks for beyond: the square of that effort, as far as it helps."""
+    sags asks for beyond: the square of that effort, as far as it helps; and "held" (n,), what of it the spring takes."""
     seen = [np.isfinite(s.effort) for s in states]
     ends = np.cumsum([len(s.effort) for s in states])[:-1]
     declared, told = np.concatenate([s.declared for s in states]), np.concatenate(seen)
     effort = np.concatenate([s.effort for s in states])[told]
-    required = declared @ coefficients(declared[told], effort)
+    fitted = coefficients(declared[told], effort)
+    pulls = [name in SPRING for name in states[0].declared_names]
+    required, held = declared @ fitted, declared[:, pulls] @ fitted[pulls]
     for _ in range(ROUNDS):
         columns = np.column_stack([declared, required * np.abs(required)])
         beta = coefficients(columns[told], effort)
         if beta[-1] <= 0:
             break
         required = columns @ beta
-    parts = np.split(required, ends)
-    return tuple(replace(s, extra={**s.extra, "required": own}) for s, own in zip(states, parts, strict=True))
+    parts = zip(np.split(required, ends), np.split(held, ends), strict=True)
+    return tuple(
+        replace(s, extra={**s.extra, "required": own, "held": load})
+        for s, (own, load) in zip(states, parts, strict=True)
+    )
 
 
 @dataclass(frozen=True)
@@ -296,16 +306,18 @@ def gives(prepared: Mapping[str, Sequence[DriveState]]) -> tuple[dict[str, Give]
     return {a: Give(min(x, granted(f)), granted(f)) for a, (x, f) in best.items()}, granted(0.0)
 
 
-def _beside_late(states: Sequence[DriveState]) -> float:
-    """Likeliest length [%] of a drive's bristles beside a late current; infinite where that is not plainly likelier than a
-    prompt one."""
+def _beside_late(states: Sequence[DriveState], late_s: float | None = None) -> float:
+    """Likeliest length [%] of a drive's bristles beside a current that late [s]; where it is not known how late, infinite
+    unless beside a late one it is plainly likelier than beside a prompt one."""
+    if late_s is not None:
+        return min(LENGTHS, key=lambda x: _misfits(states, x, (late_s / sample_interval(states),))[0])
     fits = [(_misfits(states, x, range(LATE_SAMPLES + 1)), x) for x in LENGTHS]
     prompt = min(error for ((error, _), *_), _ in fits)
     late, length = min((min(rest)[0], x) for (_, *rest), x in fits)
     return length if prompt > LATE_BETTER * late else float("inf")
 
 
-def _misfits(states: Sequence[DriveState], give: float, delays: Iterable[int] = (0,)) -> list[tuple[float, float]]:
+def _misfits(states: Sequence[DriveState], give: float, delays: Iterable[float] = (0,)) -> list[tuple[float, float]]:
     """Squared error of the declared balance with bristles of that length [%], and its Coulomb friction, with a current
     that is late by each of `delays` [sample intervals]."""
     bent = [bristled(state, give) for state in states]

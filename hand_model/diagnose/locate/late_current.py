@@ -9,6 +9,7 @@ from ...effects.base import DriveState, least_delay
 from ..name.balance import Balance
 from ..name.evidence import gain
 from ..name.shapes import polish, scan
+from .answers import Lateness, lateness
 from .command import BEYOND_CHANCE, EARLY, CommandFacts, with_lateness
 from .drive import with_gives
 from .simulated import SimulatedDrive
@@ -16,7 +17,8 @@ from .simulated import SimulatedDrive
 # log likelihood that a shift of a drive's current must bring: less, and its drive tells none (two standard deviations)
 DELAY_TOLD = 2.0
 SEEN = 0.5  # the same of a shift that is told otherwise (one standard deviation)
-ALIKE = 2.0  # standard deviations of answers within which they and the balance say the same
+ALIKE = 2.0  # standard deviations of answers within which they and what else is told say the same
+ANSWERED = 1.5  # standard deviations by which answers bear a simulated lateness out
 
 
 def timed_drives(
@@ -24,17 +26,23 @@ def timed_drives(
 ) -> tuple[dict[str, tuple[DriveState, ...]], dict[str, bool]]:
     """The drives with what is known of their current's lateness, and whether each may be late."""
     timed = with_lateness(drives, facts, simulated)
-    late = _late(drives, timed)
+    late = _late(drives, timed, lateness({a: f.answers for a, f in facts.items()}))
     in_time = [a for a in drives if not late[a]]
     if 0 < len(in_time) < len(drives):  # at a reversal a late current looks like a give, an early one like none
-        timed = with_lateness(with_gives(drives, in_time), facts, simulated)
+        known = {a: float(s[0].extra["late"][0]) for a, s in timed.items() if late[a] and _told(s)}
+        timed = with_lateness(with_gives(drives, in_time, known), facts, simulated)
     return timed, late
 
 
-def _late(drives: dict[str, tuple[DriveState, ...]], timed: dict[str, tuple[DriveState, ...]]) -> dict[str, bool]:
+def _late(
+    drives: dict[str, tuple[DriveState, ...]],
+    timed: dict[str, tuple[DriveState, ...]],
+    answered: dict[str, Lateness],
+) -> dict[str, bool]:
     """Whether each drive's current may be delayed: a delay that all drives of a session share is how the log is read.
     Answers to commands tell a late or an early current better than the balance does, and must bear it out. timed: the
-    drives with what these answers tell, which says nothing yet to the balance."""
+    drives with what these answers, or simulations, tell, which says nothing yet to the balance. answered: by the answers
+    alone."""
     nearest, brought = dict[str, float](), dict[str, float]()
     for actuator, states in drives.items():
         balance = Balance(states)
@@ -56,8 +64,9 @@ def _late(drives: dict[str, tuple[DriveState, ...]], timed: dict[str, tuple[Driv
         if (told_to := least_delay(timed[actuator])) < bound:
             told, doubt = late[actuator].tolist()  # and to the side to which the balance would shift it
             plain = brought[actuator] > BEYOND_CHANCE and abs(told - best[actuator]) < ALIKE * doubt
-            # less than a sample: what a simulation says the balance must see, if barely
-            seen = abs(told) > bound or told * nearest[actuator] > 0 and brought[actuator] > SEEN
+            # less than a sample: what a simulation says the balance, or answers, must see, if barely
+            in_balance = told * nearest[actuator] > 0 and brought[actuator] > SEEN
+            seen = abs(told) > bound or in_balance or _answers_so(answered.get(actuator), told)
             most = max(abs(told), abs(best[actuator]) if plain else 0.0)
             return seen and most > told_to and told * best[actuator] >= 0
         if late[actuator][0] < -max(bound, EARLY * late[actuator][1]):
@@ -68,3 +77,16 @@ def _late(drives: dict[str, tuple[DriveState, ...]], timed: dict[str, tuple[Driv
         return not others or max(others) - late[actuator][0] > bound  # who is early answers before the others
 
     return {a: borne_out(a) for a in best}
+
+
+def _told(states: tuple[DriveState, ...]) -> bool:
+    """Whether it is known how late a current is."""
+    return "late" in states[0].extra and abs(states[0].extra["late"][0]) > least_delay(states)
+
+
+def _answers_so(answers: Lateness | None, told_s: float) -> bool:
+    """Whether answers to commands say a current late, or early, by what a simulation tells."""
+    if answers is None:
+        return False
+    apart = abs(answers.channel_s - told_s) < ALIKE * answers.doubt_s
+    return apart and answers.channel_s * told_s > 0 and abs(answers.channel_s) > ANSWERED * answers.doubt_s
