@@ -30,7 +30,6 @@ GIVE_UNSEEN = 0.12  # [%] differences of bristles below this are within what sta
 SETTLE_SAMPLES = (14, 13)  # after a start and before a stop: where acceleration is smeared by the kernel
 
 UNFOLLOWED = 0.25  # of the range: commands that end farther than this from where the motion does are not its own
-SPRING = ("spring", "preload")  # declared columns of what a drive holds at rest
 ROUNDS = 4  # in which the effort required and its square settle
 LATE_SAMPLES = 3  # by which a current may be late, at most
 # times smaller must the misfit be beside a late current: of 600 drives it is so where the current is late or the drive
@@ -259,25 +258,20 @@ def with_coulomb(state: DriveState, give: float, granted: float) -> DriveState:
 
 def with_required(states: tuple[DriveState, ...]) -> tuple[DriveState, ...]:
     """The states with the effort "required" (n,) by the declared model fitted to all of them, and by what a drive that
-    sags asks for beyond: the square of that effort, as far as it helps; and "held" (n,), what of it the spring takes."""
+    sags asks for beyond: the square of that effort, as far as it helps."""
     seen = [np.isfinite(s.effort) for s in states]
     ends = np.cumsum([len(s.effort) for s in states])[:-1]
     declared, told = np.concatenate([s.declared for s in states]), np.concatenate(seen)
     effort = np.concatenate([s.effort for s in states])[told]
-    fitted = coefficients(declared[told], effort)
-    pulls = [name in SPRING for name in states[0].declared_names]
-    required, held = declared @ fitted, declared[:, pulls] @ fitted[pulls]
+    required = declared @ coefficients(declared[told], effort)
     for _ in range(ROUNDS):
         columns = np.column_stack([declared, required * np.abs(required)])
         beta = coefficients(columns[told], effort)
         if beta[-1] <= 0:
             break
         required = columns @ beta
-    parts = zip(np.split(required, ends), np.split(held, ends), strict=True)
-    return tuple(
-        replace(s, extra={**s.extra, "required": own, "held": load})
-        for s, (own, load) in zip(states, parts, strict=True)
-    )
+    parts = np.split(required, ends)
+    return tuple(replace(s, extra={**s.extra, "required": own}) for s, own in zip(states, parts, strict=True))
 
 
 @dataclass(frozen=True)
