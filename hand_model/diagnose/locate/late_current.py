@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...effects import catalogue
-from ...effects.base import DriveState, least_delay
+from ...effects.base import SURE_DELAY, DriveState, least_delay
 from ..name.balance import Balance
 from ..name.evidence import gain
 from ..name.shapes import polish, scan
@@ -80,8 +80,9 @@ def _late(
 
 
 def _told(states: tuple[DriveState, ...]) -> bool:
-    """Whether it is known how late a current is."""
-    return "late" in states[0].extra and abs(states[0].extra["late"][0]) > least_delay(states)
+    """Whether it is known for sure how late a current is."""
+    late_s, doubt_s = states[0].extra.get("late", (0.0, 1.0))
+    return bool(abs(late_s) > SURE_DELAY * doubt_s)
 
 
 def _answers_so(answers: Lateness | None, told_s: float) -> bool:
