@@ -357,6 +357,18 @@ def test_the_only_effect_needs_no_steady_motion_where_it_is_plain_and_a_faint_on
 
 
 @pytest.mark.parametrize(
+    ("signal", "p", "stands"), [("current", 0.5, True), ("encoder", 0.5, False), ("encoder", 1e-9, True)]
+)
+def test_what_no_test_sees_must_be_plainer_in_angles_than_in_currents(
+    monkeypatch: pytest.MonkeyPatch, signal: str, p: float, stands: bool
+) -> None:
+    monkeypatch.setattr("hand_model.diagnose.name.station._stands", lambda naming, found, which, least: least < 11.5)
+    naming = heard(drive(3, planted(*PLANTED[0]))).naming
+    naming = replace(naming, before=replace(naming.before, p=p))
+    assert bool(Station(signal, "index", "index", None, naming).proven) is stands
+
+
+@pytest.mark.parametrize(
     ("count", "p", "left", "overwhelmed"),
     [(5, 1e-9, 0.5, True), (4, 1e-9, 0.5, False), (5, 0.2, 0.5, False), (5, 1e-9, 0.1, False)],
 )

@@ -16,7 +16,9 @@ from .selection import EVIDENCE_LEAST, SMALL, name_effects
 
 # times the others are heard again, and the share of what was explained from which a fallen name has displaced others
 SECOND_HEARINGS, DISPLACING = 2, 0.1
-CHANCES = 20 * 25  # channels of a session, times names: what no test of a channel sees must stand against as many
+# channels of a session, times names: what no test of a channel sees must stand against as many. Of motors there are few
+# (in 140 healthy balances of currents the likeliest false name is at e^5, of angles, whose clocks err, at e^11)
+CHANCES, CHANCES_OF_MOTORS = 20 * 25, 4 * 25
 PART = 0.5  # of the size of a trace that is another effect's
 ALIKE = 1 / 3  # of the size of a larger effect of the same family: below, no finding of its own
 UNREST = 0.3  # of the noise: wander that every machine is granted; more is no explanation
@@ -49,7 +51,8 @@ class Station:
         self.beside: Callable[[Station], Station] | None = None
         self.compared: tuple[str, ...] = ()
         self.tilt = 0.0
-        least = EVIDENCE_LEAST + (np.log(CHANCES) if naming.before.p >= ALPHA else 0.0)
+        chances = CHANCES_OF_MOTORS if signal == "current" else CHANCES
+        least = EVIDENCE_LEAST + (np.log(chances) if naming.before.p >= ALPHA else 0.0)
         stand = [
             places[id(f)]
             for f in naming.found
