@@ -216,11 +216,25 @@ def test_a_play_and_as_much_give_are_both_named_and_little_give_is_the_plays_for
     assert {f.term.effect.name for f in station.kept} == {"drive_backlash", "series_elasticity"}
 
     def of(name: str, size: float) -> SimpleNamespace:
-        return SimpleNamespace(term=SimpleNamespace(effect=effect(name)), size=size)
+        return SimpleNamespace(term=SimpleNamespace(effect=effect(name)), size=size, share=size)
+
+    def forms(*proven: SimpleNamespace, hides: bool = False) -> tuple[SimpleNamespace, ...]:
+        return Station.forms.fget(SimpleNamespace(proven=proven, _hides=lambda whole, other: hides))
 
     play_, little, other = of("drive_backlash", 3.0), of("series_elasticity", 0.9), of("encoder_periodic_error", 0.1)
-    assert Station.forms.fget(SimpleNamespace(proven=(play_, little, other))) == (little,)
-    assert Station.forms.fget(SimpleNamespace(proven=(play_, of("series_elasticity", 1.1), other))) == ()
+    more = of("series_elasticity", 1.1)
+    assert forms(play_, little, other) == (little,) and forms(play_, more, other) == ()
+    assert forms(play_, more, other, hides=True) == (more,)
+
+
+@pytest.mark.parametrize(("gap", "drag", "hidden"), [(2.5, 0.05, True), (4.5, 0.05, False), (2.5, 0.0, False)])
+def test_what_yields_to_drag_may_hide_a_play_that_friction_would_open(gap: float, drag: float, hidden: bool) -> None:
+    """35 raw of friction both ways move it by 3.5 deg, were all of it to pass through what gives."""
+    states = joint(1, move=lambda x: x, add=lambda t, x, v: 0 * v)
+    give, form = effect("series_elasticity"), 5.0 if drag else 1.0
+    parameters = {"form": form, "compliance": 0.001, "drag_compliance": drag}
+    assert give.hides(states, parameters, {"gap": gap, "form": 0.0}) is hidden
+    assert not give.hides(states, parameters, {"compliance": 0.01, "form": 1.0})
 
 
 @pytest.mark.parametrize(("station", "name"), [("encoder", "drive_backlash"), ("linkage", "linkage_backlash")])

@@ -145,7 +145,9 @@ def _apart(p: Mapping[str, float], c: Channel) -> float:
 
 
 def _give(p: Mapping[str, float], c: Channel) -> float:
-    return p["compliance"] * c.load / (0.017 * (c.span if at_driver({"form": 1.0, **p}) else 3.5 * c.effort))
+    dragged = p.get("drag_compliance", 0.0) * p.get("drag", 0.0) * 0.5 * c.fastest
+    given = np.hypot(p["compliance"] * c.load, dragged)
+    return given / (0.017 * (c.span if at_driver({"form": 1.0, **p}) else 3.5 * c.effort))
 
 
 PLAIN: Mapping[str, Rule] = {

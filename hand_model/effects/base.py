@@ -223,6 +223,13 @@ class Effect:
         """Whether a machine with these parameters could have moved as it did: any can."""
         return True
 
+    def hides(
+        self, states: tuple[DriveState, ...], parameters: Mapping[str, float], theirs: Mapping[str, float]
+    ) -> bool:
+        """Whether what another of its family, with parameters of its own, does beside it may be a part of what it does
+        itself: it never is."""
+        return False
+
     def log_prior(self, parameters: Mapping[str, float]) -> float:
         """Log density of the parameters over that of ordinary ones: negative where machines rarely are like that."""
         return 0.0

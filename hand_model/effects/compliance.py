@@ -102,6 +102,19 @@ class Compliance(Effect):
         unit = f"raw s/{states[0].position_unit}"
         return {"drag": {"value": float(speed @ drag / max(speed @ speed, 1e-12)), "unit": unit, "ci95": None}}
 
+    def hides(
+        self, states: tuple[DriveState, ...], parameters: Mapping[str, float], theirs: Mapping[str, float]
+    ) -> bool:
+        """A play no wider than friction moves what yields to drag, were all of it to pass through what gives."""
+        if not dragged(parameters) or "gap" not in theirs:
+            return False
+        rest, way = (
+            np.concatenate(v)
+            for v in zip(*((s.extra["load"] - s.extra["drag"], np.sign(s.velocity)) for s in states), strict=True)
+        )
+        friction = 0.5 * float(np.nanmean(rest[way > 0]) - np.nanmean(rest[way < 0]))
+        return theirs["gap"] < 2 * parameters["drag_compliance"] * friction
+
     def hurries(self, parameters: Mapping[str, float]) -> bool:
         """What follows late, or yields to drag."""
         return damped(parameters) or dragged(parameters)

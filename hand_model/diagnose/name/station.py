@@ -247,8 +247,18 @@ class Station:
 
     @property
     def forms(self) -> tuple[Named, ...]:
-        """What adds little beside another of its family: a play with a mass that floats in it gives a little, too."""
-        return tuple(f for f in self.proven for g in self.proven if _related(f, g) and f.size < ALIKE * g.size)
+        """What adds little beside another of its family: a play with a mass that floats in it gives a little, too; and
+        what may be a part of one that explains more."""
+        return tuple(
+            f
+            for f in self.proven
+            for g in self.proven
+            if _related(f, g) and (f.size < ALIKE * g.size or f.share < g.share and self._hides(g, f))
+        )
+
+    def _hides(self, whole: Named, other: Named) -> bool:
+        """Whether what another does may be a part of what an effect does."""
+        return whole.term.effect.hides(self.naming.balance.states, told(self, whole), told(self, other))
 
     @property
     def contrast(self) -> float:
