@@ -10,6 +10,7 @@ import pytest
 
 from hand_model.diagnose.assemble import (
     COMPARED,
+    _beneath,
     _counted,
     _echoes,
     _leave_something,
@@ -281,6 +282,12 @@ def test_what_only_other_motors_tell_ranks_behind_what_the_recordings_show(engin
     ]
     found[0] = (1.0, replace(found[0][1], fit={"engine": engine}))
     assert assemble([], found, []).findings[0].effect == first
+
+
+@pytest.mark.parametrize(("p", "least"), [(0.5, 0.15), (0.005, 0.05), (0.0025, 0.05), (1e-5, 0.0)])
+def test_the_less_a_test_sees_the_larger_must_a_finding_be_for_its_kind(p: float, least: float) -> None:
+    """One of fifteen channels falls below a three hundredth by chance."""
+    assert _beneath(SimpleNamespace(naming=SimpleNamespace(before=SimpleNamespace(p=p)))) == least
 
 
 def test_what_only_other_motors_tell_must_be_sure_in_a_hand_of_which_something_else_is_missing() -> None:

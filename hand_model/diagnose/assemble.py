@@ -39,7 +39,8 @@ TRIFLE = 0.01  # of the square of the heaviest weight
 # of that magnitude: less, where the lack-of-fit test sees nothing, is left to the imperfections of reading angles and
 # speeds
 MINUTE = 0.15
-TINY = 0.05  # the same where that test nearly sees something, and speaks of no mismatch all the same
+TINY = 0.05  # the same where that test nearly sees something, or what one of a session's channels shows by chance
+CHANNELS = 15
 # of a weight counts where the declared model takes up what is named, so that nothing of the mismatch is its: only the
 # hand's other motors speak for it
 COMPARED = 0.01
@@ -142,7 +143,7 @@ def _worn(stations: Sequence[Station], of_markers: Sequence[Finding]) -> set[str
 def _beneath(station: Station) -> float:
     """Magnitude beneath which a finding of a station says nothing, since the lack-of-fit test sees no mismatch there."""
     p = station.naming.before.p
-    return MINUTE if p >= UNSEEN else TINY if p >= ALPHA else 0.0
+    return MINUTE if p >= UNSEEN else TINY if p >= ALPHA / CHANNELS else 0.0
 
 
 def _counted(finding: Finding, stations: Sequence[Station]) -> float:
