@@ -17,6 +17,7 @@ from hand_model.diagnose.assemble import (
     _of_hinges,
     _one_clock,
     _shared,
+    _shown_in,
     _without_shadows,
     assemble,
 )
@@ -299,6 +300,21 @@ def test_what_only_other_motors_tell_must_be_sure_in_a_hand_of_which_something_e
     assert named(0.97) == ["asymmetric_friction"]
     assert named(0.97, "marker_slip") == ["marker_slip"]
     assert named(0.999, "marker_slip") == ["marker_slip", "asymmetric_friction"]
+
+
+@pytest.mark.parametrize(("engine", "accounts"), [("strokes", 0), ("another", 1)])
+def test_what_a_limit_of_the_drive_cuts_is_told_by_its_strokes_alone(
+    monkeypatch: pytest.MonkeyPatch, engine: str, accounts: int
+) -> None:
+    """Slowed down, a motor never needs more."""
+    monkeypatch.setattr("hand_model.diagnose.assemble.channel_figures", lambda states, *told: len(told))
+    monkeypatch.setattr(
+        "hand_model.diagnose.assemble._showing",
+        lambda *_: SimpleNamespace(naming=SimpleNamespace(balance=SimpleNamespace(states=()))),
+    )
+    monkeypatch.setattr("hand_model.diagnose.assemble._accounts", lambda *_: ({},))
+    ceiling = replace(finding("current_saturation", "index", "current"), fit={"engine": engine})
+    assert _shown_in(ceiling, []) == accounts
 
 
 def test_what_only_other_drives_size_hardly_counts_in_the_ranking() -> None:

@@ -15,6 +15,7 @@ from .findings import Finding, Findings
 from .locate.displacement import NO_HINGE, NOT_RIGID
 from .locate.markers import HINGE, SLIPS
 from .locate.preload import COMPARISON, usual_spring
+from .locate.strokes import STROKES
 from .magnitude import SLIGHT, Channel, channel_figures, likely_magnitude, magnitude, sure_magnitude, values_of
 from .name.distinguishability import protocol_pairs
 from .name.entries import (
@@ -174,9 +175,13 @@ def _ranking_magnitude(finding: Finding, stations: Sequence[Station]) -> float:
 
 
 def _shown_in(finding: Finding, stations: Sequence[Station]) -> Channel | None:
-    """The figures of the station that shows effects of a finding's kind; None where its finger has none."""
+    """The figures of the station that shows effects of a finding's kind; None where its finger has none. Strokes that a
+    drive's limit slows down never need more than that limit: what it cuts is told by them alone."""
     station = _showing(finding, stations)
-    return None if station is None else channel_figures(station.naming.balance.states, *_accounts(station, stations))
+    if station is None:
+        return None
+    slowed = finding.fit.get("engine") == STROKES
+    return channel_figures(station.naming.balance.states, *(() if slowed else _accounts(station, stations)))
 
 
 def _showing(finding: Finding, stations: Sequence[Station]) -> Station | None:

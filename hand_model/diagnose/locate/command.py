@@ -15,7 +15,7 @@ from ..findings import UNWRITTEN, Finding, weighed
 from .answers import Answers, answers_of, lateness
 from .ceiling import Ceiling
 from .simulated import SimulatedDrive
-from .strokes import Loss, Stroke, beneath, ceiling, later, sag, strokes_of
+from .strokes import STROKES, Loss, Stroke, beneath, ceiling, later, sag, strokes_of
 
 Array = NDArray[np.float64]
 
@@ -177,7 +177,7 @@ def _ceiling_finding(actuator: str, finger: str | None, fact: CommandFacts) -> t
         "as the load rises."
     )
     parameters = {"limit": {"value": fact.ceiling, "unit": "raw"}, "share_cut": {"value": fact.share_cut, "unit": "1"}}
-    return fact.cut, _saturation(actuator, finger, fact, text, parameters, "speed_loss", "strokes")
+    return fact.cut, _saturation(actuator, finger, fact, text, parameters, "speed_loss", STROKES)
 
 
 def _limit_finding(actuator: str, finger: str | None, fact: CommandFacts, ceiling: Ceiling) -> tuple[float, Finding]:
@@ -286,7 +286,7 @@ def _sag_finding(actuator: str, finger: str | None, fact: CommandFacts) -> tuple
         "noise_floor": fact.loss.share_se,
         "ci95_reduction": None,
         "held_out": [],
-        "engine": "strokes",
+        "engine": STROKES,
     }
     text = f"The {actuator} motor loses {100 * loss:.1f} % of its speed over the recorded loads."
     per_stroke = fact.loss.sag / fact.loss.sag_se / np.sqrt(len(fact.strokes))

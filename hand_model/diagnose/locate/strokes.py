@@ -15,6 +15,7 @@ from ..findings import weighed
 
 Array = NDArray[np.float64]
 
+STROKES = "strokes"  # what proves a loss of speed, or a limit of the drive, where no engine does
 RUN_IN_S, RUN_OUT_S = 0.3, 0.25  # a stroke's part at steady speed begins and ends this far from rest
 PIECE_S = 0.15  # of strokes, that are compared
 LEAST_LATER = 5  # rows of half of a stroke: fewer, and it tells no speed
