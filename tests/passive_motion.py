@@ -16,6 +16,7 @@ DRIVE = [
     ("current_channel_delay", {"form": 0.0, "delay": 0.04}, {}, 0.03),
     ("current_channel_delay", {"form": 0.0, "delay": -0.05}, {}, 0.03),
     ("current_saturation", {"limit": 45.0}, {}, 0.02),
+    ("current_saturation", {"form": 2.0, "limit": 20.0}, {}, 0.02),
     ("detent_load", {"form": 0.0, "centre": 40.0, "width": 6.0}, {"load": -12.0}, 0.01),
     ("detent_load", {"form": 1.0, "centre": 60.0, "width": 4.0}, {"load": 12.0}, 0.01),
     ("drive_sag", {"form": 0.0}, {"torque_loss": SAG}, 0.01),

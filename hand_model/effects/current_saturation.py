@@ -80,6 +80,10 @@ class CurrentSaturation(Effect):
         found.set("cutoff", repr(place[1] * parameters["limit"]))
         return f"sensor/actuatorfrc[@name='{found.get('name')}']/@cutoff"
 
+    def reading(self, effort: Array, time_s: Array, parameters: Mapping[str, float]) -> Array:
+        """The effort (n,) within the limit of the end that clips; a limit at both ends is the sensor's own."""
+        return effort if parameters.get("form", BOTH) == BOTH else self.clip(effort, parameters)
+
 
 def _levels(states: tuple[DriveState, ...]) -> dict[int, Array]:
     """Clipping levels of each form, from the least on."""
