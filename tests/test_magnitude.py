@@ -132,12 +132,8 @@ def test_a_ceiling_counts_by_what_it_would_cut_without_the_other_effects() -> No
 def test_a_give_counts_by_what_load_and_drag_move_together() -> None:
     channel = Channel(effort=15.0, load=40.0, fastest=100.0)
     plain = magnitude("linkage_compliance", {"form": 1.0, "compliance": 0.01}, channel)
-    dragged = {
-        "form": 5.0,
-        "compliance": 0.0001,
-        "drag_compliance": 0.04,
-        "drag": 0.2,
-    }  # of 10 raw at half of the speed
+    # of 10 raw at half of the speed
+    dragged = {"form": 5.0, "compliance": 0.0001, "drag_compliance": 0.04, "drag": 0.2}
     assert magnitude("linkage_compliance", dragged, channel) == pytest.approx(plain, rel=0.01)
 
 

@@ -41,7 +41,8 @@ def motor_with(name: str, shape: dict[str, float], amplitude: dict[str, float]):
     beyond = np.array([-1e3, 1e3])
     read = not np.array_equal(effect(name).reading(beyond, np.array([0.0, 1.0]), values), beyond)
     # the file holds it, or the callback applies it, or it is in the reading of a sensor that cannot
-    assert (place is None) != (effect(name).law(values) is None) or read
+    held, applied = place is not None, effect(name).law(values) is not None
+    assert held != applied or not held and read
     estimates = {k: Estimate(v, None, "", "") for k, v in values.items()}
     motor = Motor("index", 0.0, 100.0, {"presliding": Estimate(GIVE, None, "%", "")}, 1.0, ())
     hand = Hand(

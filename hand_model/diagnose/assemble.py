@@ -99,15 +99,12 @@ def assemble(
     unexplained += [outsider_of(s, f) for s, f in strange if (f.term.effect.part_of, s.finger) not in named]
     unexplained += [unrepeated_of(s) for s in stations if _wanders(s, stations)]
     ranked = _without_shadows(_one_clock(_of_hinges(ranked, unexplained), [f for _, f in strange]), stations)
-    doubted = _doubted([f for _, f in ranked])
-    rejected += [{"effect": f.effect, "where": str(f.where["finger"]), "reason": DOUBT} for f in doubted]
-    ranked = [(w, f) for w, f in ranked if all(f is not doubtful for doubtful in doubted)]
+    ranked, doubted = _without(ranked, _doubted([f for _, f in ranked]))
     sized = [(_ranking_magnitude(f, stations), weight * _counted(f, stations), f) for weight, f in ranked]
     ranked = sorted(((float((m**3 * weight) ** 0.25), f) for m, weight, f in sized), key=lambda item: -item[0])
     ranked = _heaviest(ranked, _same_place)
-    trifles = _trifles(ranked, {id(f): m for m, _, f in sized})
-    rejected += [{"effect": f.effect, "where": str(f.where["finger"]), "reason": reason} for f, reason in trifles]
-    ranked = [(w, f) for w, f in ranked if all(f is not trifle for trifle, _ in trifles)]
+    ranked, trifles = _without(ranked, _trifles(ranked, {id(f): m for m, _, f in sized}))
+    rejected += [*doubted, *trifles]
     found = _shared(ranked)
     verdict = "mismatch" if found else "unexplained" if unexplained else "consistent"
     worst = max(stations, key=lambda s: variance_ratio(s.naming, s.naming.declared), default=None)
@@ -142,16 +139,15 @@ def _worn(stations: Sequence[Station], of_markers: Sequence[Finding]) -> set[str
 
 
 def _beneath(station: Station) -> float:
-    """Magnitude beneath which a finding of a station says nothing, since the lack-of-fit test sees no mismatch there."""
+    """Magnitude beneath which a finding of a station says nothing, since the lack-of-fit test sees no mismatch there, or
+    one that may be chance."""
     p = station.naming.before.p
     return MINUTE if p >= UNSEEN else TINY if p >= ALPHA / CHANNELS else 0.0
 
 
 def _counted(finding: Finding, stations: Sequence[Station]) -> float:
     """Share of a finding's weight that counts: how large it is may be told by comparison alone."""
-    compared = finding.fit.get("engine") == COMPARISON or any(
-        finding.effect in s.compared and s.names(finding) for s in stations
-    )
+    compared = _compared(finding) or any(finding.effect in s.compared and s.names(finding) for s in stations)
     return COMPARED if compared else 1.0
 
 
@@ -236,12 +232,25 @@ def _trifles(ranked: list[tuple[float, Finding]], magnitudes: Mapping[int, float
     return out
 
 
-def _doubted(found: Sequence[Finding]) -> list[Finding]:
-    """What a comparison of the hand's drives alone says, and not surely, where something else is missing of that hand:
+def _compared(finding: Finding) -> bool:
+    """Whether a comparison of the hand's drives alone says it."""
+    return finding.fit.get("engine") == COMPARISON
+
+
+def _doubted(found: Sequence[Finding]) -> list[tuple[Finding, str]]:
+    """What a comparison alone says, and not surely, where something else is missing of that hand, each with the reason:
     few have a second thing."""
-    if all(f.fit.get("engine") == COMPARISON for f in found):
+    if all(_compared(f) for f in found):
         return []
-    return [f for f in found if f.fit.get("engine") == COMPARISON and f.probability < SECOND]
+    return [(f, DOUBT) for f in found if _compared(f) and f.probability < SECOND]
+
+
+def _without(
+    ranked: list[tuple[float, Finding]], left_out: list[tuple[Finding, str]]
+) -> tuple[list[tuple[float, Finding]], list[dict[str, str]]]:
+    """The others, and what is left out with its reason, as it is told."""
+    told = [{"effect": f.effect, "where": str(f.where["finger"]), "reason": reason} for f, reason in left_out]
+    return [(w, f) for w, f in ranked if all(f is not other for other, _ in left_out)], told
 
 
 def _shared(ranked: list[tuple[float, Finding]]) -> tuple[Finding, ...]:

@@ -125,7 +125,10 @@ def _lacks(station: Station) -> bool:
 def _tells(station: Station) -> bool:
     """Whether a drive's preload can be spoken of: of one that does not repeat itself, of which something unknown is
     missing, or whose reading clips at one end, it cannot."""
-    lopsided = any(f.term.effect.clips and f.term.shape.get("form") for f in station.kept)
+    ends = np.array([-np.inf, np.inf])
+    lopsided = any(
+        np.isinf(t.effect.clip(ends, t.shape)).any() for t in (f.term for f in station.kept) if t.effect.clips
+    )
     return not lopsided and station.wander <= RESTLESS and (station.believed or not station.missing)
 
 
