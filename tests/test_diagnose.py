@@ -13,11 +13,12 @@ from hand_model.diagnose import Finding, Findings, diagnose
 from hand_model.diagnose.locate.motion import estimate_motion, local_quadratic
 from hand_model.diagnose.name.balance import Balance
 from hand_model.diagnose.name.interval import Reading, _quantile, held_out, parameter_intervals, undisturbed
+from hand_model.diagnose.name.judgement import judged
 from hand_model.diagnose.name.least_squares import bounded_least_squares
 from hand_model.diagnose.name.naming import ALPHA
 from hand_model.diagnose.name.selection import name_effects
 from hand_model.diagnose.name.shapes import polish
-from hand_model.diagnose.name.station import Station, judged
+from hand_model.diagnose.name.station import Station
 from hand_model.diagnose.name.term import Term, doubled
 from hand_model.effects import catalogue, effect
 from hand_model.effects.base import DriveState

@@ -11,8 +11,9 @@ import pytest
 from hand_model.diagnose.locate.decoupled import TRIFLE, pulls
 from hand_model.diagnose.locate.excursions import with_excursions
 from hand_model.diagnose.locate.slips import _swaps
+from hand_model.diagnose.name.judgement import judged
 from hand_model.diagnose.name.selection import name_effects
-from hand_model.diagnose.name.station import Station, judged
+from hand_model.diagnose.name.station import Station
 from hand_model.effects import catalogue, effect, outsiders
 from hand_model.effects.backlash import GRADUAL
 from hand_model.effects.base import DriveState

@@ -15,7 +15,8 @@ from hand_model.diagnose import Finding
 from hand_model.diagnose.assemble import assemble
 from hand_model.diagnose.locate.drive import with_required
 from hand_model.diagnose.name.entries import channel_of
-from hand_model.diagnose.name.station import Station, judged
+from hand_model.diagnose.name.judgement import judged
+from hand_model.diagnose.name.station import Station
 from hand_model.effects import catalogue, effect, outsiders
 from hand_model.effects.base import DriveState
 

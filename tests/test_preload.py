@@ -11,7 +11,7 @@ from test_diagnose import drive
 
 from hand_model.diagnose.locate.known_motors import MEDIAN, PRELOAD, kinship, preload_by_chance
 from hand_model.diagnose.locate.preload import preload_findings
-from hand_model.diagnose.name.station import judged
+from hand_model.diagnose.name.judgement import judged
 from hand_model.diagnose.name.term import Term
 from hand_model.effects import effect
 

@@ -12,10 +12,10 @@ from test_kinematic_stations import MAP, joint
 
 from hand_model.diagnose.name.balance import Balance
 from hand_model.diagnose.name.entries import finding_of
+from hand_model.diagnose.name.judgement import judged
 from hand_model.diagnose.name.reread import of_recording, reread
 from hand_model.diagnose.name.selection import name_effects
 from hand_model.diagnose.name.shapes import polish
-from hand_model.diagnose.name.station import judged
 from hand_model.diagnose.name.term import Term
 from hand_model.effects import catalogue, effect
 

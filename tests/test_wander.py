@@ -14,8 +14,8 @@ from test_diagnose import drive, planted
 from hand_model.diagnose.assemble import _wanders
 from hand_model.diagnose.locate.measurement import echoes_command, frozen, is_measured, rests_on_command
 from hand_model.diagnose.name.balance import Balance
+from hand_model.diagnose.name.judgement import judged
 from hand_model.diagnose.name.selection import name_effects
-from hand_model.diagnose.name.station import judged
 from hand_model.diagnose.name.wander import Wander, estimate_wander
 from hand_model.effects import catalogue, effect, outsiders
 from hand_model.session import Log

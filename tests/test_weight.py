@@ -12,7 +12,7 @@ from test_diagnose import drive
 
 from hand_model.diagnose import weight
 from hand_model.diagnose.name import entries, reread
-from hand_model.diagnose.name.station import judged
+from hand_model.diagnose.name.judgement import judged
 from hand_model.effects import effect
 from hand_model.effects.path import dahl
 

@@ -26,7 +26,8 @@ from .locate.decoupled import beside_excursions
 from .locate.markers import HINGE, MarkerNaming, corrected_angles, name_markers, tilt
 from .locate.slips import marker_findings, steps, with_steps
 from .locate.slips import unexplained as unexplained_of
-from .name.station import Station, judged
+from .name.judgement import judged
+from .name.station import Station
 from .prove.markers import OWN, marker_fit, of_chain
 
 

@@ -27,7 +27,8 @@ from .locate.simulated import SimulatedDrive
 from .magnitude import magnitude
 from .name.balance import Balance
 from .name.evidence import typical_coefficients
-from .name.station import Station, judged, told
+from .name.judgement import judged
+from .name.station import Station, told
 from .weight import with_weights
 
 REASON = 0.5  # of the size at which friction by load is plain: a soft controller falls behind by so much
