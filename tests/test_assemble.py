@@ -286,9 +286,16 @@ def test_what_only_other_motors_tell_ranks_behind_what_the_recordings_show(engin
 
 
 @pytest.mark.parametrize(("p", "least"), [(0.5, 0.15), (0.005, 0.05), (0.0025, 0.05), (1e-5, 0.0)])
-def test_the_less_a_test_sees_the_larger_must_a_finding_be_for_its_kind(p: float, least: float) -> None:
-    """One of fifteen channels falls below a three hundredth by chance."""
-    assert _beneath(SimpleNamespace(naming=SimpleNamespace(before=SimpleNamespace(p=p)))) == least
+@pytest.mark.parametrize(("signal", "steady"), [("current", True), ("current", False), ("encoder", True)])
+def test_the_less_a_test_sees_the_larger_must_a_finding_be_for_its_kind(
+    p: float, least: float, signal: str, steady: bool
+) -> None:
+    """One of fifteen channels falls below a three hundredth by chance. What a motor's steady motion tells is no error of
+    how it is read."""
+    station = SimpleNamespace(
+        naming=SimpleNamespace(before=SimpleNamespace(p=p)), signal=signal, steadily=lambda _: steady
+    )
+    assert _beneath(station, None) == (0.0 if signal == "current" and steady else least)
 
 
 def test_what_only_other_motors_tell_must_be_sure_in_a_hand_of_which_something_else_is_missing() -> None:

@@ -220,11 +220,12 @@ def test_noise_of_strokes_shorter_than_it_may_last_is_no_level_that_does_not_rep
     assert balance.inflation < 3.0 and balance.sigma == pytest.approx(1.0, rel=0.25)
 
 
+def half_untouched(states: tuple[DriveState, ...]) -> tuple[DriveState, ...]:
+    return tuple(replace(s, validate=k > 1) for k, s in enumerate(states))
+
+
 @pytest.mark.parametrize("seed", [21, 24])
 def test_a_faint_effect_needs_the_word_of_untouched_recordings(seed: int) -> None:
-    def half_untouched(states: tuple[DriveState, ...]) -> tuple[DriveState, ...]:
-        return tuple(replace(s, validate=k > 1) for k, s in enumerate(states))
-
     faint = half_untouched(drive(seed, planted("load_dependent_friction", {}, [0.014])))
     healthy = half_untouched(drive(seed))
     borne_out, refuted = (
@@ -233,6 +234,35 @@ def test_a_faint_effect_needs_the_word_of_untouched_recordings(seed: int) -> Non
     )
     assert [f.term.effect.name for f in borne_out.kept] == ["load_dependent_friction"] and borne_out.believed
     assert not refuted.missing
+
+
+@pytest.mark.parametrize("seed", [22, 24])
+def test_what_half_of_the_recordings_are_too_few_for_all_of_them_tell_and_each_half_bears_out(seed: int) -> None:
+    faint, healthy = (
+        half_untouched(drive(seed, planted("nonlinear_spring", {"form": 1.0, "knee": 50.0}, [0.0, size])))
+        for size in (0.06, 0.0)
+    )
+    told, *others = (
+        judged("current", "index", "index", None, states, catalogue("drive"))
+        for states in (faint, (*faint[:2], *healthy[2:]), healthy)
+    )
+    assert [f.term.effect.name for f in told.kept] == ["nonlinear_spring"] and told.believed
+    assert not told.naming.balance.untouched and not any(other.missing for other in others)
+
+
+def test_what_only_starts_and_stops_tell_is_not_told_by_steady_motion() -> None:
+    shape = {"form": 0.0, "reach": 4.0}
+    at_starts = unsure_at_ends(drive(5, planted("elastoplastic_hysteresis", shape, [9.0])))
+    everywhere = unsure_at_ends(drive(5, planted("torque_ripple", {"period": 9.0}, [4.0, 3.0])))
+    for states, name, told in ((at_starts, "elastoplastic_hysteresis", False), (everywhere, "torque_ripple", True)):
+        station = judged("current", "index", "index", None, states, (effect(name),))
+        assert [f.term.effect.name for f in station.naming.found] == [name]
+        assert station.steadily(station.naming.found[0]) == told
+
+
+def unsure_at_ends(states: tuple[DriveState, ...]) -> tuple[DriveState, ...]:
+    """The states with the first and last tenth of each stroke as known to 4 raw only."""
+    return tuple(replace(s, extra={**s.extra, "sigma": 4.0 * (np.abs(s.position - 50) > 40)}) for s in states)
 
 
 def test_naming_never_reads_validation_recordings() -> None:

@@ -75,8 +75,9 @@ def assemble(
         stands = stands and not (station.finger in loose and _leave_something(station, stations))
         if stands:
             strange += [(station, f) for f in station.outsiders]
-            for weight, finding in (finding_of(station, *merged) for merged in _merged(station.kept)):
-                if _magnitude(finding, stations) < _beneath(station):
+            for merged in _merged(station.kept):
+                weight, finding = finding_of(station, *merged)
+                if _magnitude(finding, stations) < _beneath(station, merged[0]):
                     rejected.append(
                         {
                             "effect": finding.effect,
@@ -138,10 +139,12 @@ def _worn(stations: Sequence[Station], of_markers: Sequence[Finding]) -> set[str
     return {finger for finger, count in named.items() if count >= MANY}
 
 
-def _beneath(station: Station) -> float:
-    """Magnitude beneath which a finding of a station says nothing, since the lack-of-fit test sees no mismatch there, or
-    one that may be chance."""
+def _beneath(station: Station, named: Named) -> float:
+    """Magnitude beneath which what was named at a station says nothing, since the lack-of-fit test sees no mismatch there,
+    or one that may be chance. A motor's steady speed is read as well as its place, which a joint's angle is not."""
     p = station.naming.before.p
+    if station.signal == "current" and station.steadily(named):
+        return 0.0
     return MINUTE if p >= UNSEEN else TINY if p >= ALPHA / CHANNELS else 0.0
 
 

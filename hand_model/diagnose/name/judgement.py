@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .naming import ALPHA, Naming
+from .naming import ALPHA, Named, Naming
 from .selection import EVIDENCE_LEAST, name_effects
 from .station import MAIN, UNREST, Station
 
@@ -65,6 +65,30 @@ def _foretold(
     return None
 
 
+def _among_all(
+    station: Station, states: tuple[Any, ...], effects: tuple[Any, ...], typical: Mapping[str, float] | None
+) -> Station:
+    """A motor's station in which nothing is seen, with what all recordings together tell, steady motion bears out and
+    those kept out have no less than the others: half of them are too few for what is faint. How late a current is its
+    answers to commands tell better."""
+    learned = name_effects(states, tuple(e for e in effects if not e.warps), typical=typical, whole=True)
+    other = Station(station.signal, station.finger, station.actuator, station.joint, learned)
+    borne_out = all(other.steadily(f) and _in_both(learned, f) for f in other.proven)
+    return other if other.believed and borne_out else station
+
+
+def _in_both(naming: Naming, named: Named) -> bool:
+    """Whether a name learned from all recordings makes those that would be kept out better, and the others; one that one
+    recording alone has need not."""
+    if not named.term.effect.of_the_hand:
+        return True
+    balance, terms = naming.balance, naming.fit.terms
+    without = balance.fit(tuple(t for t in terms if t is not named.term))
+    left, right = ((balance.effort - f.prediction) * balance.weight for f in (without, naming.fit))
+    held = balance.gather(lambda s: np.full(len(s.time_s), s.validate))
+    return all(float(np.sum((left**2 - right**2)[part])) > 0 for part in (held, ~held) if part.any())
+
+
 def judged(
     signal: str,
     finger: str | None,
@@ -112,6 +136,8 @@ def judged(
         # another pose is plain to see, whatever small is left
         seen = other.naming.after.p >= ALPHA or _altered(station.naming)
         station = other if seen and other.believed and other.wander <= max(station.wander, UNREST) else station
+    if signal == "current" and not (station.missing or station.proven):
+        station = _among_all(station, states, every, typical)
     if station.forms:
         left = tuple(e for e in left if e.name not in {f.term.effect.name for f in station.forms})
         other = Station(signal, finger, actuator, joint, name_effects(states, left, typical=typical))

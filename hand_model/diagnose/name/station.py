@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..findings import Finding
+from .balance import Balance
 from .interval import brought_held_out, parameter_intervals, sized, undisturbed, variance_ratio
 from .naming import ALPHA, EXPLAINED_LEAST, MOST_TERMS, Named, Naming
 from .selection import EVIDENCE_LEAST, SMALL
@@ -209,6 +210,16 @@ class Station:
             and f.term.effect.name not in covered
             and (f.size >= restless or not f.term.effect.drifting)
         )
+
+    def steadily(self, named: Named) -> bool:
+        """Whether steady motion holds the better part of what a name brings: else how starts and stops are read may."""
+        naming, which = self.naming, self.naming.fit.terms.index(named.term)
+        terms, rest = naming.fit.terms, naming.fit.terms[:which] + naming.fit.terms[which + 1 :]
+
+        def brought(balance: Balance) -> float:
+            return balance.fit(rest).rss - balance.fit(terms).rss
+
+        return brought(naming.balance.settled()) > MAIN * brought(naming.balance)
 
     def standing(self, name: str) -> Named | None:
         """What stands here by a name; None where nothing does."""

@@ -1,0 +1,105 @@
+"""A session with something planted in one of its fingers."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from hand_model.session import Finger, Session, read_session
+from hand_model.session.log import read_log
+from hand_model.twin.files import write_log, write_markers
+
+from .channels import CHANNELS
+from .loads import LOADS
+from .plant import Columns, Draw, Motor, Moving, Plant, smoothed
+from .segments import SEGMENTS
+from .slips import SLIPS
+from .watched import watched
+
+EFFECTS: dict[str, Callable[[Draw, float, Motor], Plant]] = {
+    f.__name__: f for f in (*LOADS, *CHANNELS, *SEGMENTS, *SLIPS)
+}
+SPREAD = 4.0  # [counts] of an encoder's noise
+
+
+def planted(source: Path, target: Path, finger: str, effect: str, size: float, seed: int, noise: float = 0.0) -> Plant:
+    """Write the session `source` with an effect in one finger to the new folder `target`; noise: white noise that comes
+    on top of it, in that of a usual recording (5 raw, 0.15 mm)."""
+    session = read_session(source)
+    answer = json.loads((source / "answer.json").read_text())
+    rng = np.random.default_rng(seed)
+    one = next(f for f in session.fingers if f.name == finger)
+    motor = _motor(session, one, answer["motor"][finger])
+    plant = EFFECTS[effect](rng, size, motor)
+    shutil.copytree(source, target, ignore=shutil.ignore_patterns("answer.json"))
+    logged = [t for t in session.trials if t.log_path is not None and t.log_path.is_file()]
+    mine = [t for t in logged if t.finger == finger]
+    begun = min(float(read_log(t.log_path).time_s[0]) for t in mine)
+    for trial in logged:
+        log = read_log(trial.log_path)
+        columns = {"time": log.time_s, **log.columns}
+        if trial in mine:
+            columns = _changed(columns, plant, _moving(columns, motor, begun, mine.index(trial)))
+        columns = {
+            **columns,
+            "current": np.round(columns["current"] + 5.0 * noise * rng.standard_normal(len(log.time_s))),
+        }
+        write_log(target / trial.log_path.relative_to(source), columns)
+    for trial in (t for t in session.select("flexion") if t.mocap_path is not None):
+        mocap, owner = trial.mocap(), next(f for f in session.fingers if f.name == trial.finger)
+        position = mocap.position_world
+        if plant.markers is not None and owner.name == finger:
+            position = plant.markers(watched(session, owner, trial))
+        position = position + 1.5e-4 * noise * rng.standard_normal(position.shape)
+        write_markers(
+            target / trial.mocap_path.relative_to(source),
+            dict(zip(mocap.labels, position.transpose(1, 0, 2), strict=True)),
+            mocap.rate_hz,
+            "mm",
+        )
+    return plant
+
+
+def _changed(columns: Columns, plant: Plant, moving: Moving) -> Columns:
+    if plant.load is not None:
+        columns = {**columns, "current": np.round(columns["current"] + plant.load(moving))}
+    return columns if plant.columns is None else plant.columns(columns, moving)
+
+
+def _moving(columns: Columns, motor: Motor, begun_s: float, number: int) -> Moving:
+    """Place and speed along a log, smoothed as far as its own scatter says."""
+    time_s, known = columns["time"], np.isfinite(columns["position"])
+    place = 100 * (columns["position"] - motor.low) / (motor.high - motor.low)
+    course = smoothed(time_s[known], place[known], 100 * SPREAD / (motor.high - motor.low))
+    return Moving(time_s - time_s[0], course(time_s), course.derivative()(time_s), time_s - begun_s, number)
+
+
+def _motor(session: Session, finger: Finger, told: dict[str, float]) -> Motor:
+    """A finger's drive as its answer tells it, its counts and the moments of a weight at its markers."""
+    trials = session.select("flexion", finger.name)
+    counts = np.concatenate([t.log().columns["position"] for t in trials])
+    low, high = (float(np.nanpercentile(counts, q)) for q in (2, 98))
+    seen = watched(session, finger, trials[0])
+    lever = np.nanmean(seen.position[:, seen.segments[0]], axis=1) - seen.centre[0]
+    lever = lever - seen.axis[0] * np.sum(lever * seen.axis[0], 1)[:, None]
+    lever = lever / np.linalg.norm(lever, axis=1)[:, None]
+    gravity = np.array([0.0, 0.0, -9.81]) if session.gravity_world is None else np.array(session.gravity_world)
+    down = gravity / np.linalg.norm(gravity)
+    moment = -np.sum(seen.axis[0] * np.cross(lever, down), axis=1)
+    known = np.isfinite(moment)
+    waves = np.stack([np.cos(seen.angle[0]), np.sin(seen.angle[0])], 1)
+    weight = np.linalg.lstsq(waves[known], moment[known], rcond=None)[0]
+    return Motor(
+        coulomb=told["Fc"],
+        viscous=told["b"],
+        stiffness=told["k"],
+        preload=told["tau0"],
+        low=low,
+        high=high,
+        weight=(float(weight[0]), float(weight[1])),
+        full_rad=float(np.percentile(seen.angle[0], 98)),
+    )

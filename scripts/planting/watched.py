@@ -1,0 +1,94 @@
+"""A finger's joints as its markers show them: angle, axis and centre along a flexion recording."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+from scipy.optimize import minimize_scalar
+from scipy.spatial.transform import Rotation
+
+from hand_model.session import Finger, Session, Trial
+
+from .plant import Array, Seen, smoothed
+
+CURVED = 4  # degree of what an angle is of the drive's place
+SPREAD = 4.0  # [counts] of an encoder's noise
+
+
+def watched(session: Session, finger: Finger, trial: Trial) -> Seen:
+    """One recording of a finger with two segments of three markers each; its angles as the encoder, much less noisy than
+    the markers, foretells them."""
+    mocap, log = trial.mocap(), trial.log()
+    palm, upper, lower = (
+        np.array([mocap.labels.index(label) for label in labels])
+        for labels in (session.palm.labels, *(s.markers for s in finger.segments))
+    )
+    bodies = [_poses(mocap.position_world[:, rows], mocap.time_s) for rows in (palm, upper, lower)]
+    joints = [_joint(bodies[i], bodies[i + 1]) for i in range(2)]
+    start = mocap.time_s - mocap.time_s[0] < 0.8
+    course = smoothed(log.time_s - log.time_s[0], log.columns["position"], SPREAD)
+    angles = _foretold(course, log.time_s[-1] - log.time_s[0], mocap.time_s - mocap.time_s[0], [j[0] for j in joints])
+    return Seen(
+        time_s=mocap.time_s - mocap.time_s[0],
+        position=mocap.position_world,
+        labels=mocap.labels,
+        segments=(upper, lower),
+        palm=palm,
+        angle=tuple(a - float(np.median(a[start])) for a in angles),
+        axis=tuple(j[1] for j in joints),
+        centre=tuple(j[2] for j in joints),
+        palm_turn=bodies[0][0],
+        proximal_turn=bodies[1][0],
+    )
+
+
+def _poses(points: Array, time_s: Array) -> tuple[Array, Array]:
+    """Turns (n, 3, 3) and places (n, 3) [m] of a body of markers (n, k, 3), between frames in which one is lost as
+    nearly as these tell (Kabsch 1976)."""
+    whole = np.flatnonzero(np.isfinite(points).all((1, 2)))
+    shape = points[whole[0]] - points[whole[0]].mean(0)
+    middle = points[whole].mean(1)
+    u, _, vt = np.linalg.svd(np.einsum("nki,kj->nij", points[whole] - middle[:, None], shape))
+    u[:, :, -1] *= np.sign(np.linalg.det(u @ vt))[:, None]
+    vector = _unwrapped(Rotation.from_matrix(u @ vt).as_rotvec())
+    turn = np.stack([np.interp(time_s, time_s[whole], v) for v in vector.T], 1)
+    place = np.stack([np.interp(time_s, time_s[whole], v) for v in middle.T], 1)
+    return Rotation.from_rotvec(turn).as_matrix(), place
+
+
+def _unwrapped(vector: Array) -> Array:
+    """Rotation vectors (n, 3) that do not jump by a whole turn."""
+    out = vector.copy()
+    for k in range(1, len(out)):
+        if out[k] @ out[k - 1] < 0 and np.linalg.norm(out[k]) > 2:
+            out[k] *= 1 - 2 * np.pi / np.linalg.norm(out[k])
+    return out
+
+
+def _joint(bearing: tuple[Array, Array], borne: tuple[Array, Array]) -> tuple[Array, Array, Array]:
+    """Angle (n,) [rad], axis (n, 3) and centre (n, 3) [m] in the world of a hinge between two bodies."""
+    relative = bearing[0].transpose(0, 2, 1) @ borne[0]
+    vector = Rotation.from_matrix(relative @ relative[0].T).as_rotvec()
+    axis = np.linalg.svd(vector, full_matrices=False)[2][0]
+    axis = axis * np.sign(np.sum(vector @ axis))
+    apart = np.einsum("nji,nj->ni", bearing[0], borne[1] - bearing[1])
+    design: NDArray[np.float64] = np.concatenate([relative, np.broadcast_to(-np.eye(3), relative.shape)], 2)
+    point = np.linalg.lstsq(design.reshape(-1, 6), -apart.ravel(), rcond=1e-6)[0]
+    return vector @ axis, bearing[0] @ axis, bearing[1] + bearing[0] @ point[3:]
+
+
+def _foretold(course: BSpline, last_s: float, time_s: Array, angles: Sequence[Array]) -> list[Array]:
+    """Angles (n,) each as polynomials of the course of an encoder, whose log begins so much after the cameras as makes
+    them fit best."""
+
+    def fitted(late_s: float) -> tuple[float, list[Array]]:
+        place = course(np.clip(time_s - late_s, 0.0, last_s))
+        told = [np.polynomial.Polynomial.fit(place, angle, CURVED)(place) for angle in angles]
+        return float(sum(np.sum((a - b) ** 2) for a, b in zip(angles, told, strict=True))), told
+
+    coarse = min(np.arange(-2.0, 2.0, 0.02), key=lambda x: fitted(x)[0])
+    best = minimize_scalar(lambda x: fitted(x)[0], bounds=(coarse - 0.02, coarse + 0.02), method="bounded").x
+    return fitted(float(best))[1]
