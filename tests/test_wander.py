@@ -13,9 +13,11 @@ from test_diagnose import drive, planted
 
 from hand_model.diagnose.assemble import _wanders
 from hand_model.diagnose.locate.measurement import echoes_command, frozen, is_measured, rests_on_command
+from hand_model.diagnose.name import station as station_module
 from hand_model.diagnose.name.balance import Balance
 from hand_model.diagnose.name.judgement import judged
-from hand_model.diagnose.name.selection import name_effects
+from hand_model.diagnose.name.naming import ALPHA
+from hand_model.diagnose.name.selection import EVIDENCE_LEAST, name_effects
 from hand_model.diagnose.name.wander import Wander, estimate_wander
 from hand_model.effects import catalogue, effect, outsiders
 from hand_model.session import Log
@@ -266,3 +268,20 @@ def test_one_finger_wanders_only_if_noise_that_lasts_as_in_the_others_does_not_s
     assert not _wanders(calm, [restless, calm])
     lasting = station("ring", 4, 300.0)  # so long that it says all
     assert not _wanders(restless, [restless, lasting])
+
+
+def test_what_one_recording_alone_has_must_be_plain_where_no_test_sees_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It may be in any of them and at any time; what the machine has is in all."""
+
+    def contact(state):
+        while_ = (state.trial == "trial_1") & (state.time_s - state.time_s[0] > 0.3 * np.ptp(state.time_s))
+        return 0.06 * np.maximum(state.position - 50.0, 0.0) * while_
+
+    asked = []
+    monkeypatch.setattr(station_module, "_stands", lambda naming, found, which, least: asked.append(least) or True)
+    rippled = planted("torque_ripple", {"period": 9.0}, [0.9, 0.0])
+    for add, name in ((contact, "external_contact"), (rippled, "torque_ripple")):
+        station = judged("current", "index", "index", None, drive(7, add), [effect(name)])
+        assert station.naming.before.p >= ALPHA and [f.term.effect.name for f in station.naming.found] == [name]
+    chance = EVIDENCE_LEAST + np.log(100.0)
+    assert asked[0] == pytest.approx(chance + EVIDENCE_LEAST) and asked[-1] == pytest.approx(chance)

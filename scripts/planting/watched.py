@@ -27,10 +27,12 @@ def watched(session: Session, finger: Finger, trial: Trial) -> Seen:
         for labels in (session.palm.labels, *(s.markers for s in finger.segments))
     )
     bodies = [_poses(mocap.position_world[:, rows], mocap.time_s) for rows in (palm, upper, lower)]
-    joints = [_joint(bodies[i], bodies[i + 1]) for i in range(2)]
+    turned = [_axis(bodies[i], bodies[i + 1]) for i in range(2)]
     start = mocap.time_s - mocap.time_s[0] < 0.8
     course = smoothed(log.time_s - log.time_s[0], log.columns["position"], SPREAD)
-    angles = _foretold(course, log.time_s[-1] - log.time_s[0], mocap.time_s - mocap.time_s[0], [j[0] for j in joints])
+    angles = _foretold(course, log.time_s[-1] - log.time_s[0], mocap.time_s - mocap.time_s[0], [j[1] for j in turned])
+    axes = [bodies[i][0] @ turned[i][0] for i in range(2)]
+    centres = [_centre(bodies[i], bodies[i + 1], turned[i][0], angles[i]) for i in range(2)]
     return Seen(
         time_s=mocap.time_s - mocap.time_s[0],
         position=mocap.position_world,
@@ -38,8 +40,8 @@ def watched(session: Session, finger: Finger, trial: Trial) -> Seen:
         segments=(upper, lower),
         palm=palm,
         angle=tuple(a - float(np.median(a[start])) for a in angles),
-        axis=tuple(j[1] for j in joints),
-        centre=tuple(j[2] for j in joints),
+        axis=tuple(axes),
+        centre=tuple(centres),
         palm_turn=bodies[0][0],
         proximal_turn=bodies[1][0],
     )
@@ -68,16 +70,25 @@ def _unwrapped(vector: Array) -> Array:
     return out
 
 
-def _joint(bearing: tuple[Array, Array], borne: tuple[Array, Array]) -> tuple[Array, Array, Array]:
-    """Angle (n,) [rad], axis (n, 3) and centre (n, 3) [m] in the world of a hinge between two bodies."""
+def _axis(bearing: tuple[Array, Array], borne: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Axis (3,) of a hinge between two bodies in the bearing one, and its angle (n,) [rad] from the first frame."""
     relative = bearing[0].transpose(0, 2, 1) @ borne[0]
     vector = Rotation.from_matrix(relative @ relative[0].T).as_rotvec()
     axis = np.linalg.svd(vector, full_matrices=False)[2][0]
     axis = axis * np.sign(np.sum(vector @ axis))
+    return axis, vector @ axis
+
+
+def _centre(bearing: tuple[Array, Array], borne: tuple[Array, Array], axis: Array, angle: Array) -> Array:
+    """Centre (n, 3) [m] of a hinge in the world, nearest to the bearing body's middle along its axis. How the segment is
+    turned is taken from the angle (n,) [rad]: the noise of its markers would draw the centre towards them."""
+    turn = Rotation.from_rotvec(axis * angle[:, None]).as_matrix()
+    relative = bearing[0].transpose(0, 2, 1) @ borne[0]
+    first = Rotation.from_matrix(turn.transpose(0, 2, 1) @ relative).mean().as_matrix()
     apart = np.einsum("nji,nj->ni", bearing[0], borne[1] - bearing[1])
-    design: NDArray[np.float64] = np.concatenate([relative, np.broadcast_to(-np.eye(3), relative.shape)], 2)
+    design: NDArray[np.float64] = np.concatenate([turn @ first, np.broadcast_to(-np.eye(3), turn.shape)], 2)
     point = np.linalg.lstsq(design.reshape(-1, 6), -apart.ravel(), rcond=1e-6)[0]
-    return vector @ axis, bearing[0] @ axis, bearing[1] + bearing[0] @ point[3:]
+    return bearing[1] + bearing[0] @ point[3:]
 
 
 def _foretold(course: BSpline, last_s: float, time_s: Array, angles: Sequence[Array]) -> list[Array]:

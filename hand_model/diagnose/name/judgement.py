@@ -69,8 +69,8 @@ def _among_all(
     station: Station, states: tuple[Any, ...], effects: tuple[Any, ...], typical: Mapping[str, float] | None
 ) -> Station:
     """A motor's station in which nothing is seen, with what all recordings together tell, steady motion bears out and
-    those kept out have no less than the others: half of them are too few for what is faint. How late a current is its
-    answers to commands tell better."""
+    those kept out have as well as the others: half of them are too few for what is faint. How late a current is its
+    answers to commands tell better; what one recording alone has is not told by more of them."""
     learned = name_effects(states, tuple(e for e in effects if not e.warps), typical=typical, whole=True)
     other = Station(station.signal, station.finger, station.actuator, station.joint, learned)
     borne_out = all(other.steadily(f) and _in_both(learned, f) for f in other.proven)
@@ -78,10 +78,7 @@ def _among_all(
 
 
 def _in_both(naming: Naming, named: Named) -> bool:
-    """Whether a name learned from all recordings makes those that would be kept out better, and the others; one that one
-    recording alone has need not."""
-    if not named.term.effect.of_the_hand:
-        return True
+    """Whether a name learned from all recordings makes those that would be kept out better, and the others."""
     balance, terms = naming.balance, naming.fit.terms
     without = balance.fit(tuple(t for t in terms if t is not named.term))
     left, right = ((balance.effort - f.prediction) * balance.weight for f in (without, naming.fit))

@@ -48,11 +48,16 @@ class Station:
         self.compared: tuple[str, ...] = ()
         self.tilt = 0.0
         chances = CHANCES_OF_MOTORS if signal == "current" else CHANCES
-        least = EVIDENCE_LEAST + (np.log(chances) if naming.before.p >= ALPHA else 0.0)
+        unseen = naming.before.p >= ALPHA
+        least = EVIDENCE_LEAST + (np.log(chances) if unseen else 0.0)
+
+        def must(f: Named) -> float:  # what one recording alone may have, it may have anywhere and at any time
+            return least + (EVIDENCE_LEAST if unseen and not f.term.effect.of_the_hand else 0.0)
+
         stand = [
             places[id(f)]
             for f in naming.found
-            if _stands(naming, f, places[id(f)], least)
+            if _stands(naming, f, places[id(f)], must(f))
             and (sized(self.reading, places[id(f)]) or _plain_at_ends(naming, f, least))
         ]
         self.parameters = {which: parameter_intervals(self.reading, which) for which in stand}
@@ -61,9 +66,7 @@ class Station:
         self._faint = {
             f.term.effect.name
             for f in self.proven
-            if naming.before.p >= ALPHA
-            and not f.term.effect.listed
-            and not _stands(naming, f, places[id(f)], least + EVIDENCE_LEAST)
+            if unseen and not f.term.effect.listed and not _stands(naming, f, places[id(f)], least + EVIDENCE_LEAST)
         }
 
     def names(self, finding: Finding) -> bool:
