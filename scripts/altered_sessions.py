@@ -10,11 +10,11 @@ hidden is printed.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from pathlib import Path
 
 from alterations import ALTERATIONS, ENDINGS, altered
+from shown_answers import hidden_in
 
 from hand_model import diagnose
 
@@ -33,11 +33,7 @@ def main() -> int:
         for j, source in enumerate(sorted(p.parent for p in arguments.folder.glob("*/answer.json"))):
             target = arguments.output / kind / source.name
             altered(source, target / "session", ALTERATIONS[kind], ENDINGS[i % len(ENDINGS)], 100 * i + j)
-            hidden = [
-                (e["effect"], e["finger"])
-                for e in json.loads((source / "answer.json").read_text())["effects"]
-                if e["effect"] != "none"
-            ]
+            hidden = hidden_in(source)
             findings = diagnose(target / "session", output=target / "findings", model=False).findings
             named = [(f.effect, f.where["finger"]) for f in findings]
             same = len(named) == len(hidden) and all(

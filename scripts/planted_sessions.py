@@ -10,22 +10,21 @@ hidden before. A load is added to the current at the motion as it was: what a co
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
 from planting.compose import EFFECTS, planted
+from shown_answers import all_named, answer_of, hidden_in
 
 from hand_model import diagnose
 
 
 def healthy(source: Path) -> list[str]:
     """Fingers of a session in which nothing is hidden."""
-    answer = json.loads((source / "answer.json").read_text())
-    hidden = {e["finger"] for e in answer["effects"] if e["effect"] != "none"}
-    return [f for f in answer["motor"] if f not in hidden]
+    ill = {finger for _, finger in hidden_in(source)}
+    return [f for f in answer_of(source)["motor"] if f not in ill]
 
 
 def trial(
@@ -33,14 +32,13 @@ def trial(
 ) -> tuple[bool, str]:
     """Plant, diagnose, compare: whether all that is there is named and nothing else, and a line that says so."""
     plant = planted(source, target / "session", finger, effect, size, seed, noise)
-    answer = json.loads((source / "answer.json").read_text())
-    hidden = {(e["effect"], e["finger"]) for e in answer["effects"] if e["effect"] != "none"} | {(effect, finger)}
+    hidden = sorted([*hidden_in(source), (effect, finger)])
     found = diagnose(target / "session", output=target / "findings", model=False)
     named = [(f.effect, f.where["finger"]) for f in found.findings]
-    right = len(named) == len(hidden) and all(any(n[0] == h[0] and n[1] in (h[1], None) for h in hidden) for n in named)
+    right = all_named(named, hidden)
     figures = {k: round(v, 4) if isinstance(v, float) else v for k, v in plant.figures.items()}
     word = "" if right else "  MISSED"
-    return right, f"{target.name}: {named or found.verdict}, hidden {sorted(hidden)} {figures}{word}"
+    return right, f"{target.name}: {named or found.verdict}, hidden {hidden} {figures}{word}"
 
 
 def main() -> None:

@@ -14,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 from planting.compose import EFFECTS
 from planting.plant import Motor, Moving, Seen, smoothed, turned_over
 from planting.segments import play, turned
+from shown_answers import all_named
 
 MOTOR = Motor(coulomb=35.0, viscous=0.15, stiffness=0.22, preload=9.0, low=12000.0, high=17700.0)
 TIME_S = np.linspace(0.0, 20.0, 2001)
@@ -108,3 +109,11 @@ def test_every_effect_changes_log_or_markers() -> None:
         drawn = plant(np.random.default_rng(1), 1.0, MOTOR)
         assert drawn.load or drawn.columns or drawn.markers, name
         assert drawn.figures
+
+
+def test_all_that_is_hidden_must_be_named_and_nothing_else() -> None:
+    one, two = ("marker_slip", "index"), ("clock_drift", "ring")
+    assert all_named([two, one], [one, two]) and all_named([one, ("clock_drift", None)], [one, two])
+    assert all_named([], [])
+    assert not all_named([one, one], [one, two]) and not all_named([one], [one, two])
+    assert not all_named([("marker_slip", "ring"), two], [one, two]) and not all_named([one, two], [one])

@@ -143,9 +143,8 @@ def _beneath(station: Station, named: Named) -> float:
     """Magnitude beneath which what was named at a station says nothing, since the lack-of-fit test sees no mismatch there,
     or one that may be chance. A motor's steady speed is read as well as its place, which a joint's angle is not."""
     p = station.naming.before.p
-    if station.signal == "current" and station.steadily(named):
-        return 0.0
-    return MINUTE if p >= UNSEEN else TINY if p >= ALPHA / CHANNELS else 0.0
+    least = MINUTE if p >= UNSEEN else TINY if p >= ALPHA / CHANNELS else 0.0
+    return 0.0 if least and station.signal == "current" and station.steadily(named) else least
 
 
 def _counted(finding: Finding, stations: Sequence[Station]) -> float:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from shown_answers import answer_of
 
 from hand_model.session import Finger, Session, read_session
 from hand_model.session.log import read_log
@@ -15,7 +15,7 @@ from hand_model.twin.files import write_log, write_markers
 
 from .channels import CHANNELS
 from .loads import LOADS
-from .plant import Columns, Draw, Motor, Moving, Plant, smoothed
+from .plant import SPREAD, Columns, Draw, Motor, Moving, Plant, smoothed
 from .segments import SEGMENTS
 from .slips import SLIPS
 from .watched import watched
@@ -23,17 +23,15 @@ from .watched import watched
 EFFECTS: dict[str, Callable[[Draw, float, Motor], Plant]] = {
     f.__name__: f for f in (*LOADS, *CHANNELS, *SEGMENTS, *SLIPS)
 }
-SPREAD = 4.0  # [counts] of an encoder's noise
 
 
 def planted(source: Path, target: Path, finger: str, effect: str, size: float, seed: int, noise: float = 0.0) -> Plant:
     """Write the session `source` with an effect in one finger to the new folder `target`; noise: white noise that comes
     on top of it, in that of a usual recording (5 raw, 0.15 mm)."""
     session = read_session(source)
-    answer = json.loads((source / "answer.json").read_text())
     rng = np.random.default_rng(seed)
     one = next(f for f in session.fingers if f.name == finger)
-    motor = _motor(session, one, answer["motor"][finger])
+    motor = _motor(session, one, answer_of(source)["motor"][finger])
     plant = EFFECTS[effect](rng, size, motor)
     shutil.copytree(source, target, ignore=shutil.ignore_patterns("answer.json"))
     logged = [t for t in session.trials if t.log_path is not None and t.log_path.is_file()]

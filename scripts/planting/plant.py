@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline, make_smoothing_spline
+from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
 Draw = np.random.Generator
 Columns = dict[str, Array]
+SPREAD = 4.0  # [counts] of an encoder's noise
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,7 @@ class Seen:
 @dataclass(frozen=True)
 class Plant:
     """load: what is added to the current [raw]; columns: other changes of a log; markers: of what cameras saw, (n, m, 3)
-    [m]. figures: for the answer. joint: where it is said to be, where that is asked."""
+    [m]. figures: for the answer."""
 
     load: Callable[[Moving], Array] | None = None
     columns: Callable[[Columns, Moving], Columns] | None = None
@@ -78,6 +80,12 @@ def smoothed(time_s: Array, values: Array, noise: float) -> BSpline:
         if np.std(values - course(time_s)) <= noise:
             break
     return course
+
+
+def about(points: Array, vector: Array, centre: Array) -> Array:
+    """Points (n, m, 3) turned about centres (n, 3) by rotation vectors (n, 3) [rad]."""
+    turn = Rotation.from_rotvec(vector).as_matrix()
+    return np.einsum("nij,nmj->nmi", turn, points - centre[:, None]) + centre[:, None]
 
 
 def turned_over(place: Array, reach: float) -> Array:

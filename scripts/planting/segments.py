@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from .plant import Array, Draw, Motor, Plant, Seen, turned_over
+from .plant import Array, Draw, Motor, Plant, Seen, about, turned_over
 
 BRISTLE = 0.6  # [%] in which dry friction turns over, either way
 
@@ -17,9 +16,7 @@ def turned(seen: Seen, proximal: Array, distal: Array) -> Array:
     out = seen.position.copy()
     upper, lower = seen.segments
     for rows, joint, angle in ((lower, 1, distal), (np.concatenate([upper, lower]), 0, proximal)):
-        turn = Rotation.from_rotvec(seen.axis[joint] * angle[:, None]).as_matrix()
-        centre = seen.centre[joint][:, None]
-        out[:, rows] = np.einsum("nij,nmj->nmi", turn, out[:, rows] - centre) + centre
+        out[:, rows] = about(out[:, rows], seen.axis[joint] * angle[:, None], seen.centre[joint])
     return out
 
 
@@ -130,9 +127,8 @@ def _moved(s: Seen, joint: int, way: float, how: Callable[[Array], tuple[Array, 
     across = bearing @ (np.cos(way) * first + np.sin(way) * np.cross(axis, first))
     tilt, shift = how(s.angle[joint])
     rows = np.concatenate(s.segments[joint:])
-    turn = Rotation.from_rotvec(across * tilt[:, None]).as_matrix()
-    out, centre = s.position.copy(), s.centre[joint][:, None]
-    out[:, rows] = np.einsum("nij,nmj->nmi", turn, out[:, rows] - centre) + centre + (across * shift[:, None])[:, None]
+    out = s.position.copy()
+    out[:, rows] = about(out[:, rows], across * tilt[:, None], s.centre[joint]) + (across * shift[:, None])[:, None]
     return out
 
 

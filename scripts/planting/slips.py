@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .plant import Array, Draw, Motor, Plant, Seen
+from .plant import Array, Draw, Motor, Plant, Seen, about
 
 
 def _direction(rng: Draw) -> Array:
@@ -45,9 +45,8 @@ def support_slip(rng: Draw, size: float, motor: Motor) -> Plant:
 
     def slipped(s: Seen) -> Array:
         rows, out = s.segments[segment], s.position.copy()
-        axis = _turns(s, segment) @ way * _since(s, begin)[:, None]
-        turn, centre = Rotation.from_rotvec(axis).as_matrix(), s.centre[segment][:, None]
-        out[:, rows] = np.einsum("nij,nmj->nmi", turn, out[:, rows] - centre) + centre
+        vector = _turns(s, segment) @ way * _since(s, begin)[:, None]
+        out[:, rows] = about(out[:, rows], vector, s.centre[segment])
         return out
 
     return Plant(markers=slipped, figures={"segment": segment, "begin": begin})

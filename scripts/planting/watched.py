@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.optimize import minimize_scalar
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import Rotation, Slerp
 
+from hand_model.rotation import kabsch
 from hand_model.session import Finger, Session, Trial
 
-from .plant import Array, Seen, smoothed
+from .plant import SPREAD, Array, Seen, smoothed
 
 CURVED = 4  # degree of what an angle is of the drive's place
-SPREAD = 4.0  # [counts] of an encoder's noise
 
 
 def watched(session: Session, finger: Finger, trial: Trial) -> Seen:
@@ -49,25 +49,13 @@ def watched(session: Session, finger: Finger, trial: Trial) -> Seen:
 
 def _poses(points: Array, time_s: Array) -> tuple[Array, Array]:
     """Turns (n, 3, 3) and places (n, 3) [m] of a body of markers (n, k, 3), between frames in which one is lost as
-    nearly as these tell (Kabsch 1976)."""
+    nearly as these tell."""
     whole = np.flatnonzero(np.isfinite(points).all((1, 2)))
     shape = points[whole[0]] - points[whole[0]].mean(0)
-    middle = points[whole].mean(1)
-    u, _, vt = np.linalg.svd(np.einsum("nki,kj->nij", points[whole] - middle[:, None], shape))
-    u[:, :, -1] *= np.sign(np.linalg.det(u @ vt))[:, None]
-    vector = _unwrapped(Rotation.from_matrix(u @ vt).as_rotvec())
-    turn = np.stack([np.interp(time_s, time_s[whole], v) for v in vector.T], 1)
-    place = np.stack([np.interp(time_s, time_s[whole], v) for v in middle.T], 1)
-    return Rotation.from_rotvec(turn).as_matrix(), place
-
-
-def _unwrapped(vector: Array) -> Array:
-    """Rotation vectors (n, 3) that do not jump by a whole turn."""
-    out = vector.copy()
-    for k in range(1, len(out)):
-        if out[k] @ out[k - 1] < 0 and np.linalg.norm(out[k]) > 2:
-            out[k] *= 1 - 2 * np.pi / np.linalg.norm(out[k])
-    return out
+    turn, place = kabsch(shape, points[whole])
+    between = Slerp(time_s[whole], Rotation.from_matrix(turn))
+    turned = between(np.clip(time_s, time_s[whole[0]], time_s[whole[-1]])).as_matrix()
+    return turned, np.stack([np.interp(time_s, time_s[whole], v) for v in place.T], 1)
 
 
 def _axis(bearing: tuple[Array, Array], borne: tuple[Array, Array]) -> tuple[Array, Array]:

@@ -59,7 +59,7 @@ def _foretold(
     known = {f.term.effect.name for f in station.naming.found}
     for among in (effects, tuple(e.apart() for e in effects)):
         naming = name_effects(told, among, typical=typical)
-        other = Station(station.signal, station.finger, station.actuator, station.joint, naming)
+        other = station.renamed(naming)
         if other.believed and {f.term.effect.name for f in other.kept} <= known:
             return other
     return None
@@ -70,9 +70,9 @@ def _among_all(
 ) -> Station:
     """A motor's station in which nothing is seen, with what all recordings together tell, steady motion bears out and
     those kept out have as well as the others: half of them are too few for what is faint. How late a current is its
-    answers to commands tell better; what one recording alone has is not told by more of them."""
+    answers to commands tell better; what one recording alone has makes the others no better."""
     learned = name_effects(states, tuple(e for e in effects if not e.warps), typical=typical, whole=True)
-    other = Station(station.signal, station.finger, station.actuator, station.joint, learned)
+    other = station.renamed(learned)
     borne_out = all(other.steadily(f) and _in_both(learned, f) for f in other.proven)
     return other if other.believed and borne_out else station
 
@@ -108,7 +108,7 @@ def judged(
         if lost < DISPLACING or station.naming.overwhelmed:
             break
         left = tuple(e for e in left if e.name not in fallen)
-        other = Station(signal, finger, actuator, joint, name_effects(states, left, typical=typical))
+        other = station.renamed(name_effects(states, left, typical=typical))
         if other.weight <= station.weight and lost <= MAIN:
             break  # else what fell had held the better part: what it left over stands on nothing
         station = other
@@ -123,13 +123,8 @@ def judged(
         # what the training recordings cannot tell, a pose that one of the others alone has may tell
         lasting = tuple(e for e in every if e.of_the_hand)  # what one recording had explains no other
         learned = name_effects(states, lasting, typical=typical, whole=True)
-        other = Station(
-            signal,
-            finger,
-            actuator,
-            joint,
-            replace(learned, before=max(station.naming.before, learned.before, key=attrgetter("excess"))),
-        )
+        before = max(station.naming.before, learned.before, key=attrgetter("excess"))
+        other = station.renamed(replace(learned, before=before))
         # another pose is plain to see, whatever small is left
         seen = other.naming.after.p >= ALPHA or _altered(station.naming)
         station = other if seen and other.believed and other.wander <= max(station.wander, UNREST) else station
@@ -137,6 +132,6 @@ def judged(
         station = _among_all(station, states, every, typical)
     if station.forms:
         left = tuple(e for e in left if e.name not in {f.term.effect.name for f in station.forms})
-        other = Station(signal, finger, actuator, joint, name_effects(states, left, typical=typical))
+        other = station.renamed(name_effects(states, left, typical=typical))
         station = other if other.believed else station
     return station

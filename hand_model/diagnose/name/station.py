@@ -69,6 +69,10 @@ class Station:
             if unseen and not f.term.effect.listed and not _stands(naming, f, places[id(f)], least + EVIDENCE_LEAST)
         }
 
+    def renamed(self, naming: Naming) -> Station:
+        """The station of the same place with another naming."""
+        return Station(self.signal, self.finger, self.actuator, self.joint, naming)
+
     def names(self, finding: Finding) -> bool:
         """Whether a finding was named here."""
         named = {f.term.effect.name for f in self.naming.found}
@@ -216,13 +220,13 @@ class Station:
 
     def steadily(self, named: Named) -> bool:
         """Whether steady motion holds the better part of what a name brings: else how starts and stops are read may."""
-        naming, which = self.naming, self.naming.fit.terms.index(named.term)
-        terms, rest = naming.fit.terms, naming.fit.terms[:which] + naming.fit.terms[which + 1 :]
+        balance, terms = self.naming.balance, self.naming.fit.terms
+        rest = tuple(t for t in terms if t is not named.term)
 
-        def brought(balance: Balance) -> float:
-            return balance.fit(rest).rss - balance.fit(terms).rss
+        def brought(among: Balance) -> float:
+            return among.fit(rest).rss - among.fit(terms).rss
 
-        return brought(naming.balance.settled()) > MAIN * brought(naming.balance)
+        return brought(balance.settled()) > MAIN * brought(balance)
 
     def standing(self, name: str) -> Named | None:
         """What stands here by a name; None where nothing does."""
