@@ -50,7 +50,18 @@ def seen(seed: int = 1) -> Seen:
     upper, lower = np.arange(3, 6), np.arange(6, 9)
     labels = tuple("abcdefghi")
     return Seen(
-        TIME_S, position, labels, (upper, lower), np.arange(3), angle, (axis, axis), centre, np.array(still), first
+        TIME_S,
+        TIME_S,
+        position,
+        labels,
+        (upper, lower),
+        np.arange(3),
+        angle,
+        (axis, axis),
+        centre,
+        np.array(still),
+        first,
+        np.zeros(len(TIME_S)),
     )
 
 

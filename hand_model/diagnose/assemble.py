@@ -16,7 +16,16 @@ from .locate.displacement import NO_HINGE, NOT_RIGID
 from .locate.markers import HINGE, SLIPS
 from .locate.preload import COMPARISON, usual_spring
 from .locate.strokes import STROKES
-from .magnitude import SLIGHT, Channel, channel_figures, likely_magnitude, magnitude, sure_magnitude, values_of
+from .magnitude import (
+    SLIGHT,
+    Channel,
+    channel_figures,
+    likely_magnitude,
+    magnitude,
+    sure_magnitude,
+    sure_share,
+    values_of,
+)
 from .name.distinguishability import protocol_pairs
 from .name.entries import (
     channel_of,
@@ -104,7 +113,8 @@ def assemble(
     sized = [(_ranking_magnitude(f, stations), weight * _counted(f, stations), f) for weight, f in ranked]
     ranked = sorted(((float((m**3 * weight) ** 0.25), f) for m, weight, f in sized), key=lambda item: -item[0])
     ranked = _heaviest(ranked, _same_place)
-    ranked, trifles = _without(ranked, _trifles(ranked, {id(f): m for m, _, f in sized}))
+    surely = {id(f): max(m, _magnitude(f, stations) * sure_share(f.fit)) for m, _, f in sized}
+    ranked, trifles = _without(ranked, _trifles(ranked, surely))
     rejected += [*doubted, *trifles]
     found = _shared(ranked)
     verdict = "mismatch" if found else "unexplained" if unexplained else "consistent"

@@ -1,9 +1,10 @@
-"""A session with something planted in one of its fingers."""
+"""A session with something planted in one of its fingers: loads first, then channels; joints, then markers."""
 
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from hand_model.twin.files import write_log, write_markers
 
 from .channels import CHANNELS
 from .loads import LOADS
-from .plant import SPREAD, Columns, Draw, Motor, Moving, Plant, smoothed
+from .plant import SPREAD, Array, Columns, Draw, Motor, Moving, Plant, smoothed
 from .segments import SEGMENTS
 from .slips import SLIPS
 from .watched import watched
@@ -25,14 +26,16 @@ EFFECTS: dict[str, Callable[[Draw, float, Motor], Plant]] = {
 }
 
 
-def planted(source: Path, target: Path, finger: str, effect: str, size: float, seed: int, noise: float = 0.0) -> Plant:
-    """Write the session `source` with an effect in one finger to the new folder `target`; noise: white noise that comes
-    on top of it, in that of a usual recording (5 raw, 0.15 mm)."""
+def planted(
+    source: Path, target: Path, finger: str, sizes: Mapping[str, float], seed: int, noise: float = 0.0
+) -> dict[str, Plant]:
+    """Write the session `source` with effects of such sizes in one finger to the new folder `target`. noise: white noise
+    that comes on top of it, in that of a usual recording (5 raw, 0.15 mm)."""
     session = read_session(source)
     rng = np.random.default_rng(seed)
     one = next(f for f in session.fingers if f.name == finger)
     motor = _motor(session, one, answer_of(source)["motor"][finger])
-    plant = EFFECTS[effect](rng, size, motor)
+    plants = {name: EFFECTS[name](rng, sizes[name], motor) for name in EFFECTS if name in sizes}
     shutil.copytree(source, target, ignore=shutil.ignore_patterns("answer.json"))
     logged = [t for t in session.trials if t.log_path is not None and t.log_path.is_file()]
     mine = [t for t in logged if t.finger == finger]
@@ -40,18 +43,22 @@ def planted(source: Path, target: Path, finger: str, effect: str, size: float, s
     for trial in logged:
         log = read_log(trial.log_path)
         columns = {"time": log.time_s, **log.columns}
+        columns = {**columns, "current": columns["current"] + 5.0 * noise * rng.standard_normal(len(log.time_s))}
         if trial in mine:
-            columns = _changed(columns, plant, _moving(columns, motor, begun, mine.index(trial)))
-        columns = {
-            **columns,
-            "current": np.round(columns["current"] + 5.0 * noise * rng.standard_normal(len(log.time_s))),
-        }
-        write_log(target / trial.log_path.relative_to(source), columns)
+            columns = _changed(columns, tuple(plants.values()), _moving(columns, motor, begun, mine.index(trial)))
+        write_log(target / trial.log_path.relative_to(source), {**columns, "current": np.round(columns["current"])})
     for trial in (t for t in session.select("flexion") if t.mocap_path is not None):
         mocap, owner = trial.mocap(), next(f for f in session.fingers if f.name == trial.finger)
         position = mocap.position_world
-        if plant.markers is not None and owner.name == finger:
-            position = plant.markers(watched(session, owner, trial))
+        moved = [p.markers for p in plants.values() if p.markers is not None]
+        if moved and owner.name == finger:
+            seen, log = watched(session, owner, trial), trial.log()
+            moving = _moving({"time": log.time_s, **log.columns}, motor, begun, mine.index(trial))
+            load = np.interp(seen.log_s, moving.time_s, _load(plants.values(), moving))
+            seen = replace(seen, load=load)
+            for markers in moved:
+                seen = replace(seen, position=markers(seen))
+            position = seen.position
         position = position + 1.5e-4 * noise * rng.standard_normal(position.shape)
         write_markers(
             target / trial.mocap_path.relative_to(source),
@@ -59,13 +66,19 @@ def planted(source: Path, target: Path, finger: str, effect: str, size: float, s
             mocap.rate_hz,
             "mm",
         )
-    return plant
+    return plants
 
 
-def _changed(columns: Columns, plant: Plant, moving: Moving) -> Columns:
-    if plant.load is not None:
-        columns = {**columns, "current": np.round(columns["current"] + plant.load(moving))}
-    return columns if plant.columns is None else plant.columns(columns, moving)
+def _changed(columns: Columns, plants: Sequence[Plant], moving: Moving) -> Columns:
+    """A log with all loads added to its current, and then as each faulty channel has it."""
+    columns = {**columns, "current": np.round(columns["current"] + _load(plants, moving))}
+    for plant in plants:
+        columns = columns if plant.columns is None else plant.columns(columns, moving)
+    return columns
+
+
+def _load(plants: Iterable[Plant], moving: Moving) -> Array:
+    return sum((p.load(moving) for p in plants if p.load is not None), np.zeros(len(moving.time_s)))
 
 
 def _moving(columns: Columns, motor: Motor, begun_s: float, number: int) -> Moving:

@@ -46,11 +46,12 @@ class Moving:
 
 @dataclass(frozen=True)
 class Seen:
-    """One flexion recording of a finger's markers: time [s] in the trial (n,), markers (n, m, 3) [m] in the world, their
-    labels; which of them are of the proximal and distal segment and of the palm; and of each joint its angle [rad],
-    axis (n, 3) in the world and centre (n, 3) [m]."""
+    """One flexion recording of a finger's markers: time [s] in the trial (n,) and in its log, markers (n, m, 3) [m] in the
+    world, their labels; which of them are of the proximal and distal segment and of the palm; of each joint its angle
+    [rad], axis (n, 3) in the world and centre (n, 3) [m]; and the load (n,) [raw] that is planted in its drive."""
 
     time_s: Array
+    log_s: Array
     position: Array
     labels: tuple[str, ...]
     segments: tuple[NDArray[np.int64], NDArray[np.int64]]
@@ -60,6 +61,7 @@ class Seen:
     centre: tuple[Array, Array]
     palm_turn: Array
     proximal_turn: Array
+    load: Array
 
 
 @dataclass(frozen=True)

@@ -44,7 +44,8 @@ def _load(seen: Seen, motor: Motor) -> Array:
     """What the drive bears (n,) [raw] as the proximal joint moves."""
     place = 100 * seen.angle[0] / motor.full_rad
     speed = np.gradient(place, seen.time_s)
-    return motor.stiffness * place + motor.preload + motor.coulomb * turned_over(place, BRISTLE) + motor.viscous * speed
+    friction = motor.coulomb * turned_over(place, BRISTLE) + motor.viscous * speed
+    return motor.stiffness * place + motor.preload + friction + seen.load
 
 
 def drive_backlash(rng: Draw, size: float, motor: Motor) -> Plant:
@@ -55,7 +56,7 @@ def drive_backlash(rng: Draw, size: float, motor: Motor) -> Plant:
 
 def series_elasticity(rng: Draw, size: float, motor: Motor) -> Plant:
     """A drive that yields under load."""
-    give = size * rng.uniform(0.0006, 0.0013)
+    give = size * rng.uniform(0.0003, 0.0006)
     return Plant(markers=lambda s: _both(s, -give * _load(s, motor)), figures={"give": give})
 
 
@@ -69,7 +70,7 @@ def linkage_backlash(rng: Draw, size: float, motor: Motor) -> Plant:
 
 def linkage_compliance(rng: Draw, size: float, motor: Motor) -> Plant:
     """A linkage that yields under load."""
-    give = size * rng.uniform(0.0007, 0.0015)
+    give = size * rng.uniform(0.0004, 0.0007)
     return Plant(markers=lambda s: turned(s, 0 * s.angle[0], -give * _load(s, motor)), figures={"give": give})
 
 

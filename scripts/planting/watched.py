@@ -16,6 +16,7 @@ from hand_model.session import Finger, Session, Trial
 from .plant import SPREAD, Array, Seen, smoothed
 
 CURVED = 4  # degree of what an angle is of the drive's place
+ROUNDS = 5
 
 
 def watched(session: Session, finger: Finger, trial: Trial) -> Seen:
@@ -30,11 +31,13 @@ def watched(session: Session, finger: Finger, trial: Trial) -> Seen:
     turned = [_axis(bodies[i], bodies[i + 1]) for i in range(2)]
     start = mocap.time_s - mocap.time_s[0] < 0.8
     course = smoothed(log.time_s - log.time_s[0], log.columns["position"], SPREAD)
-    angles = _foretold(course, log.time_s[-1] - log.time_s[0], mocap.time_s - mocap.time_s[0], [j[1] for j in turned])
+    last_s, time_s = log.time_s[-1] - log.time_s[0], mocap.time_s - mocap.time_s[0]
+    late_s, angles = _foretold(course, last_s, time_s, [j[1] for j in turned])
     axes = [bodies[i][0] @ turned[i][0] for i in range(2)]
     centres = [_centre(bodies[i], bodies[i + 1], turned[i][0], angles[i]) for i in range(2)]
     return Seen(
-        time_s=mocap.time_s - mocap.time_s[0],
+        time_s=time_s,
+        log_s=np.clip(time_s - late_s, 0.0, last_s),
         position=mocap.position_world,
         labels=mocap.labels,
         segments=(upper, lower),
@@ -44,6 +47,7 @@ def watched(session: Session, finger: Finger, trial: Trial) -> Seen:
         centre=tuple(centres),
         palm_turn=bodies[0][0],
         proximal_turn=bodies[1][0],
+        load=np.zeros(len(time_s)),
     )
 
 
@@ -59,12 +63,17 @@ def _poses(points: Array, time_s: Array) -> tuple[Array, Array]:
 
 
 def _axis(bearing: tuple[Array, Array], borne: tuple[Array, Array]) -> tuple[Array, Array]:
-    """Axis (3,) of a hinge between two bodies in the bearing one, and its angle (n,) [rad] from the first frame."""
-    relative = bearing[0].transpose(0, 2, 1) @ borne[0]
-    vector = Rotation.from_matrix(relative @ relative[0].T).as_rotvec()
-    axis = np.linalg.svd(vector, full_matrices=False)[2][0]
-    axis = axis * np.sign(np.sum(vector @ axis))
-    return axis, vector @ axis
+    """Axis (3,) of a hinge between two bodies in the bearing one, and its angle (n,) [rad] from the first frame. The
+    first frame's noise would tilt an axis about which all others turn from there: they turn from what all of them say."""
+    relative = Rotation.from_matrix(bearing[0].transpose(0, 2, 1) @ borne[0])
+    begin = relative[0]
+    for _ in range(ROUNDS):
+        vector = (relative * begin.inv()).as_rotvec()
+        axis = np.linalg.svd(vector, full_matrices=False)[2][0]
+        axis = axis * np.sign(np.sum(vector @ axis))
+        angle = vector @ axis
+        begin = (Rotation.from_rotvec(axis * angle[:, None]).inv() * relative).mean()
+    return axis, angle
 
 
 def _centre(bearing: tuple[Array, Array], borne: tuple[Array, Array], axis: Array, angle: Array) -> Array:
@@ -79,9 +88,9 @@ def _centre(bearing: tuple[Array, Array], borne: tuple[Array, Array], axis: Arra
     return bearing[1] + bearing[0] @ point[3:]
 
 
-def _foretold(course: BSpline, last_s: float, time_s: Array, angles: Sequence[Array]) -> list[Array]:
-    """Angles (n,) each as polynomials of the course of an encoder, whose log begins so much after the cameras as makes
-    them fit best."""
+def _foretold(course: BSpline, last_s: float, time_s: Array, angles: Sequence[Array]) -> tuple[float, list[Array]]:
+    """How late [s] after the cameras the log begins: as makes angles (n,) fit best as polynomials of the course of its
+    encoder; and those."""
 
     def fitted(late_s: float) -> tuple[float, list[Array]]:
         place = course(np.clip(time_s - late_s, 0.0, last_s))
@@ -90,4 +99,4 @@ def _foretold(course: BSpline, last_s: float, time_s: Array, angles: Sequence[Ar
 
     coarse = min(np.arange(-2.0, 2.0, 0.02), key=lambda x: fitted(x)[0])
     best = minimize_scalar(lambda x: fitted(x)[0], bounds=(coarse - 0.02, coarse + 0.02), method="bounded").x
-    return fitted(float(best))[1]
+    return float(best), fitted(float(best))[1]

@@ -133,7 +133,11 @@ class Balance:
 
     def settled(self) -> Balance:
         """The same balance with next to no weight on starts and stops."""
-        return self._with(weight=np.where(self.steady, self.weight, UNSETTLED * self.weight))
+        return self.only(self.steady)
+
+    def only(self, samples: NDArray[np.bool_]) -> Balance:
+        """The same balance with next to no weight on any other samples than these (n,)."""
+        return self._with(weight=np.where(samples, self.weight, UNSETTLED * self.weight))
 
     def learning(self) -> Balance:
         """The same balance without the samples of recordings that take no part in learning: what is only compared is

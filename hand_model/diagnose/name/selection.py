@@ -21,7 +21,7 @@ from .bristles import with_bristles
 from .evidence import evidence, gain, rough_evidence, scale_of
 from .lack_of_fit import LackOfFit, lack_of_fit
 from .naming import ALPHA, MOST_TERMS, Named, Naming, Rival, overwhelmed
-from .shapes import polish, refit, reform, scan
+from .shapes import polish, possible, refit, reform, scan
 from .term import Term, additive, doubled
 from .wander import Wander, estimate_wander
 
@@ -103,6 +103,11 @@ def _named(
     declared = balance.fit()
     before, after = _lacks(balance, declared, fit)
     found = _findings(pair, effects, learned)
+    exchanged = _exchanged(pair.state, learned, found)
+    if exchanged is not None:
+        learned = settle(pair, effects, exchanged.terms)[1]
+        fit = balance.fit(learned.terms)
+        (before, after), found = _lacks(balance, declared, fit), _findings(pair, effects, learned)
     kept = {t.effect.name for t in fit.terms}
     rejected = tuple(sorted(((n, e) for n, e in brought.items() if n not in kept), key=lambda item: -item[1]))
     return Naming(balance, declared, fit, estimate_wander(balance, fit.prediction), before, after, found, rejected)
@@ -192,7 +197,7 @@ def _search(
         if best is None:
             break
         _, settled = settle(pair, effects, best.fit.terms)
-        if _doubled(balance, settled):
+        if _doubled(balance, settled) or not all(possible(balance, settled, i) for i in range(len(settled.terms))):
             refused.add(best.name)
             continue
         if _names(settled) in been:  # it went again beside the others: round and round from here
@@ -291,16 +296,19 @@ def _doubled(balance: Balance, fit: Fit) -> bool:
 
 
 def _possible(balance: Balance, fit: Fit) -> bool:
-    term, amplitudes = fit.terms[-1], fit.amplitudes[-1]
+    term = fit.terms[-1]
     if not _resolved(balance, term) or _doubled(balance, fit) or fit.declared.get(term.effect.needs, 1.0) <= 0:
         return False
-    return bool(term.effect.possible(balance.states, term.effect.parameters(term.shape, amplitudes, fit.declared)))
+    return possible(balance, fit, len(fit.terms) - 1)
 
 
 def settle(pair: Pair, effects: tuple[Any, ...], terms: tuple[Term, ...]) -> tuple[tuple[Term, ...], Fit]:
     """Joint refit; terms that no longer pay leave; a term that another effect replaces better is exchanged."""
     balance = pair.state
     fit = reform(balance, refit(balance, balance.fit(terms)), len(terms) - 1)
+    for which in range(len(terms) - 1):
+        if not possible(balance, fit, which):  # what came after it says the same, and each makes the other large
+            fit = reform(balance, fit, which)
     for _ in range(3):
         dropped = _drop(balance, fit)
         if dropped is not None:
@@ -368,6 +376,22 @@ def _findings(pair: Pair, effects: tuple[Any, ...], fit: Fit) -> tuple[Named, ..
             )
         )
     return tuple(sorted(found, key=lambda f: -f.share))
+
+
+def _exchanged(balance: Balance, fit: Fit, found: Iterable[Named]) -> Fit | None:
+    """The fit with one term exchanged for another effect that turned out likelier in its place, all else refitted; None
+    where there is none. While terms are exchanged one at a time only the most promising candidate is looked at closely."""
+    for named in found:
+        which, best = fit.terms.index(named.term), named.rivals[0]
+        if best.name == named.term.effect.name:
+            continue
+        rest = tuple(t for i, t in enumerate(fit.terms) if i != which)
+        without, other = balance.fit(rest), refit(balance, balance.fit((*rest, best.fit.terms[-1])))
+        scale = min(scale_of(balance, other), scale_of(balance, fit))
+        likelier = evidence(balance, other, without, scale=scale) - evidence(balance, fit, without, which, scale)
+        if likelier > 1 and _possible(balance, other):
+            return other
+    return None
 
 
 def _in_place(pair: Pair, effects: tuple[Any, ...], fit: Fit, which: int, others: Sequence[int]) -> list[Rival]:

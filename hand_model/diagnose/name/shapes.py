@@ -172,9 +172,12 @@ def likeliest(balance: Balance, fits: Iterable[Fit], which: int, cost: Callable[
     """The fit of the smallest cost, of those whose term `which` a machine may have where there are any."""
 
     def key(fit: Fit) -> tuple[bool, float]:
-        term, amplitudes = fit.terms[which], fit.amplitudes[which]
-        return not term.effect.possible(
-            balance.states, term.effect.parameters(term.shape, amplitudes, fit.declared)
-        ), cost(fit)
+        return not possible(balance, fit, which), cost(fit)
 
     return min(fits, key=key)
+
+
+def possible(balance: Balance, fit: Fit, which: int) -> bool:
+    """Whether a machine may have term `which` of a fit as it is fitted."""
+    effect, shape = fit.terms[which].effect, fit.terms[which].shape
+    return bool(effect.possible(balance.states, effect.parameters(shape, fit.amplitudes[which], fit.declared)))

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from ..findings import Finding
 from .balance import Balance
+from .evidence import evidence
 from .interval import brought_held_out, parameter_intervals, sized, undisturbed, variance_ratio
 from .naming import ALPHA, EXPLAINED_LEAST, MOST_TERMS, Named, Naming
 from .selection import EVIDENCE_LEAST, SMALL
@@ -22,6 +24,7 @@ UNREST = 0.3  # of the noise: wander that every machine is granted; more is no e
 # times the noise of recordings kept out, and the share of what is above it that true names take
 KEPT_OUT, EXPLAINED_MOST = 1.05, 2 / 3
 CHANCE = 2.0  # standard errors
+IDLE = 0.05  # of what an effect does where it does most: less is nothing
 SAME_PERIOD = 0.02  # by which a harmonic's may differ
 PATCHES = 2  # periods beside the first that are none of its harmonics: more than a second gear
 MAIN = 0.5  # of what names explain together: what one of them must hold where they do not do
@@ -249,14 +252,34 @@ class Station:
 
     @property
     def _beside(self) -> tuple[Named, ...]:
-        large = [f for f in self.proven if f.share >= SMALL or f is self.proven[0]]
         return tuple(
             f
             for f in self.proven
-            if (f in large or any(_outgrows(f, g) for g in large))
+            if (f in self._large or any(_outgrows(f, g) for g in self._large) or f in self._told_elsewhere)
             and f not in self.forms
             and (f.size * self.naming.balance.sigma >= self.tilt or f.term.effect.signal == "log")
         )
+
+    @property
+    def _large(self) -> tuple[Named, ...]:
+        return tuple(f for f in self.proven if f.share >= SMALL or f is self.proven[0])
+
+    @cached_property
+    def _told_elsewhere(self) -> tuple[Named, ...]:
+        """Small effects that are told where none of the large ones acts: there they are no form of theirs."""
+        balance, fit = self.naming.balance, self.naming.fit
+        idle = np.ones(len(balance.effort), bool)
+        for other in self._large:
+            added = np.abs(fit.prediction - balance.removed(fit, fit.terms.index(other.term)))
+            idle &= added < IDLE * added.max()
+        there = balance.only(idle)
+
+        def told(which: int) -> bool:
+            rest = there.fit(tuple(t for i, t in enumerate(fit.terms) if i != which))
+            return evidence(there, there.fit(fit.terms), rest, which) >= EVIDENCE_LEAST
+
+        small = [f for f in self.proven if f not in self._large] if (idle & balance.train).any() else []
+        return tuple(f for f in small if told(fit.terms.index(f.term)))
 
     @property
     def forms(self) -> tuple[Named, ...]:
