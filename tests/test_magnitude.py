@@ -18,6 +18,7 @@ from hand_model.diagnose.magnitude import (
     likely_magnitude,
     magnitude,
     sure_magnitude,
+    sure_share,
 )
 from hand_model.effects import catalogue
 
@@ -142,3 +143,22 @@ def test_a_weight_that_preload_and_spring_take_up_must_be_larger_to_be_plain() -
         magnitude("gravity_load", {"largest": 5.0}, Channel(effort=20.0, turned=turned)) for turned in (True, False)
     ]
     assert sizes == pytest.approx([1.0, 1 / 3])
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "fall", "share"),
+    [
+        (5.0, 3.0, [2.0, 2.0], 1.0),
+        (5.0, 3.0, [5.0 - 17.0**0.5, 3.0], 0.5**0.5),  # half of the square for sure
+        (5.0, 3.0, [-0.1, 3.0], 0.0),
+        (5.0, 5.1, [-0.2, 0.1], 0.0),
+        (5.0, 3.0, None, 0.0),
+        (5.0, 3.0, [None, None], 0.0),
+        (None, None, None, 0.0),
+    ],
+)
+def test_what_recordings_kept_out_say_for_sure_is_by_how_much_their_error_falls_at_least(
+    before, after, fall, share
+) -> None:
+    """Of the mean square, whose root goes with the size."""
+    assert sure_share({"before": before, "after": after, "ci95_reduction": fall}) == pytest.approx(share)

@@ -16,6 +16,7 @@ from hand_model.diagnose.assemble import assemble
 from hand_model.diagnose.locate.drive import with_required
 from hand_model.diagnose.name.entries import channel_of
 from hand_model.diagnose.name.judgement import judged
+from hand_model.diagnose.name.selection import SMALL
 from hand_model.diagnose.name.station import Station
 from hand_model.effects import catalogue, effect, outsiders
 from hand_model.effects.base import DriveState
@@ -388,3 +389,20 @@ def test_an_outsider_that_no_test_sees_must_be_plainer_than_an_effect() -> None:
     assert [f.term.effect.name for f in faint.proven] == ["thixotropy"]
     assert not faint.outsiders and not faint.kept and not faint.missing
     assert [f.term.effect.name for f in plain.outsiders] == ["thixotropy"] and plain.missing
+
+
+def test_a_small_effect_stands_where_the_large_one_does_nothing() -> None:
+    """Drag beside a hill of twenty times its mean square."""
+    hill, drag = planted("detent_load", {"form": 0.0, "centre": 60.0, "width": 8.0}, [-30.0]), planted(*PLANTED[5])
+    both = heard(drive(3, lambda s: hill(s) + drag(s)))
+    assert [f.term.effect.name for f in both.kept] == ["detent_load", "quadratic_damping"]
+    assert min(f.share for f in both.kept) < SMALL
+
+
+@pytest.mark.parametrize("lean", [0.15, 0.3])
+def test_what_a_hill_of_another_form_leaves_is_no_small_effect(lean: float) -> None:
+    def leaning(state: DriveState) -> np.ndarray:
+        u = (state.position - 60.0) / 8.0
+        return -30.0 * np.exp(-0.5 * (u / (1 + lean * np.tanh(u))) ** 2)
+
+    assert {f.term.effect.name for f in heard(drive(3, leaning)).kept} <= {"detent_load"}

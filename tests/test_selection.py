@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
+from test_kinematic_stations import joint
 
 from hand_model.diagnose.name import selection
-from hand_model.diagnose.name.naming import Rival
+from hand_model.diagnose.name.naming import Named, Rival
+from hand_model.diagnose.name.selection import name_effects
+from hand_model.diagnose.name.shapes import possible
+from hand_model.effects import catalogue, outsiders
 
 LEFT = {0: 2000.0, 1: 60.0}  # what a fit without that term leaves more
 
@@ -38,3 +44,43 @@ def test_small_terms_stand_for_a_rival_only_if_it_explains_more_than_all_of_them
     assert [f.term.effect.name for f in found] == ["large", "small"]
     assert found[0].rivals[0].name == told
     assert (found[0].probability > 0.99) == (told == "large")
+
+
+@pytest.mark.parametrize(("other", "exchanged"), [(30.0, True), (25.5, False)])
+def test_what_turns_out_likelier_in_the_place_of_a_term_takes_it(
+    monkeypatch: pytest.MonkeyPatch, other: float, exchanged: bool
+) -> None:
+    """By more than the one unit that chance may make, with all else refitted."""
+    one, two, three = (SimpleNamespace(effect=SimpleNamespace(name=name)) for name in ("one", "two", "three"))
+    fit = SimpleNamespace(terms=(one, two))
+    balance = SimpleNamespace(fit=lambda terms: SimpleNamespace(terms=terms))
+    found = [
+        Named(one, {}, (Rival("one", 90.0, fit),), 0.8, 1.0, 1.0),
+        Named(two, {}, (Rival("three", 30.0, SimpleNamespace(terms=(one, three))), Rival("two", 25.0, fit)), 0.2, 1, 0),
+    ]
+    monkeypatch.setattr(selection, "refit", lambda balance, fit: fit)
+    monkeypatch.setattr(selection, "scale_of", lambda *_: 1.0)
+    monkeypatch.setattr(selection, "allowed", lambda *_: True)
+    monkeypatch.setattr(
+        selection, "evidence", lambda balance, fit, rest, *_, **__: other if three in fit.terms else 25.0
+    )
+    better = selection._exchanged(balance, fit, found)
+    assert (better is not None and better.terms == (one, three)) == exchanged
+
+
+def test_a_give_that_a_late_segment_makes_large_takes_another_form() -> None:
+    """What yields to drag alone and a lag are one column: each would make the other as large as it likes."""
+    states = joint(4, add=lambda t, x, v: -0.03 * (15.0 + 0.2 * x + 35.0 * np.tanh(v) + 0.15 * v), noise=0.15)
+    late = tuple(
+        replace(
+            s,
+            effort=s.effort - 0.03 * s.slope * s.velocity,
+            declared=s.declared[:, :4],
+            declared_names=s.declared_names[:4],
+        )
+        for s in states
+    )
+    naming = name_effects(late, [*catalogue("linkage"), *outsiders("linkage")])
+    names = [t.effect.name for t in naming.fit.terms]
+    assert "linkage_compliance" in names
+    assert all(possible(naming.balance, naming.fit, which) for which in range(len(names)))

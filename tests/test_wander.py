@@ -15,9 +15,10 @@ from hand_model.diagnose.assemble import _wanders
 from hand_model.diagnose.locate.measurement import echoes_command, frozen, is_measured, rests_on_command
 from hand_model.diagnose.name import station as station_module
 from hand_model.diagnose.name.balance import Balance
+from hand_model.diagnose.name.candidates import EVIDENCE_LEAST
 from hand_model.diagnose.name.judgement import judged
 from hand_model.diagnose.name.naming import ALPHA
-from hand_model.diagnose.name.selection import EVIDENCE_LEAST, name_effects
+from hand_model.diagnose.name.selection import name_effects
 from hand_model.diagnose.name.wander import Wander, estimate_wander
 from hand_model.effects import catalogue, effect, outsiders
 from hand_model.session import Log

@@ -19,10 +19,10 @@ from .locate.angles import FingerAngles
 from .locate.gravity import in_one_pose
 from .locate.preload import SPRING, preload_findings, usual_spring
 from .name.balance import Balance, Fit
+from .name.candidates import EVIDENCE_LEAST
 from .name.judgement import judged
 from .name.least_squares import from_products
 from .name.naming import CLASS_WIDTH
-from .name.selection import EVIDENCE_LEAST
 from .name.station import Station
 from .name.term import Term
 

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from .candidates import EVIDENCE_LEAST
 from .naming import ALPHA, Named, Naming
-from .selection import EVIDENCE_LEAST, name_effects
+from .selection import name_effects
 from .station import MAIN, UNREST, Station
 
 # times the others are heard again, and the share of what was explained from which a fallen name has displaced others

@@ -15,27 +15,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...background import Pair
-from ...effects.base import least_delay, position_range
 from .balance import Balance, Fit
 from .bristles import with_bristles
-from .evidence import evidence, gain, rough_evidence, scale_of
+from .candidates import EVIDENCE_LEAST, allowed, least_evidence, rank, settle, twice
+from .evidence import evidence, gain, scale_of
 from .lack_of_fit import LackOfFit, lack_of_fit
 from .naming import ALPHA, MOST_TERMS, Named, Naming, Rival, overwhelmed
-from .shapes import polish, possible, refit, reform, scan
-from .term import Term, additive, doubled
+from .shapes import polish, possible, refit, scan
+from .term import Term
 from .wander import Wander, estimate_wander
 
 Array = NDArray[np.float64]
 
-EVIDENCE_LEAST = 6.0  # log evidence an effect must bring: e^6 against "none", and against the search over shapes
-FAINT = 3.0  # the same of the only one, to be heard: recordings that took no part may bear out the rest
 MOST_SEARCHES = 3  # each with noise that knows what did not repeat beside the effects of the one before
-REFUTED = 3.0  # standard deviations by which a delay may miss what answers to commands say
 SMALL = 0.07  # share of the explained mismatch: less beside a larger effect may be no more than its form being another
 # a family, and the change of its map's slope from which another search is worth its time
 LOST_MOTION, BENT = "lost motion", 0.01
-# times as long a refit takes as projecting a column, and a shape that needs refits as one that does not
-REFIT, DEARER = 30.0, 4.0
 ABSORBED = 0.5  # of a column squared, at most, is left of what is mostly a level per while
 GROWN = 1.3  # change of that noise, from which another search is worth its time
 
@@ -95,7 +90,7 @@ def _named(
     if rival is not None:
         other = balance.wandering(estimate_wander(balance, balance.fit(rival.fit.terms).prediction))
         further, more, _ = _search(paired(other.learning()), effects, progress, rival.fit.terms)
-        if rival.name in _names(further) and not _doubled(other, further):
+        if rival.name in _names(further) and not twice(other, further):
             balance, brought = other.wandering(_unrepeated(other, other.fit(further.terms))), {**brought, **more}
             pair = paired(balance.learning())
             learned = settle(pair, effects, further.terms)[1]  # beside other chance, another may explain it better
@@ -192,12 +187,12 @@ def _search(
         for rival in ranked:
             brought[rival.name] = max(brought.get(rival.name, -np.inf), rival.evidence)
         best = next(
-            (r for r in ranked if r.evidence >= _least(balance, len(fit.terms)) and r.name not in refused), None
+            (r for r in ranked if r.evidence >= least_evidence(balance, len(fit.terms)) and r.name not in refused), None
         )
         if best is None:
             break
         _, settled = settle(pair, effects, best.fit.terms)
-        if _doubled(balance, settled) or not all(possible(balance, settled, i) for i in range(len(settled.terms))):
+        if twice(balance, settled) or not all(possible(balance, settled, i) for i in range(len(settled.terms))):
             refused.add(best.name)
             continue
         if _names(settled) in been:  # it went again beside the others: round and round from here
@@ -209,11 +204,6 @@ def _search(
         if progress is not None:
             progress(f"{balance.states[0].drive}: {', '.join(t.effect.name for t in fit.terms)}")
     return fit, brought, ranked
-
-
-def _least(balance: Balance, others: int) -> float:
-    restless = balance.wander is not None and balance.wander.real
-    return EVIDENCE_LEAST if others or restless or not balance.untouched else FAINT
 
 
 def _names(fit: Fit) -> tuple[str, ...]:
@@ -248,102 +238,6 @@ def _likelihood(balance: Balance, fit: Fit, wander: Wander | None) -> float:
     if wander is None or not wander.real:
         return -0.5 * float(np.sum(residual**2)) / balance.inflation
     return wander.log_likelihood(residual, weight, balance.inflation)
-
-
-def _resolved(balance: Balance, term: Term) -> bool:
-    """Whether a delay exceeds what is told of one and nothing that is known of it refutes it; true of anything else."""
-    if "delay" not in term.shape:
-        return True
-    refuted = balance.unanswered((term,)) > REFUTED**2 * balance.inflation
-    return abs(term.shape["delay"]) > least_delay(balance.states) and not refuted
-
-
-def rank(
-    pair: Pair, effects: Iterable[Any], terms: tuple[Term, ...], fit: Fit, refine: int = 6, least: float = 0.0
-) -> list[Rival]:
-    """Every candidate added to `terms`, its shape optimised from several starts; best evidence first. least: log
-    evidence below which none is of interest."""
-    balance, taken = pair.state, {t.effect.name for t in terms}
-    places = [e if e.name not in taken or e.repeats else None for e in effects]
-    costs = [len(balance.grid(e).shapes) * (1.0 if additive(e) else REFIT) for e in effects]
-    rough = [r for r in pair.map(_rough, places, terms, fit, least, costs=costs) if r is not None]
-    rough.sort(key=lambda item: -item[0])
-    starts = [start for _, start in rough]
-    polished = pair.map(
-        polish,
-        starts[:refine],
-        len(terms),
-        costs=[1.0 if additive(s.terms[-1].effect) else DEARER for s in starts[:refine]],
-    )
-    out = [(f, i < refine) for i, f in enumerate([*polished, *starts[refine:]]) if _possible(balance, f)]
-    scale = min((scale_of(balance, f) for f, _ in out), default=1.0)
-    weights = pair.map(_weight, out, fit, scale)
-    rivals = [Rival(f.terms[-1].effect.name, w, f) for (f, _), w in zip(out, weights, strict=True)]
-    return sorted(rivals, key=lambda r: -r.evidence)
-
-
-def _rough(balance: Balance, effect: Any, terms: tuple[Term, ...], fit: Fit, least: float) -> tuple[float, Fit] | None:
-    best = None if effect is None else scan(balance, effect, terms, least)
-    return None if best is None else (rough_evidence(balance, best, fit, scale_of(balance, best)), best)
-
-
-def _weight(balance: Balance, candidate: tuple[Fit, bool], fit: Fit, scale: float) -> float:
-    return (evidence if candidate[1] else rough_evidence)(balance, candidate[0], fit, scale=scale)
-
-
-def _doubled(balance: Balance, fit: Fit) -> bool:
-    return doubled(fit.terms, float(np.ptp(position_range(balance.states))))
-
-
-def _possible(balance: Balance, fit: Fit) -> bool:
-    term = fit.terms[-1]
-    if not _resolved(balance, term) or _doubled(balance, fit) or fit.declared.get(term.effect.needs, 1.0) <= 0:
-        return False
-    return possible(balance, fit, len(fit.terms) - 1)
-
-
-def settle(pair: Pair, effects: tuple[Any, ...], terms: tuple[Term, ...]) -> tuple[tuple[Term, ...], Fit]:
-    """Joint refit; terms that no longer pay leave; a term that another effect replaces better is exchanged."""
-    balance = pair.state
-    fit = reform(balance, refit(balance, balance.fit(terms)), len(terms) - 1)
-    for which in range(len(terms) - 1):
-        if not possible(balance, fit, which):  # what came after it says the same, and each makes the other large
-            fit = reform(balance, fit, which)
-    for _ in range(3):
-        dropped = _drop(balance, fit)
-        if dropped is not None:
-            fit = dropped
-            continue
-        swapped = _swap(pair, effects, fit) if len(fit.terms) > 1 else None
-        if swapped is None:
-            break
-        fit = swapped
-    return fit.terms, fit
-
-
-def _drop(balance: Balance, fit: Fit) -> Fit | None:
-    """The fit without the term that costs more than it brings; None where every term pays."""
-    for which in range(len(fit.terms)):
-        rest = balance.fit(tuple(t for i, t in enumerate(fit.terms) if i != which))
-        if evidence(balance, fit, rest, which, scale_of(balance, fit)) < _least(balance, len(rest.terms)):
-            return refit(balance, rest)
-    return None
-
-
-def _swap(pair: Pair, effects: tuple[Any, ...], fit: Fit) -> Fit | None:
-    """The best exchange of one term for another effect, where it raises the evidence; else None."""
-    balance = pair.state
-    for which in range(len(fit.terms)):
-        rest = tuple(t for i, t in enumerate(fit.terms) if i != which)
-        without = balance.fit(rest)
-        own = evidence(balance, fit, without, which, scale_of(balance, fit))
-        ranked = [r for r in rank(pair, effects, rest, without, 1, own - 10) if r.name != fit.terms[which].effect.name]
-        if ranked and ranked[0].evidence > own - 10:
-            other = refit(balance, ranked[0].fit)
-            scale = min(scale_of(balance, other), scale_of(balance, fit))
-            if evidence(balance, other, without, scale=scale) > evidence(balance, fit, without, which, scale) + 1:
-                return other
-    return None
 
 
 def _findings(pair: Pair, effects: tuple[Any, ...], fit: Fit) -> tuple[Named, ...]:
@@ -389,7 +283,7 @@ def _exchanged(balance: Balance, fit: Fit, found: Iterable[Named]) -> Fit | None
         without, other = balance.fit(rest), refit(balance, balance.fit((*rest, best.fit.terms[-1])))
         scale = min(scale_of(balance, other), scale_of(balance, fit))
         likelier = evidence(balance, other, without, scale=scale) - evidence(balance, fit, without, which, scale)
-        if likelier > 1 and _possible(balance, other):
+        if likelier > 1 and allowed(balance, other):
             return other
     return None
 

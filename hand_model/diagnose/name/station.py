@@ -10,10 +10,11 @@ import numpy as np
 
 from ..findings import Finding
 from .balance import Balance
+from .candidates import EVIDENCE_LEAST
 from .evidence import evidence
 from .interval import brought_held_out, parameter_intervals, sized, undisturbed, variance_ratio
 from .naming import ALPHA, EXPLAINED_LEAST, MOST_TERMS, Named, Naming
-from .selection import EVIDENCE_LEAST, SMALL
+from .selection import SMALL
 
 # channels of a session, times names: what no test of a channel sees must stand against as many. Of motors there are few
 # (in 140 healthy balances of currents the likeliest false name is at e^5, of angles, whose clocks err, at e^11)
@@ -266,20 +267,22 @@ class Station:
 
     @cached_property
     def _told_elsewhere(self) -> tuple[Named, ...]:
-        """Small effects that are told where none of the large ones acts: there they are no form of theirs."""
+        """Small effects that are told where none of the large ones acts, each by itself: there they are no form of theirs,
+        nor of several which together describe one."""
         balance, fit = self.naming.balance, self.naming.fit
-        idle = np.ones(len(balance.effort), bool)
-        for other in self._large:
-            added = np.abs(fit.prediction - balance.removed(fit, fit.terms.index(other.term)))
+        idle, terms = np.ones(len(balance.effort), bool), tuple(f.term for f in self._large)
+        for term in terms:
+            added = np.abs(fit.prediction - balance.removed(fit, fit.terms.index(term)))
             idle &= added < IDLE * added.max()
+        if not (idle & balance.train).any():
+            return ()
         there = balance.only(idle)
+        rest = there.fit(terms)
 
-        def told(which: int) -> bool:
-            rest = there.fit(tuple(t for i, t in enumerate(fit.terms) if i != which))
-            return evidence(there, there.fit(fit.terms), rest, which) >= EVIDENCE_LEAST
+        def told(small: Named) -> bool:
+            return evidence(there, there.fit((*terms, small.term)), rest) >= EVIDENCE_LEAST
 
-        small = [f for f in self.proven if f not in self._large] if (idle & balance.train).any() else []
-        return tuple(f for f in small if told(fit.terms.index(f.term)))
+        return tuple(f for f in self.proven if f not in self._large and told(f))
 
     @property
     def forms(self) -> tuple[Named, ...]:
