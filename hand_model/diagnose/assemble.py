@@ -54,8 +54,8 @@ CHANNELS = 15
 # of a weight counts where the declared model takes up what is named, so that nothing of the mismatch is its: only the
 # hand's other motors speak for it
 COMPARED = 0.01
-SECOND = 0.99  # probability of what a comparison alone says in a hand of which something else is missing
-DOUBT = "only the hand's other motors speak for it, and in a hand of which something else is missing it may be chance"
+SURE = 0.99  # probability of what a comparison alone says
+DOUBT = "only the hand's other motors speak for it, and it may be chance"
 MANY = 3  # names of a finger, beside which a channel of it may be explained in part
 NEARLY_ALL = 0.95  # of a mismatch: names that take as much leave nothing worth a word
 UNSEEN = 0.01  # probability from which the test sees nothing
@@ -250,11 +250,9 @@ def _compared(finding: Finding) -> bool:
 
 
 def _doubted(found: Sequence[Finding]) -> list[tuple[Finding, str]]:
-    """What a comparison alone says, and not surely, where something else is missing of that hand, each with the reason:
-    few have a second thing."""
-    if all(_compared(f) for f in found):
-        return []
-    return [(f, DOUBT) for f in found if _compared(f) and f.probability < SECOND]
+    """What a comparison alone says, and not surely, each with the reason: there are more healthy drives than drives of
+    which nothing else would show what they have."""
+    return [(f, DOUBT) for f in found if _compared(f) and f.probability < SURE]
 
 
 def _without(

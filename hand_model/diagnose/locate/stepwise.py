@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 HINGE = ("joint_wobble", "moving_centre")
 REACH = 0.06  # m: the other axis of a wobble passes nearer to its joint; farther, its centre travels
 SLIGHT = 0.05  # of what all found effects bring: what a marker yields counts from there
-MOSTLY = 0.7  # share of what any motion in step with the angle explains
+MOSTLY = 0.7  # share of what the likeliest explains: what explains less does not stand for it
 CELLS = 300  # moments that are tried first
 PROMISING = 0.5  # of the best candidate's evidence: those whose moment is settled block by block
 EDGE = 3  # blocks at either end of the session in which nothing begins
@@ -157,10 +157,11 @@ class Stepwise:
             )
             best = named if named.gain > MOSTLY * best.gain else best
         if best.candidate.effect == "joint_wobble" and self._reach(best.candidate, beside) > REACH:
-            best = max(
+            travels = max(
                 (t for t in tried if t.candidate.effect == "moving_centre" and t.candidate.body == best.candidate.body),
                 key=lambda t: t.evidence,
             )
+            best = travels if travels.gain > MOSTLY * best.gain else best
         return best.effect()
 
     def alone(self, candidate: Candidate) -> MarkerEffect:
