@@ -16,6 +16,7 @@ from hand_model.diagnose.locate.displacement import CREEP, NO_HINGE, WITH_FINGER
 from hand_model.diagnose.locate.lasting_noise import LastingNoise, lasting_noise
 from hand_model.diagnose.locate.markers import MarkerNaming, named_in, tilt
 from hand_model.diagnose.locate.slips import _finding, _turning, palm_bends, unexplained
+from hand_model.diagnose.locate.stepwise import Stepwise
 from hand_model.identify.chain import Chain
 
 BODY = np.repeat([0, 1, 2], 4)
@@ -306,3 +307,21 @@ def test_what_no_finger_can_do_is_said_where_nothing_else_explains_the_markers(m
 @pytest.mark.parametrize(("rate_hz", "frames"), [(50.0, 8), (120.0, 8), (240.0, 16), (960.0, 64)])
 def test_a_block_lasts_as_long_at_any_high_rate(rate_hz: float, frames: int) -> None:
     assert frames_of_block(np.arange(100) / rate_hz) == frames
+
+
+@pytest.mark.parametrize(("travels", "named"), [(0.9, "moving_centre"), (0.1, "joint_wobble")])
+def test_an_axis_far_away_is_a_travelling_centre_where_that_explains_as_much(
+    monkeypatch: pytest.MonkeyPatch, travels: float, named: str
+) -> None:
+    def trial(effect: str, gain: float) -> SimpleNamespace:
+        return SimpleNamespace(
+            candidate=SimpleNamespace(effect=effect, body=1), gain=gain, evidence=gain, effect=lambda: effect
+        )
+
+    search = object.__new__(Stepwise)
+    search.candidates = []
+    monkeypatch.setattr(Stepwise, "_beside", lambda *_: None)
+    monkeypatch.setattr(Stepwise, "_reach", lambda *_: 1.0)
+    tried = [trial("joint_wobble", 1000.0), trial("moving_centre", 1000.0 * travels)]
+    monkeypatch.setattr(Stepwise, "_tried", lambda *_: tried)
+    assert search.next(()) == named
