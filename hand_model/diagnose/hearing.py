@@ -22,6 +22,7 @@ from .locate.decoupled import TRIFLE, pulls, while_driven, without_excursions
 from .locate.drive import drive_states, drive_trials, frozen_share, opposes, stand_still, too_short
 from .locate.encoder_error import encoder_corrections
 from .locate.gravity import with_gravity
+from .locate.late_current import refuted as current_in_time
 from .locate.measurement import echoes_command, is_measured, rests_on_command
 from .locate.simulated import SimulatedDrive
 from .magnitude import magnitude
@@ -146,14 +147,23 @@ class Heard:
         return {a: _finger_of(self.session, a) for a in actuators}
 
     def _put_delays_right(self, facts: Mapping[str, CommandFacts]) -> None:
-        """How late a drive is was told by its current: not by as much, where that itself is late."""
+        """How late a drive is was told by its current: not by as much, where that itself is late; and by as much, where
+        that was thought to be late and is not."""
         channel_s = {
             s.actuator: float(told(s, f)["delay"])
             for s in self.stations
             if s.actuator in facts and (f := s.standing("current_channel_delay")) is not None
         }
-        if channel_s:
-            late = delays(facts, self._fingers(facts), channel_s)
+        in_time = {
+            s.actuator
+            for s in self.stations
+            if s.signal == "current"
+            and s.actuator in facts
+            and s.actuator not in channel_s
+            and current_in_time(s.naming.balance, s.naming.fit)
+        }
+        if channel_s or in_time:
+            late = delays(facts, self._fingers(facts), channel_s, in_time)
             self.found = [i for i in self.found if i[1].effect != "command_delay"] + late
 
 

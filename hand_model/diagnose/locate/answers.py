@@ -8,7 +8,7 @@ once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -71,9 +71,9 @@ def answers_of(states: Sequence[DriveState], currents: Sequence[Array]) -> Answe
     return Answers(_usual(np.array(current), step), _usual(np.array(motion), step), step, *rises)
 
 
-def lateness(answers: Mapping[str, Answers]) -> dict[str, Lateness]:
+def lateness(answers: Mapping[str, Answers], in_time: Collection[str] = ()) -> dict[str, Lateness]:
     """Of each drive that answers often enough, beside the least late one of the session, or a usual one where it is
-    alone."""
+    alone. in_time: drives of which it is known that their current is not late: what answers late is the drive."""
     told = {a: x for a, x in answers.items() if len(x.current_s) >= LEAST_ANSWERS}
     alone = len(told) == 1
     # who answers before it is told is early, and no measure for the others
@@ -95,8 +95,17 @@ def lateness(answers: Mapping[str, Answers]) -> dict[str, Lateness]:
         )
         shift = _onset(x.rise_s) if alone else _shift(x.rise_s, [y.rise_s for a, y in told.items() if a != actuator])
         slow = total > 0 and shift <= SHIFTED * total and not _moves_first(x, total - behind)
-        drive = not slow and (plain or (not alone and _both_late(x, total, behind)))
-        channel = max(total - np.nan_to_num(behind, nan=total), 0.0) if drive else max(shift, 0.0) if slow else total
+        known = actuator in in_time
+        drive = known or not slow and (plain or (not alone and _both_late(x, total, behind)))
+        channel = (
+            0.0
+            if known
+            else max(total - np.nan_to_num(behind, nan=total), 0.0)
+            if drive
+            else max(shift, 0.0)
+            if slow
+            else total
+        )
         # Neither clearly the one nor the other: the motion's own scatter decides between the two.
         torn = total > LATE * x.step_s and UNCLEAR * total < behind < (1 - UNCLEAR) * total
         between = min(behind, total - behind) if torn else 0.0

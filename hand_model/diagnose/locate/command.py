@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
@@ -84,12 +84,14 @@ def delays(
     facts: Mapping[str, CommandFacts],
     fingers: Mapping[str, str | None],
     channel_s: Mapping[str, float] = MappingProxyType({}),
+    in_time: Collection[str] = (),
 ) -> list[tuple[float, Finding]]:
     """Findings of drives that act late; by how much is told by their current. channel_s: actuator -> by how much [s]
-    that itself is late (negative: early); a drive whose current is late by as much is in time."""
+    that itself is late (negative: early); a drive whose current is late by as much is in time. in_time: drives of which
+    it is known that their current is not late."""
     return [
         _delay(a, fingers.get(a), facts[a], x.drive_s - channel_s.get(a, 0.0))
-        for a, x in lateness({a: f.answers for a, f in facts.items()}).items()
+        for a, x in lateness({a: f.answers for a, f in facts.items()}, in_time).items()
         if len(x.drive_s) and float(np.mean(x.drive_s)) > channel_s.get(a, 0.0)
     ]
 

@@ -6,11 +6,12 @@ import numpy as np
 
 from ...effects import catalogue
 from ...effects.base import SURE_DELAY, DriveState, least_delay
-from ..name.balance import Balance
+from ..name.balance import Balance, Fit
 from ..name.evidence import gain
 from ..name.shapes import polish, scan
+from ..name.term import Term
 from .answers import Lateness, lateness
-from .command import BEYOND_CHANCE, EARLY, CommandFacts, with_lateness
+from .command import BEYOND_CHANCE, EARLY, PLAINLY_LATE, CommandFacts, with_lateness
 from .drive import with_gives
 from .simulated import SimulatedDrive
 
@@ -77,6 +78,18 @@ def _late(
         return not others or max(others) - late[actuator][0] > bound  # who is early answers before the others
 
     return {a: borne_out(a) for a in best}
+
+
+def refuted(balance: Balance, fit: Fit) -> bool:
+    """Whether a drive's balance plainly says that its current is not late, where answers to commands plainly say it is:
+    what answers late is the drive then, and breaks loose sooner than the others. fit: what was named."""
+    state = balance.states[0]
+    late_s, doubt_s = state.extra.get("late", (0.0, 1.0))
+    if late_s < max(ALIKE * float(np.median(np.diff(state.time_s))), PLAINLY_LATE * doubt_s):
+        return False
+    delay = next(e for e in catalogue("drive") if e.warps)
+    shifted = balance.fit((*fit.terms, Term(delay, {"form": 0.0, "delay": float(late_s)})))
+    return gain(balance, shifted, fit) < -BEYOND_CHANCE
 
 
 def _told(states: tuple[DriveState, ...]) -> bool:
