@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from test_diagnose import drive
 
-from hand_model.diagnose.locate.answers import Lateness
+from hand_model.diagnose.locate.answers import Answers, Lateness, lateness
 from hand_model.diagnose.locate.command import BLIND, _lasting
-from hand_model.diagnose.locate.late_current import _late
+from hand_model.diagnose.locate.late_current import _late, refuted
+from hand_model.diagnose.name.balance import Balance
 from hand_model.effects.base import DriveState
 
 SHIFT_S = -0.02
@@ -75,3 +76,21 @@ def test_what_holds_a_drive_at_rest_says_nothing_against_a_late_current() -> Non
     sure, unsure = (_lasting(state, 0.1, doubt_s) for doubt_s in (0.01, 0.05))
     assert np.array_equal(sure[~at_rest], unsure[~at_rest])
     assert np.array_equal(sure[at_rest], BLIND * unsure[at_rest]) and unsure[at_rest & moving].min() == 15.0
+
+
+@pytest.mark.parametrize(
+    ("late_s", "told_s", "in_time"), [(0.0, 0.1, True), (0.1, 0.1, False), (0.0, 0.01, False), (0.0, 0.0, False)]
+)
+def test_a_current_that_its_balance_says_is_in_time_is(late_s: float, told_s: float, in_time: bool) -> None:
+    """Where answers say it to be late, by more than they may err."""
+    states = shifted(drive(3), late_s) if late_s else drive(3)
+    balance = Balance(tuple(replace(s, extra={**s.extra, "late": np.array([told_s, 0.005])}) for s in states))
+    assert refuted(balance, balance.fit()) is in_time
+
+
+def test_answers_are_late_with_the_drive_where_its_current_is_in_time() -> None:
+    """Another drive that breaks loose as late has its current much sooner, by which this one's would be late."""
+    slow, sooner = (Answers(np.full(20, current_s), np.full(20, 0.17), 0.01) for current_s in (0.02, 0.12))
+    for in_time, drive_s, channel_s in (((), 0, 0.1), (("index",), 20, 0.0)):
+        told = lateness({"index": sooner, "ring": slow}, in_time)["index"]
+        assert len(told.drive_s) == drive_s and told.channel_s == pytest.approx(channel_s)

@@ -56,7 +56,7 @@ def planted(
             moving = _moving({"time": log.time_s, **log.columns}, motor, begun, mine.index(trial))
             load = np.interp(seen.log_s, moving.time_s, _load(plants.values(), moving))
             seen = replace(seen, load=load)
-            for markers in moved:
+            for markers in reversed(moved):  # what turns segments takes along what slipped on them
                 seen = replace(seen, position=markers(seen))
             position = seen.position
         position = position + 1.5e-4 * noise * rng.standard_normal(position.shape)
