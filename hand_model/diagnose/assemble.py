@@ -11,13 +11,13 @@ import numpy as np
 
 from ..effects import catalogue
 from ..effects.base import sample_interval
+from .doubtful import REFUSED, compared, doubted, trifles
 from .findings import Finding, Findings
 from .locate.displacement import NO_HINGE, NOT_RIGID
 from .locate.markers import HINGE, SLIPS
-from .locate.preload import COMPARISON, usual_spring
+from .locate.preload import usual_spring
 from .locate.strokes import STROKES
 from .magnitude import (
-    SLIGHT,
     Channel,
     channel_figures,
     likely_magnitude,
@@ -44,8 +44,6 @@ HARMONICS = 4
 # of an encoder error's size, and of that of its kind: less, in the current of the same motor, may be what is left of it
 SHADOW = 0.5
 ANGULAR = {e.name for station in ("encoder", "linkage") for e in catalogue(station) if e.signal != "log"}
-REFUSED = "command_as_measurement"  # a channel that tells nothing: no other finding is small beside it
-TRIFLE = 0.01  # of the square of the heaviest weight
 # of that magnitude: less, where the lack-of-fit test sees nothing, is left to the imperfections of reading angles and
 # speeds
 MINUTE = 0.15
@@ -54,8 +52,6 @@ CHANNELS = 15
 # of a weight counts where the declared model takes up what is named, so that nothing of the mismatch is its: only the
 # hand's other motors speak for it
 COMPARED = 0.01
-SURE = 0.99  # probability of what a comparison alone says
-DOUBT = "only the hand's other motors speak for it, and it may be chance"
 MANY = 3  # names of a finger, beside which a channel of it may be explained in part
 NEARLY_ALL = 0.95  # of a mismatch: names that take as much leave nothing worth a word
 UNSEEN = 0.01  # probability from which the test sees nothing
@@ -109,13 +105,13 @@ def assemble(
     unexplained += [outsider_of(s, f) for s, f in strange if (f.term.effect.part_of, s.finger) not in named]
     unexplained += [unrepeated_of(s) for s in stations if _wanders(s, stations)]
     ranked = _without_shadows(_one_clock(_of_hinges(ranked, unexplained), [f for _, f in strange]), stations)
-    ranked, doubted = _without(ranked, _doubted([f for _, f in ranked]))
+    ranked, unsure = _without(ranked, doubted([f for _, f in ranked]))
     sized = [(_ranking_magnitude(f, stations), weight * _counted(f, stations), f) for weight, f in ranked]
     ranked = sorted(((float((m**3 * weight) ** 0.25), f) for m, weight, f in sized), key=lambda item: -item[0])
     ranked = _heaviest(ranked, _same_place)
     surely = {id(f): max(m, _magnitude(f, stations) * sure_share(f.fit)) for m, _, f in sized}
-    ranked, trifles = _without(ranked, _trifles(ranked, surely))
-    rejected += [*doubted, *trifles]
+    ranked, slight = _without(ranked, trifles(ranked, surely))
+    rejected += [*unsure, *slight]
     found = _shared(ranked)
     verdict = "mismatch" if found else "unexplained" if unexplained else "consistent"
     worst = max(stations, key=lambda s: variance_ratio(s.naming, s.naming.declared), default=None)
@@ -159,8 +155,8 @@ def _beneath(station: Station, named: Named) -> float:
 
 def _counted(finding: Finding, stations: Sequence[Station]) -> float:
     """Share of a finding's weight that counts: how large it is may be told by comparison alone."""
-    compared = _compared(finding) or any(finding.effect in s.compared and s.names(finding) for s in stations)
-    return COMPARED if compared else 1.0
+    alone = compared(finding) or any(finding.effect in s.compared and s.names(finding) for s in stations)
+    return COMPARED if alone else 1.0
 
 
 def _leave_something(station: Station, stations: Sequence[Station]) -> bool:
@@ -222,37 +218,6 @@ def _palm_marker(finding: Finding) -> Any:
 def _same_place(finding: Finding) -> Any:
     """What says the same of the same place: a sag shows in speed and in current."""
     return (finding.effect, *(str(finding.where.get(k)) for k in ("finger", "joint", "actuator", "marker", "markers")))
-
-
-def _trifles(ranked: list[tuple[float, Finding]], magnitudes: Mapping[int, float]) -> list[tuple[Finding, str]]:
-    """Findings that are small for their kind and hardly show beside the heaviest one of the same finger, each with the
-    reason: they may be no more than its form being another. What markers alone show shapes no current."""
-    out = []
-    for weight, finding in ranked:
-        beside = (
-            (w, f)
-            for w, f in ranked
-            if f.where["finger"] == finding.where["finger"]
-            and f.effect != REFUSED
-            and not (f.where["signal"] == "markers" and finding.where["signal"] == "current")
-        )
-        heaviest, main = next(beside, (0.0, finding))
-        if weight**2 < TRIFLE * heaviest**2 and magnitudes[id(finding)] < SLIGHT:
-            out.append(
-                (finding, f"a trifle beside {main.effect.replace('_', ' ')}, whose form may be slightly another")
-            )
-    return out
-
-
-def _compared(finding: Finding) -> bool:
-    """Whether a comparison of the hand's drives alone says it."""
-    return finding.fit.get("engine") == COMPARISON
-
-
-def _doubted(found: Sequence[Finding]) -> list[tuple[Finding, str]]:
-    """What a comparison alone says, and not surely, each with the reason: there are more healthy drives than drives of
-    which nothing else would show what they have."""
-    return [(f, DOUBT) for f in found if _compared(f) and f.probability < SURE]
 
 
 def _without(
