@@ -40,7 +40,8 @@ def trial(case: Case, target: Path, noise: float) -> tuple[bool, bool, str]:
         e: {k: round(v, 4) if isinstance(v, float) else v for k, v in plants[e].figures.items()} for e in case.main
     }
     if case.kind == "messy":
-        mine = [effect for effect, finger in named if finger in (case.finger, None)]
+        known = {effect for effect, _ in before}  # what is of no finger in particular may be another's
+        mine = [e for e, finger in named if finger == case.finger or finger is None and e not in known]
         right, three = mine[:1] == list(case.main), case.main[0] in mine[:3]
         named = [(e, case.finger) for e in mine[:4]]
     else:
