@@ -266,7 +266,7 @@ def test_a_play_that_a_smaller_give_nearly_stands_in_for_is_named_beside_it() ->
     small = of("linkage_backlash", 0.7, 0.02)
     for proven, kept in (((give, play_, other), (give, play_)), ((give, small), (give,))):
         naming = SimpleNamespace(balance=SimpleNamespace(sigma=1.0))
-        station = SimpleNamespace(proven=proven, forms=(), naming=naming, tilt=0.0)
+        station = SimpleNamespace(proven=proven, forms=(), naming=naming, tilt=0.0, _large=(give,), _told_elsewhere=())
         assert Station._beside.fget(station) == kept
 
 
