@@ -158,6 +158,6 @@ def test_a_candidate_that_is_always_dropped_again_ends_the_search(monkeypatch) -
         return [selection.Rival(kind.name, 50.0, offered)]
 
     monkeypatch.setattr(selection, "rank", rank)
-    monkeypatch.setattr(selection, "settle", lambda *_arguments: ((), balance.fit()))
+    monkeypatch.setattr(selection, "settle", lambda *_arguments: balance.fit())
     fit, brought, _ = selection._search(selection.Pair(balance), (kind,), None)
     assert fit.terms == () and brought == {kind.name: 50.0}

@@ -10,7 +10,7 @@ from test_diagnose import drive
 
 from hand_model.diagnose.locate.answers import Answers, Lateness, lateness
 from hand_model.diagnose.locate.command import BLIND, _lasting
-from hand_model.diagnose.locate.late_current import _late, refuted
+from hand_model.diagnose.locate.late_current import _late, current_in_time
 from hand_model.diagnose.name.balance import Balance
 from hand_model.effects.base import DriveState
 
@@ -85,7 +85,7 @@ def test_a_current_that_its_balance_says_is_in_time_is(late_s: float, told_s: fl
     """Where answers say it to be late, by more than they may err."""
     states = shifted(drive(3), late_s) if late_s else drive(3)
     balance = Balance(tuple(replace(s, extra={**s.extra, "late": np.array([told_s, 0.005])}) for s in states))
-    assert refuted(balance, balance.fit()) is in_time
+    assert current_in_time(balance, balance.fit()) is in_time
 
 
 def test_answers_are_late_with_the_drive_where_its_current_is_in_time() -> None:

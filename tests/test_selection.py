@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from test_kinematic_stations import joint
 
-from hand_model.diagnose.name import selection
+from hand_model.diagnose.name import candidates, selection
 from hand_model.diagnose.name.naming import Named, Rival
 from hand_model.diagnose.name.selection import name_effects
 from hand_model.diagnose.name.shapes import possible
@@ -58,13 +58,13 @@ def test_what_turns_out_likelier_in_the_place_of_a_term_takes_it(
         Named(one, {}, (Rival("one", 90.0, fit),), 0.8, 1.0, 1.0),
         Named(two, {}, (Rival("three", 30.0, SimpleNamespace(terms=(one, three))), Rival("two", 25.0, fit)), 0.2, 1, 0),
     ]
-    monkeypatch.setattr(selection, "refit", lambda balance, fit: fit)
-    monkeypatch.setattr(selection, "scale_of", lambda *_: 1.0)
+    monkeypatch.setattr(candidates, "refit", lambda balance, fit: fit)
+    monkeypatch.setattr(candidates, "scale_of", lambda *_: 1.0)
     monkeypatch.setattr(selection, "allowed", lambda *_: True)
     monkeypatch.setattr(
-        selection, "evidence", lambda balance, fit, rest, *_, **__: other if three in fit.terms else 25.0
+        candidates, "evidence", lambda balance, fit, rest, *_, **__: other if three in fit.terms else 25.0
     )
-    better = selection._exchanged(balance, fit, found)
+    better = selection._outdone(balance, fit, found)
     assert (better is not None and better.terms == (one, three)) == exchanged
 
 

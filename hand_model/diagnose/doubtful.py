@@ -23,9 +23,9 @@ def trifles(ranked: list[tuple[float, Finding]], magnitudes: Mapping[int, float]
     def small(weight: float, finding: Finding, heaviest: float) -> bool:
         return weight**2 < TRIFLE * heaviest**2 and magnitudes[id(finding)] < SLIGHT
 
+    others = [(w, f) for w, f in ranked if f.effect != REFUSED]
     out = []
     for weight, finding in ranked:
-        others = [(w, f) for w, f in ranked if f.effect != REFUSED]
         beside = (
             (w, f)
             for w, f in others

@@ -22,7 +22,7 @@ from .locate.decoupled import TRIFLE, pulls, while_driven, without_excursions
 from .locate.drive import drive_states, drive_trials, frozen_share, opposes, stand_still, too_short
 from .locate.encoder_error import encoder_corrections
 from .locate.gravity import with_gravity
-from .locate.late_current import refuted as current_in_time
+from .locate.late_current import current_in_time
 from .locate.measurement import echoes_command, is_measured, rests_on_command
 from .locate.simulated import SimulatedDrive
 from .magnitude import magnitude

@@ -42,8 +42,8 @@ def planted(
     begun = min(float(read_log(t.log_path).time_s[0]) for t in mine)
     for trial in logged:
         log = read_log(trial.log_path)
-        columns = {"time": log.time_s, **log.columns}
-        columns = {**columns, "current": columns["current"] + 5.0 * noise * rng.standard_normal(len(log.time_s))}
+        current = log.columns["current"] + 5.0 * noise * rng.standard_normal(len(log.time_s))
+        columns = {"time": log.time_s, **log.columns, "current": current}
         if trial in mine:
             columns = _changed(columns, tuple(plants.values()), _moving(columns, motor, begun, mine.index(trial)))
         write_log(target / trial.log_path.relative_to(source), {**columns, "current": np.round(columns["current"])})

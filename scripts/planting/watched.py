@@ -16,7 +16,7 @@ from hand_model.session import Finger, Session, Trial
 from .plant import SPREAD, Array, Seen, smoothed
 
 CURVED = 4  # degree of what an angle is of the drive's place
-ROUNDS = 5
+ROUNDS = 5  # of an axis and of what everything turns from, each as the other says
 
 
 def watched(session: Session, finger: Finger, trial: Trial) -> Seen:

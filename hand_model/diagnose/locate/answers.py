@@ -97,15 +97,12 @@ def lateness(answers: Mapping[str, Answers], in_time: Collection[str] = ()) -> d
         slow = total > 0 and shift <= SHIFTED * total and not _moves_first(x, total - behind)
         known = actuator in in_time
         drive = known or not slow and (plain or (not alone and _both_late(x, total, behind)))
-        channel = (
-            0.0
-            if known
-            else max(total - np.nan_to_num(behind, nan=total), 0.0)
-            if drive
-            else max(shift, 0.0)
-            if slow
-            else total
-        )
+        if known:
+            channel = 0.0
+        elif drive:
+            channel = max(total - np.nan_to_num(behind, nan=total), 0.0)
+        else:
+            channel = max(shift, 0.0) if slow else total
         # Neither clearly the one nor the other: the motion's own scatter decides between the two.
         torn = total > LATE * x.step_s and UNCLEAR * total < behind < (1 - UNCLEAR) * total
         between = min(behind, total - behind) if torn else 0.0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ...effects import catalogue
@@ -47,8 +49,7 @@ def _late(
     nearest, brought = dict[str, float](), dict[str, float]()
     for actuator, states in drives.items():
         balance = Balance(states)
-        delay = next(e for e in catalogue("drive") if e.warps)
-        fit = scan(balance, delay, ())
+        fit = scan(balance, _delay(), ())
         polished = None if fit is None else polish(balance, fit, 0)
         brought[actuator] = 0.0 if polished is None else gain(balance, polished, balance.fit())
         nearest[actuator] = 0.0 if polished is None else polished.terms[0].shape["delay"]
@@ -80,16 +81,20 @@ def _late(
     return {a: borne_out(a) for a in best}
 
 
-def refuted(balance: Balance, fit: Fit) -> bool:
+def current_in_time(balance: Balance, fit: Fit) -> bool:
     """Whether a drive's balance plainly says that its current is not late, where answers to commands plainly say it is:
     what answers late is the drive then, and breaks loose sooner than the others. fit: what was named."""
     state = balance.states[0]
     late_s, doubt_s = state.extra.get("late", (0.0, 1.0))
     if late_s < max(ALIKE * float(np.median(np.diff(state.time_s))), PLAINLY_LATE * doubt_s):
         return False
-    delay = next(e for e in catalogue("drive") if e.warps)
-    shifted = balance.fit((*fit.terms, Term(delay, {"form": 0.0, "delay": float(late_s)})))
+    shifted = balance.fit((*fit.terms, Term(_delay(), {"form": 0.0, "delay": float(late_s)})))
     return gain(balance, shifted, fit) < -BEYOND_CHANCE
+
+
+def _delay() -> Any:
+    """The effect of a current that is late."""
+    return next(e for e in catalogue("drive") if e.warps)
 
 
 def _told(states: tuple[DriveState, ...]) -> bool:

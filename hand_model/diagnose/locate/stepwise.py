@@ -151,17 +151,9 @@ class Stepwise:
         tried = [t for t in tried if t.candidate.effect != YIELDING or t.gain >= least]
         best = max(tried, key=lambda t: t.evidence)
         if best.candidate.effect == NO_HINGE:
-            named = max(
-                (t for t in tried if t.candidate.effect in HINGE and t.candidate.body == best.candidate.body),
-                key=lambda t: t.evidence,
-            )
-            best = named if named.gain > MOSTLY * best.gain else best
+            best = _instead(best, tried, HINGE)
         if best.candidate.effect == "joint_wobble" and self._reach(best.candidate, beside) > REACH:
-            travels = max(
-                (t for t in tried if t.candidate.effect == "moving_centre" and t.candidate.body == best.candidate.body),
-                key=lambda t: t.evidence,
-            )
-            best = travels if travels.gain > MOSTLY * best.gain else best
+            best = _instead(best, tried, ("moving_centre",))
         return best.effect()
 
     def alone(self, candidate: Candidate) -> MarkerEffect:
@@ -349,6 +341,15 @@ class Stepwise:
         # of arms in all directions, two thirds are across
         tilt = np.sqrt(np.sum(spread**2) / max(float(np.sum(arm**2)) * 2 / 3, 1e-300))
         return float(np.sqrt(np.mean(np.sum(moved**2, axis=-1))) / max(tilt, 1e-12))
+
+
+def _instead(best: _Trial, tried: Sequence[_Trial], effects: tuple[str, ...]) -> _Trial:
+    """The likeliest of some effects of the same joint, where it explains most of what the best trial does; else that."""
+    named = max(
+        (t for t in tried if t.candidate.effect in effects and t.candidate.body == best.candidate.body),
+        key=lambda t: t.evidence,
+    )
+    return named if named.gain > MOSTLY * best.gain else best
 
 
 def _flat(columns: Array) -> Array:

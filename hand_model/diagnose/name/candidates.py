@@ -77,7 +77,7 @@ def allowed(balance: Balance, fit: Fit) -> bool:
     return possible(balance, fit, len(fit.terms) - 1)
 
 
-def settle(pair: Pair, effects: tuple[Any, ...], terms: tuple[Term, ...]) -> tuple[tuple[Term, ...], Fit]:
+def settle(pair: Pair, effects: tuple[Any, ...], terms: tuple[Term, ...]) -> Fit:
     """Joint refit; terms that no longer pay leave; a term that another effect replaces better is exchanged."""
     balance = pair.state
     fit = reform(balance, refit(balance, balance.fit(terms)), len(terms) - 1)
@@ -93,7 +93,7 @@ def settle(pair: Pair, effects: tuple[Any, ...], terms: tuple[Term, ...]) -> tup
         if swapped is None:
             break
         fit = swapped
-    return fit.terms, fit
+    return fit
 
 
 def _drop(balance: Balance, fit: Fit) -> Fit | None:
@@ -114,11 +114,19 @@ def _swap(pair: Pair, effects: tuple[Any, ...], fit: Fit) -> Fit | None:
         own = evidence(balance, fit, without, which, scale_of(balance, fit))
         ranked = [r for r in rank(pair, effects, rest, without, 1, own - 10) if r.name != fit.terms[which].effect.name]
         if ranked and ranked[0].evidence > own - 10:
-            other = refit(balance, ranked[0].fit)
-            scale = min(scale_of(balance, other), scale_of(balance, fit))
-            if evidence(balance, other, without, scale=scale) > evidence(balance, fit, without, which, scale) + 1:
+            other = exchanged(balance, fit, which, without, ranked[0].fit)
+            if other is not None:
                 return other
     return None
+
+
+def exchanged(balance: Balance, fit: Fit, which: int, without: Fit, other: Fit) -> Fit | None:
+    """A fit with another effect, its last, in the place of the term `which`, all refitted, where that is likelier by more
+    than a unit of chance; else None. without: the fit of the other terms alone."""
+    other = refit(balance, other)
+    scale = min(scale_of(balance, other), scale_of(balance, fit))
+    likelier = evidence(balance, other, without, scale=scale) > evidence(balance, fit, without, which, scale) + 1
+    return other if likelier else None
 
 
 def least_evidence(balance: Balance, others: int) -> float:

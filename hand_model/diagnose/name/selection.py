@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from ...background import Pair
 from .balance import Balance, Fit
 from .bristles import with_bristles
-from .candidates import EVIDENCE_LEAST, allowed, least_evidence, rank, settle, twice
+from .candidates import EVIDENCE_LEAST, allowed, exchanged, least_evidence, rank, settle, twice
 from .evidence import evidence, gain, scale_of
 from .lack_of_fit import LackOfFit, lack_of_fit
 from .naming import ALPHA, MOST_TERMS, Named, Naming, Rival, overwhelmed
-from .shapes import polish, possible, refit, scan
+from .shapes import polish, possible, scan
 from .term import Term
 from .wander import Wander, estimate_wander
 
@@ -93,16 +93,15 @@ def _named(
         if rival.name in _names(further) and not twice(other, further):
             balance, brought = other.wandering(_unrepeated(other, other.fit(further.terms))), {**brought, **more}
             pair = paired(balance.learning())
-            learned = settle(pair, effects, further.terms)[1]  # beside other chance, another may explain it better
+            learned = settle(pair, effects, further.terms)  # beside other chance, another may explain it better
             fit = balance.fit(learned.terms)
+    found = _findings(pair, effects, learned)
+    likelier = _outdone(pair.state, learned, found)
+    if likelier is not None:
+        learned = settle(pair, effects, likelier.terms)
+        fit, found = balance.fit(learned.terms), _findings(pair, effects, learned)
     declared = balance.fit()
     before, after = _lacks(balance, declared, fit)
-    found = _findings(pair, effects, learned)
-    exchanged = _exchanged(pair.state, learned, found)
-    if exchanged is not None:
-        learned = settle(pair, effects, exchanged.terms)[1]
-        fit = balance.fit(learned.terms)
-        (before, after), found = _lacks(balance, declared, fit), _findings(pair, effects, learned)
     kept = {t.effect.name for t in fit.terms}
     rejected = tuple(sorted(((n, e) for n, e in brought.items() if n not in kept), key=lambda item: -item[1]))
     return Naming(balance, declared, fit, estimate_wander(balance, fit.prediction), before, after, found, rejected)
@@ -180,7 +179,7 @@ def _search(
     refused. start:
     terms to begin with."""
     balance = pair.state
-    fit, brought, ranked = settle(pair, effects, start)[1] if start else balance.fit(), {}, list[Rival]()
+    fit, brought, ranked = settle(pair, effects, start) if start else balance.fit(), {}, list[Rival]()
     been, refused = {_names(fit)}, set[str]()
     while len(fit.terms) < MOST_TERMS:
         ranked = rank(pair, effects, fit.terms, fit)
@@ -191,7 +190,7 @@ def _search(
         )
         if best is None:
             break
-        _, settled = settle(pair, effects, best.fit.terms)
+        settled = settle(pair, effects, best.fit.terms)
         if twice(balance, settled) or not all(possible(balance, settled, i) for i in range(len(settled.terms))):
             refused.add(best.name)
             continue
@@ -272,7 +271,7 @@ def _findings(pair: Pair, effects: tuple[Any, ...], fit: Fit) -> tuple[Named, ..
     return tuple(sorted(found, key=lambda f: -f.share))
 
 
-def _exchanged(balance: Balance, fit: Fit, found: Iterable[Named]) -> Fit | None:
+def _outdone(balance: Balance, fit: Fit, found: Iterable[Named]) -> Fit | None:
     """The fit with one term exchanged for another effect that turned out likelier in its place, all else refitted; None
     where there is none. While terms are exchanged one at a time only the most promising candidate is looked at closely."""
     for named in found:
@@ -280,10 +279,8 @@ def _exchanged(balance: Balance, fit: Fit, found: Iterable[Named]) -> Fit | None
         if best.name == named.term.effect.name:
             continue
         rest = tuple(t for i, t in enumerate(fit.terms) if i != which)
-        without, other = balance.fit(rest), refit(balance, balance.fit((*rest, best.fit.terms[-1])))
-        scale = min(scale_of(balance, other), scale_of(balance, fit))
-        likelier = evidence(balance, other, without, scale=scale) - evidence(balance, fit, without, which, scale)
-        if likelier > 1 and allowed(balance, other):
+        other = exchanged(balance, fit, which, balance.fit(rest), balance.fit((*rest, best.fit.terms[-1])))
+        if other is not None and allowed(balance, other):
             return other
     return None
 
