@@ -49,6 +49,17 @@ def test_damped_bristles_follow_the_state_of_lugre() -> None:
     assert np.ptp(damped - z) == pytest.approx(np.ptp(0.05 * rate), rel=0.1)
 
 
+@pytest.mark.parametrize("length", [0.6, 1.2, 4.0])
+def test_bristles_that_damp_a_motor_critically_are_damped_in_full(length: float) -> None:
+    """As they do in simulators (Canudas de Wit et al. 1995): a motor of 0.012 raw s^2/% with friction of 35 raw. What is
+    damped a hundred times more gives nothing at all."""
+    time = 2 * np.sqrt(0.012 * length / 35.0)
+    shape = {"bristle_length": length, "bristle_time": time, "form": 0.0}
+    told = effect("presliding_friction").parameters
+    assert told(shape, {}, {})["bristle_time"] == pytest.approx(time)
+    assert told({**shape, "bristle_time": 100 * time}, {}, {})["bristle_time"] < 3 * time
+
+
 def test_jenkins_is_elastic_then_yields() -> None:
     x = np.concatenate([np.linspace(0, 10, 500), np.linspace(10, 0, 500)])
     z = jenkins(x, 2.0, threshold=0.1)

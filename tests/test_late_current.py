@@ -13,6 +13,7 @@ from hand_model.diagnose.locate.command import BLIND, _lasting
 from hand_model.diagnose.locate.late_current import _late, current_in_time
 from hand_model.diagnose.name.balance import Balance
 from hand_model.effects.base import DriveState
+from hand_model.effects.current_channel_delay import EFFECT
 
 SHIFT_S = -0.02
 
@@ -38,6 +39,28 @@ def test_a_balance_that_plainly_shows_a_shift_is_believed_where_answers_agree(
     """Answers that are wrong by a sample or two tell less than the balance does; those that speak against it do not."""
     drives = {"index": shifted(drive(3), SHIFT_S), "ring": drive(4)}
     told = {"index": (told_s, doubt_s), "ring": (0.0, doubt_s)}
+    timed = {
+        a: tuple(replace(s, extra={**s.extra, "late": np.array(told[a])}) for s in states)
+        for a, states in drives.items()
+    }
+    assert _late(drives, timed, {}) == {"index": may_be, "ring": False}
+
+
+@pytest.mark.parametrize(
+    ("told_s", "doubt_s", "may_be"),
+    [(0.002, 0.03, True), (0.05, 0.02, True), (0.16, 0.03, False), (-0.06, 0.02, False)],
+)
+def test_answers_that_a_filter_leaves_vague_do_not_deny_it(told_s: float, doubt_s: float, may_be: bool) -> None:
+    """Of a current behind a filter of 60 ms a sudden rise is noticed anywhere from its start to then."""
+    read = {"form": 1.0, "delay": 0.06}
+
+    def behind(state: DriveState) -> DriveState:
+        seen = np.isfinite(state.effort)
+        whole = np.interp(state.time_s, state.time_s[seen], state.effort[seen])
+        return replace(state, effort=np.where(seen, EFFECT.reading(whole, state.time_s, read), np.nan))
+
+    drives = {"index": tuple(behind(s) for s in drive(3)), "ring": drive(4)}
+    told = {"index": (told_s, doubt_s), "ring": (0.0, 0.005)}
     timed = {
         a: tuple(replace(s, extra={**s.extra, "late": np.array(told[a])}) for s in states)
         for a, states in drives.items()

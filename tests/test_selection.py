@@ -7,13 +7,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from test_diagnose import drive, planted
 from test_kinematic_stations import joint
 
 from hand_model.diagnose.name import candidates, selection
+from hand_model.diagnose.name.balance import Balance
 from hand_model.diagnose.name.naming import Named, Rival
 from hand_model.diagnose.name.selection import name_effects
 from hand_model.diagnose.name.shapes import possible
-from hand_model.effects import catalogue, outsiders
+from hand_model.diagnose.name.term import Term
+from hand_model.effects import catalogue, effect, outsiders
 
 LEFT = {0: 2000.0, 1: 60.0}  # what a fit without that term leaves more
 
@@ -40,23 +43,27 @@ def test_small_terms_stand_for_a_rival_only_if_it_explains_more_than_all_of_them
     monkeypatch.setattr(selection, "evidence", lambda balance, fit, rest, which, scale: {0: 1000.0, 1: 25.0}[which])
     monkeypatch.setattr(selection, "scale_of", lambda *_: 1.0)
     monkeypatch.setattr(selection, "_size", lambda *_: 1.0)
-    found = selection._findings(SimpleNamespace(state=balance), (), fit)
+    found = selection._findings(SimpleNamespace(state=balance), balance, (), fit)
     assert [f.term.effect.name for f in found] == ["large", "small"]
     assert found[0].rivals[0].name == told
     assert (found[0].probability > 0.99) == (told == "large")
 
 
-@pytest.mark.parametrize(("other", "exchanged"), [(30.0, True), (25.5, False)])
+@pytest.mark.parametrize(
+    ("other", "kept_out", "exchanged"),
+    [(30.0, 0.0, True), (25.5, 0.0, False), (24.0, 1.5, True), (24.0, 0.5, False), (30.0, -6.0, False)],
+)
 def test_what_turns_out_likelier_in_the_place_of_a_term_takes_it(
-    monkeypatch: pytest.MonkeyPatch, other: float, exchanged: bool
+    monkeypatch: pytest.MonkeyPatch, other: float, kept_out: float, exchanged: bool
 ) -> None:
-    """By more than the one unit that chance may make, with all else refitted."""
+    """By more than the one unit that chance may make, with all else refitted, or with what recordings kept out say."""
     one, two, three = (SimpleNamespace(effect=SimpleNamespace(name=name)) for name in ("one", "two", "three"))
     fit = SimpleNamespace(terms=(one, two))
+    likelier = SimpleNamespace(terms=(one, three))
     balance = SimpleNamespace(fit=lambda terms: SimpleNamespace(terms=terms))
     found = [
         Named(one, {}, (Rival("one", 90.0, fit),), 0.8, 1.0, 1.0),
-        Named(two, {}, (Rival("three", 30.0, SimpleNamespace(terms=(one, three))), Rival("two", 25.0, fit)), 0.2, 1, 0),
+        Named(two, {}, (Rival("three", 30.0, likelier, kept_out), Rival("two", 25.0, fit)), 0.2, 1, 0),
     ]
     monkeypatch.setattr(candidates, "refit", lambda balance, fit: fit)
     monkeypatch.setattr(candidates, "scale_of", lambda *_: 1.0)
@@ -64,8 +71,37 @@ def test_what_turns_out_likelier_in_the_place_of_a_term_takes_it(
     monkeypatch.setattr(
         candidates, "evidence", lambda balance, fit, rest, *_, **__: other if three in fit.terms else 25.0
     )
-    better = selection._outdone(balance, fit, found)
+    monkeypatch.setattr(selection, "settle", lambda pair, effects, terms: SimpleNamespace(terms=terms))
+    better = selection._outdone(SimpleNamespace(state=balance), (), fit, found)
     assert (better is not None and better.terms == (one, three)) == exchanged
+
+
+def rivals(balance: Balance, *told: tuple[str, dict[str, float], float]) -> list[Rival]:
+    """Effects fitted to the training recordings, with the evidence that they are told to have there."""
+    return [Rival(name, brought, balance.fit((Term(effect(name), shape),))) for name, shape, brought in told]
+
+
+DRAG, BENT = ("quadratic_damping", {}), ("nonlinear_spring", {"form": 0.0})
+
+
+@pytest.mark.parametrize(("ahead", "asked"), [(1.0, True), (2.9, True), (3.1, False)])
+def test_recordings_kept_out_tell_apart_what_training_cannot(ahead: float, asked: bool) -> None:
+    """Of a spring that seems likelier than the drag that is there; what training tells they are not asked of."""
+    balance = Balance(drive(3, add=planted("quadratic_damping", {}, [0.002])))
+    told = rivals(balance, (*BENT, 90.0 + ahead), (*DRAG, 90.0))
+    heard = selection._with_kept_out(balance, told)
+    assert (heard[0].name == "quadratic_damping") == asked
+    assert heard[0].kept_out == 0.0 and heard[0].evidence == (90.0 if asked else 90.0 + ahead)
+    assert heard[1].evidence == pytest.approx(told[0 if asked else 1].evidence + heard[1].kept_out)
+    assert selection._with_kept_out(balance.learning(), told) == told  # there is none
+
+
+def test_recordings_kept_out_say_nothing_of_what_one_recording_had() -> None:
+    """An obstacle in the last training recording that a bent spring cannot be, whatever the next recording has."""
+    balance = Balance(drive(3, add=planted("quadratic_damping", {}, [0.002])))
+    touched = {"trial": 1.0, "form": 0.0, "since": 0.0, "until": 1.0, "begin": 60.0}
+    told = rivals(balance, ("external_contact", touched, 91.0), (*DRAG, 90.0))
+    assert selection._with_kept_out(balance, told) == told
 
 
 def test_a_give_that_a_late_segment_makes_large_takes_another_form() -> None:

@@ -185,6 +185,16 @@ def test_a_diagnosis_leaves_out_a_finger_that_is_held_and_says_how_far_it_turns(
         assert f'"{reading.finger}" turns by ' in reading.notes[0] and "180 deg at least" in reading.notes[0]
 
 
+def test_counts_that_are_not_believed_say_nothing_of_the_linkage_either(recorded):
+    """A position that echoes the command would stand for the proximal joint's angle."""
+    session = read_session(recorded)
+    for unread in ((), ("index",)):
+        ((call,),) = (finger_calls(session, unread),)
+        stations = call().stations
+        assert [s.signal for s in stations] == ([] if unread else ["encoder"]) + ["markers"]
+        assert all(("load" in state.extra) != bool(unread) for state in stations[-1].naming.balance.states)
+
+
 def test_a_direction_that_is_missing():
     rng, up = np.random.default_rng(0), np.linspace(0, 100, 200)
     assert missing_direction(up + rng.normal(size=200)) == "extension"

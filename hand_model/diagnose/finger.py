@@ -131,7 +131,7 @@ def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, f
     parted = any(f.term.effect.signal == "log" for s in stations for f in s.outsiders)
     for joint in range(1, len(finger.segments)):
         expected = expected_angles(stations[0].naming) if stations and joint == 1 else {}
-        states = linkage_states(angles, joint, moments, expected, not parted)
+        states = linkage_states(angles, joint, moments, expected, not parted and finger.actuator in counts)
         if states and joint == 1 and stations and _leaves(stations[0]):
             states = beside_excursions(states, stations[0].naming.balance.states)
         if states:

@@ -11,7 +11,7 @@ from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
 from .mjcf import lugre_friction
 from .path import dahl, jenkins
 
-FULL_SPEED = 100.0  # a range of 100 % in a second
+SOON = 20.0  # [% of the range, or deg, a second] of a drive once it has gone its bristles' length
 
 
 class PreslidingFriction(Effect):
@@ -82,10 +82,10 @@ class PreslidingFriction(Effect):
 
 
 def _time(shape: Mapping[str, float]) -> float:
-    """Damping over stiffness [s], at most what lets friction turn over at once at full speed: beyond, bristles would
-    give nothing, and it is the estimate of starts that is described."""
+    """Damping over stiffness [s], at most what lets friction turn over at once as soon as the drive moves: beyond, bristles
+    would give nothing, and it is the estimate of starts that is described."""
     damped = shape.get("form", 0.0) < 0.5  # what breaks away is not
-    return min(shape.get("bristle_time", 0.0), shape["bristle_length"] / FULL_SPEED) if damped else 0.0
+    return min(shape.get("bristle_time", 0.0), shape["bristle_length"] / SOON) if damped else 0.0
 
 
 EFFECT = PreslidingFriction()

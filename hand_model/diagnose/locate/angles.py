@@ -171,7 +171,7 @@ def linkage_states(
 
     The driver's angle is smoothed (see `driver_angle`): noise in a regressor would bend the map and hide small departures.
     expected: trial -> times [s] and angles [deg] of the driver as its own station has it (`expected_angles`). logged:
-    whether the logs' clocks are believed; the markers tell alone otherwise.
+    whether the logs' counts and clocks are believed; the markers tell alone otherwise.
     """
     states, told = [], []
     name = angles.finger.segments[joint].name

@@ -46,13 +46,14 @@ def _late(
     Answers to commands tell a late or an early current better than the balance does, and must bear it out. timed: the
     drives with what these answers, or simulations, tell, which says nothing yet to the balance. answered: by the answers
     alone."""
-    nearest, brought = dict[str, float](), dict[str, float]()
+    nearest, brought, seen_s = dict[str, float](), dict[str, float](), dict[str, tuple[float, float]]()
     for actuator, states in drives.items():
         balance = Balance(states)
         fit = scan(balance, _delay(), ())
         polished = None if fit is None else polish(balance, fit, 0)
         brought[actuator] = 0.0 if polished is None else gain(balance, polished, balance.fit())
-        nearest[actuator] = 0.0 if polished is None else polished.terms[0].shape["delay"]
+        shape = {"form": 0.0, "delay": 0.0} if polished is None else polished.terms[0].shape
+        nearest[actuator], seen_s[actuator] = shape["delay"], _delay().lateness(shape)
     best = {a: delay_s if brought[a] > DELAY_TOLD else 0.0 for a, delay_s in nearest.items()}
     step = {a: float(np.median(np.diff(s[0].time_s))) for a, s in drives.items()}
     # a lone drive cannot tell how the log is read from what its own channel does: twice as much is asked of it
@@ -63,6 +64,11 @@ def _late(
         x, bound = best[actuator] - common, least * step[actuator]
         if actuator not in late:
             return abs(x) > bound
+        earliest, latest = seen_s[actuator]
+        if earliest < latest and brought[actuator] > BEYOND_CHANCE and x > bound:
+            # behind a filter answers tell little of how late it is: they must not deny it
+            told, doubt = late[actuator].tolist()
+            return earliest - ALIKE * doubt < told < latest + ALIKE * doubt
         if (told_to := least_delay(timed[actuator])) < bound:
             told, doubt = late[actuator].tolist()  # and to the side to which the balance would shift it
             plain = brought[actuator] > BEYOND_CHANCE and abs(told - best[actuator]) < ALIKE * doubt

@@ -120,13 +120,15 @@ def _swap(pair: Pair, effects: tuple[Any, ...], fit: Fit) -> Fit | None:
     return None
 
 
-def exchanged(balance: Balance, fit: Fit, which: int, without: Fit, other: Fit) -> Fit | None:
+def exchanged(balance: Balance, fit: Fit, which: int, without: Fit, other: Fit, favour: float = 0.0) -> Fit | None:
     """A fit with another effect, its last, in the place of the term `which`, all refitted, where that is likelier by more
-    than a unit of chance; else None. without: the fit of the other terms alone."""
+    than a unit of chance; else None. without: the fit of the other terms alone. favour: log evidence that the other one
+    has from recordings kept out, which are asked once."""
     other = refit(balance, other)
     scale = min(scale_of(balance, other), scale_of(balance, fit))
-    likelier = evidence(balance, other, without, scale=scale) > evidence(balance, fit, without, which, scale) + 1
-    return other if likelier else None
+    brought = evidence(balance, other, without, scale=scale) + favour
+    own, chance = evidence(balance, fit, without, which, scale), 0.0 if favour > 0 else 1.0
+    return other if brought > own + chance else None
 
 
 def least_evidence(balance: Balance, others: int) -> float:

@@ -69,7 +69,7 @@ def _foretold(
 def _among_all(
     station: Station, states: tuple[Any, ...], effects: tuple[Any, ...], typical: Mapping[str, float] | None
 ) -> Station:
-    """A motor's station in which nothing is seen, with what all recordings together tell, steady motion bears out and
+    """A motor's station in which nothing is seen, or nothing that has a name, with what all recordings together tell, steady motion bears out and
     those kept out have as well as the others: half of them are too few for what is faint. How late a current is its
     answers to commands tell better; what one recording alone has makes the others no better."""
     learned = name_effects(states, tuple(e for e in effects if not e.warps), typical=typical, whole=True)
@@ -129,7 +129,8 @@ def judged(
         # another pose is plain to see, whatever small is left
         seen = other.naming.after.p >= ALPHA or _altered(station.naming)
         station = other if seen and other.believed and other.wander <= max(station.wander, UNREST) else station
-    if signal == "current" and not (station.missing or station.proven):
+    unseen = station.naming.before.p >= ALPHA and not any(f.term.effect.listed for f in station.proven)
+    if signal == "current" and unseen:
         station = _among_all(station, states, every, typical)
     if station.forms:
         left = tuple(e for e in left if e.name not in {f.term.effect.name for f in station.forms})

@@ -18,11 +18,13 @@ CLASS_WIDTH = 3.0  # log evidence within which two effects are one class: 20 to 
 
 @dataclass(frozen=True)
 class Rival:
-    """A candidate in the place of a finding: its log evidence relative to none, and its fit."""
+    """A candidate in the place of a finding: its log evidence relative to none, and its fit. kept_out: the part of that
+    evidence that recordings kept out have given, relative to the likeliest of those that training cannot tell apart."""
 
     name: str
     evidence: float
     fit: Fit
+    kept_out: float = 0.0
 
 
 @dataclass(frozen=True)

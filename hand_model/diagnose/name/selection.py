@@ -1,14 +1,15 @@
 """Which effects are missing: candidates compete on a balance, by forward and backward selection with joint refits.
 
 Generic: the balance may be a motor's current, a rig's torque or one angle against another; the candidates are whatever
-`effects.catalogue(station)` holds. Decided by their evidence on the training recordings; nothing here sees a validation
-recording.
+`effects.catalogue(station)` holds. Decided by their evidence on the training recordings; validation recordings are
+asked which of a few names it is that training cannot tell apart, and of nothing else.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from .bristles import with_bristles
 from .candidates import EVIDENCE_LEAST, allowed, exchanged, least_evidence, rank, settle, twice
 from .evidence import evidence, gain, scale_of
 from .lack_of_fit import LackOfFit, lack_of_fit
-from .naming import ALPHA, MOST_TERMS, Named, Naming, Rival, overwhelmed
+from .naming import ALPHA, CLASS_WIDTH, MOST_TERMS, Named, Naming, Rival, overwhelmed
 from .shapes import polish, possible, scan
 from .term import Term
 from .wander import Wander, estimate_wander
@@ -95,11 +96,11 @@ def _named(
             pair = paired(balance.learning())
             learned = settle(pair, effects, further.terms)  # beside other chance, another may explain it better
             fit = balance.fit(learned.terms)
-    found = _findings(pair, effects, learned)
-    likelier = _outdone(pair.state, learned, found)
+    found = _findings(pair, balance, effects, learned)
+    likelier = _outdone(pair, effects, learned, found)
     if likelier is not None:
-        learned = settle(pair, effects, likelier.terms)
-        fit, found = balance.fit(learned.terms), _findings(pair, effects, learned)
+        learned = likelier
+        fit, found = balance.fit(learned.terms), _findings(pair, balance, effects, learned)
     declared = balance.fit()
     before, after = _lacks(balance, declared, fit)
     kept = {t.effect.name for t in fit.terms}
@@ -239,9 +240,10 @@ def _likelihood(balance: Balance, fit: Fit, wander: Wander | None) -> float:
     return wander.log_likelihood(residual, weight, balance.inflation)
 
 
-def _findings(pair: Pair, effects: tuple[Any, ...], fit: Fit) -> tuple[Named, ...]:
+def _findings(pair: Pair, every_recording: Balance, effects: tuple[Any, ...], fit: Fit) -> tuple[Named, ...]:
     """Each term with its rivals (every candidate in its place, small terms aside that may stand for one of them), its
-    share and its probability; largest share first."""
+    share and its probability; largest share first. pair: of the training recordings of the balance
+    `every_recording`."""
     balance, found, terms = pair.state, [], fit.terms
     left = [balance.fit(tuple(t for i, t in enumerate(terms) if i != which)) for which in range(len(terms))]
     losses = [max(rest.rss - fit.rss, 0.0) for rest in left]
@@ -255,6 +257,7 @@ def _findings(pair: Pair, effects: tuple[Any, ...], fit: Fit) -> tuple[Named, ..
             brought = sum(max(evidence(balance, fit, left[i], i, scale_of(balance, fit)), 0.0) for i in small)
             if own.evidence + brought > rivals[0].evidence:  # they do not stand for it: together they explain more
                 rivals = _in_place(pair, effects, fit, which, every)
+        rivals = _with_kept_out(every_recording, rivals)
         weights = np.exp(np.array([r.evidence for r in rivals] + [0.0]) - max(rivals[0].evidence, 0.0))
         mine = [r.name for r in rivals].index(term.effect.name)
         share = losses[which] / max(sum(losses), 1e-12)
@@ -271,18 +274,50 @@ def _findings(pair: Pair, effects: tuple[Any, ...], fit: Fit) -> tuple[Named, ..
     return tuple(sorted(found, key=lambda f: -f.share))
 
 
-def _outdone(balance: Balance, fit: Fit, found: Iterable[Named]) -> Fit | None:
+def _outdone(pair: Pair, effects: tuple[Any, ...], fit: Fit, found: Iterable[Named]) -> Fit | None:
     """The fit with one term exchanged for another effect that turned out likelier in its place, all else refitted; None
-    where there is none. While terms are exchanged one at a time only the most promising candidate is looked at closely."""
+    where there is none. While terms are exchanged one at a time only the most promising candidate is looked at closely.
+    What recordings kept out have decided, training does not exchange again."""
+    balance = pair.state
     for named in found:
         which, best = fit.terms.index(named.term), named.rivals[0]
         if best.name == named.term.effect.name:
             continue
         rest = tuple(t for i, t in enumerate(fit.terms) if i != which)
-        other = exchanged(balance, fit, which, balance.fit(rest), balance.fit((*rest, best.fit.terms[-1])))
+        own = next(r for r in named.rivals if r.name == named.term.effect.name)
+        likelier = balance.fit((*rest, best.fit.terms[-1]))
+        favour = best.kept_out - own.kept_out
+        other = exchanged(balance, fit, which, balance.fit(rest), likelier, favour)
         if other is not None and allowed(balance, other):
-            return other
+            return other if favour > 0 else settle(pair, effects, other.terms)
     return None
+
+
+def _with_kept_out(balance: Balance, rivals: list[Rival]) -> list[Rival]:
+    """Rivals, those that training cannot tell apart with what recordings kept out say of them as trained (prequential
+    evidence; Dawid 1984); best first. What one recording had foretells nothing of another."""
+    near = [r for r in rivals if r.evidence > rivals[0].evidence - CLASS_WIDTH]
+    if len(near) < 2 or balance.train.all() or not all(r.fit.terms[-1].effect.of_the_hand for r in near):
+        return rivals
+    foretold = [_foretold(balance, balance.fit(r.fit.terms)) for r in near]
+    scale = max(min(square for square, _ in foretold), 1.0)  # a misfit there weighs all down
+    told = [brought / scale for _, brought in foretold]
+    likeliest = int(np.argmax([r.evidence + t for r, t in zip(near, told, strict=True)]))
+    more = [t - told[likeliest] for t in told]
+    heard = [replace(r, evidence=r.evidence + m, kept_out=m) for r, m in zip(near, more, strict=True)]
+    return sorted([*heard, *rivals[len(near) :]], key=lambda r: -r.evidence)
+
+
+def _foretold(balance: Balance, fit: Fit) -> tuple[float, float]:
+    """Of a fit, in the recordings kept out: mean square of residual over noise, and log likelihood."""
+    weight = balance.weights(fit.terms) * ~balance.train
+    held = weight > 0
+    residual, noise = (balance.effort - fit.prediction) * weight, float(np.sum(np.log(weight[held])))
+    if balance.wander is None:
+        likelihood = -0.5 * float(residual @ residual) / balance.inflation
+    else:
+        likelihood = balance.wander.log_likelihood(residual, weight, balance.inflation)
+    return float(np.mean(residual[held] ** 2)), likelihood + noise / balance.inflation
 
 
 def _in_place(pair: Pair, effects: tuple[Any, ...], fit: Fit, which: int, others: Sequence[int]) -> list[Rival]:
@@ -293,7 +328,9 @@ def _in_place(pair: Pair, effects: tuple[Any, ...], fit: Fit, which: int, others
     own = evidence(balance, beside, without, which if beside is fit else len(rest), scale_of(balance, beside))
     ranked = rank(pair, effects, rest, without, refine=3)
     same = [r.evidence for r in ranked if r.name == term.effect.name]
-    rivals = [r for r in ranked if r.name != term.effect.name] + [Rival(term.effect.name, max([own, *same]), fit)]
+    rivals = [r for r in ranked if r.name != term.effect.name] + [
+        Rival(term.effect.name, max([own, *same]), balance.fit((*rest, term)))
+    ]
     return sorted(rivals, key=lambda r: -r.evidence)
 
 
