@@ -40,6 +40,26 @@ def test_what_a_controller_does_at_rest_says_nothing_of_the_load() -> None:
         assert np.sqrt(np.mean((found - load)[inside] ** 2)) < 0.5 * NOISE
 
 
+def test_a_controller_that_lets_go_at_every_rest_otherwise_leaves_the_load_what_it_was() -> None:
+    """Friction holds what gives where the motion left it, and what the drive is asked for as it comes to rest and leaves it
+    is its controller's: where that was taken for load, plays had the better word."""
+    t = np.arange(4800) * 0.018
+    stroke = np.floor(t / 3.0).astype(int)
+    lasting = np.array([1.0, 1.9, 0.6, 1.4])[stroke // 2 % 4]  # rests of one to two and a half seconds
+    share = np.clip((np.mod(t, 3.0) - 0.5) / lasting, 0.0, 1.0)
+    x = 10 + 80 * np.abs(stroke % 2 - (0.5 - 0.5 * np.cos(np.pi * share)))
+    rng = np.random.default_rng(2)
+    motion = estimate_motion(t, x + rng.normal(0, 0.05, len(t)))
+    velocity = np.gradient(x, t)
+    load = 0.2 * x + 9.0 + 35.0 * dahl(x, 0.5) + 0.15 * velocity
+    moving = np.abs(velocity) > 1.0
+    asked = np.where(moving, load, rng.uniform(-30, 30, 40)[stroke % 40])
+    asked += np.where(moving & ~np.roll(moving, 4), 12.0 * np.sign(velocity), 0.0)
+    found, _ = transmitted_load(t, asked + rng.normal(0, NOISE, len(t)), motion)
+    resting = ~np.any([np.roll(moving, k) for k in range(-3, 4)], axis=0)
+    assert resting.sum() > 1500 and np.sqrt(np.mean((found - load)[resting] ** 2)) < NOISE
+
+
 def test_what_friction_has_built_up_stays_at_rest_however_the_position_is_read() -> None:
     """A give follows the load: where noise of the position undid friction at rest, plays had the better word."""
     t = np.arange(2400) * 0.018

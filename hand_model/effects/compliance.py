@@ -12,10 +12,9 @@ from .base import Amplitude, Array, DriveState, Effect, Shape, figure
 from .law import Law, Moment
 from .path import lowpass
 
-DRIVER, FOLLOWER, LATE_DRIVER, LATE_FOLLOWER, DRAGGED_DRIVER, DRAGGED_FOLLOWER, STIFF_DRIVER, STIFF_FOLLOWER = FORMS = (
-    range(8)
-)
-DAMPED, STIFFENING = (LATE_DRIVER, LATE_FOLLOWER), (STIFF_DRIVER, STIFF_FOLLOWER)
+DRIVER, FOLLOWER = 0, 1  # even forms give at the driver's end, odd ones at the follower's
+FORMS = range(10)
+DAMPED, DRAGGED, STIFFENING = (2, 3, 8, 9), (4, 5, 8, 9), (6, 7)
 # [s]: a damper that lets a give follow faster is none that a hand's motion shows, and one slower holds it still
 LAG_S = 0.03, 0.6
 PLAIN = 0.4  # probability of each of the two plain forms
@@ -39,14 +38,14 @@ class Compliance(Effect):
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """form 0: give at the driver's end, in its unit; form 1: at the end of what follows, in its unit; forms 2 and 3:
         the same, damped, with a time constant; forms 4 and 5: the same as the first, drag apart; forms 6 and 7: the
-        same as the first, stiffening from a load on."""
+        same as the first, stiffening from a load on; forms 8 and 9: damped, drag apart."""
         forms = tuple(float(form) for form in FORMS) if all("drag" in s.extra for s in states) else ()
         most = max(
             (float(np.percentile(np.abs(s.extra["load"]), 99)) for s in states if "load" in s.extra), default=1.0
         )
         least, greatest = (share * max(most, 1e-9) for share in STIFF)
         return (
-            Shape("form", "1", DRIVER, STIFF_FOLLOWER, forms),
+            Shape("form", "1", FORMS[0], FORMS[-1], forms),
             Shape("lag", "s", *LAG_S, (0.06, 0.15, 0.35), forms=DAMPED),
             Shape("stiff", "raw", least, greatest, (2 * least,), forms=STIFFENING),
         )
@@ -56,15 +55,15 @@ class Compliance(Effect):
         return ("compliance", "position/raw", 0.0, np.inf), ("drag_compliance", "position/raw", 0.0, np.inf)
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """Minus the load, or what of it the give has followed, and nothing; or minus the load without drag, and minus
-        drag, (n, 2); times the map's slope where the give is at the driver's end."""
+        """Minus the load and nothing, or minus the load without drag, and minus drag, or what of them the give has
+        followed, (n, 2); times the map's slope where the give is at the driver's end."""
         load, apart = state.extra["load"], np.zeros(len(state.time_s))
         if stiffens(shape):
             load = shape["stiff"] * np.tanh(load / shape["stiff"])
-        if damped(shape):
-            load = lowpass(state.time_s, load, shape["lag"])
-        elif dragged(shape):
+        if dragged(shape):
             load, apart = load - state.extra["drag"], state.extra["drag"]
+        if damped(shape):
+            load, apart = (lowpass(state.time_s, part, shape["lag"]) for part in (load, apart))
         return -np.stack([load, apart], axis=-1) * (state.slope if at_driver(shape) else np.ones(len(load)))[:, None]
 
     def parameters(
@@ -127,26 +126,26 @@ class Compliance(Effect):
         stiff = parameters["stiff"] if stiffens(parameters) else math.inf
 
         def departure(now: Moment) -> float:
-            load = now.load if followed is None else followed(now)
-            load = load if math.isinf(stiff) else stiff * math.tanh(load / stiff)
+            load = now.load if math.isinf(stiff) else stiff * math.tanh(now.load / stiff)
             give = compliance * load + other * now.velocity
+            give = give if followed is None else followed(give, now.step_s)
             return -give * (now.slope if there else math.radians(1.0))
 
         return departure
 
 
 class _Followed:
-    """The load [raw] behind a first-order low pass, step by step."""
+    """A give behind a first-order low pass, step by step."""
 
     def __init__(self, lag_s: float) -> None:
         self.lag_s, self.state = lag_s, math.nan
 
-    def __call__(self, now: Moment) -> float:
-        """The load that the give has followed up to this moment."""
-        if math.isnan(self.state) and now.step_s == 0:  # nothing has been simulated yet, and no load computed
-            return now.load
-        before = now.load if math.isnan(self.state) else self.state
-        self.state = now.load + (before - now.load) * math.exp(-now.step_s / self.lag_s)
+    def __call__(self, give: float, step_s: float) -> float:
+        """As much of it as there is by this moment."""
+        if math.isnan(self.state) and step_s == 0:  # nothing has been simulated yet, and no load computed
+            return give
+        before = give if math.isnan(self.state) else self.state
+        self.state = give + (before - give) * math.exp(-step_s / self.lag_s)
         return self.state
 
 
@@ -157,7 +156,7 @@ def damped(parameters: Mapping[str, float]) -> bool:
 
 def dragged(parameters: Mapping[str, float]) -> bool:
     """Whether a give yields to drag otherwise than to other load."""
-    return parameters.get("form", FOLLOWER) in (DRAGGED_DRIVER, DRAGGED_FOLLOWER)
+    return parameters.get("form", FOLLOWER) in DRAGGED
 
 
 def stiffens(parameters: Mapping[str, float]) -> bool:
@@ -167,11 +166,10 @@ def stiffens(parameters: Mapping[str, float]) -> bool:
 
 def besides(parameters: Mapping[str, float]) -> str:
     """What a sentence about a give says of time, drag or load; nothing of a plain one."""
-    if damped(parameters):
-        return f", {1e3 * parameters['lag']:.0f} ms late"
     if stiffens(parameters):
         return f", stiffening from {figure(parameters['stiff'])} raw on"
-    return f", and by {figure(100 * parameters['drag_compliance'])} where speed makes it" if dragged(parameters) else ""
+    drag = f", and by {figure(100 * parameters['drag_compliance'])} where speed makes it" if dragged(parameters) else ""
+    return drag + (f", {1e3 * parameters['lag']:.0f} ms late" if damped(parameters) else "")
 
 
 def at_driver(parameters: Mapping[str, float]) -> bool:

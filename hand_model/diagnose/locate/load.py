@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 REACHES = np.geomspace(0.001, 0.05, 12)  # of the range, over which friction builds up after a reversal
 FEWEST = 50  # samples in motion
-LETS_GO = 1.2  # times the variance of what motion leaves unexplained
+LETS_GO = 1.6  # times what motion leaves unexplained of itself it leaves at rest, where a controller lets go
 ORDER = 4  # of the load over the position
 NEAR_S = 0.3  # of a start or a stop
 JITTER = 4.0  # times the median departure of a resting position: more is no noise
@@ -28,29 +28,44 @@ def transmitted_load(time_s: Array, current: Array, motion: Motion) -> tuple[Arr
     what tells a give from a play. Speed, friction that builds up after reversals (Dahl's or Jenkins's, whichever the
     current prefers) and position explain nearly all of it; of the rest, what a smoothing with least error leaves: near
     starts and stops, in steady motion and at rest by a bandwidth of its own. A controller that lets go of the load at
-    rest is told by how much worse rests make the motion fit: they are bridged.
+    rest is told by how much less motion explains there: then, and where the drive comes to rest or leaves it, what is left
+    tells of the controller, and the load stays what friction and position hold.
     """
     span, moving = float(np.ptp(motion.position)), motion.moving
     if span == 0 or moving.sum() < FEWEST:
         return least_error(time_s, current)[0], np.zeros(len(current))
-    designs = _designs(motion)
-    everywhere = _explained(current, designs, np.ones(len(current), bool))
-    in_motion = _explained(current, designs, moving)
-    lets_go = np.var((current - everywhere[0])[moving]) > LETS_GO * np.var((current - in_motion[0])[moving])
-    explained, inertia, viscous = in_motion if lets_go else everywhere
+    designs, near = _designs(motion), _near(time_s, moving)
+    explained, inertia, viscous = _explained(current, designs, moving)
+    lets_go = _lets_go(current - explained, moving, near)
+    if not lets_go:
+        explained, inertia, viscous = _explained(current, designs, np.ones(len(current), bool))
     rest = current - explained
     if lets_go:
         rest = np.interp(time_s, time_s[moving], rest[moving])
-    load = explained + _departure(time_s, rest, moving) - max(inertia, 0.0) * motion.acceleration
-    return load, max(viscous, 0.0) * motion.velocity
+    departure = _departure(time_s, rest, moving, near)
+    if lets_go:
+        departure[near | ~moving] = 0.0
+    return explained + departure - max(inertia, 0.0) * motion.acceleration, max(viscous, 0.0) * motion.velocity
 
 
-def _departure(time_s: Array, rest: Array, moving: NDArray[np.bool_]) -> Array:
-    """What is no noise of what motion leaves unexplained of a current (n,)."""
+def _lets_go(rest: Array, moving: NDArray[np.bool_], near: NDArray[np.bool_]) -> bool:
+    """Whether a current (n,) less what motion explains is larger at rest than in motion, starts and stops left out."""
+    at_rest, in_motion = rest[~moving & ~near], rest[moving & ~near]
+    if min(len(at_rest), len(in_motion)) < FEWEST:
+        return False
+    return bool(np.mean(at_rest**2) > LETS_GO**2 * np.mean(in_motion**2))
+
+
+def _near(time_s: Array, moving: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Samples (n,) near a start or a stop."""
     changes = time_s[1:][moving[1:] != moving[:-1]]
     there = np.searchsorted(changes, time_s)
     known = np.r_[-np.inf, changes, np.inf]
-    near = np.minimum(time_s - known[there], known[there + 1] - time_s) < NEAR_S
+    return np.minimum(time_s - known[there], known[there + 1] - time_s) < NEAR_S
+
+
+def _departure(time_s: Array, rest: Array, moving: NDArray[np.bool_], near: NDArray[np.bool_]) -> Array:
+    """What is no noise of what motion leaves unexplained of a current (n,)."""
     tried = [(error, smooth) for error, smooth, _ in smoothings(time_s, rest)]
     out = np.zeros(len(rest))
     for part in (near, moving & ~near, ~moving & ~near):
