@@ -334,7 +334,7 @@ def test_a_driver_is_as_quiet_as_its_encoder_where_nothing_is_expected_yet(cover
     x, v = strokes((45.0, 27.0), rest_s=2.0)
     t = np.arange(len(x)) / 100.0
     truth = np.polynomial.Polynomial(MAP)(x / 100) + 0.8 * np.sin(x / 20)  # no cubic
-    log = LogAtFrames(x, v, 0 * v, None, None, np.ones(len(x), bool))
+    log = LogAtFrames(x, v, 0 * v, (), np.ones(len(x), bool))
     told = (t >= covered) & (x > 0.05 * np.ptp(x) * (covered > 0))
     seen = truth + np.random.default_rng(4).normal(0, 1.0, len(x))
     foreseen = foresee(t, seen, log, (t[told], truth[told]))

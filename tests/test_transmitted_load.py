@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-import numpy as np
-from drive_motion import state
+from dataclasses import replace
 
-from hand_model.diagnose.locate.load import transmitted_load
+import numpy as np
+import pytest
+from drive_motion import state
+from test_kinematic_stations import joint
+
+from hand_model.diagnose.locate.load import transmitted_loads, with_likelier_load
 from hand_model.diagnose.locate.motion import estimate_motion, least_error
+from hand_model.effects.base import DriveState
 from hand_model.effects.path import dahl
 
 NOISE = 5.0
@@ -18,9 +23,8 @@ def test_load_is_the_current_without_what_accelerates_the_motor_and_without_most
     load += 6.0 * np.sin(2 * np.pi * s.time_s / 15.0)  # no function of the motion
     rng = np.random.default_rng(3)
     current = load + 0.013 * s.acceleration + rng.normal(0, NOISE, len(load))
-    found, _ = transmitted_load(
-        s.time_s, current, estimate_motion(s.time_s, s.position + rng.normal(0, 0.02, len(load)))
-    )
+    motion = estimate_motion(s.time_s, s.position + rng.normal(0, 0.02, len(load)))
+    found = transmitted_loads(s.time_s, current, motion)[0].load
     # a reversal within one sample interval is known no better than that
     steady = np.abs(s.velocity) > 5.0
     assert np.sqrt(np.mean((found - load)[steady] ** 2)) < 0.3 * NOISE
@@ -36,7 +40,7 @@ def test_what_a_controller_does_at_rest_says_nothing_of_the_load() -> None:
     noise = np.random.default_rng(4).normal(0, NOISE, len(t))
     inside = moving & np.roll(moving, 3) & np.roll(moving, -3)
     for at_rest in (1.0, 0.0):
-        found, _ = transmitted_load(t, np.where(moving, load, at_rest * load) + noise, motion)
+        found = transmitted_loads(t, np.where(moving, load, at_rest * load) + noise, motion)[-1].load
         assert np.sqrt(np.mean((found - load)[inside] ** 2)) < 0.5 * NOISE
 
 
@@ -55,9 +59,26 @@ def test_a_controller_that_lets_go_at_every_rest_otherwise_leaves_the_load_what_
     moving = np.abs(velocity) > 1.0
     asked = np.where(moving, load, rng.uniform(-30, 30, 40)[stroke % 40])
     asked += np.where(moving & ~np.roll(moving, 4), 12.0 * np.sign(velocity), 0.0)
-    found, _ = transmitted_load(t, asked + rng.normal(0, NOISE, len(t)), motion)
+    found = transmitted_loads(t, asked + rng.normal(0, NOISE, len(t)), motion)[-1].load
     resting = ~np.any([np.roll(moving, k) for k in range(-3, 4)], axis=0)
     assert resting.sum() > 1500 and np.sqrt(np.mean((found - load)[resting] ** 2)) < NOISE
+
+
+@pytest.mark.parametrize("held", [True, False])
+def test_angles_tell_whether_friction_holds_the_load_at_rest(held: bool) -> None:
+    """Or whether what a controller does there is passed on."""
+    states, rng = joint(5, noise=0.05), np.random.default_rng(6)
+
+    def at_rest(s: DriveState) -> DriveState:
+        flows = s.extra["load"] + np.where(np.abs(s.velocity) < 20.0, rng.normal(0, 12.0, len(s.time_s)), 0.0)
+        other = s.extra["load"] if held else flows
+        extra = {**s.extra, "load": flows, "held_load": s.extra["load"], "held_drag": s.extra["drag"]}
+        return replace(s, effort=s.effort - 0.02 * s.slope * other, extra=extra)
+
+    told = tuple(at_rest(s) for s in states)
+    for before, after in zip(told, with_likelier_load(told), strict=True):
+        assert np.array_equal(after.extra["load"], before.extra["held_load" if held else "load"])
+        assert not any(name.startswith("held") for name in after.extra)
 
 
 def test_what_friction_has_built_up_stays_at_rest_however_the_position_is_read() -> None:
@@ -68,7 +89,7 @@ def test_what_friction_has_built_up_stays_at_rest_however_the_position_is_read()
     load = 0.2 * x + 9.0 + 35.0 * dahl(x, 0.6)
     rng = np.random.default_rng(5)
     motion = estimate_motion(t, x + rng.normal(0, 0.12, len(t)))
-    found, _ = transmitted_load(t, load + rng.normal(0, NOISE, len(t)), motion)
+    found = transmitted_loads(t, load + rng.normal(0, NOISE, len(t)), motion)[-1].load
     resting = ~np.any([np.roll(motion.moving, k) for k in range(-10, 11)], axis=0)
     assert resting.sum() > 500 and np.sqrt(np.mean((found - load)[resting] ** 2)) < 0.25 * NOISE
 
@@ -82,5 +103,5 @@ def test_rows_that_are_stamped_in_packets_are_smoothed_all_the_same() -> None:
 def test_a_motor_that_never_moved_passes_its_current_on() -> None:
     t = np.arange(400) * 0.02
     current = 7.0 + np.random.default_rng(1).normal(0, NOISE, len(t))
-    found, _ = transmitted_load(t, current, estimate_motion(t, np.full(len(t), 30.0)))
+    (found,) = (p.load for p in transmitted_loads(t, current, estimate_motion(t, np.full(len(t), 30.0))))
     assert np.abs(found - 7.0).max() < 0.6 * NOISE

@@ -25,7 +25,7 @@ from .drive import count_range
 from .driver_angle import LogAtFrames, driver_angle, foresee, lasting
 from .excursions import with_excursions
 from .ghosts import ghosts
-from .load import transmitted_load
+from .load import PassedOn, transmitted_loads, with_likelier_load
 from .motion import estimate_motion, position_at, sure_acceleration, told_between
 
 Array = NDArray[np.float64]
@@ -194,10 +194,9 @@ def linkage_states(
         follower = np.where(sure & _begun(driver) & ~_near(index, t, steps), q[:, joint], np.nan)
         extra = {
             "trial_index": np.full(len(t), float(index)),
-            "load": None if log is None else log.load,
-            "drag": None if log is None else log.drag,
             "scale": np.full(len(t), scale),
             "slope": _slope(driver, driver, q[:, joint], sure, 4),
+            **({} if log is None else log.accounts),
         }
         states.append(
             DriveState(
@@ -211,12 +210,12 @@ def linkage_states(
                 declared,
                 "deg",
                 "deg",
-                _known(extra),
+                extra,
                 (*_names(4), *more),
                 record.trial.validate,
             )
         )
-    return tuple(states)
+    return with_likelier_load(states)
 
 
 def encoder_states(angles: FingerAngles, low: float, high: float, steps: Sequence[Step] = ()) -> tuple[DriveState, ...]:
@@ -241,10 +240,9 @@ def encoder_states(angles: FingerAngles, low: float, high: float, steps: Sequenc
         declared = np.concatenate([np.stack([(x / 100) ** k for k in range(4)], axis=-1), offsets, stepped], axis=1)
         extra = {
             "trial_index": np.full(len(t), float(index)),
-            "load": log.load,
-            "drag": log.drag,
             "scale": np.full(len(t), 100.0),
             "slope": slope,
+            **log.accounts,
         }
         states.append(
             DriveState(
@@ -258,12 +256,12 @@ def encoder_states(angles: FingerAngles, low: float, high: float, steps: Sequenc
                 declared,
                 "%",
                 "deg",
-                _known(extra),
+                extra,
                 (*_names(3), *(f"offset_{i}" for i in range(len(records))), *more),
                 record.trial.validate,
             )
         )
-    return with_excursions(states)
+    return with_excursions(with_likelier_load(states))
 
 
 def _at_frames(record: FlexionAngles, time_s: Array, drifting: bool = True) -> LogAtFrames | None:
@@ -283,13 +281,13 @@ def _at_frames(record: FlexionAngles, time_s: Array, drifting: bool = True) -> L
         then = time_s + float(clock.log_time(np.array([middle]))[0]) - middle
     motion = estimate_motion(at, counts, uneven=log.uneven)
     current = log.columns.get("current")
-    load = drag = None
+    loads: tuple[PassedOn, ...] = ()
     if current is not None and np.isfinite(current[seen]).sum() > 20:
         known = np.isfinite(current[seen])
-        passed = transmitted_load(at, np.interp(at, at[known], current[seen][known]), motion)
-        load, drag = (np.interp(then, at, part) for part in passed)
+        passed = transmitted_loads(at, np.interp(at, at[known], current[seen][known]), motion)
+        loads = tuple(PassedOn(np.interp(then, at, p.load), np.interp(then, at, p.drag)) for p in passed)
     v, a = (np.interp(then, at, y) for y in (motion.velocity, sure_acceleration(motion)))
-    return LogAtFrames(position_at(motion, at, then), v, a, load, drag, told_between(motion, at, counts, then))
+    return LogAtFrames(position_at(motion, at, then), v, a, loads, told_between(motion, at, counts, then))
 
 
 def expected_angles(naming: Naming) -> dict[str, tuple[Array, Array]]:
@@ -330,10 +328,6 @@ def _slope(at: Array, driver: Array, follower: Array, use: NDArray[np.bool_], or
 
 def _names(order: int) -> tuple[str, ...]:
     return tuple(f"power_{k}" for k in range(order + 1))
-
-
-def _known(extra: dict[str, Array | None]) -> dict[str, Array]:
-    return {name: values for name, values in extra.items() if values is not None}
 
 
 def ranges_of_counts(session: Session) -> dict[str, tuple[float, float]]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .load import PassedOn
 from .motion import WHITE, estimate_motion, lasting_errors, least_error
 
 Array = NDArray[np.float64]
@@ -19,15 +20,24 @@ APART_S = 1e3  # between recordings that are laid one after the other
 
 @dataclass(frozen=True)
 class LogAtFrames:
-    """A log at mocap frames: counts, speed, acceleration (where it is sure) [counts, s], load and what of it
-    grows with speed [raw] or None, inside: where it was running and its rows tell the position. (n,)."""
+    """A log at mocap frames: counts, speed, acceleration (where it is sure) [counts, s], accounts of the load that is passed
+    on, inside: where it was running and its rows tell the position. (n,)."""
 
     counts: Array
     speed: Array
     acceleration: Array
-    load: Array | None
-    drag: Array | None
+    loads: tuple[PassedOn, ...]
     inside: NDArray[np.bool_]
+
+    @property
+    def accounts(self) -> dict[str, Array]:
+        """The accounts as a state's `extra` has them (`with_likelier_load`)."""
+        names = (("load", "drag"), ("held_load", "held_drag"))
+        return {
+            k: v
+            for name, p in zip(names, self.loads, strict=False)
+            for k, v in zip(name, (p.load, p.drag), strict=True)
+        }
 
 
 @dataclass(frozen=True)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...effects.base import DriveState
 from ...effects.path import dahl, jenkins, runs
 from .motion import Motion, least_error, smoothings
 
@@ -16,36 +18,77 @@ REACHES = np.geomspace(0.001, 0.05, 12)  # of the range, over which friction bui
 FEWEST = 50  # samples in motion
 LETS_GO = 1.6  # times what motion leaves unexplained of itself it leaves at rest, where a controller lets go
 ORDER = 4  # of the load over the position
-NEAR_S = 0.3  # of a start or a stop
+NEAR_S, LEAVES_S = 0.3, 0.1  # of a start or a stop; in which a controller that had let go takes hold
 JITTER = 4.0  # times the median departure of a resting position: more is no noise
 
 
-def transmitted_load(time_s: Array, current: Array, motion: Motion) -> tuple[Array, Array]:
-    """Load (n,) [raw] that a motor passes on: its current without what accelerates it and without its noise; and what of
-    it grows with speed (n,).
+@dataclass(frozen=True)
+class _Explained:
+    """What motion explains of a current (n,) [raw], and inertia and drag over speed [raw, %, s]."""
+
+    current: Array
+    inertia: float
+    viscous: float
+
+    def passed_on(self, motion: Motion, departure: Array) -> PassedOn:
+        """That, and what departs from it (n,), without what accelerates the motor."""
+        load = self.current + departure - max(self.inertia, 0.0) * motion.acceleration
+        return PassedOn(load, max(self.viscous, 0.0) * motion.velocity)
+
+
+@dataclass(frozen=True)
+class PassedOn:
+    """Load (n,) [raw] that a motor passes on, and what of it grows with speed (n,)."""
+
+    load: Array
+    drag: Array
+
+
+def transmitted_loads(time_s: Array, current: Array, motion: Motion) -> tuple[PassedOn, ...]:
+    """What a motor passes on: its current without what accelerates it and without its noise.
 
     A current's noise would be an error of a regressor, and smoothing it rounds what happens at a reversal, which is
     what tells a give from a play. Speed, friction that builds up after reversals (Dahl's or Jenkins's, whichever the
     current prefers) and position explain nearly all of it; of the rest, what a smoothing with least error leaves: near
-    starts and stops, in steady motion and at rest by a bandwidth of its own. A controller that lets go of the load at
-    rest is told by how much less motion explains there: then, and where the drive comes to rest or leaves it, what is left
-    tells of the controller, and the load stays what friction and position hold.
+    starts and stops, in steady motion and at rest by a bandwidth of its own. Where motion explains much less at rest, the
+    controller may have let go of the load there, which friction holds: then what motion explains is a second account.
     """
     span, moving = float(np.ptp(motion.position)), motion.moving
     if span == 0 or moving.sum() < FEWEST:
-        return least_error(time_s, current)[0], np.zeros(len(current))
-    designs, near = _designs(motion), _near(time_s, moving)
-    explained, inertia, viscous = _explained(current, designs, moving)
-    lets_go = _lets_go(current - explained, moving, near)
-    if not lets_go:
-        explained, inertia, viscous = _explained(current, designs, np.ones(len(current), bool))
-    rest = current - explained
-    if lets_go:
-        rest = np.interp(time_s, time_s[moving], rest[moving])
-    departure = _departure(time_s, rest, moving, near)
-    if lets_go:
-        departure[near | ~moving] = 0.0
-    return explained + departure - max(inertia, 0.0) * motion.acceleration, max(viscous, 0.0) * motion.velocity
+        return (PassedOn(least_error(time_s, current)[0], np.zeros(len(current))),)
+    designs, near = _designs(motion), _near(time_s, moving, NEAR_S)
+    everywhere = _explained(current, designs, np.ones(len(current), bool))
+    flowing = everywhere.passed_on(motion, _departure(time_s, current - everywhere.current, moving, near))
+    in_motion = _explained(current, designs, moving)
+    rest = current - in_motion.current
+    if not _lets_go(rest, moving, near):
+        return (flowing,)
+    departure = _departure(time_s, np.interp(time_s, time_s[moving], rest[moving]), moving, near)
+    departure[_near(time_s, moving, LEAVES_S) | ~moving] = 0.0
+    return flowing, in_motion.passed_on(motion, departure)
+
+
+def with_likelier_load(states: Sequence[DriveState]) -> tuple[DriveState, ...]:
+    """States of an angle with the account of the load, of which "load" and "drag" in `extra` are the first and "held_load"
+    and "held_drag" the second, that a plain give explains it by better: whether friction holds the load at rest, or the
+    current passes it on there too, the current does not say."""
+    told = [s for s in states if "held_load" in s.extra]
+
+    def left(name: str) -> float:
+        rows = [(s, np.isfinite(s.effort)) for s in told if not s.validate]
+        columns = np.concatenate([np.c_[s.declared, s.slope * s.extra[name]][m] for s, m in rows])
+        effort = np.concatenate([s.effort[m] for s, m in rows])
+        return float(np.sum((effort - columns @ np.linalg.lstsq(columns, effort, rcond=None)[0]) ** 2))
+
+    held = any(not s.validate for s in told) and left("held_load") < left("load")
+    return tuple(_by_account(s, held) for s in states)
+
+
+def _by_account(state: DriveState, held: bool) -> DriveState:
+    extra = {k: v for k, v in state.extra.items() if not k.startswith("held_")}
+    if held and "held_load" in state.extra:
+        extra |= {"load": state.extra["held_load"], "drag": state.extra["held_drag"]}
+    return replace(state, extra=extra)
 
 
 def _lets_go(rest: Array, moving: NDArray[np.bool_], near: NDArray[np.bool_]) -> bool:
@@ -56,12 +99,12 @@ def _lets_go(rest: Array, moving: NDArray[np.bool_], near: NDArray[np.bool_]) ->
     return bool(np.mean(at_rest**2) > LETS_GO**2 * np.mean(in_motion**2))
 
 
-def _near(time_s: Array, moving: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _near(time_s: Array, moving: NDArray[np.bool_], within_s: float) -> NDArray[np.bool_]:
     """Samples (n,) near a start or a stop."""
     changes = time_s[1:][moving[1:] != moving[:-1]]
     there = np.searchsorted(changes, time_s)
     known = np.r_[-np.inf, changes, np.inf]
-    return np.minimum(time_s - known[there], known[there + 1] - time_s) < NEAR_S
+    return np.minimum(time_s - known[there], known[there + 1] - time_s) < within_s
 
 
 def _departure(time_s: Array, rest: Array, moving: NDArray[np.bool_], near: NDArray[np.bool_]) -> Array:
@@ -97,12 +140,12 @@ def _designs(motion: Motion) -> list[Array]:
     return [np.c_[moved, rise(path, reach), powers] for rise in (dahl, jenkins) for reach in REACHES * span]
 
 
-def _explained(current: Array, designs: Sequence[Array], use: NDArray[np.bool_]) -> tuple[Array, float, float]:
-    """What the best design explains of the current (n,), learned from some samples, inertia and drag over speed."""
-    best, out = np.inf, (current, 0.0, 0.0)
+def _explained(current: Array, designs: Sequence[Array], use: NDArray[np.bool_]) -> _Explained:
+    """What the best design explains of the current (n,), learned from some samples."""
+    best, out = np.inf, _Explained(current, 0.0, 0.0)
     for columns in designs:
         fitted = np.linalg.lstsq(columns[use], current[use], rcond=1e-12)[0]
         error = float(np.sum((current - columns @ fitted)[use] ** 2))
         if error < best:
-            best, out = error, (columns @ fitted, float(fitted[0]), float(fitted[1]))
+            best, out = error, _Explained(columns @ fitted, float(fitted[0]), float(fitted[1]))
     return out
