@@ -309,10 +309,21 @@ def test_a_block_lasts_as_long_at_any_high_rate(rate_hz: float, frames: int) -> 
     assert frames_of_block(np.arange(100) / rate_hz) == frames
 
 
-@pytest.mark.parametrize(("travels", "named"), [(0.9, "moving_centre"), (0.1, "joint_wobble")])
+@pytest.mark.parametrize(
+    ("reach_m", "travels", "named"),
+    [
+        (1.0, 0.75, "moving_centre"),
+        (1.0, 0.1, "joint_wobble"),
+        (0.04, 0.95, "moving_centre"),
+        (0.04, 0.75, "joint_wobble"),
+        (0.01, 0.95, "joint_wobble"),
+    ],
+)
 def test_an_axis_far_away_is_a_travelling_centre_where_that_explains_as_much(
-    monkeypatch: pytest.MonkeyPatch, travels: float, named: str
+    monkeypatch: pytest.MonkeyPatch, reach_m: float, travels: float, named: str
 ) -> None:
+    """The less surely it is far away, the more must the centre explain."""
+
     def trial(effect: str, gain: float) -> SimpleNamespace:
         return SimpleNamespace(
             candidate=SimpleNamespace(effect=effect, body=1), gain=gain, evidence=gain, effect=lambda: effect
@@ -321,7 +332,7 @@ def test_an_axis_far_away_is_a_travelling_centre_where_that_explains_as_much(
     search = object.__new__(Stepwise)
     search.candidates = []
     monkeypatch.setattr(Stepwise, "_beside", lambda *_: None)
-    monkeypatch.setattr(Stepwise, "_reach", lambda *_: 1.0)
+    monkeypatch.setattr(Stepwise, "_reach", lambda *_: reach_m)
     tried = [trial("joint_wobble", 1000.0), trial("moving_centre", 1000.0 * travels)]
     monkeypatch.setattr(Stepwise, "_tried", lambda *_: tried)
     assert search.next(()) == named

@@ -21,9 +21,10 @@ from .lasting_noise import LastingNoise
 Array = NDArray[np.float64]
 
 HINGE = ("joint_wobble", "moving_centre")
-REACH = 0.06  # m: the other axis of a wobble passes nearer to its joint; farther, its centre travels
+REACH = 0.06  # m: the other axis of a wobble passes nearer to its joint; farther, its centre travels, and from half of that on it may
 SLIGHT = 0.05  # of what all found effects bring: what a marker yields counts from there
 MOSTLY = 0.7  # share of what the likeliest explains: what explains less does not stand for it
+NEARLY = 0.85  # the same of what may be either: of 13 joints (looked at) a tilt leaves 0.24 to a centre at most, a travel 0.97 at least
 CELLS = 300  # moments that are tried first
 PROMISING = 0.5  # of the best candidate's evidence: those whose moment is settled block by block
 EDGE = 3  # blocks at either end of the session in which nothing begins
@@ -151,9 +152,11 @@ class Stepwise:
         tried = [t for t in tried if t.candidate.effect != YIELDING or t.gain >= least]
         best = max(tried, key=lambda t: t.evidence)
         if best.candidate.effect == NO_HINGE:
-            best = _instead(best, tried, HINGE)
-        if best.candidate.effect == "joint_wobble" and self._reach(best.candidate, beside) > REACH:
-            best = _instead(best, tried, ("moving_centre",))
+            best = _instead(best, tried, HINGE, MOSTLY)
+        if best.candidate.effect == "joint_wobble":
+            reach = self._reach(best.candidate, beside)
+            least = MOSTLY if reach > REACH else NEARLY if reach > REACH / 2 else np.inf
+            best = _instead(best, tried, ("moving_centre",), least)
         return best.effect()
 
     def alone(self, candidate: Candidate) -> MarkerEffect:
@@ -343,13 +346,14 @@ class Stepwise:
         return float(np.sqrt(np.mean(np.sum(moved**2, axis=-1))) / max(tilt, 1e-12))
 
 
-def _instead(best: _Trial, tried: Sequence[_Trial], effects: tuple[str, ...]) -> _Trial:
-    """The likeliest of some effects of the same joint, where it explains most of what the best trial does; else that."""
+def _instead(best: _Trial, tried: Sequence[_Trial], effects: tuple[str, ...], least: float) -> _Trial:
+    """The likeliest of some effects of the same joint, where it explains more than the share `least` of what the best
+    trial does; else that."""
     named = max(
         (t for t in tried if t.candidate.effect in effects and t.candidate.body == best.candidate.body),
         key=lambda t: t.evidence,
     )
-    return named if named.gain > MOSTLY * best.gain else best
+    return named if named.gain > least * best.gain else best
 
 
 def _flat(columns: Array) -> Array:
