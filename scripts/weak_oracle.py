@@ -19,24 +19,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from fourth_recorder.compose import CLEAR_GAIN, Case, draw_session, place_effects
-from fourth_recorder.effects import EFFECTS, Form, Site
-from fourth_recorder.effects.draw import WEAK
-from fourth_recorder.gain.current import friction_shape
+from fourth_recorder.compose import Case, draw_session, draw_sized, place_effects
+from fourth_recorder.effects import EFFECTS
+from fourth_recorder.gain.current import current_gain
 from fourth_recorder.kinematics import joint_angles, play
-from fourth_recorder.log_file import channels
 from fourth_recorder.motor import ROW_S
 from fourth_recorder.session import Session
-from fourth_recorder.size import clear_size, gain_of
+from fourth_recorder.size import gain_of
 from fourth_recorder.trial import Trial, run_finger
 
 from hand_model.blind_trial import score_case
 
 Array = np.ndarray
-EVERY = 5  # rows of a simulation
 MOVING = 2.0  # [%/s]
-STEADY = 60.0  # [%/s^2] acceleration within SETTLE_S
-SETTLE_S = 0.1
 GAPS = np.geomspace(5e-4, 0.05, 60)  # [rad] of the plays that are held against a give
 BOUNDS = (8.0, 20.0, 40.0)  # [nats]
 JOINTS = {"drive_backlash": 0, "series_elasticity": 0, "linkage_backlash": 1, "linkage_compliance": 1}
@@ -45,23 +40,6 @@ JOINTS = {"drive_backlash": 0, "series_elasticity": 0, "linkage_backlash": 1, "l
 def left_over(columns: Array, values: Array) -> float:
     """Sum of squares that least squares leaves."""
     return float(np.sum((values - columns @ np.linalg.lstsq(columns, values, rcond=None)[0]) ** 2))
-
-
-def current_nats(session: Session, trials: list[Trial]) -> float:
-    """What the best healthy motor leaves of the current in motion [nats]; trials: all of one finger."""
-    columns, currents = [], []
-    for trial in trials:
-        position, current = channels(trial)
-        speed = np.gradient(position, ROW_S)
-        acceleration = np.gradient(speed, ROW_S)
-        friction = friction_shape(position, trial.finger.motor.coulomb)
-        rows = np.c_[acceleration, speed, friction, position, np.ones_like(position)]
-        use = ((np.abs(speed) > MOVING) & (trial.trace.time < trial.duration_s))[::EVERY]
-        columns.append(rows[::EVERY][use])
-        currents.append(current[::EVERY][use])
-    variance = session.laboratory.current_noise**2 + 1 / 12
-    left = left_over(np.concatenate(columns), np.concatenate(currents))
-    return 0.5 * left / variance * ROW_S * EVERY / session.laboratory.row_s
 
 
 def angle_nats(session: Session, trials: list[Trial], name: str, noise_rad: float) -> tuple[float, float]:
@@ -115,9 +93,7 @@ def observed(answer: dict[str, Any], found: dict[str, Any]) -> tuple[float, floa
     rng = np.random.default_rng(seed)
     session = draw_session(rng, "weak", seed)
     _, finger = place_effects(rng, Case("weak", (name,), seed), session)[0]
-    form = Form(rng)
-    size = clear_size(session, finger, name, form, 3 * CLEAR_GAIN) * WEAK
-    drawn = EFFECTS[name].draw(Site(session, finger, size, form))
+    drawn, _, _ = draw_sized(rng, "weak", session, name, finger)
     known = {k: v for k, v in answer["effects"][0]["figures"].items() if isinstance(v, float)}
     if any(abs(float(drawn.figures[k]) - v) > 1e-9 * max(abs(v), 1.0) for k, v in known.items()):
         raise SystemExit(f"{answer['effects'][0]}: another recorder made this session")
@@ -125,7 +101,8 @@ def observed(answer: dict[str, Any], found: dict[str, Any]) -> tuple[float, floa
     if name in JOINTS:
         return angle_nats(session, trials, name, noise_of(found, finger.name, JOINTS[name]))
     if EFFECTS[name].channel == "current" or name == "drive_sag":
-        return current_nats(session, trials) - current_nats(session, run_finger(session, finger, [])), np.inf
+        gain, healthy = (current_gain(session, t, MOVING) for t in (trials, run_finger(session, finger, [])))
+        return gain.above(healthy).log_likelihood, np.inf
     return gain_of(session, finger, name, drawn).log_likelihood, np.inf
 
 

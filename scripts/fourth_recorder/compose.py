@@ -83,20 +83,27 @@ def entry(name: str, finger: Finger, drawn: Drawn, strength: float, size: float)
     }
 
 
+def draw_sized(
+    rng: np.random.Generator, kind: str, session: Session, name: str, finger: Finger
+) -> tuple[Drawn, float, float]:
+    """An effect that a session of a kind hides in a finger, its strength, and its size; of the table's as large as it
+    takes to show."""
+    form, strength = Form(rng), WEAK if kind == "weak" else CLEAR
+    size = strength
+    if name in EFFECTS:
+        size = clear_size(session, finger, name, form, CLEAR_GAIN * (3.0 if kind == "weak" else 1.0)) * strength
+    return (EFFECTS.get(name) or OUTSIDE[name]).draw(Site(session, finger, size, form)), strength, size
+
+
 def make_case(case: Case, folder: Path) -> dict[str, Any]:
     """Record one session and return its answer."""
     rng = np.random.default_rng(case.seed)
     session = draw_session(rng, case.kind, case.seed)
-    wanted = CLEAR_GAIN * (3.0 if case.kind == "weak" else 1.0)
-    strength = WEAK if case.kind == "weak" else CLEAR
     hidden: dict[str, list[Drawn]] = {name: [] for name in session.hand.fingers}
     entries, traces = [], []
     placed = place_effects(rng, case, session)
     for name, finger in placed:
-        form, size = Form(rng), strength
-        if name in EFFECTS:
-            size = clear_size(session, finger, name, form, wanted) * strength
-        drawn = (EFFECTS.get(name) or OUTSIDE[name]).draw(Site(session, finger, size, form))
+        drawn, strength, size = draw_sized(rng, case.kind, session, name, finger)
         hidden[finger.name].append(drawn)
         entries.append(entry(name, finger, drawn, strength, size))
     if case.kind == "messy":

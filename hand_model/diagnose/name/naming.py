@@ -41,9 +41,14 @@ class Named:
     probability: float
 
     @property
+    def own(self) -> Rival:
+        """The effect in its own place."""
+        return next(r for r in self.rivals if r.name == self.term.effect.name)
+
+    @property
     def evidence(self) -> float:
         """Log evidence of the effect in its own place."""
-        return next(r.evidence for r in self.rivals if r.name == self.term.effect.name)
+        return self.own.evidence
 
     @property
     def members(self) -> tuple[str, ...]:

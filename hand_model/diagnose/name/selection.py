@@ -233,7 +233,11 @@ def _alike(a: Wander | None, b: Wander | None) -> bool:
 
 
 def _likelihood(balance: Balance, fit: Fit, wander: Wander | None) -> float:
-    weight = balance.weight * balance.train
+    return _log_likelihood(balance, fit, wander, balance.weight * balance.train)
+
+
+def _log_likelihood(balance: Balance, fit: Fit, wander: Wander | None, weight: Array) -> float:
+    """Of samples with these weights (n,), zero for those that do not count."""
     residual = (balance.effort - fit.prediction) * weight
     if wander is None or not wander.real:
         return -0.5 * float(np.sum(residual**2)) / balance.inflation
@@ -284,9 +288,8 @@ def _outdone(pair: Pair, effects: tuple[Any, ...], fit: Fit, found: Iterable[Nam
         if best.name == named.term.effect.name:
             continue
         rest = tuple(t for i, t in enumerate(fit.terms) if i != which)
-        own = next(r for r in named.rivals if r.name == named.term.effect.name)
         likelier = balance.fit((*rest, best.fit.terms[-1]))
-        favour = best.kept_out - own.kept_out
+        favour = best.kept_out - named.own.kept_out
         other = exchanged(balance, fit, which, balance.fit(rest), likelier, favour)
         if other is not None and allowed(balance, other):
             return other if favour > 0 else settle(pair, effects, other.terms)
@@ -312,25 +315,21 @@ def _foretold(balance: Balance, fit: Fit) -> tuple[float, float]:
     """Of a fit, in the recordings kept out: mean square of residual over noise, and log likelihood."""
     weight = balance.weights(fit.terms) * ~balance.train
     held = weight > 0
-    residual, noise = (balance.effort - fit.prediction) * weight, float(np.sum(np.log(weight[held])))
-    if balance.wander is None:
-        likelihood = -0.5 * float(residual @ residual) / balance.inflation
-    else:
-        likelihood = balance.wander.log_likelihood(residual, weight, balance.inflation)
-    return float(np.mean(residual[held] ** 2)), likelihood + noise / balance.inflation
+    square = float(np.mean(((balance.effort - fit.prediction) * weight)[held] ** 2))
+    noise = float(np.sum(np.log(weight[held]))) / balance.inflation
+    return square, _log_likelihood(balance, fit, balance.wander, weight) + noise
 
 
 def _in_place(pair: Pair, effects: tuple[Any, ...], fit: Fit, which: int, others: Sequence[int]) -> list[Rival]:
     """Every candidate in the place of a term, beside the terms `others` alone, and that term; best evidence first."""
     balance, term = pair.state, fit.terms[which]
     rest = tuple(fit.terms[i] for i in others)
-    without, beside = balance.fit(rest), fit if len(rest) == len(fit.terms) - 1 else balance.fit((*rest, term))
+    without, alone = balance.fit(rest), balance.fit((*rest, term))
+    beside = fit if len(rest) == len(fit.terms) - 1 else alone
     own = evidence(balance, beside, without, which if beside is fit else len(rest), scale_of(balance, beside))
     ranked = rank(pair, effects, rest, without, refine=3)
     same = [r.evidence for r in ranked if r.name == term.effect.name]
-    rivals = [r for r in ranked if r.name != term.effect.name] + [
-        Rival(term.effect.name, max([own, *same]), balance.fit((*rest, term)))
-    ]
+    rivals = [r for r in ranked if r.name != term.effect.name] + [Rival(term.effect.name, max([own, *same]), alone)]
     return sorted(rivals, key=lambda r: -r.evidence)
 
 

@@ -28,8 +28,9 @@ def friction_shape(positions: Array, coulomb: float) -> Array:
     return np.array(out)
 
 
-def best_healthy(trials: Sequence[Trial]) -> tuple[Array, Array]:
-    """Mass, viscous and Coulomb friction, stiffness, preload (raw units, %) and the residuals [raw]."""
+def best_healthy(trials: Sequence[Trial], least_speed: float = 0.0) -> tuple[Array, Array]:
+    """Mass, viscous and Coulomb friction, stiffness, preload (raw units, %) and the residuals [raw], where the motor is at
+    least so fast [%/s]."""
     columns, currents = [], []
     for trial in trials:
         position, current = channels(trial)
@@ -38,16 +39,18 @@ def best_healthy(trials: Sequence[Trial]) -> tuple[Array, Array]:
         friction = friction_shape(position, trial.finger.motor.coulomb)
         during = trial.trace.time < trial.duration_s
         rows = np.c_[acceleration, speed, friction, position, np.ones_like(position)]
-        columns.append(rows[during][::EVERY])
-        currents.append(current[during][::EVERY])
+        use = np.flatnonzero(during)[::EVERY]
+        use = use[np.abs(speed[use]) >= least_speed]
+        columns.append(rows[use])
+        currents.append(current[use])
     matrix, values = np.concatenate(columns), np.concatenate(currents)
     figures, *_ = np.linalg.lstsq(matrix, values, rcond=None)
     return figures, values - matrix @ figures
 
 
-def current_gain(session: Session, trials: Sequence[Trial]) -> Gain:
-    """Of all trials of one finger."""
-    _, residuals = best_healthy(trials)
+def current_gain(session: Session, trials: Sequence[Trial], least_speed: float = 0.0) -> Gain:
+    """Of all trials of one finger, where its motor is at least so fast [%/s]."""
+    _, residuals = best_healthy(trials, least_speed)
     laboratory = session.laboratory
     variance = laboratory.current_noise**2 + 1 / 12
     rows_per_value = ROW_S * EVERY / laboratory.row_s
