@@ -46,6 +46,23 @@ def test_a_balance_that_plainly_shows_a_shift_is_believed_where_answers_agree(
     assert _late(drives, timed, {}) == {"index": may_be, "ring": False}
 
 
+@pytest.mark.parametrize(("told_s", "may_be"), [(-0.025, True), (-0.015, False), (0.012, False)])
+def test_answers_that_may_be_early_by_chance_are_so_where_the_balance_says_the_same(
+    told_s: float, may_be: bool
+) -> None:
+    """Beside much else that is missing the balance shifts a current by less than it is early, and answers alone are
+    early by chance up to three standard deviations."""
+    drives = {"index": shifted(drive(3), -0.006), "ring": drive(4)}
+    timed = {
+        a: tuple(replace(s, extra={**s.extra, "late": np.array([late_s, 0.0115])}) for s in drives[a])
+        for a, late_s in {"index": told_s, "ring": 0.0}.items()
+    }
+    assert _late(drives, timed, {}) == {"index": may_be, "ring": False}
+    healthy = {**drives, "index": drive(3)}
+    told = {a: tuple(replace(s, extra=t.extra) for s, t in zip(healthy[a], timed[a], strict=True)) for a in healthy}
+    assert _late(healthy, told, {}) == {"index": False, "ring": False}
+
+
 @pytest.mark.parametrize(
     ("told_s", "doubt_s", "may_be"),
     [(0.002, 0.03, True), (0.05, 0.02, True), (0.16, 0.03, False), (-0.06, 0.02, False)],

@@ -12,6 +12,7 @@ from test_kinematic_stations import joint
 
 from hand_model.diagnose.name import candidates, selection
 from hand_model.diagnose.name.balance import Balance
+from hand_model.diagnose.name.judgement import _as_likely
 from hand_model.diagnose.name.naming import Named, Rival
 from hand_model.diagnose.name.selection import name_effects
 from hand_model.diagnose.name.shapes import possible
@@ -120,3 +121,20 @@ def test_a_give_that_a_late_segment_makes_large_takes_another_form() -> None:
     names = [t.effect.name for t in naming.fit.terms]
     assert "linkage_compliance" in names
     assert all(possible(naming.balance, naming.fit, which) for which in range(len(names)))
+
+
+def test_a_hearing_without_what_fell_explains_as_much_as_the_names_that_did_not_fall() -> None:
+    """A spring that relaxes beside a tight spot that recordings kept out do not bear out: without the spot a search may
+    end with a hysteresis in the spring's place, which explains less."""
+    spring = Term(effect("viscoelastic_spring"), {"relaxation_time": 1.0})
+    spot = Term(effect("position_dependent_friction"), {"centre": 45.0, "width": 7.0})
+    slip = Term(effect("elastoplastic_hysteresis"), {"form": 0.0, "reach": 15.0})
+    balance = Balance(drive(5, planted(spring.effect.name, dict(spring.shape), [0.2])))
+
+    def named(*terms: Term) -> SimpleNamespace:
+        return SimpleNamespace(balance=balance, fit=balance.fit(terms))
+
+    fallen = {spot.effect.name}
+    assert not _as_likely(named(slip), named(spring, spot), fallen)
+    assert _as_likely(named(spring), named(slip, spot), fallen)
+    assert _as_likely(named(spring, slip), named(spring, spot), fallen)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...effects import catalogue
-from ...effects.base import SURE_DELAY, DriveState, least_delay
+from ...effects.base import SURE_DELAY, DriveState
 from ..name.balance import Balance, Fit
 from ..name.evidence import gain
 from ..name.shapes import polish, scan
@@ -65,24 +65,26 @@ def _late(
         if actuator not in late:
             return abs(x) > bound
         earliest, latest = seen_s[actuator]
+        told, doubt = late[actuator].tolist()
         if earliest < latest and brought[actuator] > BEYOND_CHANCE and x > bound:
             # behind a filter answers tell little of how late it is: they must not deny it
-            told, doubt = late[actuator].tolist()
             return earliest - ALIKE * doubt < told < latest + ALIKE * doubt
-        if (told_to := least_delay(timed[actuator])) < bound:
-            told, doubt = late[actuator].tolist()  # and to the side to which the balance would shift it
+        if (told_to := SURE_DELAY * doubt) < bound:  # and to the side to which the balance would shift it
             plain = brought[actuator] > BEYOND_CHANCE and abs(told - best[actuator]) < ALIKE * doubt
             # less than a sample: what a simulation says the balance, or answers, must see, if barely
             in_balance = told * nearest[actuator] > 0 and brought[actuator] > SEEN
             seen = abs(told) > bound or in_balance or _answers_so(answered.get(actuator), told)
             most = max(abs(told), abs(best[actuator]) if plain else 0.0)
             return seen and most > told_to and told * best[actuator] >= 0
-        if late[actuator][0] < -max(bound, EARLY * late[actuator][1]):
+        # early answers that may be chance are none where the balance would shift the current so, too, beside whatever
+        # else it lacks
+        both = brought[actuator] > BEYOND_CHANCE and nearest[actuator] < 0
+        if told < -max(bound, (ANSWERED if both else EARLY) * doubt):
             return True
         if x >= -bound:
-            return float(late[actuator][0]) > bound
+            return told > bound
         others = [float(np.sum(value)) for a, value in late.items() if a != actuator]
-        return not others or max(others) - late[actuator][0] > bound  # who is early answers before the others
+        return not others or max(others) - told > bound  # who is early answers before the others
 
     return {a: borne_out(a) for a in best}
 

@@ -12,11 +12,24 @@ import numpy as np
 from .candidates import EVIDENCE_LEAST
 from .naming import ALPHA, Named, Naming
 from .selection import name_effects
+from .shapes import priced, refit
 from .station import MAIN, UNREST, Station
 
 # times the others are heard again, and the share of what was explained from which a fallen name has displaced others
 SECOND_HEARINGS, DISPLACING = 2, 0.1
 WORSE = 1.5  # times the mean square of training recordings
+
+
+def _as_likely(other: Naming, naming: Naming, fallen: set[str]) -> bool:
+    """Whether another naming explains the training recordings as well as the names that did not fall: a search without
+    those that fell may end with a worse one in the place of one of them."""
+    rest = tuple(t for t in naming.fit.terms if t.effect.name not in fallen)
+    if {t.effect.name for t in rest} <= {t.effect.name for t in other.fit.terms}:
+        return True
+    balance = naming.balance.learning()
+    kept, heard = (refit(balance, balance.fit(terms)) for terms in (rest, other.fit.terms))
+    cost = priced(balance)
+    return cost(heard) <= cost(kept)
 
 
 def _elsewhere(naming: Naming) -> bool:
@@ -112,6 +125,8 @@ def judged(
         other = station.renamed(name_effects(states, left, typical=typical))
         if other.weight <= station.weight and lost <= MAIN:
             break  # else what fell had held the better part: what it left over stands on nothing
+        if not _as_likely(other.naming, station.naming, fallen):
+            break
         station = other
     hopeless = station.naming.overwhelmed and not elsewhere  # in the training recordings already
     many = station.full  # more is missing than is looked for, whatever is learned from
