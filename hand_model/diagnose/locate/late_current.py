@@ -69,8 +69,8 @@ def _late(
         if earliest < latest and brought[actuator] > BEYOND_CHANCE and x > bound:
             # behind a filter answers tell little of how late it is: they must not deny it
             return earliest - ALIKE * doubt < told < latest + ALIKE * doubt
+        plain = brought[actuator] > BEYOND_CHANCE and abs(told - best[actuator]) < ALIKE * doubt
         if (told_to := SURE_DELAY * doubt) < bound:  # and to the side to which the balance would shift it
-            plain = brought[actuator] > BEYOND_CHANCE and abs(told - best[actuator]) < ALIKE * doubt
             # less than a sample: what a simulation says the balance, or answers, must see, if barely
             in_balance = told * nearest[actuator] > 0 and brought[actuator] > SEEN
             seen = abs(told) > bound or in_balance or _answers_so(answered.get(actuator), told)
@@ -79,7 +79,7 @@ def _late(
         # early answers that may be chance are none where the balance would shift the current so, too, beside whatever
         # else it lacks
         both = brought[actuator] > BEYOND_CHANCE and nearest[actuator] < 0
-        if told < -max(bound, (ANSWERED if both else EARLY) * doubt):
+        if told < -max(bound, (ANSWERED if both else EARLY) * doubt) or plain and told * x > 0 and abs(x) > bound:
             return True
         if x >= -bound:
             return told > bound
