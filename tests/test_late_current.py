@@ -29,6 +29,16 @@ def shifted(states: tuple[DriveState, ...], delay_s: float) -> tuple[DriveState,
     return tuple(one(s) for s in states)
 
 
+def answering(
+    drives: dict[str, tuple[DriveState, ...]], told: dict[str, tuple[float, float]]
+) -> dict[str, tuple[DriveState, ...]]:
+    """The drives with how late answers to commands tell each current, and how far that may be wrong [s]."""
+    return {
+        a: tuple(replace(s, extra={**s.extra, "late": np.array(told[a])}) for s in states)
+        for a, states in drives.items()
+    }
+
+
 @pytest.mark.parametrize(
     ("told_s", "doubt_s", "may_be"),
     [(-0.011, 0.0065, True), (-0.02, 0.0065, True), (-0.004, 0.0065, False), (0.011, 0.0065, False)],
@@ -39,10 +49,7 @@ def test_a_balance_that_plainly_shows_a_shift_is_believed_where_answers_agree(
     """Answers that are wrong by a sample or two tell less than the balance does; those that speak against it do not."""
     drives = {"index": shifted(drive(3), SHIFT_S), "ring": drive(4)}
     told = {"index": (told_s, doubt_s), "ring": (0.0, doubt_s)}
-    timed = {
-        a: tuple(replace(s, extra={**s.extra, "late": np.array(told[a])}) for s in states)
-        for a, states in drives.items()
-    }
+    timed = answering(drives, told)
     assert _late(drives, timed, {}) == {"index": may_be, "ring": False}
 
 
@@ -53,14 +60,10 @@ def test_answers_that_may_be_early_by_chance_are_so_where_the_balance_says_the_s
     """Beside much else that is missing the balance shifts a current by less than it is early, and answers alone are
     early by chance up to three standard deviations."""
     drives = {"index": shifted(drive(3), -0.006), "ring": drive(4)}
-    timed = {
-        a: tuple(replace(s, extra={**s.extra, "late": np.array([late_s, 0.0115])}) for s in drives[a])
-        for a, late_s in {"index": told_s, "ring": 0.0}.items()
-    }
-    assert _late(drives, timed, {}) == {"index": may_be, "ring": False}
     healthy = {**drives, "index": drive(3)}
-    told = {a: tuple(replace(s, extra=t.extra) for s, t in zip(healthy[a], timed[a], strict=True)) for a in healthy}
-    assert _late(healthy, told, {}) == {"index": False, "ring": False}
+    told = {"index": (told_s, 0.0115), "ring": (0.0, 0.0115)}
+    assert _late(drives, answering(drives, told), {}) == {"index": may_be, "ring": False}
+    assert _late(healthy, answering(healthy, told), {}) == {"index": False, "ring": False}
 
 
 @pytest.mark.parametrize(
@@ -78,10 +81,7 @@ def test_answers_that_a_filter_leaves_vague_do_not_deny_it(told_s: float, doubt_
 
     drives = {"index": tuple(behind(s) for s in drive(3)), "ring": drive(4)}
     told = {"index": (told_s, doubt_s), "ring": (0.0, 0.005)}
-    timed = {
-        a: tuple(replace(s, extra={**s.extra, "late": np.array(told[a])}) for s in states)
-        for a, states in drives.items()
-    }
+    timed = answering(drives, told)
     assert _late(drives, timed, {}) == {"index": may_be, "ring": False}
 
 
@@ -92,10 +92,7 @@ def test_a_delay_that_a_simulation_tells_to_a_fraction_of_a_sample_must_show_els
 
     def may_be(shift_s: float, **answered: Lateness) -> dict[str, bool]:
         drives = {"index": shifted(drive(3), shift_s) if shift_s else drive(3), "ring": drive(4)}
-        timed = {
-            a: tuple(replace(s, extra={**s.extra, "late": np.array(told[a])}) for s in states)
-            for a, states in drives.items()
-        }
+        timed = answering(drives, told)
         return _late(drives, timed, answered)
 
     assert may_be(0.0) == {"index": False, "ring": False}

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...effects import catalogue
-from ...effects.base import SURE_DELAY, DriveState
+from ...effects.base import SURE_DELAY, UNSEEN_DELAY, DriveState
 from ..name.balance import Balance, Fit
 from ..name.evidence import gain
 from ..name.shapes import polish, scan
@@ -57,7 +57,7 @@ def _late(
     best = {a: delay_s if brought[a] > DELAY_TOLD else 0.0 for a, delay_s in nearest.items()}
     step = {a: float(np.median(np.diff(s[0].time_s))) for a, s in drives.items()}
     # a lone drive cannot tell how the log is read from what its own channel does: twice as much is asked of it
-    common, least = (min(best.values(), key=abs), 0.75) if len(best) > 1 else (0.0, 2.0)
+    common, least = (min(best.values(), key=abs), UNSEEN_DELAY) if len(best) > 1 else (0.0, 2.0)
     late = {a: s[0].extra["late"] for a, s in timed.items() if "late" in s[0].extra}
 
     def borne_out(actuator: str) -> bool:
@@ -66,20 +66,24 @@ def _late(
             return abs(x) > bound
         earliest, latest = seen_s[actuator]
         told, doubt = late[actuator].tolist()
-        if earliest < latest and brought[actuator] > BEYOND_CHANCE and x > bound:
+        beyond_chance = brought[actuator] > BEYOND_CHANCE
+        if earliest < latest and beyond_chance and x > bound:
             # behind a filter answers tell little of how late it is: they must not deny it
             return earliest - ALIKE * doubt < told < latest + ALIKE * doubt
-        plain = brought[actuator] > BEYOND_CHANCE and abs(told - best[actuator]) < ALIKE * doubt
-        if (told_to := SURE_DELAY * doubt) < bound:  # and to the side to which the balance would shift it
+        plain = beyond_chance and abs(told - best[actuator]) < ALIKE * doubt
+        # `least_delay` by the step that the bound is made of, so that no rounding decides
+        if (told_to := min(UNSEEN_DELAY * step[actuator], SURE_DELAY * doubt)) < bound:
             # less than a sample: what a simulation says the balance, or answers, must see, if barely
             in_balance = told * nearest[actuator] > 0 and brought[actuator] > SEEN
             seen = abs(told) > bound or in_balance or _answers_so(answered.get(actuator), told)
             most = max(abs(told), abs(best[actuator]) if plain else 0.0)
+            # and to the side to which the balance would shift it
             return seen and most > told_to and told * best[actuator] >= 0
-        # early answers that may be chance are none where the balance would shift the current so, too, beside whatever
-        # else it lacks
-        both = brought[actuator] > BEYOND_CHANCE and nearest[actuator] < 0
-        if told < -max(bound, (ANSWERED if both else EARLY) * doubt) or plain and told * x > 0 and abs(x) > bound:
+        if plain and told * x > 0 and abs(x) > bound:
+            return True
+        # what answers alone may say by chance they say for sure where the balance would shift the current so, too
+        early = ANSWERED if beyond_chance and nearest[actuator] < 0 else EARLY
+        if told < -max(bound, early * doubt):
             return True
         if x >= -bound:
             return told > bound

@@ -155,8 +155,8 @@ class Stepwise:
             best = _instead(best, tried, HINGE, MOSTLY)
         if best.candidate.effect == "joint_wobble":
             reach = self._reach(best.candidate, beside)
-            least = MOSTLY if reach > REACH else NEARLY if reach > REACH / 2 else np.inf
-            best = _instead(best, tried, ("moving_centre",), least)
+            share = MOSTLY if reach > REACH else NEARLY if reach > REACH / 2 else np.inf
+            best = _instead(best, tried, ("moving_centre",), share)
         return best.effect()
 
     def alone(self, candidate: Candidate) -> MarkerEffect:
