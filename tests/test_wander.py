@@ -34,7 +34,7 @@ def test_whitening_and_likelihood_are_those_of_the_dense_covariance():
     values = rng.normal(size=(20, 3))
     white = wander.whiten(values, weight, inflation)
     assert np.allclose(white.T @ white, values.T @ np.linalg.solve(cover, values), atol=1e-12)
-    assert np.allclose(values.T @ values - wander.common(values, weight, inflation), white.T @ white, atol=1e-12)
+    assert np.allclose(values.T @ values - wander.common(values.T, weight, inflation), white.T @ white, atol=1e-12)
     residual = values[:, 0]
     dense = -0.5 * (residual @ np.linalg.solve(cover, residual) / inflation + np.linalg.slogdet(cover)[1])
     assert wander.log_likelihood(residual, weight, inflation) == pytest.approx(dense, rel=1e-12)

@@ -18,7 +18,6 @@ from ..session import Session, read_session
 from .assemble import assemble
 from .findings import FILES, FOLDERS, Findings
 from .hearing import Heard
-from .locate.course import FingerCourses
 from .locate.drive import drive_trials
 from .locate.encoder_error import counts_corrected
 from .locate.late_current import timed_drives
@@ -87,7 +86,7 @@ def diagnose(
         forget(output, FOLDERS, FILES[0])
         if model is not False:
             known = told[-1] if owned else hand
-            with Pair((findings, session, known, written, heard.courses, Path(output), tell)) as pair:
+            with Pair((findings, session, known, written, heard, Path(output))) as pair:
                 (findings, replays), _ = pair.map(_written, ("model", "corrected"))
         write_page(findings, stations, replays, session.path.name, Path(output))
         findings.save(output)
@@ -115,8 +114,9 @@ def _written(results: tuple[Any, ...], what: str) -> Any:
     """What of a diagnosis goes into folders of its own."""
     if what == "model":
         return _modelled(*results)
-    findings, session, _, stations, _, output, _ = results
-    return write_corrected(session, findings.findings, counts_corrected(session, stations), output)
+    findings, session, _, stations, heard, output = results
+    read = {name: (heard.fingers[name], markers) for name, markers in heard.markers.items()}
+    return write_corrected(session, findings.findings, counts_corrected(session, stations), output, read)
 
 
 def _identified(session: Session) -> Hand | HandModelError:
@@ -134,9 +134,8 @@ def _modelled(
     session: Session,
     hand: Hand | HandModelError,
     stations: list[Station],
-    courses: dict[str, FingerCourses],
+    heard: Heard,
     output: Path,
-    tell: Callable[[str], None],
 ) -> tuple[Findings, tuple[Replay, ...]]:
     """The findings with the model that holds them written, and its replays."""
     from .locate.angles import ranges_of_counts
@@ -146,8 +145,10 @@ def _modelled(
     try:
         if isinstance(hand, HandModelError):
             raise hand
-        tell(f"writing {output / 'model'}")
-        named, replays = write_improved(hand, findings.findings, stations, ranges_of_counts(session), output, courses)
+        heard.tell(f"writing {output / 'model'}")
+        named, replays = write_improved(
+            hand, findings.findings, stations, ranges_of_counts(session), output, heard.courses
+        )
     except HandModelError as error:
         return replace(findings, notes=(*findings.notes, f"no model was written: {error}")), ()
     return replace(findings, findings=named), replays

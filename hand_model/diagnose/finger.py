@@ -35,7 +35,7 @@ from .prove.markers import OWN, marker_fit, of_chain
 class FingerReading:
     """One finger seen by the cameras. stations: encoder and linkages, in this order. found: of its markers, each with
     its weight.
-    angles: None where nothing could be read, and notes say why. lines: for a progress display. courses: of joints that
+    angles: None where nothing could be read, and notes say why. markers: what they tell. lines: for a progress display. courses: of joints that
     are no plain hinges."""
 
     finger: str
@@ -46,6 +46,7 @@ class FingerReading:
     notes: tuple[str, ...] = ()
     lines: tuple[str, ...] = ()
     courses: FingerCourses | None = None
+    markers: MarkerNaming | None = None
 
 
 def finger_calls(session: Session, unread: tuple[str, ...] = ()) -> list[Callable[[], FingerReading]]:
@@ -145,5 +146,13 @@ def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, f
     lines += [s.line() for s in stations]
     found = with_steps(found, seen, markers, {s.joint: s.naming.fit.declared for s in stations})
     return FingerReading(
-        finger.name, seen, tuple(stations), found, tuple(unexplained_of(seen, markers)), (), tuple(lines), courses
+        finger.name,
+        seen,
+        tuple(stations),
+        found,
+        tuple(unexplained_of(seen, markers)),
+        (),
+        tuple(lines),
+        courses,
+        markers,
     )

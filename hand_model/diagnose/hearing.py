@@ -23,6 +23,7 @@ from .locate.drive import drive_states, drive_trials, frozen_share, opposes, sta
 from .locate.encoder_error import encoder_corrections
 from .locate.gravity import with_gravity
 from .locate.late_current import current_in_time
+from .locate.markers import MarkerNaming
 from .locate.measurement import echoes_command, is_measured, rests_on_command
 from .locate.simulated import SimulatedDrive
 from .magnitude import magnitude
@@ -46,6 +47,7 @@ class Heard:
         self.notes = [*check_session(session, dead=True), *too_short(session)]
         self.fingers: dict[str, FingerAngles] = {}
         self.courses: dict[str, FingerCourses] = {}
+        self.markers: dict[str, MarkerNaming] = {}
         self.stations: list[Station] = []
         distrusted = _distrusted(session)
         self.unexplained = [_false_stamps(session, a, s) for a, s in distrusted.items()]
@@ -75,6 +77,8 @@ class Heard:
             self.notes += reading.notes
             if reading.angles is not None:
                 self.fingers[reading.finger] = reading.angles
+            if reading.markers is not None:
+                self.markers[reading.finger] = reading.markers
             if reading.courses is not None:
                 self.courses[reading.finger] = reading.courses
         return done

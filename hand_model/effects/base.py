@@ -160,6 +160,7 @@ class Effect:
     # effects of one family move alike: a small one beside a large one may be its form
     family: ClassVar[str | None] = None
     listed: ClassVar[bool] = True  # False of an outsider: no row of the table of effects, told as unexplained
+    held: ClassVar[int] = 0  # of its amplitudes, the last ones, whose columns act in validation recordings alone
     repeats: ClassVar[bool] = False  # may be named more than once in one balance, with other shapes
 
     def __eq__(self, other: object) -> bool:
@@ -187,6 +188,10 @@ class Effect:
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """No column."""
         return np.zeros((len(state.time_s), 0))
+
+    def acts(self, state: DriveState, shape: Mapping[str, float]) -> bool:
+        """Whether its columns may be other than zero along a recording: in any."""
+        return True
 
     def declared(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """The declared columns as they are."""

@@ -28,6 +28,7 @@ class ExternalContact(Effect):
 
     name = "external_contact"
     drifting = True
+    held = MOST_VALIDATION
     repeats = True  # in another trial
     of_the_hand = False
     recorded = True
@@ -81,14 +82,16 @@ class ExternalContact(Effect):
             *((f"stiffness_validation_{i}", "effort/position", 0.0, np.inf) for i in range(MOST_VALIDATION)),
         )
 
+    def acts(self, state: DriveState, shape: Mapping[str, float]) -> bool:
+        """In its trials and in validation recordings; nowhere, where it is there in all of them nearly all along."""
+        return (state.validate or _has(shape["trial"], _index(state))) and not self._all_along(shape)
+
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """Depth into the contact in that trial and in each validation recording, (n, 1 + MOST_VALIDATION); none of what
-        is there in all of them nearly all along."""
+        """Depth into the contact in that trial and in each validation recording, (n, 1 + MOST_VALIDATION)."""
         out = np.zeros((len(state.time_s), 1 + MOST_VALIDATION))
-        index = int(state.extra.get("trial_index", np.zeros(len(state.time_s)))[0])
-        several, mine = shape["trial"] < 0, _has(shape["trial"], index)
-        if not (mine or state.validate) or self._all_along(shape):
+        if not self.acts(state, shape):
             return out
+        several, mine = shape["trial"] < 0, _has(shape["trial"], _index(state))
         depth = np.maximum(state.position - shape["begin"], 0.0)
         if shape["form"] > 0.5:
             depth = depth**2 / 10.0
@@ -138,6 +141,11 @@ def _several(trials: tuple[float, ...]) -> list[tuple[int, ...]]:
     """Every choice of at least two of them and not of all."""
     numbers = [round(t) for t in trials]
     return [some for k in range(2, len(numbers)) for some in combinations(numbers, k)]
+
+
+def _index(state: DriveState) -> int:
+    """Number of a recording among those of its balance, 0 where that is not told."""
+    return int(state.extra["trial_index"][0]) if "trial_index" in state.extra else 0
 
 
 def _has(trial: float, index: int) -> bool:

@@ -119,13 +119,17 @@ def _along_strokes(
 
 
 def lowpass(time_s: Array, values: Array, time_constant_s: float) -> Array:
-    """First-order low pass (n,) on irregular samples (exact for a held input), started at rest on the first value."""
-    decay = np.exp(-np.diff(time_s) / max(time_constant_s, 1e-9))
+    """First-order low pass (n,) on irregular samples (exact for a held input), started at rest on the first value.
+
+    state[i] = decay[i] state[i - 1] + brought[i], of which ever longer runs are joined (Hillis & Steele 1986).
+    """
     v = np.asarray(values, float)
-    out = np.empty(len(v))
-    state = out[0] = v[0]
-    mean = 0.5 * (v[1:] + v[:-1])
-    for i, (e, m) in enumerate(zip(decay.tolist(), mean.tolist(), strict=True), start=1):
-        state = m + (state - m) * e
-        out[i] = state
-    return out
+    step = np.diff(time_s) / max(time_constant_s, 1e-9)
+    decay = np.r_[0.0, np.exp(-step)]
+    state = np.r_[v[:1], -np.expm1(-step) * 0.5 * (v[1:] + v[:-1])]
+    run = 1
+    while run < len(v) and decay.any():
+        state[run:] += decay[run:] * state[:-run]
+        decay[run:] = decay[run:] * decay[:-run]
+        run *= 2
+    return state

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ...effects.base import DriveState
 from ...effects.path import strokes
-from .grid import Grid, GridColumns, stacked
+from .grid import AT_ONCE, Grid, GridColumns, stacked
 from .least_squares import from_products
 from .memory import Memory
 from .noise import noise
@@ -31,7 +31,6 @@ Array = NDArray[np.float64]
 # What physics allows of a declared coefficient, by its column's name.
 DECLARED_LOW = {"inertia": 0.0, "viscous": 0.0, "coulomb": 0.0, "spring": 0.0}
 MOST_KEPT = 6e8  # bytes of columns that one balance keeps
-AT_ONCE = 60  # shapes of a grid whose columns are made together
 SETTLED = 0.25  # of the noise: more of what starts and stops bring, and motion is not steady
 UNSETTLED = 1e-3  # weight left to a start or stop where steady motion alone is asked
 
@@ -162,21 +161,25 @@ class Balance:
         """What another process needs: nothing of what is only kept to save time."""
         return {**self.__dict__, "_kept": {}, "_apart": None, "_learning": None, "_last": Memory()}
 
-    def whiten(self, values: Array, weight: Array) -> Array:
-        """Weighted values (n,) or (n, k) in which the noise is as good as white; as they are without `wander`."""
-        return values if self.wander is None else self.wander.whiten(values, weight, self.inflation)
+    def whiten(self, values: Array, weight: Array, rows: slice | None = None) -> Array:
+        """Weighted values (n,) or (n, k) in which the noise is as good as white; as they are without `wander`. rows:
+        those of whole recordings that the values are of, None for all."""
+        if self.wander is None:
+            return values
+        return (self.wander if rows is None else self.wander.within(rows)).whiten(values, weight, self.inflation)
 
     def products(self, weighted: Array, weight: Array) -> Array:
-        """Products (k, k) with each other of columns (n, k) that are weighted by `weight`, whitened."""
-        out = weighted.T @ weighted
+        """Products (k, k) with each other of columns, rows here (k, n), that are weighted by `weight`, whitened."""
+        out = weighted @ weighted.T
         return out if self.wander is None else out - self.wander.common(weighted, weight, self.inflation)
 
-    def gather(self, value: Any) -> Array:
-        """Stack `value(state)` (n, ...) over the compared samples."""
+    def gather(self, value: Any, first: int = 0, end: int | None = None) -> Array:
+        """Stack `value(state)` (n, ...) over the compared samples, of the recordings from `first` to before `end`
+        alone."""
         return np.concatenate(
             [
                 np.asarray(value(s)).take(rows, axis=0)
-                for s, rows in zip(self.states, self._rows, strict=True)
+                for s, rows in zip(self.states[first:end], self._rows[first:end], strict=True)
                 if len(rows)
             ]
         )
@@ -194,11 +197,32 @@ class Balance:
     def columns(self, effect: Any, shape: Mapping[str, float], bends: tuple[Term, ...] = ()) -> Array:
         """An effect's columns (n, j), as those of `bends` make them, unweighted. To be read only: the last ones are
         kept."""
+        return self._remembered(
+            (effect, key_of(shape), keys(bends)), lambda state: self._bent(state, effect, shape, bends)
+        )
 
-        def bent(state: DriveState) -> Array:
-            return warped(state, effect.columns(self._rubbed(state, bends), shape), bends)
+    def acting_columns(
+        self, effect: Any, shape: Mapping[str, float], bends: tuple[Term, ...] = ()
+    ) -> tuple[Array, slice | None]:
+        """The same of the recordings alone in which the effect acts (m, j), and their rows, None where it acts in the
+        first and in the last; without the columns of validation recordings where none is heard."""
+        heard = [i for i, rows in enumerate(self._rows) if len(rows)]
+        acting = [i for i in heard if effect.acts(self.states[i], shape)] or heard[:1]
+        first, end = acting[0], acting[-1] + 1
+        own = self.own_columns(effect)
+        if (first, end) == (heard[0], heard[-1] + 1):
+            return self.columns(effect, shape, bends)[:, own], None
+        begin, count = (sum(len(rows) for rows in self._rows[a:b]) for a, b in ((0, first), (first, end)))
+        columns = self.gather(lambda state: self._bent(state, effect, shape, bends)[:, own], first, end)
+        return columns, slice(begin, begin + count)
 
-        return self._remembered((effect, key_of(shape), keys(bends)), bent)
+    def own_columns(self, effect: Any) -> slice:
+        """The columns of an effect that may act at all: those of validation recordings only where one is heard."""
+        held = any(s.validate and len(rows) for s, rows in zip(self.states, self._rows, strict=True))
+        return slice(len(effect.amplitudes()) - (0 if held else effect.held))
+
+    def _bent(self, state: DriveState, effect: Any, shape: Mapping[str, float], bends: tuple[Term, ...]) -> Array:
+        return warped(state, effect.columns(self._rubbed(state, bends), shape), bends)
 
     def _rubbed(self, state: DriveState, bends: tuple[Term, ...]) -> DriveState:
         """The state with friction turned over by the bristles among `bends`, its columns kept: every candidate beside
@@ -250,18 +274,27 @@ class Balance:
     ) -> list[Array]:
         """The columns (n, j) of each shape that are not zero, weighted and whitened; what shifts them shifts all of
         them at once. Not remembered, for whole grids would push out what is asked for again."""
+        own = self.own_columns(effect)
         plain = {
-            id(state): [effect.columns(self._rubbed(state, bends), shape) for shape in shapes]
+            id(state): [
+                effect.columns(self._rubbed(state, bends), shape)[:, own] if effect.acts(state, shape) else None
+                for shape in shapes
+            ]
             for state, rows in zip(self.states, self._rows, strict=True)
             if len(rows)
         }
-        acting = [np.any([part.any(0) for part in parts], axis=0) for parts in zip(*plain.values(), strict=True)]
+        idle = np.zeros(own.stop, bool)
+        acting = [
+            np.any([idle, *(part.any(0) for part in parts if part is not None)], axis=0)
+            for parts in zip(*plain.values(), strict=True)
+        ]
         some = [i for i, which in enumerate(acting) if which.any()]
 
         def bent(state: DriveState) -> Array:
-            parts = [plain[id(state)][i][:, acting[i]] for i in some]
-            columns = np.concatenate(parts, axis=1) if parts else np.zeros((len(state.time_s), 0))
-            return warped(state, columns, bends)
+            nothing = np.zeros((len(state.time_s), own.stop))
+            parts = [nothing if (part := plain[id(state)][i]) is None else part for i in some]
+            columns = [part[:, acting[i]] for i, part in zip(some, parts, strict=True)]
+            return warped(state, np.concatenate(columns, axis=1) if columns else nothing[:, :0], bends)
 
         together = self.gather(bent) * weight[:, None]
         edges = np.cumsum([np.count_nonzero(which) for which in acting])[:-1]
@@ -269,6 +302,11 @@ class Balance:
 
     def design(self, terms: tuple[Term, ...]) -> tuple[Array, Array, Array]:
         """Matrix (n, k + j) of declared and effect columns, lower and upper bounds (k + j,) of their coefficients."""
+        parts, low, high = self._parts(terms)
+        return np.concatenate(parts, axis=1), low, high
+
+    def _parts(self, terms: tuple[Term, ...]) -> tuple[list[Array], Array, Array]:
+        """The same, the declared columns and those of each effect apart."""
         warps, changing = (
             tuple(t for t in terms if t.effect.warps),
             tuple(t for t in terms if t.effect.replaces is not None),
@@ -284,52 +322,81 @@ class Balance:
             parts.append(self.columns(term.effect, term.shape, bending(terms, term.effect)))
             low += [a[2] for a in term.effect.amplitudes()]
             high += [a[3] for a in term.effect.amplitudes()]
-        return np.concatenate(parts, axis=1), np.array(low), np.array(high)
+        return parts, np.array(low), np.array(high)
 
     def fit(self, terms: tuple[Term, ...] = (), held: bool = True) -> Fit:
         """Amplitudes and declared coefficients by bounded weighted least squares on the training samples. held: also
         what belongs to validation recordings alone, which training does not see."""
-        matrix, low, high = self.design(terms)
+        parts, low, high = self._parts(terms)
         weight = self.weights(terms)
         w = weight * self.train
-        clips = [t for t in terms if t.effect.clips]
-        prediction = np.zeros(len(self.effort))
-        inside = np.ones(len(self.effort), bool)
-        weighted = np.column_stack([matrix, self.effort]) * w[:, None]
-        every = self.products(weighted, w)
-
-        def among(inside: NDArray[np.bool_]) -> Array:
-            if self.wander is not None:
-                return self.products(weighted * inside[:, None], w * inside)
-            outside = weighted[~inside]  # a few
-            return every - outside.T @ outside
-
-        for _ in range(4 if clips else 1):
-            products = every if inside.all() else among(inside)
-            coefficients = from_products(products[:-1, :-1], products[:-1, -1], low, high)
-            if held:
-                coefficients = self._own_nuisances(matrix, coefficients, w, low)
-            prediction = raw = matrix @ coefficients
-            for term in clips:
-                prediction = term.effect.clip(prediction, term.shape)
-            was, inside = inside, prediction == raw
-            if np.array_equal(was, inside):
-                break
-        rss = (
-            float(np.sum(self.whiten((self.effort - prediction) * w, w) ** 2))
-            + self.vagueness(weight)
-            + self.unanswered(terms)
-        )
+        weighted = _weighted(parts, self.effort, w)
+        coefficients, prediction = self._solved(terms, parts, weighted, w, (low, high), held)
+        rss = self._square(prediction, w) + self.vagueness(weight) + self.unanswered(terms)
         k = len(self.names)
         amplitudes, start = [], k
         for term in terms:
             names = [a[0] for a in term.effect.amplitudes()]
             amplitudes.append(dict(zip(names, coefficients[start : start + len(names)].tolist(), strict=True)))
             start += len(names)
-        acting = int(np.any(weighted[:, k:-1] != 0, axis=0).sum())  # in training recordings
+        acting = int(weighted[k:-1].any(1).sum())  # in training recordings
         size = sum(len([k for k in t.shape if k not in DISCRETE]) for t in terms) + acting
         declared = dict(zip(self.names, coefficients[:k].tolist(), strict=True))
         return Fit(terms, declared, tuple(amplitudes), prediction, rss, size)
+
+    def error(self, terms: tuple[Term, ...]) -> float:
+        """`rss` of the fit of `terms`, sooner."""
+        parts, low, high = self._parts(terms)
+        weight = self.weights(terms)
+        w = weight * self.train
+        weighted = _weighted(parts, self.effort, w)
+        if any(t.effect.clips for t in terms):
+            rss = self._square(self._solved(terms, parts, weighted, w, (low, high), False)[1], w)
+        else:
+            products = self.products(weighted, w)
+            gram, right = products[:-1, :-1], products[:-1, -1]
+            x = from_products(gram, right, low, high)
+            rss = float(products[-1, -1] - 2 * right @ x + x @ gram @ x)
+        return rss + self.vagueness(weight) + self.unanswered(terms)
+
+    def _solved(
+        self,
+        terms: tuple[Term, ...],
+        parts: list[Array],
+        weighted: Array,
+        w: Array,
+        bounds: tuple[Array, Array],
+        held: bool,
+    ) -> tuple[Array, Array]:
+        """Coefficients (k,) and clipped prediction (n,) of a design in parts, weighted by w; what is clipped tells
+        nothing of them."""
+        clips = [t for t in terms if t.effect.clips]
+        inside = np.ones(len(w), bool)
+        every = self.products(weighted, w)
+
+        def among(inside: NDArray[np.bool_]) -> Array:
+            if self.wander is not None:
+                return self.products(weighted * inside, w * inside)
+            outside = weighted[:, ~inside]  # a few
+            return every - outside @ outside.T
+
+        for _ in range(4 if clips else 1):
+            products = every if inside.all() else among(inside)
+            coefficients = from_products(products[:-1, :-1], products[:-1, -1], *bounds)
+            if held:
+                coefficients = self._own_nuisances(parts, coefficients, w, bounds[0])
+            prediction = raw = _along(parts, coefficients)
+            for term in clips:
+                prediction = term.effect.clip(prediction, term.shape)
+            was, inside = inside, prediction == raw
+            if np.array_equal(was, inside):
+                break
+        return coefficients, prediction
+
+    def _square(self, prediction: Array, w: Array) -> float:
+        """Weighted and whitened sum of squares of what a prediction (n,) leaves."""
+        left = self.whiten((self.effort - prediction) * w, w)
+        return float(left @ left)
 
     def removed(self, fit: Fit, which: int) -> Array:
         """Prediction (n,) of a fit with one term taken out and all coefficients as they are."""
@@ -362,7 +429,7 @@ class Balance:
         add is the same."""
 
         def fitted(shape: Mapping[str, float]) -> float:
-            return self.fit((*terms, Term(effect, shape)), held=False).rss
+            return self.error((*terms, Term(effect, shape)))
 
         clipped = any(t.effect.clips for t in terms)
         if not additive(effect) or clipped and near is None:
@@ -372,11 +439,12 @@ class Balance:
             return fitted
         more = self.vagueness(self.weights(terms)) + self.unanswered(terms)
         bends = bending(terms, effect)
-        low, high = (np.array([a[i] for a in effect.amplitudes()]) for i in (2, 3))
+        low, high = (np.array([a[i] for a in effect.amplitudes()[self.own_columns(effect)]]) for i in (2, 3))
 
         def projected(shape: Mapping[str, float]) -> float:
-            columns = self.columns(effect, shape, bends)
-            rss = rest.rss(self.whiten(columns * rest.weight[:, None], rest.weight), low, high)
+            columns, rows = self.acting_columns(effect, shape, bends)
+            weight = rest.weight if rows is None else rest.weight[rows]
+            rss = rest.rss(self.whiten(columns * weight[:, None], weight, rows), low, high, rows or slice(None))
             return fitted(shape) if rss is None else rss + more
 
         return projected
@@ -439,11 +507,14 @@ class Balance:
         ]
         return ~np.any([np.isclose(free, level) for level in levels], axis=0) if levels else np.ones(len(free), bool)
 
-    def _own_nuisances(self, matrix: Array, coefficients: Array, w: Array, low: Array) -> Array:
+    def _own_nuisances(self, parts: list[Array], coefficients: Array, w: Array, low: Array) -> Array:
         """Coefficients of columns that act in validation recordings only (their own clock offset, a step in them, an
         obstacle that is still there) from those recordings: they belong to the recording, not to the model, which stays
         as trained."""
         columns = np.flatnonzero(coefficients == 0)  # least squares leaves a column alone that never acts
+        if not len(columns):
+            return coefficients
+        matrix = np.concatenate(parts, axis=1)
         columns = columns[np.any(matrix[:, columns] != 0, axis=0) & ~np.any(matrix[:, columns][w > 0] != 0, axis=0)]
         if not len(columns):
             return coefficients
@@ -452,3 +523,18 @@ class Balance:
         out = coefficients.copy()
         out[columns] += np.linalg.lstsq(matrix[:, columns] * held[:, None], left, rcond=None)[0]
         return np.maximum(out, low)
+
+
+def _weighted(parts: list[Array], effort: Array, w: Array) -> Array:
+    """The columns of a design in parts and the effort, weighted, one row each (k + 1, n)."""
+    out, start = np.empty((sum(p.shape[1] for p in parts) + 1, len(w))), 0
+    for part in (*parts, effort[:, None]):
+        np.multiply(part.T, w, out=out[start : start + part.shape[1]])
+        start += part.shape[1]
+    return out
+
+
+def _along(parts: list[Array], coefficients: Array) -> Array:
+    """Prediction (n,) of a design in parts."""
+    edges = np.cumsum([p.shape[1] for p in parts])[:-1]
+    return np.sum([p @ x for p, x in zip(parts, np.split(coefficients, edges), strict=True)], axis=0)

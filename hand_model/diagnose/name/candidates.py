@@ -10,7 +10,7 @@ import numpy as np
 from ...background import Pair
 from ...effects.base import least_delay, position_range
 from .balance import Balance, Fit
-from .evidence import evidence, rough_evidence, scale_of
+from .evidence import evidence, gain, rough_evidence, scale_of
 from .naming import Rival
 from .shapes import polish, possible, refit, reform, scan
 from .term import Term, additive, doubled
@@ -20,6 +20,8 @@ FAINT = 3.0  # the same of the only one, to be heard: recordings that took no pa
 REFUTED = 3.0  # standard deviations by which a delay may miss what answers to commands say
 # times as long a refit takes as projecting a column, and a shape that needs refits as one that does not
 REFIT, DEARER = 30.0, 4.0
+FIRST = 2  # candidates that are looked at closely whatever the others are
+FINER = 2.0  # times what a start of a grid brings: more its optimised shape is not expected to
 
 
 def _resolved(balance: Balance, term: Term) -> bool:
@@ -40,18 +42,27 @@ def rank(
     costs = [len(balance.grid(e).shapes) * (1.0 if additive(e) else REFIT) for e in effects]
     rough = [r for r in pair.map(_rough, places, terms, fit, least, costs=costs) if r is not None]
     rough.sort(key=lambda item: -item[0])
-    starts = [start for _, start in rough]
-    polished = pair.map(
-        polish,
-        starts[:refine],
-        len(terms),
-        costs=[1.0 if additive(s.terms[-1].effect) else DEARER for s in starts[:refine]],
-    )
-    out = [(f, i < refine) for i, f in enumerate([*polished, *starts[refine:]]) if allowed(balance, f)]
+    first = _polished(pair, [start for _, start in rough[: min(refine, FIRST)]], len(terms))
+    passed = min((rough_evidence(balance, f, fit, scale_of(balance, f)) for f in first), default=0.0)
+    hopeful = [_hope(balance, item, fit) > max(passed, 0.0) for item in rough[FIRST:refine]]
+    more = iter(_polished(pair, [s for (_, s), h in zip(rough[FIRST:refine], hopeful, strict=True) if h], len(terms)))
+    rest = [(next(more), True) if h else (s, False) for (_, s), h in zip(rough[FIRST:refine], hopeful, strict=True)]
+    every = [*((f, True) for f in first), *rest, *((s, False) for _, s in rough[max(refine, len(first)) :])]
+    out = [(f, closely) for f, closely in every if allowed(balance, f)]
     scale = min((scale_of(balance, f) for f, _ in out), default=1.0)
     weights = pair.map(_weight, out, fit, scale)
     rivals = [Rival(f.terms[-1].effect.name, w, f) for (f, _), w in zip(out, weights, strict=True)]
     return sorted(rivals, key=lambda r: -r.evidence)
+
+
+def _polished(pair: Pair, starts: list[Fit], which: int) -> list[Fit]:
+    costs = [1.0 if additive(s.terms[-1].effect) else DEARER for s in starts]
+    return pair.map(polish, starts, which, costs=costs)
+
+
+def _hope(balance: Balance, start: tuple[float, Fit], fit: Fit) -> float:
+    """Evidence that a start, its rough evidence with it, may come to where its shape is optimised."""
+    return start[0] + (FINER - 1) * gain(balance, start[1], fit, scale_of(balance, start[1]))
 
 
 def _rough(balance: Balance, effect: Any, terms: tuple[Term, ...], fit: Fit, least: float) -> tuple[float, Fit] | None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 SPARSE = 0.2  # share of entries that are not zero, below which a matrix is kept sparse: events act in one trial
+
+AT_ONCE = 60  # shapes whose columns are made together
 
 
 @dataclass(frozen=True)
@@ -72,8 +75,22 @@ def stacked(columns: Iterable[Array]) -> GridColumns:
     """One matrix from the columns (n, j) of every shape that act at all (of one shape at least)."""
     from scipy.sparse import csc_matrix, hstack
 
-    parts = [part[:, part.any(0)] for part in columns]
-    owner = np.repeat(np.arange(len(parts)), [p.shape[1] for p in parts])
-    if not len(owner) or sum(np.count_nonzero(p) for p in parts) > SPARSE * len(parts[0]) * len(owner):
-        return GridColumns.of(np.concatenate(parts, axis=1), owner)
-    return GridColumns.of(hstack([csc_matrix(p) for p in parts if p.size], format="csc"), owner)
+    owner, kept, sparse = list[int](), list[Any](), True
+    for begin, chunk in enumerate(_chunks(columns)):
+        parts = [part[:, part.any(0)] for part in chunk]
+        owner += [AT_ONCE * begin + i for i, part in enumerate(parts) for _ in range(part.shape[1])]
+        matrix = np.concatenate(parts, axis=1)
+        thin = np.count_nonzero(matrix) <= SPARSE * matrix.size
+        sparse = sparse and thin
+        kept.append(csc_matrix(matrix) if thin else matrix)
+    if owner and sparse:
+        return GridColumns.of(hstack(kept, format="csc"), np.array(owner))
+    dense = [m if isinstance(m, np.ndarray) else m.toarray() for m in kept]
+    return GridColumns.of(np.concatenate(dense, axis=1), np.array(owner, int))
+
+
+def _chunks(columns: Iterable[Array]) -> Iterator[list[Array]]:
+    """AT_ONCE of them at a time."""
+    every = iter(columns)
+    while chunk := list(islice(every, AT_ONCE)):
+        yield chunk

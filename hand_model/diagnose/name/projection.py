@@ -55,15 +55,16 @@ class Projection:
         """Whether every column of the design says something of its own."""
         return bool(np.all(np.abs(np.diag(self.triangle)) > DEPENDENT * np.linalg.norm(self.triangle, axis=0)))
 
-    def rss(self, columns: Array, low: Array, high: Array) -> float | None:
-        """Residual sum of squares of the joint fit of the design and of `columns` (n, j), weighted and whitened, whose
+    def rss(self, columns: Array, low: Array, high: Array, rows: slice = slice(None)) -> float | None:
+        """Residual sum of squares of the joint fit of the design and of `columns` (m, j), weighted and whitened, whose
         coefficients are bounded; None where the design's own coefficients would leave their bounds, or a column hardly
-        says anything beside it."""
-        inside = self.basis.T @ columns
-        gram = columns.T @ columns - inside.T @ inside  # of what is left of them beside the design
-        if np.any(gram.diagonal() < DEPENDENT * np.sum(columns**2, axis=0)):
+        says anything beside it. rows: the m rows outside of which the columns are zero."""
+        inside = self.basis[rows].T @ columns
+        whole = columns.T @ columns
+        gram = whole - inside.T @ inside  # of what is left of them beside the design
+        if np.any(gram.diagonal() < DEPENDENT * whole.diagonal()):
             return None
-        right = columns.T @ self.left
+        right = columns.T @ self.left[rows]
         amplitudes = from_products(gram, right, low, high)
         coefficients = np.linalg.solve(self.triangle, self.explained - inside @ amplitudes)
         if np.any(coefficients < self.low) or np.any(coefficients > self.high):

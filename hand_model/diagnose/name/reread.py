@@ -7,12 +7,14 @@ either: sizes beside it would not be those of the model. What belongs to the rec
 from __future__ import annotations
 
 from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 from copy import copy
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...background import Pair
 from ...effects.base import DriveState
 from ..findings import Finding
 from .balance import Balance, Fit
@@ -31,7 +33,9 @@ SETTLED = 0.003  # of the noise: a round that moves the prediction less is the l
 def reread(findings: Sequence[Finding], stations: Sequence[Station]) -> tuple[tuple[Finding, ...], list[Station]]:
     """Findings with the sizes that they have among themselves, and the stations so read. `declared` of those is beside
     what belongs to the recording."""
-    written = [_written(s, {f.effect for f in findings if s.names(f)}) for s in stations]
+    named = [(i, frozenset(f.effect for f in findings if s.names(f))) for i, s in enumerate(stations)]
+    with Pair(tuple(stations)) as pair:
+        written = pair.map(_again, named, costs=[1.0 + len(names) for _, names in named])
     changed = [
         (old, new) for old, new in zip(stations, written, strict=True) if new.reading.fit.terms != old.reading.fit.terms
     ]
@@ -49,7 +53,11 @@ def reread(findings: Sequence[Finding], stations: Sequence[Station]) -> tuple[tu
     return tuple(out), written
 
 
-def _written(station: Station, names: set[str]) -> Station:
+def _again(stations: tuple[Station, ...], named: tuple[int, frozenset[str]]) -> Station:
+    return _written(stations[named[0]], named[1])
+
+
+def _written(station: Station, names: AbstractSet[str]) -> Station:
     """The station with the terms of these names and of the recording; as it was read where there are no others."""
     naming, out = station.naming, copy(station)
     kept = [i for i, t in enumerate(naming.fit.terms) if t.effect.name in names or t.effect.recorded]

@@ -4,6 +4,7 @@ step."""
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -25,6 +26,7 @@ ALONG = 1e-6  # of a column's length: less left beside the design, and it says n
 CLIPPED_ANEW = 0.005
 EDGE_STEPS, EDGE_ROUNDS = (31, 9, 9), 3  # in which an edge is looked for, ever closer, and how often
 EDGE_GAIN = 1.0  # in the sum of squares, for another round
+FEW = 2  # shapes that are all fitted
 GRAIN = 1.5  # times what the best shape of a grid brings: more no shape between is expected to
 
 
@@ -37,11 +39,26 @@ def scan(balance: Balance, effect: Any, terms: tuple[Term, ...], least: float = 
     shapes = grid.shapes
     if additive(effect):
         shapes = _project(balance, grid, terms, 2 * balance.inflation * least / GRAIN)
-    fits = [balance.fit((*terms, Term(effect, shape)), held=False) for shape in shapes]
-    if not fits:
+    if not shapes:
         return None
-    best = likeliest(balance, fits, -1, priced(balance))
+    best = _likeliest_of(balance, [(*terms, Term(effect, shape)) for shape in shapes])
     return best if balance.train.all() else balance.fit(best.terms)
+
+
+def _likeliest_of(balance: Balance, candidates: Sequence[tuple[Term, ...]]) -> Fit:
+    """The likeliest fit of terms that differ in the last one's shape, parameters paying their price; of many only those
+    are fitted that may be it."""
+
+    def among(chosen: NDArray[np.bool_]) -> list[Fit]:
+        return [balance.fit(terms, held=False) for terms, may in zip(candidates, chosen, strict=True) if may]
+
+    errors = np.array(
+        [balance.error(terms) for terms in candidates] if len(candidates) > FEW else [0.0] * len(candidates)
+    )
+    spread = parameter_price(balance) * len(candidates[0][-1].effect.amplitudes())
+    near = errors <= errors.min() + spread
+    best = likeliest(balance, among(near), -1, priced(balance))
+    return best if possible(balance, best, -1) else likeliest(balance, [best, *among(~near)], -1, priced(balance))
 
 
 def _project(balance: Balance, grid: Grid, terms: tuple[Term, ...], least: float) -> list[dict[str, float]]:
@@ -79,6 +96,8 @@ def polish(balance: Balance, fit: Fit, which: int) -> Fit:
     if not shapes:
         return fit
     others = tuple(t for i, t in enumerate(fit.terms) if i != which)
+    learning = balance.learning()
+    near = fit if learning is balance else replace(fit, prediction=fit.prediction[balance.train])
 
     def optimum(error: Error) -> Fit:
         best = _descended(error, term.shape, shapes)
@@ -89,12 +108,12 @@ def polish(balance: Balance, fit: Fit, which: int) -> Fit:
             best = _descended(error, moved, shapes)
         return balance.fit((*fit.terms[:which], Term(term.effect, best), *fit.terms[which + 1 :]))
 
-    best = optimum(balance.error_beside(others, term.effect, fit))
+    best = optimum(learning.error_beside(others, term.effect, near))
     if (
         any(t.effect.clips for t in others)
         and np.mean(balance.unclipped_by(best) != balance.unclipped_by(fit)) > CLIPPED_ANEW
     ):
-        best = optimum(balance.error_beside(others, term.effect))
+        best = optimum(learning.error_beside(others, term.effect))
     return likeliest(balance, (fit, best), which)
 
 

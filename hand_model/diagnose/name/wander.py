@@ -8,7 +8,7 @@ replicates say.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -38,6 +38,17 @@ class Wander:
     def real(self) -> bool:
         """Whether it brings as much evidence as any effect must."""
         return self.evidence >= EVIDENCE_LEAST
+
+    @cached_property
+    def _pieces(self) -> dict[tuple[int, int], Wander]:
+        return {}
+
+    def within(self, rows: slice) -> Wander:
+        """The levels of some rows alone, which hold whole whiles."""
+        place = rows.start, rows.stop
+        if place not in self._pieces:
+            self._pieces[place] = replace(self, label=self.label[rows])
+        return self._pieces[place]
 
     @cached_property
     def _starts(self) -> NDArray[np.int64]:
@@ -70,12 +81,12 @@ class Wander:
         return out
 
     def common(self, weighted: Array, weight: Array, inflation: float) -> Array:
-        """What the levels take off the products (k, k) of weighted columns (n, k): X'X less this is that of the
-        whitened ones (Woodbury)."""
+        """What the levels take off the products (k, k) of weighted columns, rows here (k, n): X X' less this is that of
+        the whitened ones (Woodbury)."""
         size = np.add.reduceat(weight**2, self._starts)
-        sums = np.stack([np.add.reduceat(column * weight, self._starts) for column in weighted.T], axis=1)
+        sums = np.add.reduceat(weighted * weight, self._starts, axis=1)
         share = self.deviation**2 / (inflation + self.deviation**2 * size)
-        return sums.T @ (share[:, None] * sums)
+        return (sums * share) @ sums.T
 
     def log_likelihood(self, residual: Array, weight: Array, inflation: float) -> float:
         """Log likelihood of a weighted residual (n,), normalised to that of white noise of the same weights."""

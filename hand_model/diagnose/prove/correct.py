@@ -33,12 +33,17 @@ def refuse_output(output: Path) -> None:
 
 
 def write_corrected(
-    session: Session, findings: Sequence[Finding], encoders: Mapping[str, Callable[[Array], Array]], output: Path
+    session: Session,
+    findings: Sequence[Finding],
+    encoders: Mapping[str, Callable[[Array], Array]],
+    output: Path,
+    read: Mapping[str, tuple[FingerAngles, MarkerNaming]] | None = None,
 ) -> Path | None:
     """Write the session with every correction of `findings` applied into `output`/corrected; None where there is none
     to apply.
 
-    encoders: actuator -> correction of its encoder counts. Marker files become QTM TSV, logs CSV, where they are
+    encoders: actuator -> correction of its encoder counts. read: finger -> its angles and what its markers tell, where
+    that is known already. Marker files become QTM TSV, logs CSV, where they are
     changed; the manifest names them, everything else is copied as it is, but for `output` itself. Replaces an earlier
     copy, whole or not at all.
     """
@@ -69,7 +74,7 @@ def write_corrected(
             ignore=lambda folder, names: [n for n in names if (Path(folder) / n).resolve() in ours],
         )
         renamed: dict[str, str] = {}
-        for path, mocap in _corrected_files(session, markers).items():
+        for path, mocap in _corrected_files(session, markers, read or {}).items():
             renamed |= _replace(session, path, staging, ".tsv", lambda file, m=mocap: write_tsv(file, m))
         for trial in session.trials:
             actuator = session.finger(trial.finger).actuator if trial.finger is not None else None
@@ -86,15 +91,20 @@ def _logs_of(session: Session, finding: Finding) -> set[str]:
     return {t.name for t in session.trials if t.finger in fingers}
 
 
-def _corrected_files(session: Session, markers: Mapping[str, set[str]]) -> dict[Path, Mocap]:
+def _corrected_files(
+    session: Session, markers: Mapping[str, set[str]], read: Mapping[str, tuple[FingerAngles, MarkerNaming]]
+) -> dict[Path, Mocap]:
     """Marker file -> what it should have held; one file may hold several fingers. markers: finger -> effects to put
     right."""
     from ...identify.identification import palm_shape
 
     out: dict[Path, Mocap] = {}
     for finger in (f for f in session.fingers if markers[f.name]):
-        angles = finger_angles(session, finger, palm_shape(session))
-        naming = name_markers(angles)
+        if finger.name in read:
+            angles, naming = read[finger.name]
+        else:
+            angles = finger_angles(session, finger, palm_shape(session))
+            naming = name_markers(angles)
         for index, record in enumerate(angles.records):
             path = Path(str(record.trial.mocap_path))
             out[path] = corrected_markers(angles, naming, index, markers[finger.name], out.get(path, record.mocap))
