@@ -283,18 +283,17 @@ class Balance:
             for state, rows in zip(self.states, self._rows, strict=True)
             if len(rows)
         }
-        idle = np.zeros(own.stop, bool)
         acting = [
-            np.any([idle, *(part.any(0) for part in parts if part is not None)], axis=0)
+            np.any([part.any(0) for part in parts if part is not None] or [[False]], axis=0)
             for parts in zip(*plain.values(), strict=True)
         ]
         some = [i for i, which in enumerate(acting) if which.any()]
 
         def bent(state: DriveState) -> Array:
-            nothing = np.zeros((len(state.time_s), own.stop))
-            parts = [nothing if (part := plain[id(state)][i]) is None else part for i in some]
-            columns = [part[:, acting[i]] for i, part in zip(some, parts, strict=True)]
-            return warped(state, np.concatenate(columns, axis=1) if columns else nothing[:, :0], bends)
+            every = len(state.time_s)
+            parts = [(plain[id(state)][i], acting[i]) for i in some]
+            columns = [np.zeros((every, which.sum())) if p is None else p[:, which] for p, which in parts]
+            return warped(state, np.concatenate(columns, axis=1) if columns else np.zeros((every, 0)), bends)
 
         together = self.gather(bent) * weight[:, None]
         edges = np.cumsum([np.count_nonzero(which) for which in acting])[:-1]
