@@ -67,6 +67,18 @@ def test_jenkins_is_elastic_then_yields() -> None:
     assert z[499] == 1 and z[-1] == -1
 
 
+@pytest.mark.parametrize(("count", "constant_s"), [(1, 0.1), (2, 0.1), (700, 0.03), (700, 1.0), (700, 1e-9)])
+def test_lowpass_of_uneven_samples_goes_from_one_to_the_next(count, constant_s) -> None:
+    rng = np.random.default_rng(0)
+    time_s = np.cumsum(rng.uniform(0.002, 0.03, count))
+    values = np.cumsum(rng.normal(size=count))
+    wanted = [values[0]]
+    for i in range(1, count):
+        kept = np.exp(-(time_s[i] - time_s[i - 1]) / constant_s)
+        wanted.append(0.5 * (values[i] + values[i - 1]) * (1 - kept) + kept * wanted[-1])
+    np.testing.assert_allclose(lowpass(time_s, values, constant_s), wanted, rtol=1e-12, atol=1e-12)
+
+
 def test_lowpass_of_a_step_is_exponential() -> None:
     t = np.linspace(0, 3, 3001)
     y = lowpass(t, (t > 1e-4).astype(float), 0.5)

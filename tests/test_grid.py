@@ -10,7 +10,7 @@ from test_diagnose import drive, planted
 
 from hand_model.diagnose.name.balance import Balance
 from hand_model.diagnose.name.grid import stacked
-from hand_model.diagnose.name.shapes import scan
+from hand_model.diagnose.name.shapes import error_beside, scan
 from hand_model.diagnose.name.term import Term
 from hand_model.diagnose.name.wander import Wander
 from hand_model.effects import effect
@@ -54,6 +54,43 @@ def test_what_is_learned_is_the_same_without_the_recordings_that_take_no_part(na
     assert balance.learning() is balance.learning() and balance.learning().learning() is balance.learning()
     again = pickle.loads(pickle.dumps(balance))
     assert again.fit(terms).rss == whole.rss and len(pickle.dumps(balance)) < 2 * len(pickle.dumps(Balance(states)))
+
+
+@pytest.mark.parametrize("restless", [False, True])
+@pytest.mark.parametrize(
+    ("name", "shape"),
+    [
+        ("current_channel_delay", {"form": 0.0, "delay": 0.03}),
+        ("current_saturation", {"limit": 50.0}),
+        ("presliding_friction", {"bristle_length": 1.5}),
+        ("stribeck_friction", {"form": 0.0, "stribeck_speed": 20.0}),
+    ],
+)
+def test_the_error_of_a_fit_is_known_sooner_than_the_fit(name, shape, restless) -> None:
+    states = drive(7, planted("detent_load", {"form": 0.0, "centre": 50.0, "width": 6.0}, [12.0]), trials=4)
+    balance = Balance(states)
+    balance = balance.wandering(Wander(balance.stroke, 2.0, 9.0, np.inf) if restless else None)
+    terms = (Term(effect("detent_load"), {"form": 0.0, "centre": 50.0, "width": 6.0}), Term(effect(name), shape))
+    for one in (balance, balance.learning(), balance.settled()):
+        assert one.error(terms) == pytest.approx(one.fit(terms).rss, rel=1e-9)
+
+
+@pytest.mark.parametrize("trial", [0.0, 1.0, -2.0])
+def test_an_obstacle_is_looked_for_along_its_own_recordings(trial) -> None:
+    """Rows of the others add nothing: its error is that of whole fits, of all recordings and of those that learn."""
+    balance = Balance(drive(7, planted("detent_load", {"form": 0.0, "centre": 50.0, "width": 6.0}, [12.0]), trials=4))
+    balance = balance.wandering(Wander(balance.stroke, 2.0, 9.0, np.inf))
+    kind = effect("external_contact")
+    others = (Term(effect("stribeck_friction"), {"form": 0.0, "stribeck_speed": 20.0}),)
+    shape = {"trial": trial, "form": 0.0, "since": 0.2, "until": 0.8, "begin": 40.0}
+    for one in (balance, balance.learning()):
+        columns, rows = one.acting_columns(kind, shape)
+        whole = one.columns(kind, shape)
+        assert (rows is None) == (len(columns) == len(whole))
+        rest = np.delete(whole, np.arange(len(whole))[rows or slice(None)], axis=0)
+        assert not rest.any() and not whole[:, one.own_columns(kind).stop :].any()
+        wanted = one.fit((*others, Term(kind, shape))).rss
+        assert error_beside(one, others, kind)(shape) == pytest.approx(wanted, rel=1e-9)
 
 
 def test_beside_a_term_that_clips_kept_columns_serve() -> None:

@@ -15,7 +15,7 @@ from hand_model.diagnose.name.entries import finding_of
 from hand_model.diagnose.name.judgement import judged
 from hand_model.diagnose.name.reread import of_recording, reread
 from hand_model.diagnose.name.selection import name_effects
-from hand_model.diagnose.name.shapes import polish
+from hand_model.diagnose.name.shapes import error_beside, polish
 from hand_model.diagnose.name.term import Term
 from hand_model.effects import catalogue, effect
 
@@ -98,7 +98,7 @@ def test_a_shape_polished_beside_a_projection_is_that_of_full_fits(name, shape, 
         Term(effect("stribeck_friction"), {"form": 0.0, "stribeck_speed": 20.0}),
         Term(effect("nonlinear_spring"), {"form": 0.0}),
     )
-    error = balance.error_beside(others, effect(name), balance.fit(others))
+    error = error_beside(balance, others, effect(name), balance.fit(others))
     for step in (0.0, 0.3, 0.7):
         moved = {**shape, **{k: v + step for k, v in start.items()}}
         whole = balance.fit((*others, Term(effect(name), moved))).rss

@@ -7,23 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from ...effects.base import DriveState
-from ...effects.path import strokes
 from .grid import AT_ONCE, Grid, GridColumns, stacked
 from .least_squares import from_products
-from .memory import Memory
-from .noise import noise
 from .projection import Projection
-from .term import DISCRETE, Term, additive, bending, key_of, keys, replaced, warped
-
-if TYPE_CHECKING:
-    from .wander import Wander
+from .samples import Samples
+from .term import DISCRETE, Term, bending, key_of, keys, replaced, warped
 
 Array = NDArray[np.float64]
 
@@ -31,8 +26,6 @@ Array = NDArray[np.float64]
 # What physics allows of a declared coefficient, by its column's name.
 DECLARED_LOW = {"inertia": 0.0, "viscous": 0.0, "coulomb": 0.0, "spring": 0.0}
 MOST_KEPT = 6e8  # bytes of columns that one balance keeps
-SETTLED = 0.25  # of the noise: more of what starts and stops bring, and motion is not steady
-UNSETTLED = 1e-3  # weight left to a start or stop where steady motion alone is asked
 
 
 @dataclass(frozen=True)
@@ -56,49 +49,19 @@ class Fit:
         )
 
 
-class Balance:
-    """The compared samples of several DriveStates, stacked.
-
-    effort, weight (1 / standard deviation), timing (the part of that deviation that starts and stops bring), train
-    (bool): (n,). sigma:
-    noise of the effort; inflation: integrated autocorrelation of that noise (1 where it is white): a sum of squares
-    counts divided by it. untouched: whether some recordings take no part in learning. typical: declared coefficients of
-    other balances of the same kind, by name.
-    """
+class Balance(Samples):
+    """The linear model of stacked samples: declared columns and those of effects, which may bend one another."""
 
     def __init__(
         self, states: tuple[DriveState, ...], everything: bool = False, typical: Mapping[str, float] | None = None
     ) -> None:
-        self.states, self.typical = states, typical or {}
-        self.masks = [np.isfinite(s.effort) & np.isfinite(s.declared).all(1) for s in states]
-        self._rows = [np.flatnonzero(m) for m in self.masks]
-        self.effort = self.gather(lambda s: s.effort)
-        self.train = np.concatenate(
-            [np.full(m.sum(), everything or not s.validate) for s, m in zip(states, self.masks, strict=True)]
-        )
-        self.untouched = not self.train.all()
-        self.names = states[0].declared_names or tuple(f"c{i}" for i in range(states[0].declared.shape[1]))
-        self.stroke = self._strokes()
-        self.sigma, self.inflation = 1.0, 1.0
-        self.weight = np.ones(len(self.effort))
-        self.sigma, self.inflation = noise(self)
-        self.timing = self.gather(lambda s: s.extra.get("sigma", np.zeros(len(s.time_s))))
-        self.weight = 1 / np.hypot(self.sigma, self.timing)
-        self.steady = self.timing <= SETTLED * self.sigma
-        self.wander: Wander | None = None
+        super().__init__(states, everything, typical)
         self._grids: dict[Any, Grid] = {}
         self._kept: dict[Any, tuple[Any, GridColumns]] = {}
-        self._last = Memory()
         self._apart: Any = None
-        self._learning: Balance | None = None
 
-    def wandering(self, wander: Wander | None) -> Balance:
-        """The same balance with a random level per while in its noise, where that is real."""
-        return self._with(wander=wander if wander is not None and wander.real else None)
-
-    def with_inflation(self, inflation: float) -> Balance:
-        """The same balance with noise that lasts as long as an integrated autocorrelation says."""
-        return self._with(inflation=inflation)
+    def _fresh(self) -> dict[str, Any]:
+        return {**super()._fresh(), "_kept": {}, "_apart": None}
 
     def remapped(self, fit: Fit) -> Balance:
         """The same balance with the slope of its map as it is in a fit, for what yields moves along that; of a balance
@@ -125,74 +88,6 @@ class Balance:
             return replace(state, extra={**state.extra, "required": effort})
 
         return self.told(asked)
-
-    def told(self, other: Callable[[DriveState], DriveState]) -> Balance:
-        """The same balance with `other` of each state in its place: of the same samples, efforts and noise."""
-        return self._with(states=tuple(other(s) for s in self.states), _last=Memory())
-
-    def settled(self) -> Balance:
-        """The same balance with next to no weight on starts and stops."""
-        return self.only(self.steady)
-
-    def only(self, samples: NDArray[np.bool_]) -> Balance:
-        """The same balance with next to no weight on any other samples than these (n,)."""
-        return self._with(weight=np.where(samples, self.weight, UNSETTLED * self.weight))
-
-    def learning(self) -> Balance:
-        """The same balance without the samples of recordings that take no part in learning: what is only compared is
-        found there sooner."""
-        if self._learning is None:
-            mine = self.train
-            kept = {
-                name: getattr(self, name)[mine] for name in ("effort", "weight", "timing", "steady", "stroke", "train")
-            }
-            rows = [rows[:0] if state.validate else rows for state, rows in zip(self.states, self._rows, strict=True)]
-            wander = None if self.wander is None else replace(self.wander, label=self.wander.label[mine])
-            self._learning = self if mine.all() else self._with(**kept, _rows=rows, wander=wander, _last=Memory())
-        return self._learning
-
-    def _with(self, **changes: Any) -> Balance:
-        """The same balance with other attributes, what is kept of weighted columns thrown away."""
-        other = object.__new__(Balance)
-        other.__dict__.update({**self.__dict__, "_kept": {}, "_apart": None, "_learning": None, **changes})
-        return other
-
-    def __getstate__(self) -> dict[str, Any]:
-        """What another process needs: nothing of what is only kept to save time."""
-        return {**self.__dict__, "_kept": {}, "_apart": None, "_learning": None, "_last": Memory()}
-
-    def whiten(self, values: Array, weight: Array, rows: slice | None = None) -> Array:
-        """Weighted values (n,) or (n, k) in which the noise is as good as white; as they are without `wander`. rows:
-        those of whole recordings that the values are of, None for all."""
-        if self.wander is None:
-            return values
-        return (self.wander if rows is None else self.wander.within(rows)).whiten(values, weight, self.inflation)
-
-    def products(self, weighted: Array, weight: Array) -> Array:
-        """Products (k, k) with each other of columns, rows here (k, n), that are weighted by `weight`, whitened."""
-        out = weighted @ weighted.T
-        return out if self.wander is None else out - self.wander.common(weighted, weight, self.inflation)
-
-    def gather(self, value: Any, first: int = 0, end: int | None = None) -> Array:
-        """Stack `value(state)` (n, ...) over the compared samples, of the recordings from `first` to before `end`
-        alone."""
-        return np.concatenate(
-            [
-                np.asarray(value(s)).take(rows, axis=0)
-                for s, rows in zip(self.states[first:end], self._rows[first:end], strict=True)
-                if len(rows)
-            ]
-        )
-
-    def _strokes(self) -> NDArray[np.int64]:
-        out, count = [], 0
-        for state in self.states:
-            label = np.zeros(len(state.time_s), int)
-            for a, b, _ in strokes(state.position):
-                label[a:b] = count
-                count += 1
-            out.append(label)
-        return np.concatenate([label[m] for label, m in zip(out, self.masks, strict=True)])
 
     def columns(self, effect: Any, shape: Mapping[str, float], bends: tuple[Term, ...] = ()) -> Array:
         """An effect's columns (n, j), as those of `bends` make them, unweighted. To be read only: the last ones are
@@ -412,41 +307,14 @@ class Balance:
         """The design of `terms` taken out of the effort, samples that they clip left out. The last one is kept, for
         every candidate beside the same terms asks for it."""
         if self._apart is None or self._apart[0] != terms:
-            self._apart = terms, self._taken_out(terms, self.unclipped(terms))
+            self._apart = terms, self.taken_out(terms, self.unclipped(terms))
         return self._apart[1]
 
-    def _taken_out(self, terms: tuple[Term, ...], inside: NDArray[np.bool_]) -> Projection:
+    def taken_out(self, terms: tuple[Term, ...], inside: NDArray[np.bool_]) -> Projection:
+        """The same, of the samples `inside` (n,)."""
         w = self.weights(terms) * self.train * inside
         matrix, low, high = self.design(terms)
         return Projection.of(self.whiten(matrix * w[:, None], w), self.whiten(self.effort * w, w), w, low, high)
-
-    def error_beside(
-        self, terms: tuple[Term, ...], effect: Any, near: Fit | None = None
-    ) -> Callable[[Mapping[str, float]], float]:
-        """The sum of squares (as `Fit.rss`) of `terms` and one more effect, as a function of that effect's shape. near:
-        beside terms that clip, of the samples that this fit leaves unclipped; as long as these stay so, what the others
-        add is the same."""
-
-        def fitted(shape: Mapping[str, float]) -> float:
-            return self.error((*terms, Term(effect, shape)))
-
-        clipped = any(t.effect.clips for t in terms)
-        if not additive(effect) or clipped and near is None:
-            return fitted
-        rest = self._taken_out(terms, self.unclipped_by(near)) if clipped else self.apart(terms)
-        if not rest.regular:
-            return fitted
-        more = self.vagueness(self.weights(terms)) + self.unanswered(terms)
-        bends = bending(terms, effect)
-        low, high = (np.array([a[i] for a in effect.amplitudes()[self.own_columns(effect)]]) for i in (2, 3))
-
-        def projected(shape: Mapping[str, float]) -> float:
-            columns, rows = self.acting_columns(effect, shape, bends)
-            weight = rest.weight if rows is None else rest.weight[rows]
-            rss = rest.rss(self.whiten(columns * weight[:, None], weight, rows), low, high, rows or slice(None))
-            return fitted(shape) if rss is None else rss + more
-
-        return projected
 
     def weights(self, terms: tuple[Term, ...]) -> Array:
         """1 / standard deviation (n,) beside `terms`: what is not known of rest, starts and stops stays, and is delayed

@@ -11,7 +11,7 @@ from ...effects.base import sample_interval
 from .least_squares import bounded_least_squares
 
 if TYPE_CHECKING:
-    from .balance import Balance
+    from .samples import Samples
 
 Array = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ LONGEST, LONGEST_S = 15, 0.25
 FEW, LOUDER = 100, 3.0
 
 
-def noise(balance: Balance) -> tuple[float, float]:
+def noise(balance: Samples) -> tuple[float, float]:
     """Standard deviation of the effort's noise and its integrated autocorrelation time in samples.
 
     Pure error of replicates: the declared fit's residual minus its mean over all strokes with the same direction, speed
@@ -60,7 +60,7 @@ def noise(balance: Balance) -> tuple[float, float]:
     return float(np.sqrt(max(covariance[0], 1e-300) / share)), float(1 + 2 * rho[1:stop].sum())
 
 
-def replicate_deviation(balance: Balance, residual: Array, use: NDArray[np.bool_]) -> tuple[Array, float]:
+def replicate_deviation(balance: Samples, residual: Array, use: NDArray[np.bool_]) -> tuple[Array, float]:
     """Residual minus its mean over the other strokes' replicates (n,), nan where there are none, and the share of the
     variance that is left by taking a mean out."""
     position, velocity = balance.gather(lambda s: s.position), balance.gather(lambda s: s.velocity)
@@ -81,7 +81,7 @@ def replicate_deviation(balance: Balance, residual: Array, use: NDArray[np.bool_
     return (out, float(np.concatenate(shares).mean())) if shares else (np.zeros(0), 1.0)
 
 
-def loudness(balance: Balance, residual: Array) -> Array:
+def loudness(balance: Samples, residual: Array) -> Array:
     """Noise of the recording of each sample (n,) over that of all, by how neighbouring residuals (n,) differ; one where
     it is no louder than by chance."""
     recording = balance.gather(lambda s: np.full(len(s.time_s), s.trial))
@@ -97,7 +97,7 @@ def loudness(balance: Balance, residual: Array) -> Array:
     return out
 
 
-def _plain_fit(balance: Balance, use: NDArray[np.bool_]) -> Array:
+def _plain_fit(balance: Samples, use: NDArray[np.bool_]) -> Array:
     matrix = balance.gather(lambda s: s.declared)
     free = np.full(matrix.shape[1], np.inf)
     use = use if use.sum() > 5 * matrix.shape[1] else np.ones(len(matrix), bool)

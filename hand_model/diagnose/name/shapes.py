@@ -16,7 +16,7 @@ from ...effects.base import Shape
 from .balance import Balance, Fit
 from .evidence import parameter_price
 from .grid import Grid
-from .term import DISCRETE, Term, additive
+from .term import DISCRETE, Term, additive, bending
 
 Array = NDArray[np.float64]
 Error = Callable[[Mapping[str, float]], float]  # of a shape
@@ -88,6 +88,35 @@ def _project(balance: Balance, grid: Grid, terms: tuple[Term, ...], least: float
     return [grid.shapes[i] for i in np.argsort(worth)[::-1][:2] if np.isfinite(worth[i])]
 
 
+def error_beside(balance: Balance, terms: tuple[Term, ...], effect: Any, near: Fit | None = None) -> Error:
+    """The sum of squares (as `Fit.rss`) of `terms` and one more effect, as a function of that effect's shape. near:
+    beside terms that clip, of the samples that this fit leaves unclipped; as long as these stay so, what the others add
+    is the same."""
+
+    def fitted(shape: Mapping[str, float]) -> float:
+        return balance.error((*terms, Term(effect, shape)))
+
+    clipped = any(t.effect.clips for t in terms)
+    if not additive(effect) or clipped and near is None:
+        return fitted
+    rest = (
+        balance.taken_out(terms, balance.unclipped_by(near)) if clipped and near is not None else balance.apart(terms)
+    )
+    if not rest.regular:
+        return fitted
+    more = balance.vagueness(balance.weights(terms)) + balance.unanswered(terms)
+    bends = bending(terms, effect)
+    low, high = (np.array([a[i] for a in effect.amplitudes()[balance.own_columns(effect)]]) for i in (2, 3))
+
+    def projected(shape: Mapping[str, float]) -> float:
+        columns, rows = balance.acting_columns(effect, shape, bends)
+        weight = rest.weight if rows is None else rest.weight[rows]
+        rss = rest.rss(balance.whiten(columns * weight[:, None], weight, rows), low, high, rows or slice(None))
+        return fitted(shape) if rss is None else rss + more
+
+    return projected
+
+
 def polish(balance: Balance, fit: Fit, which: int) -> Fit:
     """Optimise the shape of one term within its bounds, everything linear refitted at each step; as it was where no
     machine could be like the optimum."""
@@ -108,12 +137,12 @@ def polish(balance: Balance, fit: Fit, which: int) -> Fit:
             best = _descended(error, moved, shapes)
         return balance.fit((*fit.terms[:which], Term(term.effect, best), *fit.terms[which + 1 :]))
 
-    best = optimum(learning.error_beside(others, term.effect, near))
+    best = optimum(error_beside(learning, others, term.effect, near))
     if (
         any(t.effect.clips for t in others)
         and np.mean(balance.unclipped_by(best) != balance.unclipped_by(fit)) > CLIPPED_ANEW
     ):
-        best = optimum(learning.error_beside(others, term.effect))
+        best = optimum(error_beside(learning, others, term.effect))
     return likeliest(balance, (fit, best), which)
 
 

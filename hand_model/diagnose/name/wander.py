@@ -14,8 +14,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .balance import Balance
 from .noise import replicate_deviation
+from .samples import Samples
 
 Array = NDArray[np.float64]
 
@@ -95,7 +95,7 @@ class Wander:
         return -0.5 * (left + float(np.sum(np.log1p(self.deviation**2 * size))))
 
 
-def estimate_wander(balance: Balance, prediction: Array) -> Wander | None:
+def estimate_wander(balance: Samples, prediction: Array) -> Wander | None:
     """The random level that the residual of a prediction (n,) shows in training recordings, beside what repeats: the
     likeliest size and length of a while (Laird & Ware 1982). None where there are too few replicates to tell."""
     use = balance.train & balance.steady
@@ -126,7 +126,7 @@ def _gain(variance: float, size: Array, square: Array) -> float:
     return 0.5 * float(np.sum(square * variance / grown - np.log(grown)))
 
 
-def whiles(balance: Balance, length_s: float) -> NDArray[np.int64]:
+def whiles(balance: Samples, length_s: float) -> NDArray[np.int64]:
     """Label (n,) of the while to which each compared sample belongs: strokes, cut into pieces of `length_s` [s]."""
     if not np.isfinite(length_s):
         return balance.stroke

@@ -15,8 +15,8 @@ from ...effects import effect
 from ...effects.base import DriveState
 from ...effects.path import strokes
 from ..findings import Finding
-from ..name.balance import SETTLED
 from ..name.reread import of_recording
+from ..name.samples import SETTLED
 
 Array = NDArray[np.float64]
 Place = tuple[str, str | None, str | None, str | None]  # signal, finger, joint, actuator of a station
