@@ -152,24 +152,17 @@ def jacobians(chain: Chain, body: Array, angle_rad: Array) -> tuple[Array, Array
     Returns x (n, m, 3) [m]; by frame unknowns (n, m, 3, 6 + k) as in `Pose.moved`; by marker (n, m, 3, 3): the rotation
     of its body; by joint unknowns (n, m, 3, 4 k) as in `Chain.moved`, those of a plain hinge (a course is small).
     """
-    x, rotations, joints = propagate(chain, body, angle_rad)
+    placed = propagate(chain, body, angle_rad)
+    x, rotations, joints = placed
+    by_frame = _by_frame(chain, body, angle_rad, placed)
     n, m, n_joints = len(x), len(body), angle_rad.shape[1]
-    by_frame = np.zeros((n, m, 3, 6 + n_joints))
     by_joint = np.zeros((n, m, 3, 4 * n_joints))
-    by_frame[..., :3] = np.eye(3)
-    by_frame[..., 3:6] = -skew(x)
     tangent = chain.tangent
     for k in range(n_joints):
         moved = np.flatnonzero(body > k)
-        axis, centre = joints[k]
         outer, inner = rotations[:, k], rotations[:, k + 1]
-        arm = x[:, moved] - centre[:, None]
+        arm = x[:, moved] - joints[k][1][:, None]
         arm_rest = np.einsum("nji,nmj->nmi", inner, arm)
-        by_frame[..., 6 + k][:, moved] = np.cross(axis[:, None], arm)
-        if chain.course(k) is not None:
-            own = motion(chain.axis_palm[k], chain.centre_palm[k], chain.course(k), angle_rad[:, k])
-            spin, drift = ((outer @ v[..., None])[:, None, :, 0] for v in (own.spin, own.drift))
-            by_frame[..., 6 + k][:, moved] = np.cross(spin, arm) + drift
         for i in range(2):
             # tilting the axis along the tangent = turning it about this
             turn = np.cross(chain.axis_palm[k], tangent[k, i])
@@ -178,6 +171,32 @@ def jacobians(chain: Chain, body: Array, angle_rad: Array) -> tuple[Array, Array
             by_joint[..., 4 * k + i][:, moved] = tilt_after - tilt_before
             by_joint[..., 4 * k + 2 + i][:, moved] = ((outer - inner) @ tangent[k, i])[:, None]
     return x, by_frame, rotations[:, body], by_joint
+
+
+def frame_jacobian(chain: Chain, body: Array, angle_rad: Array) -> tuple[Array, Array]:
+    """The first two of `jacobians`, sooner: positions x (n, m, 3) [m] and what frame unknowns do (n, m, 3, 6 + k)."""
+    placed = propagate(chain, body, angle_rad)
+    return placed[0], _by_frame(chain, body, angle_rad, placed)
+
+
+def _by_frame(
+    chain: Chain, body: Array, angle_rad: Array, placed: tuple[Array, Array, list[tuple[Array, Array]]]
+) -> Array:
+    x, rotations, joints = placed
+    n, m, n_joints = len(x), len(body), angle_rad.shape[1]
+    by_frame = np.zeros((n, m, 3, 6 + n_joints))
+    by_frame[..., :3] = np.eye(3)
+    by_frame[..., 3:6] = -skew(x)
+    for k in range(n_joints):
+        moved = np.flatnonzero(body > k)
+        axis, centre = joints[k]
+        arm = x[:, moved] - centre[:, None]
+        by_frame[..., 6 + k][:, moved] = np.cross(axis[:, None], arm)
+        if chain.course(k) is not None:
+            own = motion(chain.axis_palm[k], chain.centre_palm[k], chain.course(k), angle_rad[:, k])
+            spin, drift = ((rotations[:, k] @ v[..., None])[:, None, :, 0] for v in (own.spin, own.drift))
+            by_frame[..., 6 + k][:, moved] = np.cross(spin, arm) + drift
+    return by_frame
 
 
 def palm_pose(chain: Chain, data: ChainData, weight: Array | None = None) -> Pose:

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from .chain import Chain, ChainData, Pose, jacobians, palm_pose, propagate
+from .chain import Chain, ChainData, Pose, frame_jacobian, jacobians, palm_pose, propagate
 
 Array = NDArray[np.float64]
 
@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 OUTLIER_LIMIT = 4.5
 # A step of this many standard deviations (all shared unknowns together) is the last: the next would be far smaller.
 STEP_LIMIT = 0.1
+LAST_STEP = 1e-8  # [m, rad]: a frame that moves less stays
 # Frames that bring the chain into its basin before all frames are used.
 START_FRAMES = 400
 # There the outlier limit starts this many times wider and halves with every step, so that a poor start is not taken for
@@ -85,13 +86,18 @@ def angle_noise_ratio(fit: ChainFit) -> Array:
 def fit_poses(data: ChainData, chain: Chain, noise_m: float, iterations: int = 8) -> tuple[Pose, Array]:
     """Poses of all frames for a known chain, and the robust weights (n, m) of their markers."""
     pose = palm_pose(chain, data)
+    left = np.arange(len(data.position_world))  # frames that still move
     for _ in range(iterations):
-        residual, by_frame, _, _ = _linearise(data, chain, pose)
-        weight = robust_weight(residual, noise_m)
-        block, gradient = _frame_system(by_frame, residual, weight)
+        here, seen = pose.take(left), data.take(left)
+        x, by_frame = frame_jacobian(chain, data.body, here.angle_rad)
+        residual = here.to_palm(seen.position_world) - x
+        block, gradient = _frame_system(by_frame, residual, robust_weight(residual, noise_m))
         step = np.linalg.solve(block, gradient[..., None])[..., 0]
-        pose = pose.moved(step)
-        if np.abs(step).max(initial=0.0) < 1e-8:
+        here = here.moved(step)
+        for name in ("rotation", "translation", "angle_rad"):
+            getattr(pose, name)[left] = getattr(here, name)
+        left = left[np.abs(step).max(axis=1) >= LAST_STEP]
+        if not len(left):
             break
     return pose, robust_weight(_residual(data, chain, pose), noise_m)
 
