@@ -132,7 +132,7 @@ def test_a_passive_session_without_validation_is_diagnosed(tmp_path: Path, zero:
     text = text.replace('frictionloss="0.05"', 'frictionloss="0.004"')
     (tmp_path / "log").mkdir()
     (tmp_path / "rig.xml").write_text(text)
-    manifest, n = HEAD.replace('torque = "actuator:motor:force"\n', ""), 2500
+    manifest, n = HEAD.replace('torque = "actuator:motor:force"\n', ""), 1500
     truth = vector({"inertia": 0.0225, "damping": 0.001, "coulomb": 0.004, "drag": 0.004})
     for k, start in enumerate((1.4, 0.8)):
         lane = Lane("x", False, np.zeros(n), 1.0, np.zeros(n), (start, 0.0), np.zeros(n), np.ones(n))
