@@ -138,3 +138,34 @@ def test_a_hearing_without_what_fell_explains_as_much_as_the_names_that_did_not_
     assert not _as_likely(named(slip), named(spring, spot), fallen)
     assert _as_likely(named(spring), named(slip, spot), fallen)
     assert _as_likely(named(spring, slip), named(spring, spot), fallen)
+
+
+@pytest.mark.parametrize(
+    ("name", "shape", "amplitude"),
+    [
+        ("stribeck_friction", {"form": 0.0, "stribeck_speed": 12.0}, [14.0]),
+        ("detent_load", {"form": 0.0, "centre": 47.0, "width": 6.0}, [8.0]),
+    ],
+)
+def test_candidates_that_cannot_pass_are_not_looked_at_closely_and_the_first_are_the_same(
+    monkeypatch: pytest.MonkeyPatch, name, shape, amplitude
+) -> None:
+    balance = Balance(drive(7, planted(name, shape, amplitude), trials=3)).learning()
+    effects, polish, looked_at = tuple(catalogue("drive")), candidates.polish, []
+    pair = SimpleNamespace(
+        state=balance, map=lambda function, items, *rest, costs=None: [function(balance, i, *rest) for i in items]
+    )
+
+    def counted(balance, fit, which):
+        looked_at.append(fit.terms[which].effect.name)
+        return polish(balance, fit, which)
+
+    monkeypatch.setattr(candidates, "polish", counted)
+    soon = candidates.rank(pair, effects, (), balance.fit())
+    few = len(looked_at)
+    monkeypatch.setattr(candidates, "FINER", 1e9)
+    thorough = candidates.rank(pair, effects, (), balance.fit())
+    assert candidates.FIRST <= few < len(looked_at) - few <= 6
+    assert soon[0].name == thorough[0].name == name
+    assert soon[0].evidence == pytest.approx(thorough[0].evidence, rel=1e-9)
+    assert {r.name for r in soon} == {r.name for r in thorough}

@@ -42,27 +42,38 @@ def rank(
     costs = [len(balance.grid(e).shapes) * (1.0 if additive(e) else REFIT) for e in effects]
     rough = [r for r in pair.map(_rough, places, terms, fit, least, costs=costs) if r is not None]
     rough.sort(key=lambda item: -item[0])
-    first = _polished(pair, [start for _, start in rough[: min(refine, FIRST)]], len(terms))
-    passed = min((rough_evidence(balance, f, fit, scale_of(balance, f)) for f in first), default=0.0)
-    hopeful = [_hope(balance, item, fit) > max(passed, 0.0) for item in rough[FIRST:refine]]
-    more = iter(_polished(pair, [s for (_, s), h in zip(rough[FIRST:refine], hopeful, strict=True) if h], len(terms)))
-    rest = [(next(more), True) if h else (s, False) for (_, s), h in zip(rough[FIRST:refine], hopeful, strict=True)]
-    every = [*((f, True) for f in first), *rest, *((s, False) for _, s in rough[max(refine, len(first)) :])]
-    out = [(f, closely) for f, closely in every if allowed(balance, f)]
+    out = [(f, closely) for f, closely in _looked_at(pair, rough, fit, refine) if allowed(balance, f)]
     scale = min((scale_of(balance, f) for f, _ in out), default=1.0)
     weights = pair.map(_weight, out, fit, scale)
     rivals = [Rival(f.terms[-1].effect.name, w, f) for (f, _), w in zip(out, weights, strict=True)]
     return sorted(rivals, key=lambda r: -r.evidence)
 
 
-def _polished(pair: Pair, starts: list[Fit], which: int) -> list[Fit]:
+def _looked_at(pair: Pair, rough: list[tuple[float, Fit]], fit: Fit, refine: int) -> list[tuple[Fit, bool]]:
+    """The candidates, and whether they were looked at closely, their shapes optimised: of the `refine` most promising the
+    first ones, and those that may pass one of these. rough: evidence and fit of their starts, best first."""
+    balance = pair.state
+    first = _polished(pair, [start for _, start in rough[: min(refine, FIRST)]])
+    passed = [rough_evidence(balance, f, fit, scale_of(balance, f)) for f in first if allowed(balance, f)]
+    least, left = max(min(passed, default=0.0), 0.0), rough[len(first) :]
+    hopeful = [i < refine - len(first) and _hope(balance, *item, fit) > least for i, item in enumerate(left)]
+    more = _polished(pair, [start for (_, start), may in zip(left, hopeful, strict=True) if may])
+    others = [start for (_, start), may in zip(left, hopeful, strict=True) if not may]
+    return [*((f, True) for f in (*first, *more)), *((f, False) for f in others)]
+
+
+def _polished(pair: Pair, starts: list[Fit]) -> list[Fit]:
     costs = [1.0 if additive(s.terms[-1].effect) else DEARER for s in starts]
-    return pair.map(polish, starts, which, costs=costs)
+    return pair.map(_last_polished, starts, costs=costs)
 
 
-def _hope(balance: Balance, start: tuple[float, Fit], fit: Fit) -> float:
-    """Evidence that a start, its rough evidence with it, may come to where its shape is optimised."""
-    return start[0] + (FINER - 1) * gain(balance, start[1], fit, scale_of(balance, start[1]))
+def _last_polished(balance: Balance, fit: Fit) -> Fit:
+    return polish(balance, fit, len(fit.terms) - 1)
+
+
+def _hope(balance: Balance, rough: float, start: Fit, fit: Fit) -> float:
+    """Evidence that a start of this rough evidence may come to where its shape is optimised."""
+    return rough + (FINER - 1) * gain(balance, start, fit, scale_of(balance, start))
 
 
 def _rough(balance: Balance, effect: Any, terms: tuple[Term, ...], fit: Fit, least: float) -> tuple[float, Fit] | None:
