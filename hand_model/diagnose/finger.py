@@ -35,8 +35,8 @@ from .prove.markers import OWN, marker_fit, of_chain
 class FingerReading:
     """One finger seen by the cameras. stations: encoder and linkages, in this order. found: of its markers, each with
     its weight.
-    angles: None where nothing could be read, and notes say why. markers: what they tell. lines: for a progress display. courses: of joints that
-    are no plain hinges."""
+    angles: None where nothing could be read, and notes say why. markers: what they tell. lines: for a progress display.
+    courses: of joints that are no plain hinges."""
 
     finger: str
     angles: FingerAngles | None = None

@@ -26,18 +26,12 @@ def driven(state: DriveState, change: Callable[[Array], Array]) -> Array:
     first = state.declared_names.index("power_1")
     driver = change(state.declared[:, first] * scale) / scale
     out = np.array(state.declared)
-    power, known = np.ones(len(driver)), 0
-    for column, exponent in sorted(_powers(state.declared_names), key=lambda item: item[1]):
-        for _ in range(known, exponent):
-            power = power * driver  # sooner than a power each
-        known = exponent
-        out[:, column] = power
+    exponents = {
+        i: int(name.removeprefix("power_")) for i, name in enumerate(state.declared_names) if name.startswith("power_")
+    }
+    powers = np.vander(driver, max(exponents.values()) + 1, increasing=True)  # sooner than a power each
+    out[:, list(exponents)] = powers[:, list(exponents.values())]
     return out
-
-
-def _powers(names: tuple[str, ...]) -> list[tuple[int, int]]:
-    """Columns that hold a power, and which."""
-    return [(i, int(n.removeprefix("power_"))) for i, n in enumerate(names) if n.startswith("power_")]
 
 
 def play(path: Array, gap: float, threshold: float | None = None) -> Array:

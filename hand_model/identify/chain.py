@@ -97,6 +97,11 @@ class Pose:
         """The poses of some frames."""
         return Pose(self.rotation[frames], self.translation[frames], self.angle_rad[frames])
 
+    def put(self, frames: Array, poses: Pose) -> None:
+        """Overwrite the poses of some frames."""
+        for name in ("rotation", "translation", "angle_rad"):
+            getattr(self, name)[frames] = getattr(poses, name)
+
     def to_palm(self, position_world: Array) -> Array:
         """World positions (n, m, 3) [m] expressed in the palm frame."""
         return np.einsum("nji,nmj->nmi", self.rotation, position_world - self.translation[:, None])

@@ -93,9 +93,7 @@ def fit_poses(data: ChainData, chain: Chain, noise_m: float, iterations: int = 8
         residual = here.to_palm(seen.position_world) - x
         block, gradient = _frame_system(by_frame, residual, robust_weight(residual, noise_m))
         step = np.linalg.solve(block, gradient[..., None])[..., 0]
-        here = here.moved(step)
-        for name in ("rotation", "translation", "angle_rad"):
-            getattr(pose, name)[left] = getattr(here, name)
+        pose.put(left, here.moved(step))
         left = left[np.abs(step).max(axis=1) >= LAST_STEP]
         if not len(left):
             break

@@ -155,8 +155,7 @@ def _poses(markers: ChainData, chain: Chain, noise_m: float) -> tuple[Pose, NDAr
     odd = np.flatnonzero(~sound)
     if len(odd):
         wide, _ = fit_poses(markers.take(odd), chain, max(noise_m, FARTHEST_M / OUTLIER_LIMIT))
-        for name in ("rotation", "translation", "angle_rad"):
-            getattr(pose, name)[odd] = getattr(wide, name)
+        pose.put(odd, wide)
     return pose, sound
 
 

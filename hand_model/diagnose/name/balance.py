@@ -14,7 +14,7 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from ...effects.base import DriveState
-from .grid import AT_ONCE, Grid, GridColumns, stacked
+from .grid import Grid, GridColumns, stacked
 from .least_squares import from_products
 from .projection import Projection
 from .samples import Samples
@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 # What physics allows of a declared coefficient, by its column's name.
 DECLARED_LOW = {"inertia": 0.0, "viscous": 0.0, "coulomb": 0.0, "spring": 0.0}
 MOST_KEPT = 6e8  # bytes of columns that one balance keeps
+AT_ONCE = 60  # shapes of a grid whose columns are made together
 
 
 @dataclass(frozen=True)
@@ -162,7 +163,7 @@ class Balance(Samples):
 
     def _stacked(self, grid: Grid, weight: Array, bends: tuple[Term, ...]) -> GridColumns:
         chunks = [grid.shapes[i : i + AT_ONCE] for i in range(0, len(grid.shapes), AT_ONCE)]
-        return stacked(part for chunk in chunks for part in self._acting(grid.effect, chunk, weight, bends))
+        return stacked(self._acting(grid.effect, chunk, weight, bends) for chunk in chunks)
 
     def _acting(
         self, effect: Any, shapes: Sequence[Mapping[str, float]], weight: Array, bends: tuple[Term, ...]

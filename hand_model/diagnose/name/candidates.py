@@ -53,22 +53,18 @@ def _looked_at(pair: Pair, rough: list[tuple[float, Fit]], fit: Fit, refine: int
     """The candidates, and whether they were looked at closely, their shapes optimised: of the `refine` most promising the
     first ones, and those that may pass one of these. rough: evidence and fit of their starts, best first."""
     balance = pair.state
-    first = _polished(pair, [start for _, start in rough[: min(refine, FIRST)]])
+    first = _polished(pair, [start for _, start in rough[: min(refine, FIRST)]], len(fit.terms))
     passed = [rough_evidence(balance, f, fit, scale_of(balance, f)) for f in first if allowed(balance, f)]
     least, left = max(min(passed, default=0.0), 0.0), rough[len(first) :]
     hopeful = [i < refine - len(first) and _hope(balance, *item, fit) > least for i, item in enumerate(left)]
-    more = _polished(pair, [start for (_, start), may in zip(left, hopeful, strict=True) if may])
+    more = _polished(pair, [start for (_, start), may in zip(left, hopeful, strict=True) if may], len(fit.terms))
     others = [start for (_, start), may in zip(left, hopeful, strict=True) if not may]
     return [*((f, True) for f in (*first, *more)), *((f, False) for f in others)]
 
 
-def _polished(pair: Pair, starts: list[Fit]) -> list[Fit]:
+def _polished(pair: Pair, starts: list[Fit], which: int) -> list[Fit]:
     costs = [1.0 if additive(s.terms[-1].effect) else DEARER for s in starts]
-    return pair.map(_last_polished, starts, costs=costs)
-
-
-def _last_polished(balance: Balance, fit: Fit) -> Fit:
-    return polish(balance, fit, len(fit.terms) - 1)
+    return pair.map(polish, starts, which, costs=costs)
 
 
 def _hope(balance: Balance, rough: float, start: Fit, fit: Fit) -> float:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -13,8 +12,6 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 SPARSE = 0.2  # share of entries that are not zero, below which a matrix is kept sparse: events act in one trial
-
-AT_ONCE = 60  # shapes whose columns are made together
 
 
 @dataclass(frozen=True)
@@ -71,26 +68,20 @@ def _lengths(matrix: Any, inside: NDArray[np.bool_] | None) -> Array:
     return np.sqrt(np.einsum("ij,ij,i->j", matrix, matrix, inside.astype(float)))
 
 
-def stacked(columns: Iterable[Array]) -> GridColumns:
-    """One matrix from the columns (n, j) of every shape that act at all (of one shape at least)."""
+def stacked(chunks: Iterable[Sequence[Array]]) -> GridColumns:
+    """One matrix from the columns (n, j) of every shape that act at all (of one shape at least), in chunks of shapes."""
     from scipy.sparse import csc_matrix, hstack
 
-    owner, kept, sparse = list[int](), list[Any](), True
-    for begin, chunk in enumerate(_chunks(columns)):
+    widths, kept, sparse = list[int](), list[Any](), True
+    for chunk in chunks:
         parts = [part[:, part.any(0)] for part in chunk]
-        owner += [AT_ONCE * begin + i for i, part in enumerate(parts) for _ in range(part.shape[1])]
+        widths += [part.shape[1] for part in parts]
         matrix = np.concatenate(parts, axis=1)
         thin = np.count_nonzero(matrix) <= SPARSE * matrix.size
         sparse = sparse and thin
         kept.append(csc_matrix(matrix) if thin else matrix)
-    if owner and sparse:
-        return GridColumns.of(hstack(kept, format="csc"), np.array(owner))
+    owner = np.repeat(np.arange(len(widths)), widths)
+    if len(owner) and sparse:
+        return GridColumns.of(hstack(kept, format="csc"), owner)
     dense = [m if isinstance(m, np.ndarray) else m.toarray() for m in kept]
-    return GridColumns.of(np.concatenate(dense, axis=1), np.array(owner, int))
-
-
-def _chunks(columns: Iterable[Array]) -> Iterator[list[Array]]:
-    """AT_ONCE of them at a time."""
-    every = iter(columns)
-    while chunk := list(islice(every, AT_ONCE)):
-        yield chunk
+    return GridColumns.of(np.concatenate(dense, axis=1), owner)

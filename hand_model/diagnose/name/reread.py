@@ -7,7 +7,6 @@ either: sizes beside it would not be those of the model. What belongs to the rec
 from __future__ import annotations
 
 from collections.abc import Sequence
-from collections.abc import Set as AbstractSet
 from copy import copy
 from dataclasses import replace
 
@@ -35,7 +34,7 @@ def reread(findings: Sequence[Finding], stations: Sequence[Station]) -> tuple[tu
     what belongs to the recording."""
     named = [(i, frozenset(f.effect for f in findings if s.names(f))) for i, s in enumerate(stations)]
     with Pair(tuple(stations)) as pair:
-        written = pair.map(_again, named, costs=[1.0 + len(names) for _, names in named])
+        written = pair.map(_written, named, costs=[1.0 + len(names) for _, names in named])
     changed = [
         (old, new) for old, new in zip(stations, written, strict=True) if new.reading.fit.terms != old.reading.fit.terms
     ]
@@ -53,12 +52,10 @@ def reread(findings: Sequence[Finding], stations: Sequence[Station]) -> tuple[tu
     return tuple(out), written
 
 
-def _again(stations: tuple[Station, ...], named: tuple[int, frozenset[str]]) -> Station:
-    return _written(stations[named[0]], named[1])
-
-
-def _written(station: Station, names: AbstractSet[str]) -> Station:
-    """The station with the terms of these names and of the recording; as it was read where there are no others."""
+def _written(stations: tuple[Station, ...], named: tuple[int, frozenset[str]]) -> Station:
+    """One of the stations with the terms of some names and of the recording; as it was read where there are no others.
+    named: its place and the names."""
+    station, names = stations[named[0]], named[1]
     naming, out = station.naming, copy(station)
     kept = [i for i, t in enumerate(naming.fit.terms) if t.effect.name in names or t.effect.recorded]
     asking = any(naming.fit.terms[i].effect.asks for i in kept)

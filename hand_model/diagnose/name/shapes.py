@@ -52,11 +52,10 @@ def _likeliest_of(balance: Balance, candidates: Sequence[tuple[Term, ...]]) -> F
     def among(chosen: NDArray[np.bool_]) -> list[Fit]:
         return [balance.fit(terms, held=False) for terms, may in zip(candidates, chosen, strict=True) if may]
 
-    errors = np.array(
-        [balance.error(terms) for terms in candidates] if len(candidates) > FEW else [0.0] * len(candidates)
-    )
-    spread = parameter_price(balance) * len(candidates[0][-1].effect.amplitudes())
-    near = errors <= errors.min() + spread
+    near = np.ones(len(candidates), bool)
+    if len(candidates) > FEW:
+        errors = np.array([balance.error(terms) for terms in candidates])
+        near = errors <= errors.min() + parameter_price(balance) * len(candidates[0][-1].effect.amplitudes())
     best = likeliest(balance, among(near), -1, priced(balance))
     return best if possible(balance, best, -1) else likeliest(balance, [best, *among(~near)], -1, priced(balance))
 
