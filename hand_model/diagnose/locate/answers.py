@@ -132,12 +132,13 @@ def _moves_first(x: Answers, apart_s: float) -> bool:
 def _shift(rise_s: Array, others: Sequence[Array]) -> float:
     """By how much [s] a rise begins later than those of other drives, the least of them: one is another stretched in
     time, as by another gain, and shifted. Infinite where nothing is told."""
-    shifts = []
-    for other in (o for o in others if np.isfinite(o + rise_s).all()):
-        # slower than the other, or as fast: a late drive that is faster would seem later still
-        stretch = float(np.clip(np.ptp(rise_s) / max(float(np.ptp(other)), 1e-9), 1.0, SLOWER))
-        shifts.append(float(np.min(rise_s - stretch * other)))
-    return min(shifts, default=np.inf)
+    told = [other for other in others if np.isfinite(other + rise_s).all()]
+    return min((float(np.min(rise_s - _stretch(rise_s, other) * other)) for other in told), default=np.inf)
+
+
+def _stretch(rise_s: Array, other_s: Array) -> float:
+    """How many times as slow as another a rise is, at least one: a late drive that is faster would seem later still."""
+    return float(np.clip(np.ptp(rise_s) / max(float(np.ptp(other_s)), 1e-9), 1.0, SLOWER))
 
 
 def _onset(rise_s: Array) -> float:
@@ -151,14 +152,15 @@ def _onset(rise_s: Array) -> float:
 
 def _ahead(x: Answers, others: Sequence[Answers]) -> tuple[float, float]:
     """By how much [s] a current that has risen before the changes come rises later (negative: earlier) than those of
-    other drives, the most of these, or than the changes where there is none; and how far its shares differ in that. Zero
-    of one that rises with them or after."""
+    other drives, the most of these, or than the changes where there is none; and the doubt of that: how far its shares
+    differ, and half of what the stretch between two drives makes. Zero of one that rises with them or after."""
     if not np.isfinite(x.lead_s).all():
         return 0.0, 0.0
-    shifts = [x.lead_s - (y.lead_s if np.isfinite(y.lead_s).all() else y.rise_s) for y in others]
-    shifts = [d for d in shifts if np.isfinite(d).all()] or [x.lead_s[:1]]
-    nearest = max(shifts, key=lambda d: float(np.median(d)))
-    return float(np.median(nearest)), float(np.std(nearest))
+    rises = [y.lead_s if np.isfinite(y.lead_s).all() else y.rise_s for y in others]
+    shifts = [(x.lead_s - _stretch(x.lead_s, r) * r, x.lead_s - r) for r in rises if np.isfinite(r).all()]
+    stretched, plain = max(shifts, key=lambda d: float(np.median(d[0])), default=(x.lead_s[:1], x.lead_s[:1]))
+    ahead = float(np.median(stretched))
+    return ahead, float(np.hypot(np.std(stretched), 0.5 * (ahead - float(np.median(plain)))))
 
 
 def _rise(states: Sequence[DriveState], currents: Sequence[Array], step_s: float) -> tuple[Array, Array]:
