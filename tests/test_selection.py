@@ -169,3 +169,33 @@ def test_candidates_that_cannot_pass_are_not_looked_at_closely_and_the_first_are
     assert soon[0].name == thorough[0].name == name
     assert soon[0].evidence == pytest.approx(thorough[0].evidence, rel=1e-9)
     assert {r.name for r in soon} == {r.name for r in thorough}
+
+
+SIX = (
+    "stribeck_friction",
+    "quadratic_damping",
+    "position_dependent_friction",
+    "detent_load",
+    "torque_ripple",
+    "end_stop_contact",
+)
+
+
+@pytest.mark.parametrize(("hopeless", "named"), [(False, 6), (True, 5)])
+def test_more_than_five_effects_are_looked_for_where_five_explain_most(
+    monkeypatch: pytest.MonkeyPatch, hopeless: bool, named: int
+) -> None:
+    def six(s) -> np.ndarray:
+        x, v, way = s.position, s.velocity, np.sign(s.velocity)
+        rubs = 14 * np.exp(-np.abs(v) / 20) + 6 * np.exp(-0.5 * ((x - 60) / 7) ** 2)
+        return (
+            way * (rubs + 3e-3 * v**2)
+            + 9 * np.exp(-0.5 * ((x - 30) / 6) ** 2)
+            + 4 * np.sin(2 * np.pi * x / 11)
+            + 0.8 * np.maximum(x - 85, 0.0)
+        )
+
+    monkeypatch.setattr(selection, "_overwhelmed", lambda balance, fit: hopeless and len(fit.terms) >= 5)
+    naming = name_effects(drive(4, six, noise=3.0, trials=3), [effect(name) for name in SIX])
+    found = {f.term.effect.name for f in naming.found}
+    assert len(found) == named and found <= set(SIX)

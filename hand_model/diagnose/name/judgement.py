@@ -114,7 +114,7 @@ def judged(
     left = every = tuple(effects)
     station = Station(signal, finger, actuator, joint, name_effects(states, left, typical=typical))
     elsewhere = _elsewhere(station.naming)
-    for _ in range(1 if station.full else SECOND_HEARINGS):
+    for _ in range(1 if station.many else SECOND_HEARINGS):
         fallen = {f.term.effect.name for f in station.naming.found} - {f.term.effect.name for f in station.proven}
         lost = sum(
             f.share for f in station.naming.found if f.term.effect.name in fallen and f.evidence >= EVIDENCE_LEAST
@@ -129,7 +129,7 @@ def judged(
             break
         station = other
     hopeless = station.naming.overwhelmed and not elsewhere  # in the training recordings already
-    many = station.full  # more is missing than is looked for, whatever is learned from
+    many = station.many  # more is missing than is looked for, whatever is learned from
     if station.missing and not (station.believed or hopeless or many) and _eventful(station.naming):
         station = _foretold(station, states, every, typical) or station
     untold = not (station.believed or many) or elsewhere and station.naming.after.p < ALPHA

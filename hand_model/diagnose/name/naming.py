@@ -11,7 +11,8 @@ from .term import Term
 from .wander import Wander
 
 ALPHA = 0.003  # false alarms per channel: 5 % over some fifteen channels of a session
-MOST_TERMS = 5  # effects of one balance
+MANY = 5  # effects of one balance: where so many leave a plain mismatch, nothing known is missing
+MOST_TERMS = 7  # effects of one balance that are looked for, while so many explain most of it
 EXPLAINED_LEAST = 0.7  # of the explainable mismatch: below, the names are not believed
 CLASS_WIDTH = 3.0  # log evidence within which two effects are one class: 20 to 1
 
@@ -83,6 +84,5 @@ class Naming:
 
 
 def overwhelmed(count: int, before: LackOfFit, after: LackOfFit) -> bool:
-    """Whether as many effects as may be named leave a plain mismatch unexplained: whatever else is tried, nothing known
-    is missing."""
-    return count >= MOST_TERMS and after.p < ALPHA and after.excess > (1 - EXPLAINED_LEAST) * before.excess
+    """Whether many named effects leave a plain mismatch unexplained: whatever else is tried, nothing known is missing."""
+    return count >= MANY and after.p < ALPHA and after.excess > (1 - EXPLAINED_LEAST) * before.excess

@@ -21,7 +21,7 @@ from .bristles import with_bristles
 from .candidates import EVIDENCE_LEAST, allowed, exchanged, least_evidence, rank, settle, twice
 from .evidence import evidence, gain, scale_of
 from .lack_of_fit import LackOfFit, lack_of_fit
-from .naming import ALPHA, CLASS_WIDTH, MOST_TERMS, Named, Naming, Rival, overwhelmed
+from .naming import ALPHA, CLASS_WIDTH, MANY, MOST_TERMS, Named, Naming, Rival, overwhelmed
 from .shapes import polish, possible, scan
 from .term import Term
 from .wander import Wander, estimate_wander
@@ -54,8 +54,8 @@ def name_effects(
     if naming.before.p < ALPHA and not naming.found and any(s.validate for s in states):
         # What happened in a validation recording only cannot be learned from the others.
         naming = _name(Balance(tuple(states), True, typical), tuple(effects), progress)
-    if naming.after.p < ALPHA and not balance.steady.all() and len(naming.fit.terms) < MOST_TERMS:
-        # Where starts mislead, steady motion may still be explained; with as many names as may be, more is missing.
+    if naming.after.p < ALPHA and not balance.steady.all() and len(naming.fit.terms) < MANY:
+        # Where starts mislead, steady motion may still be explained; with many names, more is missing.
         calm = _name(balance.settled(), tuple(effects), progress)
         return calm if calm.found and calm.after.p >= ALPHA else naming
     return naming
@@ -129,7 +129,7 @@ def _lack(balance: Balance, fit: Fit, calmest: float = np.inf) -> LackOfFit:
 
 
 def _overwhelmed(balance: Balance, fit: Fit) -> bool:
-    return len(fit.terms) >= MOST_TERMS and overwhelmed(len(fit.terms), *_lacks(balance, balance.fit(), fit))
+    return len(fit.terms) >= MANY and overwhelmed(len(fit.terms), *_lacks(balance, balance.fit(), fit))
 
 
 def _calmed(balance: Balance, fit: Fit, ranked: Iterable[Rival]) -> Rival | None:
@@ -182,7 +182,7 @@ def _search(
     balance = pair.state
     fit, brought, ranked = settle(pair, effects, start) if start else balance.fit(), {}, list[Rival]()
     been, refused = {_names(fit)}, set[str]()
-    while len(fit.terms) < MOST_TERMS:
+    while len(fit.terms) < MOST_TERMS and not _overwhelmed(balance, fit):
         ranked = rank(pair, effects, fit.terms, fit)
         for rival in ranked:
             brought[rival.name] = max(brought.get(rival.name, -np.inf), rival.evidence)

@@ -13,7 +13,7 @@ from .balance import Balance
 from .candidates import EVIDENCE_LEAST
 from .evidence import evidence
 from .interval import brought_held_out, parameter_intervals, sized, undisturbed, variance_ratio
-from .naming import ALPHA, EXPLAINED_LEAST, MOST_TERMS, Named, Naming
+from .naming import ALPHA, EXPLAINED_LEAST, MANY, Named, Naming
 from .selection import SMALL
 
 # channels of a session, times names: what no test of a channel sees must stand against as many. Of motors there are few
@@ -93,9 +93,9 @@ class Station:
         return self.naming.before.p < ALPHA or any(f.term.effect.name not in self._faint for f in self.proven)
 
     @property
-    def full(self) -> bool:
-        """Whether as many effects as may be named are."""
-        return len(self.naming.found) >= MOST_TERMS
+    def many(self) -> bool:
+        """Whether so many effects are named that more is to be expected."""
+        return len(self.naming.found) >= MANY
 
     @property
     def wander(self) -> float:
@@ -118,7 +118,7 @@ class Station:
     def believed(self) -> bool:
         """Whether the names stand: the final model passes the test, or takes most of the mismatch away, or all that
         recordings kept out show. Names that take little of a plain mismatch away do not, however little is left to see,
-        nor names of nothing where more than the noise does not repeat, nor as many as may be, none of them the main
+        nor names of nothing where more than the noise does not repeat, nor many, none of them the main
         one, beside which the test fails, nor what is left beside something larger that does not stand, nor many
         periods that have nothing in common."""
         most = self.naming.after.p >= ALPHA or self.explained >= EXPLAINED_LEAST or self._predicted
@@ -126,13 +126,13 @@ class Station:
 
     @property
     def believed_in_part(self) -> bool:
-        """Whether the names would stand but that as many as may be, or some that leave recordings kept out within their
-        noise, leave something by the test, or as many as may be of recordings kept out (and make these no worse): in a
+        """Whether the names would stand but that many, or some that leave recordings kept out within their
+        noise, leave something by the test, or many of recordings kept out (and make these no worse): in a
         finger of which much is missing that is to be expected."""
         before, after = self._kept_out
         fits = self.naming.balance.untouched and after <= KEPT_OUT**2 < before
-        left_by_test = self.naming.after.p < ALPHA and (self.full or fits)
-        left_kept_out = self.full and self._short and not self._worse
+        left_by_test = self.naming.after.p < ALPHA and (self.many or fits)
+        left_kept_out = self.many and self._short and not self._worse
         return self._tells and (left_by_test or left_kept_out) and self.explained >= EXPLAINED_PARTLY
 
     @property
@@ -143,9 +143,9 @@ class Station:
 
     @property
     def _scattered(self) -> bool:
-        """Whether as many names as may be leave something that the test sees, and none of them holds the better part of
+        """Whether many names leave something that the test sees, and none of them holds the better part of
         what they explain: each describes a piece of what is something else."""
-        return self.naming.after.p < ALPHA and self.full and max(f.share for f in self.naming.found) < MAIN
+        return self.naming.after.p < ALPHA and self.many and max(f.share for f in self.naming.found) < MAIN
 
     @property
     def _left_over(self) -> bool:
