@@ -137,7 +137,8 @@ def _shift(rise_s: Array, others: Sequence[Array]) -> float:
 
 
 def _stretch(rise_s: Array, other_s: Array) -> float:
-    """How many times as slow as another a rise is, at least one: a late drive that is faster would seem later still."""
+    """How many times as slow as another a rise is, at least one: a late drive that is faster would seem later still. An
+    early one that is faster seems earlier than it is."""
     return float(np.clip(np.ptp(rise_s) / max(float(np.ptp(other_s)), 1e-9), 1.0, SLOWER))
 
 

@@ -129,7 +129,7 @@ def judged(
             break
         station = other
     hopeless = station.naming.overwhelmed and not elsewhere  # in the training recordings already
-    many = station.many  # more is missing than is looked for, whatever is learned from
+    many = station.many  # more is missing than is named, whatever is learned from
     if station.missing and not (station.believed or hopeless or many) and _eventful(station.naming):
         station = _foretold(station, states, every, typical) or station
     untold = not (station.believed or many) or elsewhere and station.naming.after.p < ALPHA

@@ -118,17 +118,17 @@ class Station:
     def believed(self) -> bool:
         """Whether the names stand: the final model passes the test, or takes most of the mismatch away, or all that
         recordings kept out show. Names that take little of a plain mismatch away do not, however little is left to see,
-        nor names of nothing where more than the noise does not repeat, nor many, none of them the main
-        one, beside which the test fails, nor what is left beside something larger that does not stand, nor many
-        periods that have nothing in common."""
+        nor names of nothing where more than the noise does not repeat, nor many, none of them the main one, beside
+        which the test fails, nor what is left beside something larger that does not stand, nor many periods that have
+        nothing in common."""
         most = self.naming.after.p >= ALPHA or self.explained >= EXPLAINED_LEAST or self._predicted
         return self._tells and most and not self._short and not self._scattered
 
     @property
     def believed_in_part(self) -> bool:
-        """Whether the names would stand but that many, or some that leave recordings kept out within their
-        noise, leave something by the test, or many of recordings kept out (and make these no worse): in a
-        finger of which much is missing that is to be expected."""
+        """Whether the names would stand but that many, or some that leave recordings kept out within their noise, leave
+        something by the test, or many of recordings kept out (and make these no worse): in a finger of which much is
+        missing that is to be expected."""
         before, after = self._kept_out
         fits = self.naming.balance.untouched and after <= KEPT_OUT**2 < before
         left_by_test = self.naming.after.p < ALPHA and (self.many or fits)
@@ -143,8 +143,8 @@ class Station:
 
     @property
     def _scattered(self) -> bool:
-        """Whether many names leave something that the test sees, and none of them holds the better part of
-        what they explain: each describes a piece of what is something else."""
+        """Whether many names leave something that the test sees, and none of them holds the better part of what they
+        explain: each describes a piece of what is something else."""
         return self.naming.after.p < ALPHA and self.many and max(f.share for f in self.naming.found) < MAIN
 
     @property
