@@ -185,7 +185,8 @@ def _shown_in(finding: Finding, stations: Sequence[Station]) -> Channel | None:
     if station is None:
         return None
     slowed = finding.fit.get("engine") == STROKES
-    return channel_figures(station.naming.balance.states, *(() if slowed else _accounts(station, stations)))
+    accounts = () if slowed else _accounts(station, stations)
+    return channel_figures(station.naming.balance.states, *accounts, stiffness=_stiffness(station))
 
 
 def _showing(finding: Finding, stations: Sequence[Station]) -> Station | None:
@@ -200,6 +201,17 @@ def _accounts(station: Station, stations: Sequence[Station]) -> tuple[Mapping[st
     declared = station.naming.fit.declared
     known = usual_spring(stations, station) if station.signal == "current" else {}
     return (declared, {**declared, **{name: value for name, (value, _) in known.items()}}) if known else (declared,)
+
+
+def _stiffness(station: Station) -> float:
+    """Stiffness [effort/position] of a drive's spring over the positions that it was at, as declared and as bent; zero
+    where none is declared."""
+    balance, fit = station.naming.balance, station.naming.fit
+    bends = [i for i, t in enumerate(fit.terms) if t.effect.name == "nonlinear_spring"]
+    position = balance.gather(lambda s: s.position)
+    bent = balance.gather(lambda s: sum((fit.added(i, s) for i in bends), np.zeros(len(s.position))))
+    there = position - position.mean()
+    return fit.declared.get("spring", 0.0) + float(there @ bent / max(there @ there, 1e-300))
 
 
 def _heaviest(found: Sequence[tuple[float, Finding]], key: Callable[[Finding], Any]) -> list[tuple[float, Finding]]:

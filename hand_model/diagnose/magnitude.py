@@ -27,7 +27,7 @@ class Channel:
     """What magnitudes refer to. effort, load: standard deviations; low, high: range of positions; fastest: speed;
     ahead: farthest that a joint ran ahead of its drive; granted: length of bristles that any drive of the session may
     have; turned: whether the hand was seen to turn; plain: sizes (n,) of what the drive needs without the named effects,
-    by each account of it."""
+    by each account of it; stiffness: of its spring, bent or not, over the positions that it was at."""
 
     effort: float = 1.0
     load: float = 0.0
@@ -38,6 +38,7 @@ class Channel:
     granted: float = 0.0
     turned: bool = True
     plain: tuple[NDArray[np.float64], ...] = ()
+    stiffness: float = 0.0
 
     @property
     def span(self) -> float:
@@ -50,8 +51,9 @@ class Channel:
         return min((float(np.mean(plain > limit)) for plain in self.plain), default=1.0)
 
 
-def channel_figures(states: tuple[DriveState, ...], *declared: Mapping[str, float]) -> Channel:
-    """The figures of one balance's recordings. declared: accounts of what the drive needs, name -> coefficient."""
+def channel_figures(states: tuple[DriveState, ...], *declared: Mapping[str, float], stiffness: float = 0.0) -> Channel:
+    """The figures of one balance's recordings. declared: accounts of what the drive needs, name -> coefficient;
+    stiffness: of its spring [effort/position], zero where it is unknown."""
     effort = np.concatenate([s.effort[np.isfinite(s.effort)] for s in states])
     load, ahead, granted = (
         np.concatenate([s.extra.get(name, np.zeros(1)) for s in states]) for name in ("load", "ahead", "granted")
@@ -67,6 +69,7 @@ def channel_figures(states: tuple[DriveState, ...], *declared: Mapping[str, floa
         float(np.max(granted)),
         any(np.ptp(s.extra.get("gravity_along", np.zeros(1))) > 0 for s in states),
         tuple(_needed(states, account) for account in declared),
+        stiffness,
     )
 
 
@@ -151,6 +154,11 @@ def _depth(p: Mapping[str, float], c: Channel) -> float:
     return p["stiffness"] * reach * (reach / 10.0 if bent else 1.0) / (0.6 * c.effort)
 
 
+def _by_load(p: Mapping[str, float], c: Channel) -> float:
+    """Friction per load of the whole spring: beside one that bends, its straight part alone may be anything."""
+    return (p["per_load"] / c.stiffness if c.stiffness > 0 else p["load_coefficient"]) / 0.4
+
+
 def _apart(p: Mapping[str, float], c: Channel) -> float:
     if tips_over(p):
         return p["lead"] / (0.3 * c.effort)
@@ -169,7 +177,7 @@ PLAIN: Mapping[str, Rule] = {
     "stribeck_friction": lambda p, c: (
         p["static_excess"] * min(p["stribeck_speed"] / (0.25 * c.fastest), 1.0) / (0.5 * c.effort)
     ),
-    "load_dependent_friction": lambda p, _: p["load_coefficient"] / 0.4,
+    "load_dependent_friction": _by_load,
     "position_dependent_friction": lambda p, c: p["extra_friction"] / (0.4 * c.effort),
     "quadratic_damping": lambda p, c: p["drag"] * c.fastest**2 / (0.6 * c.effort),
     "presliding_friction": lambda p, c: max(p["bristle_length"] - c.granted, 0.0) / (0.02 * c.span),

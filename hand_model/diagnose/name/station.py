@@ -12,7 +12,7 @@ from ..findings import Finding
 from .balance import Balance
 from .candidates import EVIDENCE_LEAST
 from .evidence import evidence
-from .interval import brought_held_out, parameter_intervals, sized, undisturbed, variance_ratio
+from .interval import Reading, brought_held_out, parameter_intervals, sized, undisturbed, variance_ratio
 from .naming import ALPHA, EXPLAINED_LEAST, MANY, Named, Naming
 from .selection import SMALL
 
@@ -47,22 +47,19 @@ class Station:
     ) -> None:
         self.signal, self.finger, self.actuator, self.joint, self.naming = signal, finger, actuator, joint, naming
         places = {id(f): naming.fit.terms.index(f.term) for f in naming.found}
-        self.reading = undisturbed(naming)
         self.beside: Callable[[Station], Station] | None = None
         self.compared: tuple[str, ...] = ()
         self.tilt = 0.0
         chances = CHANCES_OF_MOTORS if signal == "current" else CHANCES
         unseen = naming.before.p >= ALPHA
-        least = EVIDENCE_LEAST + (np.log(chances) if unseen else 0.0)
+        self.least = least = EVIDENCE_LEAST + (np.log(chances) if unseen else 0.0)
+        self.reading, sure = read(naming, least)
 
         def must(f: Named) -> float:  # what one recording alone may have, it may have anywhere and at any time
             return least + (EVIDENCE_LEAST if unseen and not f.term.effect.of_the_hand else 0.0)
 
         stand = [
-            places[id(f)]
-            for f in naming.found
-            if _stands(naming, f, places[id(f)], must(f))
-            and (sized(self.reading, places[id(f)]) or _plain_at_ends(naming, f, least))
+            places[id(f)] for f in naming.found if places[id(f)] in sure and _stands(naming, f, places[id(f)], must(f))
         ]
         self.parameters = {which: parameter_intervals(self.reading, which) for which in stand}
         self.proven = tuple(f for f in naming.found if places[id(f)] in stand)
@@ -343,10 +340,21 @@ def _stands(naming: Naming, named: Named, which: int, least: float) -> bool:
     return named.evidence >= least if brought is None else brought > 0 and named.evidence + brought >= least
 
 
-def _plain_at_ends(naming: Naming, named: Named, least: float) -> bool:
-    """Whether the only effect is that plain that it needs no steady motion to be told from zero: some act where motion
-    starts and stops, as a stop of the open hand. What no table names, or one recording alone has, and only starts and
-    stops show may be how these are read."""
-    kind = named.term.effect
-    alone = len(naming.found) == 1 and kind.listed and kind.of_the_hand
-    return alone and _stands(naming, named, 0, least + EVIDENCE_LEAST)
+def read(naming: Naming, least: float) -> tuple[Reading, set[int]]:
+    """Where sizes are read: from steady motion, but as named where starts and stops alone tell an effect plainly from
+    zero; and the terms whose size is told from zero. least: log evidence that an effect must bring."""
+    reading = undisturbed(naming)
+    places = {naming.fit.terms.index(f.term): f for f in naming.found}
+    steady = {which for which in places if sized(reading, which)}
+    at_ends = {w for w, f in places.items() if w not in steady and _plain_at_ends(naming, f, w, least)}
+    named = Reading(naming.balance, naming.declared, naming.fit)
+    return named if at_ends else reading, steady | at_ends
+
+
+def _plain_at_ends(naming: Naming, named: Named, which: int, least: float) -> bool:
+    """Whether an effect is that plain that it needs no steady motion to be told from zero: some act where motion starts
+    and stops, as a stop of the open hand. Many effects describe how these are read: it must explain no less than an even
+    part. What no table names, or one recording alone has, and only starts and stops show may be how these are read."""
+    kind, even = named.term.effect, 1 / len(naming.found)
+    plain = named.share >= even and kind.listed and kind.of_the_hand
+    return plain and _stands(naming, named, which, least + EVIDENCE_LEAST)
