@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from test_diagnose import drive, planted
 
-from hand_model.diagnose.assemble import SIGNALS
+from hand_model.diagnose.assemble import SIGNALS, _stiffness
 from hand_model.diagnose.magnitude import (
     LEAST,
     MOST,
@@ -19,8 +20,11 @@ from hand_model.diagnose.magnitude import (
     magnitude,
     sure_magnitude,
     sure_share,
+    values_of,
 )
-from hand_model.effects import catalogue
+from hand_model.diagnose.name.balance import Balance, Fit
+from hand_model.diagnose.name.term import Term
+from hand_model.effects import catalogue, effect
 
 RAW = {
     "asymmetric_friction": {"half_difference": 4.0},
@@ -162,3 +166,27 @@ def test_what_recordings_kept_out_say_for_sure_is_by_how_much_their_error_falls_
 ) -> None:
     """Of the mean square, whose root goes with the size."""
     assert sure_share({"before": before, "after": after, "ci95_reduction": fall}) == pytest.approx(share)
+
+
+def test_friction_by_load_counts_by_the_stiffness_of_the_whole_spring() -> None:
+    """Beside a spring that bends, the straight part may be nothing and the ratio to it anything."""
+    figures = {
+        "load_coefficient": {"value": 5.0, "ci95": [-9.0, 19.0]},
+        "per_load": {"value": 0.08, "ci95": [0.06, 0.1]},
+    }
+    channel = channel_figures(drive(0), stiffness=0.2)
+    assert magnitude("load_dependent_friction", values_of(figures), channel) == pytest.approx(1.0)
+    assert sure_magnitude("load_dependent_friction", figures, channel) == pytest.approx(0.75)
+    assert sure_magnitude("load_dependent_friction", figures, channel_figures(drive(0))) == LEAST
+
+
+def test_a_springs_stiffness_is_that_of_its_line_through_the_bend() -> None:
+    states = drive(0)
+    balance = Balance(states)
+    position = balance.gather(lambda s: s.position)
+    term = Term(effect("nonlinear_spring"), {"form": 0.0, "knee": 50.0})
+    bend = {"quadratic_stiffness": 2e-3, "cubic_stiffness": 0.0}
+    fit = Fit((term,), {"spring": 0.05}, (bend,), position, 0.0, 0)
+    station = SimpleNamespace(naming=SimpleNamespace(balance=balance, fit=fit))
+    line = np.polyfit(position, 0.05 * position + 2e-3 * position**2, 1)[0]
+    assert _stiffness(station) == pytest.approx(line)

@@ -310,29 +310,35 @@ def test_a_block_lasts_as_long_at_any_high_rate(rate_hz: float, frames: int) -> 
 
 
 @pytest.mark.parametrize(
-    ("reach_m", "travels", "named"),
+    ("through", "travels", "named"),
     [
-        (1.0, 0.75, "moving_centre"),
-        (1.0, 0.1, "joint_wobble"),
-        (0.04, 0.95, "moving_centre"),
-        (0.04, 0.75, "joint_wobble"),
-        (0.01, 0.95, "joint_wobble"),
+        (0.99, 0.25, "joint_wobble"),
+        (0.15, 0.97, "moving_centre"),
+        (0.4, 0.7, "moving_centre"),
+        (0.55, 0.4, "joint_wobble"),
     ],
 )
-def test_an_axis_far_away_is_a_travelling_centre_where_that_explains_as_much(
-    monkeypatch: pytest.MonkeyPatch, reach_m: float, travels: float, named: str
+def test_an_axis_beside_the_joint_is_a_travelling_centre_where_that_explains_more_than_one_through_it(
+    monkeypatch: pytest.MonkeyPatch, through: float, travels: float, named: str
 ) -> None:
-    """The less surely it is far away, the more must the centre explain."""
-
-    def trial(effect: str, gain: float) -> SimpleNamespace:
-        return SimpleNamespace(
-            candidate=SimpleNamespace(effect=effect, body=1), gain=gain, evidence=gain, effect=lambda: effect
-        )
+    def candidate(effect: str, gain: float, shifts: tuple[bool, ...]) -> SimpleNamespace:
+        kind = SimpleNamespace(effect=effect, body=1, shifts=shifts)
+        return SimpleNamespace(candidate=kind, gain=gain, evidence=gain, effect=lambda: effect)
 
     search = object.__new__(Stepwise)
     search.candidates = []
     monkeypatch.setattr(Stepwise, "_beside", lambda *_: None)
-    monkeypatch.setattr(Stepwise, "_reach", lambda *_: reach_m)
-    tried = [trial("joint_wobble", 1000.0), trial("moving_centre", 1000.0 * travels)]
+    tried = [
+        candidate("joint_wobble", 1000.0, (False, True)),
+        candidate("joint_wobble", 1000.0 * through, (False, False)),
+        candidate("moving_centre", 1000.0 * travels, (True,)),
+    ]
     monkeypatch.setattr(Stepwise, "_tried", lambda *_: tried)
     assert search.next(()) == named
+
+
+def test_a_centre_that_travels_and_a_joint_that_tilts_are_both_told() -> None:
+    travel = travelling(lambda u: 0.3e-3 * np.stack([np.sin(np.pi * u), 1 - np.cos(np.pi * u)], axis=1))
+    tilt = tilting(lambda u, way: 0.02 * np.sin(6 * np.pi * u))
+    naming = seen(lambda share, turn, arm: travel(share, turn, arm) + tilt(share, turn, arm), body=2)
+    assert naming.believed and places(naming) == {("moving_centre", None), ("joint_wobble", None)}

@@ -21,10 +21,8 @@ from .lasting_noise import LastingNoise
 Array = NDArray[np.float64]
 
 HINGE = ("joint_wobble", "moving_centre")
-REACH = 0.06  # m: the other axis of a wobble passes nearer to its joint; farther, its centre travels, and from half of that on it may
 SLIGHT = 0.05  # of what all found effects bring: what a marker yields counts from there
 MOSTLY = 0.7  # share of what the likeliest explains: what explains less does not stand for it
-NEARLY = 0.85  # the same of what may be either: of 13 joints (looked at) a tilt leaves 0.24 to a centre at most, a travel 0.97 at least
 CELLS = 300  # moments that are tried first
 PROMISING = 0.5  # of the best candidate's evidence: those whose moment is settled block by block
 EDGE = 3  # blocks at either end of the session in which nothing begins
@@ -153,10 +151,9 @@ class Stepwise:
         best = max(tried, key=lambda t: t.evidence)
         if best.candidate.effect == NO_HINGE:
             best = _instead(best, tried, HINGE, MOSTLY)
-        if best.candidate.effect == "joint_wobble":
-            reach = self._reach(best.candidate, beside)
-            share = MOSTLY if reach > REACH else NEARLY if reach > REACH / 2 else np.inf
-            best = _instead(best, tried, ("moving_centre",), share)
+        # beside the same joint's, a small one is the rest of that
+        if best.candidate.effect == "joint_wobble" and (best.gain >= least or best.candidate.body not in hinges):
+            best = _or_centre(best, tried)
         return best.effect()
 
     def alone(self, candidate: Candidate) -> MarkerEffect:
@@ -325,26 +322,6 @@ class Stepwise:
         ends = np.searchsorted(self.starts, self.last[self.starts])
         return total[ends] - total[:-1]
 
-    def _reach(self, wobble: Candidate, beside: _Beside) -> float:
-        """How far [m] from the joint the other axis of a wobble passes: what it shifts over what it turns (root mean
-        squares)."""
-        shifts = np.array(wobble.shifts)
-        if not shifts.any():
-            return 0.0
-        at = self.place[id(wobble.base)].start + np.array(wobble.pick)
-        crossed = beside.white @ np.concatenate([r.whole for r in beside.rows])[:, at]
-        free = self.own[id(wobble.base)][np.ix_(wobble.pick, wobble.pick)] - crossed.T @ crossed
-        own = np.linalg.lstsq(free, self.whole_readings[at] - crossed.T @ beside.readings, rcond=1e-9)[0]
-        columns, carried = wobble.columns, np.flatnonzero(self.blocks.body == wobble.body)
-        moved, turned = (
-            (columns[..., mine] @ own[mine]).reshape(len(self.y), -1, 3)[:, carried] for mine in (shifts, ~shifts)
-        )
-        spread = turned - turned.mean(1, keepdims=True)
-        arm = self.blocks.position[:, carried] - self.blocks.position[:, carried].mean(1, keepdims=True)
-        # of arms in all directions, two thirds are across
-        tilt = np.sqrt(np.sum(spread**2) / max(float(np.sum(arm**2)) * 2 / 3, 1e-300))
-        return float(np.sqrt(np.mean(np.sum(moved**2, axis=-1))) / max(tilt, 1e-12))
-
 
 def _instead(best: _Trial, tried: Sequence[_Trial], effects: tuple[str, ...], least: float) -> _Trial:
     """The likeliest of some effects of the same joint, where it explains more than the share `least` of what the best
@@ -354,6 +331,21 @@ def _instead(best: _Trial, tried: Sequence[_Trial], effects: tuple[str, ...], le
         key=lambda t: t.evidence,
     )
     return named if named.gain > least * best.gain else best
+
+
+def _or_centre(wobble: _Trial, tried: Sequence[_Trial]) -> _Trial:
+    """A wobble about an axis that may pass beside the joint; the joint's travelling centre where most of what the former
+    explains is none of an axis through the joint, and the centre alone explains more than that axis: its tilt, if there
+    is one, comes after it."""
+    body = wobble.candidate.body
+    through = max(
+        t.gain
+        for t in tried
+        if t.candidate.effect == "joint_wobble" and t.candidate.body == body and not any(t.candidate.shifts)
+    )
+    return (
+        wobble if through > MOSTLY * wobble.gain else _instead(wobble, tried, ("moving_centre",), through / wobble.gain)
+    )
 
 
 def _flat(columns: Array) -> Array:
