@@ -315,12 +315,13 @@ def test_what_a_limit_of_the_drive_cuts_is_told_by_its_strokes_alone(
     monkeypatch: pytest.MonkeyPatch, engine: str, accounts: int
 ) -> None:
     """Slowed down, a motor never needs more."""
-    monkeypatch.setattr("hand_model.diagnose.assemble.channel_figures", lambda states, *told: len(told))
+    monkeypatch.setattr("hand_model.diagnose.assemble.channel_figures", lambda states, *told, stiffness: len(told))
     monkeypatch.setattr(
         "hand_model.diagnose.assemble._showing",
         lambda *_: SimpleNamespace(naming=SimpleNamespace(balance=SimpleNamespace(states=()))),
     )
     monkeypatch.setattr("hand_model.diagnose.assemble._accounts", lambda *_: ({},))
+    monkeypatch.setattr("hand_model.diagnose.assemble._stiffness", lambda _: 0.0)
     ceiling = replace(finding("current_saturation", "index", "current"), fit={"engine": engine})
     assert _shown_in(ceiling, []) == accounts
 

@@ -260,6 +260,29 @@ def test_what_only_starts_and_stops_tell_is_not_told_by_steady_motion() -> None:
         assert station.steadily(station.naming.found[0]) == told
 
 
+@pytest.mark.parametrize(("stiffness", "ripple", "stands"), [(3.0, 2.0, True), (1.0, 6.0, False)])
+def test_what_only_starts_and_stops_tell_stands_beside_others_where_it_holds_its_part(
+    stiffness: float, ripple: float, stands: bool
+) -> None:
+    """A stop that begins where motion turns; its size is then read there, too."""
+    shape = {"side": 1.0, "inward": 8.0, "end": 100.0}
+
+    def both(state: DriveState) -> np.ndarray:
+        return planted("end_stop_contact", shape, [stiffness])(state) + planted(
+            "torque_ripple", {"period": 9.0}, [ripple, 0.0]
+        )(state)
+
+    states = unsure_at_ends(drive(5, both))
+    names = ("end_stop_contact", "torque_ripple")
+    station = judged("current", "index", "index", None, states, tuple(effect(name) for name in names))
+    assert {f.term.effect.name for f in station.naming.found} == set(names)
+    assert {f.term.effect.name for f in station.kept} == (set(names) if stands else {"torque_ripple"})
+    for place, figures in station.parameters.items():
+        if station.naming.fit.terms[place].effect.name == "end_stop_contact":
+            low, high = figures["stiffness"]["ci95"]
+            assert low <= stiffness <= high and high - low < stiffness
+
+
 def unsure_at_ends(states: tuple[DriveState, ...]) -> tuple[DriveState, ...]:
     """The states with the first and last tenth of each stroke as known to 4 raw only."""
     return tuple(replace(s, extra={**s.extra, "sigma": 4.0 * (np.abs(s.position - 50) > 40)}) for s in states)
