@@ -316,6 +316,7 @@ def test_a_block_lasts_as_long_at_any_high_rate(rate_hz: float, frames: int) -> 
         (0.15, 0.97, "moving_centre"),
         (0.4, 0.7, "moving_centre"),
         (0.55, 0.4, "joint_wobble"),
+        (0.3, 0.35, "joint_wobble"),
     ],
 )
 def test_an_axis_beside_the_joint_is_a_travelling_centre_where_that_explains_more_than_one_through_it(

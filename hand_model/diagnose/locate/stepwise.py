@@ -334,18 +334,16 @@ def _instead(best: _Trial, tried: Sequence[_Trial], effects: tuple[str, ...], le
 
 
 def _or_centre(wobble: _Trial, tried: Sequence[_Trial]) -> _Trial:
-    """A wobble about an axis that may pass beside the joint; the joint's travelling centre where most of what the former
-    explains is none of an axis through the joint, and the centre alone explains more than that axis: its tilt, if there
-    is one, comes after it."""
-    body = wobble.candidate.body
-    through = max(
-        t.gain
-        for t in tried
-        if t.candidate.effect == "joint_wobble" and t.candidate.body == body and not any(t.candidate.shifts)
+    """A wobble about an axis that may pass beside the joint. Where most of what it explains is none of an axis through
+    the joint, that axis or the joint's travelling centre, whichever explains more, if they explain as much between them:
+    the other comes after it."""
+    mine = [t for t in tried if t.candidate.body == wobble.candidate.body]
+    through, centre = (
+        max((t for t in mine if t.candidate.effect == name and any(t.candidate.shifts) == shifts), key=lambda t: t.gain)
+        for name, shifts in (("joint_wobble", False), ("moving_centre", True))
     )
-    return (
-        wobble if through > MOSTLY * wobble.gain else _instead(wobble, tried, ("moving_centre",), through / wobble.gain)
-    )
+    parted = through.gain < MOSTLY * wobble.gain < through.gain + centre.gain
+    return max(through, centre, key=lambda t: t.gain) if parted else wobble
 
 
 def _flat(columns: Array) -> Array:
