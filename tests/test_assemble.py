@@ -11,6 +11,7 @@ import pytest
 from hand_model.diagnose.assemble import (
     COMPARED,
     _beneath,
+    _countable,
     _counted,
     _echoes,
     _leave_something,
@@ -229,6 +230,24 @@ def test_angles_of_markers_that_leave_segments_or_hinge_need_names_that_leave_no
     asked = station(finger, signal, p, explained)
     every = [asked, station("index", "encoder", other), station("index", "current", 1e-9)]
     assert _leave_something(asked, every) is doubtful
+
+
+@pytest.mark.parametrize(
+    ("loose", "soft", "left", "counts"),
+    [
+        ((), (), True, {"clock_drift", "drive_backlash"}),
+        (("index",), (), False, {"clock_drift", "drive_backlash"}),
+        (("index",), (), True, {"clock_drift"}),
+        (("index",), ("index",), True, None),
+    ],
+)
+def test_beside_markers_that_leave_their_hinge_with_the_angle_a_clock_still_drifts(
+    monkeypatch: pytest.MonkeyPatch, loose: tuple[str, ...], soft: tuple[str, ...], left: bool, counts: set[str] | None
+) -> None:
+    monkeypatch.setattr("hand_model.diagnose.assemble._leave_something", lambda *_: left)
+    kept = tuple(SimpleNamespace(term=SimpleNamespace(effect=effect(n))) for n in ("clock_drift", "drive_backlash"))
+    told = _countable(SimpleNamespace(finger="index", kept=kept), [], loose, soft)
+    assert (told and {f.term.effect.name for f in told}) == counts
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -71,16 +71,16 @@ def assemble(
     ranked: list[tuple[float, Finding]] = _heaviest(marker_findings, _palm_marker)
     rejected: list[dict[str, str]] = []
     unexplained, strange = list(unexplained), list[tuple[Station, Named]]()
-    loose = {
-        entry["where"]["finger"] for entry in unexplained if entry["shape"] == NOT_RIGID or NO_HINGE in entry["shape"]
-    }
+    soft = {entry["where"]["finger"] for entry in unexplained if entry["shape"] == NOT_RIGID}
+    loose = soft | {entry["where"]["finger"] for entry in unexplained if NO_HINGE in entry["shape"]}
     worn = _worn(stations, [f for _, f in ranked])
     believed = [s.believed or s.finger in worn and s.believed_in_part for s in stations]
     for station, stands in zip(stations, believed, strict=True):
-        stands = stands and not (station.finger in loose and _leave_something(station, stations))
+        names = _countable(station, stations, loose, soft)
+        stands = stands and names is not None
         if stands:
             strange += [(station, f) for f in station.outsiders]
-            for merged in _merged(station.kept):
+            for merged in _merged(names or ()):
                 weight, finding = finding_of(station, *merged)
                 if _magnitude(finding, stations) < _beneath(station, merged[0]):
                     rejected.append(
@@ -157,6 +157,17 @@ def _counted(finding: Finding, stations: Sequence[Station]) -> float:
     """Share of a finding's weight that counts: how large it is may be told by comparison alone."""
     alone = compared(finding) or any(finding.effect in s.compared and s.names(finding) for s in stations)
     return COMPARED if alone else 1.0
+
+
+def _countable(
+    station: Station, stations: Sequence[Station], loose: Collection[str], soft: Collection[str]
+) -> tuple[Named, ...] | None:
+    """What stands at a station; None where nothing of it counts, for the markers of its finger are `loose`. Where these
+    leave their hinge in step with the angle, and are not `soft`, that is no function of time: a clock that drifts counts."""
+    if station.finger not in loose or not _leave_something(station, stations):
+        return station.kept
+    clock = () if station.finger in soft else tuple(f for f in station.kept if f.term.effect.signal == "log")
+    return clock or None
 
 
 def _leave_something(station: Station, stations: Sequence[Station]) -> bool:
