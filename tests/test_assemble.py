@@ -17,6 +17,7 @@ from hand_model.diagnose.assemble import (
     _leave_something,
     _of_hinges,
     _one_clock,
+    _ranking_magnitude,
     _shared,
     _shown_in,
     _without_shadows,
@@ -29,6 +30,7 @@ from hand_model.diagnose.locate.command import CommandFacts
 from hand_model.diagnose.locate.displacement import NO_HINGE
 from hand_model.diagnose.locate.preload import COMPARISON
 from hand_model.diagnose.locate.strokes import Loss
+from hand_model.diagnose.magnitude import magnitude
 from hand_model.effects import effect, outsiders
 
 
@@ -352,3 +354,22 @@ def test_what_only_other_drives_size_hardly_counts_in_the_ranking() -> None:
     assert _counted(replace(own, where={"finger": "ring"}), [station]) == 1.0
     assert _counted(replace(own, effect="detent_load"), [station]) == 1.0
     assert _counted(replace(own, fit={"engine": COMPARISON}), []) == COMPARED
+
+
+@pytest.mark.parametrize(("least", "share"), [(0.0, 0.25), (0.9, 0.9)])
+def test_a_finding_ranks_by_its_figures_or_by_what_recordings_kept_out_bear_out_of_it(
+    least: float, share: float
+) -> None:
+    """A rise of friction that is higher where it is narrower: each figure alone is hardly known."""
+    figures = {
+        "static_excess": {"value": 0.4, "ci95": [0.1, 0.7]},
+        "stribeck_speed": {"value": 10.0, "ci95": [10.0, 10.0]},
+    }
+    # the error of recordings kept out falls by `least` squared of its fall for sure
+    after, before = 1.0, 2.0
+    fall = before - (before**2 - least**2 * (before**2 - after**2)) ** 0.5
+    fit = {"before": before, "after": after, "ci95_reduction": [fall, 2.0]}
+    where = {"finger": "index", "actuator": "index", "joint": None, "signal": "current", "marker": None, "trials": []}
+    found = Finding("stribeck_friction", ("stribeck_friction",), 1.0, (), where, "", figures, fit, None)
+    whole = magnitude("stribeck_friction", {"static_excess": 0.4, "stribeck_speed": 10.0})
+    assert _ranking_magnitude(found, []) == pytest.approx(share * whole)

@@ -109,7 +109,7 @@ def assemble(
     sized = [(_ranking_magnitude(f, stations), weight * _counted(f, stations), f) for weight, f in ranked]
     ranked = sorted(((float((m**3 * weight) ** 0.25), f) for m, weight, f in sized), key=lambda item: -item[0])
     ranked = _heaviest(ranked, _same_place)
-    surely = {id(f): max(m, _magnitude(f, stations) * sure_share(f.fit)) for m, _, f in sized}
+    surely = {id(f): m for m, _, f in sized}
     ranked, slight = _without(ranked, trifles(ranked, surely))
     rejected += [*unsure, *slight]
     found = _shared(ranked)
@@ -183,10 +183,13 @@ def _magnitude(finding: Finding, stations: Sequence[Station]) -> float:
 
 
 def _ranking_magnitude(finding: Finding, stations: Sequence[Station]) -> float:
-    """How large a finding is for its kind for sure. How far a hinge that is none moves is told only beside what another
-    hinge would explain, its value the least: that it is none is sure all the same, and how far likely more."""
-    size = likely_magnitude if finding.effect in HINGE else sure_magnitude
-    return size(finding.effect, finding.parameters, _shown_in(finding, stations))
+    """How large a finding is for its kind for sure, by its figures or by what recordings kept out bear out of it. How far
+    a hinge that is none moves is told only beside what another hinge would explain, its value the least: that it is none
+    is sure all the same, and how far likely more."""
+    if finding.effect in HINGE:
+        return likely_magnitude(finding.effect, finding.parameters, _shown_in(finding, stations))
+    sure = sure_magnitude(finding.effect, finding.parameters, _shown_in(finding, stations))
+    return max(sure, _magnitude(finding, stations) * sure_share(finding.fit))
 
 
 def _shown_in(finding: Finding, stations: Sequence[Station]) -> Channel | None:
