@@ -373,3 +373,7 @@ def test_a_finding_ranks_by_its_figures_or_by_what_recordings_kept_out_bear_out_
     found = Finding("stribeck_friction", ("stribeck_friction",), 1.0, (), where, "", figures, fit, None)
     whole = magnitude("stribeck_friction", {"static_excess": 0.4, "stribeck_speed": 10.0})
     assert _ranking_magnitude(found, []) == pytest.approx(share * whole)
+    stop = {"begin": {"value": 80.0}, "stiffness": {"value": 0.01, "ci95": [0.0025, 0.0175]}}
+    ended = replace(found, effect="end_stop_contact", parameters=stop)
+    of_stop = magnitude("end_stop_contact", {"begin": 80.0, "stiffness": 0.01})
+    assert _ranking_magnitude(ended, []) == pytest.approx(0.25 * of_stop)

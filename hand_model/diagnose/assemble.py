@@ -54,6 +54,7 @@ CHANNELS = 15
 COMPARED = 0.01
 MANY = 3  # names of a finger, beside which a channel of it may be explained in part
 NEARLY_ALL = 0.95  # of a mismatch: names that take as much leave nothing worth a word
+AT_THE_END = ("end_stop_contact", "external_contact")  # count by their load at the end of the range
 UNSEEN = 0.01  # probability from which the test sees nothing
 SIGNALS = {"drive": "current", "motors": "current", "command": "current", "encoder": "encoder", "linkage": "markers"}
 SHOWN_IN = {e.name: SIGNALS[e.station] for e in catalogue() if e.station in SIGNALS}
@@ -109,7 +110,7 @@ def assemble(
     sized = [(_ranking_magnitude(f, stations), weight * _counted(f, stations), f) for weight, f in ranked]
     ranked = sorted(((float((m**3 * weight) ** 0.25), f) for m, weight, f in sized), key=lambda item: -item[0])
     ranked = _heaviest(ranked, _same_place)
-    surely = {id(f): m for m, _, f in sized}
+    surely = {id(f): max(m, _sure_part(f, stations)) for m, _, f in sized}
     ranked, slight = _without(ranked, trifles(ranked, surely))
     rejected += [*unsure, *slight]
     found = _shared(ranked)
@@ -183,13 +184,20 @@ def _magnitude(finding: Finding, stations: Sequence[Station]) -> float:
 
 
 def _ranking_magnitude(finding: Finding, stations: Sequence[Station]) -> float:
-    """How large a finding is for its kind for sure, by its figures or by what recordings kept out bear out of it. How far
-    a hinge that is none moves is told only beside what another hinge would explain, its value the least: that it is none
-    is sure all the same, and how far likely more."""
+    """How large a finding is for its kind for sure, by its figures or by what recordings kept out bear out of it (but of
+    what counts by its load at the end of the range, where it may never have been felt). How far a hinge that is none
+    moves is told only beside what another hinge would explain, its value the least: that it is none is sure all the
+    same, and how far likely more."""
     if finding.effect in HINGE:
         return likely_magnitude(finding.effect, finding.parameters, _shown_in(finding, stations))
     sure = sure_magnitude(finding.effect, finding.parameters, _shown_in(finding, stations))
-    return max(sure, _magnitude(finding, stations) * sure_share(finding.fit))
+    borne_out = 0.0 if finding.effect in AT_THE_END else _sure_part(finding, stations)
+    return max(sure, borne_out)
+
+
+def _sure_part(finding: Finding, stations: Sequence[Station]) -> float:
+    """The part of a finding's magnitude that recordings kept out bear out."""
+    return _magnitude(finding, stations) * sure_share(finding.fit)
 
 
 def _shown_in(finding: Finding, stations: Sequence[Station]) -> Channel | None:
