@@ -17,9 +17,9 @@ from hand_model.diagnose.assemble import (
     _leave_something,
     _of_hinges,
     _one_clock,
-    _ranking_magnitude,
     _shared,
     _shown_in,
+    _sure_sizes,
     _without_shadows,
     assemble,
 )
@@ -372,8 +372,8 @@ def test_a_finding_ranks_by_its_figures_or_by_what_recordings_kept_out_bear_out_
     where = {"finger": "index", "actuator": "index", "joint": None, "signal": "current", "marker": None, "trials": []}
     found = Finding("stribeck_friction", ("stribeck_friction",), 1.0, (), where, "", figures, fit, None)
     whole = magnitude("stribeck_friction", {"static_excess": 0.4, "stribeck_speed": 10.0})
-    assert _ranking_magnitude(found, []) == pytest.approx(share * whole)
+    assert _sure_sizes(found, None)[0] == pytest.approx(share * whole)
     stop = {"begin": {"value": 80.0}, "stiffness": {"value": 0.01, "ci95": [0.0025, 0.0175]}}
     ended = replace(found, effect="end_stop_contact", parameters=stop)
     of_stop = magnitude("end_stop_contact", {"begin": 80.0, "stiffness": 0.01})
-    assert _ranking_magnitude(ended, []) == pytest.approx(0.25 * of_stop)
+    assert _sure_sizes(ended, None)[0] == pytest.approx(0.25 * of_stop)

@@ -18,6 +18,7 @@ from .locate.markers import HINGE, SLIPS
 from .locate.preload import usual_spring
 from .locate.strokes import STROKES
 from .magnitude import (
+    AT_THE_END,
     Channel,
     channel_figures,
     likely_magnitude,
@@ -54,7 +55,6 @@ CHANNELS = 15
 COMPARED = 0.01
 MANY = 3  # names of a finger, beside which a channel of it may be explained in part
 NEARLY_ALL = 0.95  # of a mismatch: names that take as much leave nothing worth a word
-AT_THE_END = ("end_stop_contact", "external_contact")  # count by their load at the end of the range
 UNSEEN = 0.01  # probability from which the test sees nothing
 SIGNALS = {"drive": "current", "motors": "current", "command": "current", "encoder": "encoder", "linkage": "markers"}
 SHOWN_IN = {e.name: SIGNALS[e.station] for e in catalogue() if e.station in SIGNALS}
@@ -107,10 +107,10 @@ def assemble(
     unexplained += [unrepeated_of(s) for s in stations if _wanders(s, stations)]
     ranked = _without_shadows(_one_clock(_of_hinges(ranked, unexplained), [f for _, f in strange]), stations)
     ranked, unsure = _without(ranked, doubted([f for _, f in ranked]))
-    sized = [(_ranking_magnitude(f, stations), weight * _counted(f, stations), f) for weight, f in ranked]
-    ranked = sorted(((float((m**3 * weight) ** 0.25), f) for m, weight, f in sized), key=lambda item: -item[0])
+    sized = [(*_sure_sizes(f, _shown_in(f, stations)), weight * _counted(f, stations), f) for weight, f in ranked]
+    ranked = sorted(((float((m**3 * weight) ** 0.25), f) for m, _, weight, f in sized), key=lambda item: -item[0])
     ranked = _heaviest(ranked, _same_place)
-    surely = {id(f): max(m, _sure_part(f, stations)) for m, _, f in sized}
+    surely = {id(f): most for _, most, _, f in sized}
     ranked, slight = _without(ranked, trifles(ranked, surely))
     rejected += [*unsure, *slight]
     found = _shared(ranked)
@@ -183,21 +183,19 @@ def _magnitude(finding: Finding, stations: Sequence[Station]) -> float:
     return magnitude(finding.effect, values_of(finding.parameters), _shown_in(finding, stations))
 
 
-def _ranking_magnitude(finding: Finding, stations: Sequence[Station]) -> float:
-    """How large a finding is for its kind for sure, by its figures or by what recordings kept out bear out of it (but of
-    what counts by its load at the end of the range, where it may never have been felt). How far a hinge that is none
-    moves is told only beside what another hinge would explain, its value the least: that it is none is sure all the
-    same, and how far likely more."""
-    if finding.effect in HINGE:
-        return likely_magnitude(finding.effect, finding.parameters, _shown_in(finding, stations))
-    sure = sure_magnitude(finding.effect, finding.parameters, _shown_in(finding, stations))
-    borne_out = 0.0 if finding.effect in AT_THE_END else _sure_part(finding, stations)
-    return max(sure, borne_out)
+def _sure_sizes(finding: Finding, channel: Channel | None) -> tuple[float, float]:
+    """How large a finding is for its kind for sure, by its figures or by the part of it that recordings kept out bear out:
+    as it is ranked, and at most.
 
-
-def _sure_part(finding: Finding, stations: Sequence[Station]) -> float:
-    """The part of a finding's magnitude that recordings kept out bear out."""
-    return _magnitude(finding, stations) * sure_share(finding.fit)
+    What counts by its load at the end of the range is ranked by its figures. How far a hinge that is none moves is told
+    only beside what another hinge would explain, its value the least: that it is none is sure all the same, and how far
+    likely more.
+    """
+    by_figures = likely_magnitude if finding.effect in HINGE else sure_magnitude
+    sure = by_figures(finding.effect, finding.parameters, channel)
+    borne_out = magnitude(finding.effect, values_of(finding.parameters), channel) * sure_share(finding.fit)
+    most = max(sure, borne_out)
+    return sure if finding.effect in AT_THE_END else most, most
 
 
 def _shown_in(finding: Finding, stations: Sequence[Station]) -> Channel | None:
@@ -229,11 +227,12 @@ def _stiffness(station: Station) -> float:
     """Stiffness [effort/position] of a drive's spring over the positions that it was at, as declared and as bent; zero
     where none is declared."""
     balance, fit = station.naming.balance, station.naming.fit
-    bends = [i for i, t in enumerate(fit.terms) if t.effect.name == "nonlinear_spring"]
-    position = balance.gather(lambda s: s.position)
-    bent = balance.gather(lambda s: sum((fit.added(i, s) for i in bends), np.zeros(len(s.position))))
-    there = position - position.mean()
-    return fit.declared.get("spring", 0.0) + float(there @ bent / max(there @ there, 1e-300))
+    stiffness = fit.declared.get("spring", 0.0)
+    for which, term in enumerate(fit.terms):
+        if term.effect.name == "nonlinear_spring":
+            at = balance.gather(lambda s, i=which: np.stack([s.position, fit.added(i, s)], axis=-1))
+            stiffness += float(np.polyfit(*at.T, 1)[0])
+    return stiffness
 
 
 def _heaviest(found: Sequence[tuple[float, Finding]], key: Callable[[Finding], Any]) -> list[tuple[float, Finding]]:

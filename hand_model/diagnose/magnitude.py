@@ -213,3 +213,5 @@ PLAIN: Mapping[str, Rule] = {
     "support_slip": lambda p, _: p["turn"] / 0.05,
     "marker_swap": lambda p, _: p["lasting"] / 4.0,
 }
+# By their load at the end of the range, where they may never have been felt.
+AT_THE_END = frozenset(effect for effect, rule in PLAIN.items() if rule is _depth)

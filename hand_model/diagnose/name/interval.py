@@ -111,6 +111,11 @@ def _forms(balance: Balance, fit: Fit, which: int, scale: float) -> list[tuple[f
     return list(zip((chance / (1 + chance.sum())).tolist(), out, strict=True))
 
 
+def as_named(naming: Naming) -> Reading:
+    """Sizes read where the effects were named."""
+    return Reading(naming.balance, naming.declared, naming.fit)
+
+
 def undisturbed(naming: Naming) -> Reading:
     """Where sizes are read: from steady samples alone, for starts and stops are smeared and bend what happens at low
     speed; as named where an effect acts at starts, and where too few samples are steady; of lost motion without levels
@@ -123,7 +128,7 @@ def undisturbed(naming: Naming) -> Reading:
         even = balance.wandering(None)
         return Reading(balance, naming.declared, balance.fit(refit(even, even.fit(fit.terms)).terms))
     if not fit.terms or lively or balance.steady.all() or count < 20 * (len(balance.names) + fit.size):
-        return Reading(balance, naming.declared, fit)
+        return as_named(naming)
     calm = balance.settled()
     best = refit(calm, calm.fit(fit.terms))
     for which, term in enumerate(fit.terms):
@@ -139,7 +144,7 @@ def undisturbed(naming: Naming) -> Reading:
         [float(np.mean((balance.effort - f.prediction)[held] ** 2)) for f in (fit, best)] if held.any() else [1.0, 1.0]
     )
     if errors[1] > REFUTED * errors[0]:  # slow moves that the training recordings did not have
-        return Reading(balance, naming.declared, fit)
+        return as_named(naming)
     return Reading(calm, calm.fit(), best)
 
 

@@ -18,9 +18,9 @@ from ...effects.base import DriveState
 from ..findings import Finding
 from .balance import Balance, Fit
 from .entries import finding_of
-from .interval import Reading, parameter_intervals
+from .interval import Reading, as_named, parameter_intervals, undisturbed
 from .shapes import refit, reform
-from .station import Station, read
+from .station import Station
 from .term import Term
 
 Array = NDArray[np.float64]
@@ -69,7 +69,8 @@ def _written(stations: tuple[Station, ...], named: tuple[int, frozenset[str]]) -
         }
         out.naming = replace(naming, balance=balance, fit=fit, found=tuple(again.values()))
         out.proven = tuple(again[id(f)] for f in station.proven if id(f) in again)
-        out.reading, _ = read(out.naming, station.least)
+        at_ends = any(f.term.effect.name in station.at_ends for f in again.values())
+        out.reading = as_named(out.naming) if at_ends else undisturbed(out.naming)
         out.parameters = {which: parameter_intervals(out.reading, which) for which in range(len(fit.terms))}
         out = out if out.beside is None else out.beside(out)
     out.naming = replace(out.naming, declared=_recorded(out.naming.balance, out.naming.fit))

@@ -12,7 +12,7 @@ from ..findings import Finding
 from .balance import Balance
 from .candidates import EVIDENCE_LEAST
 from .evidence import evidence
-from .interval import Reading, brought_held_out, parameter_intervals, sized, undisturbed, variance_ratio
+from .interval import as_named, brought_held_out, parameter_intervals, sized, undisturbed, variance_ratio
 from .naming import ALPHA, EXPLAINED_LEAST, MANY, Named, Naming
 from .selection import SMALL
 
@@ -39,8 +39,9 @@ EXPLAINED_PARTLY = 0.5
 
 class Station:
     """One balance of one finger and what was named there. beside: reads its sizes again where more is known of the drive
-    than its own balance tells; compared: names of which other drives tell the size; tilt: root mean square, in the unit
-    of the balance, below which a departure of an angle may be what a joint that is no plain hinge leaves in it."""
+    than its own balance tells; compared: names of which other drives tell the size; at_ends: of what starts and stops
+    alone tell, beside which sizes are read as named; tilt: root mean square, in the unit of the balance, below which a
+    departure of an angle may be what a joint that is no plain hinge leaves in it."""
 
     def __init__(
         self, signal: str, finger: str | None, actuator: str | None, joint: str | None, naming: Naming
@@ -52,15 +53,22 @@ class Station:
         self.tilt = 0.0
         chances = CHANCES_OF_MOTORS if signal == "current" else CHANCES
         unseen = naming.before.p >= ALPHA
-        self.least = least = EVIDENCE_LEAST + (np.log(chances) if unseen else 0.0)
-        self.reading, sure = read(naming, least)
+        least = EVIDENCE_LEAST + (np.log(chances) if unseen else 0.0)
 
         def must(f: Named) -> float:  # what one recording alone may have, it may have anywhere and at any time
             return least + (EVIDENCE_LEAST if unseen and not f.term.effect.of_the_hand else 0.0)
 
-        stand = [
-            places[id(f)] for f in naming.found if places[id(f)] in sure and _stands(naming, f, places[id(f)], must(f))
-        ]
+        reading = undisturbed(naming)
+        stand, at_ends = list[int](), list[int]()
+        for f in naming.found:
+            if _stands(naming, f, which := places[id(f)], must(f)):
+                if sized(reading, which):
+                    stand.append(which)
+                elif _plain_at_ends(naming, f, which, least):
+                    at_ends.append(which)
+        stand += at_ends
+        self.at_ends = frozenset(naming.fit.terms[which].effect.name for which in at_ends)
+        self.reading = as_named(naming) if at_ends else reading
         self.parameters = {which: parameter_intervals(self.reading, which) for which in stand}
         self.proven = tuple(f for f in naming.found if places[id(f)] in stand)
         # names that no table holds, where no test sees them, and that bring no more than an effect must
@@ -338,17 +346,6 @@ def _stands(naming: Naming, named: Named, which: int, least: float) -> bool:
     out."""
     brought = brought_held_out(naming, which)
     return named.evidence >= least if brought is None else brought > 0 and named.evidence + brought >= least
-
-
-def read(naming: Naming, least: float) -> tuple[Reading, set[int]]:
-    """Where sizes are read: from steady motion, but as named where starts and stops alone tell an effect plainly from
-    zero; and the terms whose size is told from zero. least: log evidence that an effect must bring."""
-    reading = undisturbed(naming)
-    places = {naming.fit.terms.index(f.term): f for f in naming.found}
-    steady = {which for which in places if sized(reading, which)}
-    at_ends = {w for w, f in places.items() if w not in steady and _plain_at_ends(naming, f, w, least)}
-    named = Reading(naming.balance, naming.declared, naming.fit)
-    return named if at_ends else reading, steady | at_ends
 
 
 def _plain_at_ends(naming: Naming, named: Named, which: int, least: float) -> bool:
