@@ -34,13 +34,14 @@ def test_small_terms_stand_for_a_rival_only_if_it_explains_more_than_all_of_them
         fit=lambda some: SimpleNamespace(rss=fit.rss + sum(v for i, v in LEFT.items() if terms[i] not in some))
     )
 
-    def in_place(pair, effects, fit, which, others) -> list[Rival]:
+    def in_place(pair, effects, fit, which, others, tangents) -> list[Rival]:
         if which == 1:
             return [Rival("small", 25.0, fit)]
         other = together if 1 in others else rival
         return sorted([Rival("large", 1000.0, fit), Rival("rival", other, fit)], key=lambda r: -r.evidence)
 
     monkeypatch.setattr(selection, "_in_place", in_place)
+    monkeypatch.setattr(selection, "Tangents", SimpleNamespace(of=lambda *_: None))
     monkeypatch.setattr(selection, "evidence", lambda balance, fit, rest, which, scale: {0: 1000.0, 1: 25.0}[which])
     monkeypatch.setattr(selection, "scale_of", lambda *_: 1.0)
     monkeypatch.setattr(selection, "_size", lambda *_: 1.0)

@@ -23,6 +23,7 @@ from .evidence import evidence, gain, scale_of
 from .lack_of_fit import LackOfFit, lack_of_fit
 from .naming import ALPHA, CLASS_WIDTH, MANY, MOST_TERMS, Named, Naming, Rival, overwhelmed
 from .shapes import polish, possible, scan
+from .tangent import Tangents, turned
 from .term import Term
 from .wander import Wander, estimate_wander
 
@@ -252,15 +253,16 @@ def _findings(pair: Pair, every_recording: Balance, effects: tuple[Any, ...], fi
     left = [balance.fit(tuple(t for i, t in enumerate(terms) if i != which)) for which in range(len(terms))]
     losses = [max(rest.rss - fit.rss, 0.0) for rest in left]
     large = [loss >= SMALL * sum(losses) for loss in losses]
+    tangents = Tangents.of(balance, fit)
     for which, term in enumerate(terms):
         every = [i for i in range(len(terms)) if i != which]
         others = [i for i in every if large[i] or not large[which]]
-        rivals = _in_place(pair, effects, fit, which, others)
+        rivals = _in_place(pair, effects, fit, which, others, tangents)
         if rivals[0].name != term.effect.name and others != every:
             own, small = next(r for r in rivals if r.name == term.effect.name), [i for i in every if i not in others]
             brought = sum(max(evidence(balance, fit, left[i], i, scale_of(balance, fit)), 0.0) for i in small)
             if own.evidence + brought > rivals[0].evidence:  # they do not stand for it: together they explain more
-                rivals = _in_place(pair, effects, fit, which, every)
+                rivals = _in_place(pair, effects, fit, which, every, tangents)
         rivals = _with_kept_out(every_recording, rivals)
         weights = np.exp(np.array([r.evidence for r in rivals] + [0.0]) - max(rivals[0].evidence, 0.0))
         mine = [r.name for r in rivals].index(term.effect.name)
@@ -320,8 +322,11 @@ def _foretold(balance: Balance, fit: Fit) -> tuple[float, float]:
     return square, _log_likelihood(balance, fit, balance.wander, weight) + noise
 
 
-def _in_place(pair: Pair, effects: tuple[Any, ...], fit: Fit, which: int, others: Sequence[int]) -> list[Rival]:
-    """Every candidate in the place of a term, beside the terms `others` alone, and that term; best evidence first."""
+def _in_place(
+    pair: Pair, effects: tuple[Any, ...], fit: Fit, which: int, others: Sequence[int], tangents: Tangents
+) -> list[Rival]:
+    """Every candidate in the place of a term, beside the terms `others` alone, and that term; best evidence first.
+    tangents: of the fit."""
     balance, term = pair.state, fit.terms[which]
     rest = tuple(fit.terms[i] for i in others)
     without, alone = balance.fit(rest), balance.fit((*rest, term))
@@ -330,6 +335,8 @@ def _in_place(pair: Pair, effects: tuple[Any, ...], fit: Fit, which: int, others
     ranked = rank(pair, effects, rest, without, refine=3)
     same = [r.evidence for r in ranked if r.name == term.effect.name]
     rivals = [r for r in ranked if r.name != term.effect.name] + [Rival(term.effect.name, max([own, *same]), alone)]
+    if beside is fit:
+        rivals = [*turned(balance, rivals[:-1], rivals[-1], without, tangents, others), rivals[-1]]
     return sorted(rivals, key=lambda r: -r.evidence)
 
 
