@@ -148,8 +148,8 @@ class _Model:
     """Declared columns and terms of a balance, and further columns (n, k), as a linear model with normal priors, of the
     samples `inside`.
 
-    priors: coefficient -> mean and standard deviation; of the others nothing is known, the further ones and the terms
-    have some `effort`. mean, covariance: of the coefficients (m,), (m, m); possible: their mode (m,) within what physics
+    priors: coefficient -> mean and standard deviation; of the others nothing is known, the terms have some `effort`, and
+    the further ones, of a weight, no more than the drive can lift in any pose, however little of it this one shows. mean, covariance: of the coefficients (m,), (m, m); possible: their mode (m,) within what physics
     allows.
     """
 
@@ -171,6 +171,8 @@ class _Model:
         size = np.maximum(np.sqrt(np.mean(matrix**2, axis=0)), 1e-12)
         mean, deviation = np.zeros(len(size)), effort / size
         deviation[: len(balance.names)] *= FLAT
+        if further is not None:
+            deviation[-further.shape[1] :] = 0.5 * np.max(np.abs(balance.effort[balance.train]))
         for name, (value, doubt) in priors.items():
             at = balance.names.index(name)
             mean[at], deviation[at] = value, doubt

@@ -11,6 +11,7 @@ import numpy as np
 from .base import Amplitude, Array, DriveState, Effect, Shape, figure
 from .law import Law, Moment
 
+LIFTED = 2.0  # of the largest effort, at most, is a weight: in other poses friction and spring may hold some of it
 NEAR = 0.2  # share by which the angle that matters may differ: the map to the joint is no line
 
 
@@ -58,6 +59,11 @@ class GravityLoad(Effect):
         pose that nobody knows."""
         along, across = amplitude["along"], amplitude["across"]
         return {**shape, "along": along, "across": across, "largest": math.hypot(along, across)}
+
+    def possible(self, states: tuple[DriveState, ...], parameters: Mapping[str, float]) -> bool:
+        """Whether the drive could lift the weight in any pose, with what it was seen to give."""
+        most = max((float(np.max(np.abs(s.effort[np.isfinite(s.effort)]), initial=0.0)) for s in states), default=0.0)
+        return parameters["largest"] <= LIFTED * most
 
     def units(self, shape: Mapping[str, float]) -> dict[str, str]:
         """Of the largest load."""
