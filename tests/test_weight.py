@@ -132,3 +132,27 @@ def test_a_bend_that_a_weight_explains_is_not_looked_for_beside_it(
     heard(monkeypatch, lambda s: 60 * (s.position / 100) ** 2 - 40.0)
     ((*effects,),) = asked
     assert ("nonlinear_spring" in {e.name for e in effects}) == beside_bend
+
+
+def test_a_weight_is_no_more_than_its_drive_could_lift() -> None:
+    states = posed(drive(1, trials=2))
+    most = max(float(np.nanmax(np.abs(s.effort))) for s in states)
+    possible = [effect("gravity_load").possible(states, {"largest": share * most}) for share in (0.3, 1.5, 2.5)]
+    assert possible == [True, True, False]
+
+
+@pytest.mark.parametrize(("shown", "told"), [(1.0, True), (0.02, False)])
+def test_a_pose_that_hardly_shows_a_weight_tells_of_none(
+    monkeypatch: pytest.MonkeyPatch, shown: float, told: bool
+) -> None:
+    """What would be a weight of 45 raw where the finger moves upright is one of 2250 where it moves nearly level."""
+
+    def level(state: Any) -> Any:
+        gravity = {name: shown * state.extra[name] for name in ("gravity_along", "gravity_across")}
+        return replace(state, extra={**state.extra, **gravity})
+
+    upright = posed
+    monkeypatch.setattr(f"{__name__}.posed", lambda states: tuple(level(s) for s in upright(states)))
+    stations, findings = heard(monkeypatch, lambda s: -45.0 * np.sin(1.7 + SWEEP * s.position / 100))
+    named = {f.term.effect.name for s in stations if s.believed for f in s.kept}
+    assert ("gravity_load" in {f.effect for _, f in findings} | named) == told

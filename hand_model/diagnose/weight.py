@@ -130,7 +130,8 @@ def _pulled(usual: Usual, station: Station, states: tuple[DriveState, ...], odd_
             weighed, likelier = both, both.log_evidence - odd.log_evidence
             beside_bend = len(plain) < len(terms)
         likelier += CLASS_WIDTH + EVIDENCE_LEAST
-    if likelier <= 0:
+    largest = {"largest": float(np.hypot(*weighed.mean[-2:]))}
+    if likelier <= 0 or not effect(WEIGHT).possible(states, largest):
         return None
     probability = float(1 / (1 + np.exp(-likelier)))
     return Pull(weighed.mean[-2:], weighed.covariance[-2:, -2:], probability, beside_bend)
