@@ -12,7 +12,9 @@ from test_diagnose import drive
 
 from hand_model.diagnose import weight
 from hand_model.diagnose.name import entries, reread
+from hand_model.diagnose.name.balance import Balance
 from hand_model.diagnose.name.judgement import judged
+from hand_model.diagnose.name.term import Term
 from hand_model.effects import effect
 from hand_model.effects.path import dahl
 
@@ -156,3 +158,17 @@ def test_a_pose_that_hardly_shows_a_weight_tells_of_none(
     stations, findings = heard(monkeypatch, lambda s: -45.0 * np.sin(1.7 + SWEEP * s.position / 100))
     named = {f.term.effect.name for s in stations if s.believed for f in s.kept}
     assert ("gravity_load" in {f.effect for _, f in findings} | named) == told
+
+
+def test_a_bent_spring_is_taken_from_the_line_between_its_ends() -> None:
+    balance = Balance(drive(1, trials=2))
+    terms = tuple(Term(effect(n), s) for n, s in (("torque_ripple", {"period": 9.0}), (weight.BENT, {"form": 0.0})))
+    design = balance.design(terms)[0]
+    bent = weight._from_chords(balance, terms, design)
+    position = balance.gather(lambda s: s.position)
+    ends = [int(np.argmin(position)), int(np.argmax(position))]
+    np.testing.assert_array_equal(bent[:, :-2], design[:, :-2])
+    np.testing.assert_allclose(bent[ends, -2:], 0.0, atol=1e-6)
+    line = np.c_[np.ones(len(position)), position]
+    for column in (design - bent)[:, -2:].T:  # what was taken off is a line
+        np.testing.assert_allclose(line @ np.linalg.lstsq(line, column, rcond=None)[0], column, rtol=1e-8)

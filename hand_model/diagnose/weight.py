@@ -164,6 +164,7 @@ class _Model:
         further: Array | None = None,
     ) -> None:
         matrix, low, high = balance.design(terms)
+        matrix = _from_chords(balance, terms, matrix)
         if further is not None:
             matrix = np.c_[matrix, further]
             unbounded = np.full(further.shape[1], np.inf)
@@ -186,11 +187,26 @@ class _Model:
         precision = columns.T @ columns + np.eye(len(size))
         found = np.linalg.solve(precision, columns.T @ left)
         possible = from_products(precision, columns.T @ left, (low - mean) / deviation, (high - mean) / deviation)
-        self.log_evidence = float(0.5 * (columns.T @ left) @ found - 0.5 * left @ left) - 0.5 * float(
-            np.linalg.slogdet(precision)[1]
-        )
+        # at the mode within what physics allows: what a coefficient says beyond it speaks for nothing
+        explained = (columns.T @ left) @ possible - 0.5 * possible @ precision @ possible
+        self.log_evidence = float(explained - 0.5 * left @ left - 0.5 * np.linalg.slogdet(precision)[1])
         self.mean, self.possible = mean + deviation * found, mean + deviation * possible
         self.covariance = np.linalg.inv(precision) * np.outer(deviation, deviation)
+
+
+def _from_chords(balance: Balance, terms: tuple[Term, ...], design: Array) -> Array:
+    """The design (n, k) of terms, each column of a bent spring taken from the line between its ends: what is usual of
+    preload and stiffness is so of the whole spring, and not of where it is straight, or of its tangent at zero."""
+    position = balance.gather(lambda s: s.position)
+    low, high = int(np.argmin(position)), int(np.argmax(position))
+    way = (position - position[low]) / max(position[high] - position[low], 1e-12)
+    out, at = design.copy(), len(balance.names)
+    for term in terms:
+        own = slice(at, at + len(term.effect.amplitudes()))
+        if term.effect.name == BENT:
+            out[:, own] -= design[low, own] + way[:, None] * (design[high, own] - design[low, own])
+        at = own.stop
+    return out
 
 
 def _beside_usual(station: Station, usual: Usual) -> Station:
