@@ -58,6 +58,7 @@ class Balance(Samples):
     ) -> None:
         super().__init__(states, everything, typical)
         self._grids: dict[Any, Grid] = {}
+        self._idle: dict[Any, frozenset[str]] = {}
         self._kept: dict[Any, tuple[Any, GridColumns]] = {}
         self._apart: Any = None
 
@@ -142,6 +143,14 @@ class Balance(Samples):
         if effect not in self._grids:
             self._grids[effect] = Grid(effect, effect.grid(self.states))
         return self._grids[effect]
+
+    def freedom(self, effect: Any, shape: Mapping[str, float]) -> int:
+        """How many parameters a shape has beside its amplitudes: those that matter in its form."""
+        form = effect, shape.get("form")
+        if form not in self._idle:
+            idle = [s.name for s in effect.shapes(self.states) if not s.matters(shape)]
+            self._idle[form] = frozenset((*DISCRETE, *idle))
+        return len(shape.keys() - self._idle[form])
 
     def grid_columns(self, grid: Grid, weight: Array, terms: tuple[Term, ...] = ()) -> GridColumns:
         """The columns beside `terms` of every shape of a grid, weighted by `weight` (n,) and whitened; kept under the
@@ -235,7 +244,7 @@ class Balance(Samples):
             amplitudes.append(dict(zip(names, coefficients[start : start + len(names)].tolist(), strict=True)))
             start += len(names)
         acting = int(weighted[k:-1].any(1).sum())  # in training recordings
-        size = sum(len([k for k in t.shape if k not in DISCRETE]) for t in terms) + acting
+        size = sum(self.freedom(t.effect, t.shape) for t in terms) + acting
         declared = dict(zip(self.names, coefficients[:k].tolist(), strict=True))
         return Fit(terms, declared, tuple(amplitudes), prediction, rss, size)
 

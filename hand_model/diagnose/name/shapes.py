@@ -83,7 +83,8 @@ def _project(balance: Balance, grid: Grid, terms: tuple[Term, ...], least: float
         else:
             gram = columns.gram(mine) - inside[mine] @ inside[mine].T
             gains[i] = float(right[mine] @ np.linalg.lstsq(gram, right[mine], rcond=None)[0])
-    worth = np.where(gains > max(least, 0.0), gains - parameter_price(balance) * np.diff(first), -np.inf)
+    size = np.diff(first) + np.array([balance.freedom(grid.effect, shape) for shape in grid.shapes])
+    worth = np.where(gains > max(least, 0.0), gains - parameter_price(balance) * size, -np.inf)
     return [grid.shapes[i] for i in np.argsort(worth)[::-1][:2] if np.isfinite(worth[i])]
 
 
