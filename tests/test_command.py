@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from hand_model.diagnose.locate.answers import Answers, lateness
-from hand_model.diagnose.locate.command import command_facts, command_findings, delays, sags_beneath, with_lateness
+from hand_model.diagnose.locate.command import (
+    _sags,
+    command_facts,
+    command_findings,
+    delays,
+    sags_beneath,
+    with_lateness,
+)
 from hand_model.diagnose.locate.simulated import SimulatedDrive
 from hand_model.diagnose.locate.strokes import Loss, later, strokes_of
 from hand_model.effects.base import DriveState
@@ -125,6 +132,18 @@ def test_drives_that_lose_speed_alike_are_of_a_kind_and_one_that_loses_more_sags
     assert sags(index=sagging, ring=sagging) == set()
     assert sags(index=sagging, ring=softer) == {"index"}
     assert sags(index=sagging, ring=hastier) == set()  # controllers of this hand err by as much
+
+
+@pytest.mark.parametrize(("later_share", "sags"), [(0.021, True), (0.013, False)])
+def test_a_sag_is_plain_by_whole_strokes_and_sure_by_their_later_halves(later_share: float, sags: bool) -> None:
+    state, current = strokes(healthy, 0)
+    other = command_facts((state,), (current,))
+    mine, other = (
+        replace(other, loss=Loss(whole, 0.002, 1.0), later=Loss(half, 0.002, 1.0))
+        for whole, half in ((0.027, later_share), (0.003, -0.005))
+    )
+    assert _sags(mine, [other]) == sags
+    assert not _sags(replace(mine, loss=Loss(0.02, 0.002, 1.0)), [other])
 
 
 def test_what_a_slow_controller_still_settles_is_no_sag() -> None:

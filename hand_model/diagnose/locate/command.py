@@ -20,8 +20,8 @@ from .strokes import STROKES, Loss, Stroke, beneath, ceiling, later, sag, stroke
 Array = NDArray[np.float64]
 
 ALIKE = 2.0  # times the loss of speed that the session's other drives have (median): one kind's may differ by as much
-# of the speed, by which a drive must lose more than those for sure (standard errors): of 172 healthy drives of four
-# recorders none loses any more than those for sure; one that meets a stop loses 0.006
+# of the speed, by which a drive must lose more than those for sure (standard errors): of some 700 drives without a sag
+# of four recorders one loses as much and goes on to; one that meets a stop loses 0.006
 LEAST_BEYOND, SURE = 0.01, 4.0
 USUAL_LOSS = 0.0175  # of the speed, that controllers may lose where no other drive says how much
 # log likelihood that a limit must bring: for an effect, for the limits that are tried, and for as many names of as many
@@ -97,12 +97,16 @@ def delays(
 
 
 def _sags(fact: CommandFacts, others: Sequence[CommandFacts]) -> bool:
-    """Whether a drive loses speed, and goes on to, surely and plainly more than the session's other drives lose, or seem
-    to gain: controllers with little feedback lose more under load."""
-    for loss, theirs in ((fact.loss, [f.loss for f in others]), (fact.later, [f.later for f in others])):
+    """Whether a drive loses speed surely and plainly more than the session's other drives lose, or seem to gain, and
+    surely goes on to: controllers with little feedback lose more under load."""
+    both = (
+        (fact.loss, [f.loss for f in others], LEAST_BEYOND),
+        (fact.later, [f.later for f in others], 0.0),  # of half of each stroke, which tells less
+    )
+    for loss, theirs, least in both:
         known = [abs(x.share) for x in theirs if np.isfinite(x.share)]
         usual = float(np.median(known)) if known else USUAL_LOSS
-        if not (loss.share > ALIKE * usual and loss.share - usual - SURE * loss.share_se > LEAST_BEYOND):
+        if not (loss.share > ALIKE * usual and loss.share - usual - SURE * loss.share_se > least):
             return False
     return True
 
