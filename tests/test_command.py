@@ -179,7 +179,7 @@ def test_of_the_later_half_of_strokes_the_speed_is_read_there() -> None:
         (0.1, 3, 30, 0.0, False),  # one of the readings may be chance
         (0.028, 24, 15, 0.0, True),
         (0.028, 7, 30, 0.0, True),
-        (0.028, 24, 15, 0.013, False),  # such controllers lose as much
+        (0.028, 24, 15, 0.0145, False),  # such controllers lose as much
         (0.012, 24, 15, 0.0, False),  # any controller may lose as much
         (0.028, 24, 15, None, False),  # nothing says what controllers of this hand lose
         (0.05, 24, 15, None, True),

@@ -20,7 +20,7 @@ from .strokes import STROKES, Loss, Stroke, beneath, ceiling, later, sag, stroke
 Array = NDArray[np.float64]
 
 ALIKE = 2.0  # times the loss of speed that the session's other drives have (median): one kind's may differ by as much
-# of the speed, by which a drive must lose more than those for sure (standard errors): of some 700 drives without a sag
+# of the speed, by which a drive must lose more than those for sure (standard errors): of 891 drives without a sag
 # of four recorders one loses as much and goes on to; one that meets a stop loses 0.006
 LEAST_BEYOND, SURE = 0.01, 4.0
 USUAL_LOSS = 0.0175  # of the speed, that controllers may lose where no other drive says how much
