@@ -236,7 +236,7 @@ def test_a_faint_effect_needs_the_word_of_untouched_recordings(seed: int) -> Non
     assert not refuted.missing
 
 
-@pytest.mark.parametrize("seed", [22, 24])
+@pytest.mark.parametrize("seed", [22, 32])
 def test_what_half_of_the_recordings_are_too_few_for_all_of_them_tell_and_each_half_bears_out(seed: int) -> None:
     faint, healthy = (
         half_untouched(drive(seed, planted("nonlinear_spring", {"form": 1.0, "knee": 50.0}, [0.0, size])))
