@@ -15,7 +15,7 @@ from hand_model.diagnose.name.evidence import evidence, gain
 from hand_model.diagnose.name.naming import Rival
 from hand_model.diagnose.name.shapes import refit, scan
 from hand_model.diagnose.name.tangent import Tangents, turned
-from hand_model.diagnose.name.term import Term
+from hand_model.diagnose.name.term import Term, reshaped
 from hand_model.effects import effect
 from hand_model.effects.base import DriveState
 from hand_model.effects.path import dahl
@@ -61,3 +61,11 @@ def test_a_rival_is_weighed_beside_the_others_as_they_turn_to_it(risen: tuple[Ba
     assert before[DRAG.name].evidence < own.evidence < after[DRAG.name].evidence
     assert gain(balance, after[DRAG.name].fit, fit) > 0
     assert after["detent_load"] is before["detent_load"]  # turning does not bring it near
+
+
+def test_one_of_several_terms_takes_another_shape() -> None:
+    terms = (Term(BRISTLES, {"form": 0.0}), Term(RISE, {"form": 1.0}), Term(DRAG, {}))
+    for which in range(len(terms)):
+        wanted = tuple(Term(t.effect, {"form": 2.0}) if i == which else t for i, t in enumerate(terms))
+        assert reshaped(terms, which, {"form": 2.0}) == wanted
+        assert reshaped(terms, which - len(terms), {"form": 2.0}) == wanted  # counted from the end

@@ -24,7 +24,7 @@ from .name.judgement import judged
 from .name.least_squares import from_products
 from .name.naming import CLASS_WIDTH
 from .name.station import Station
-from .name.term import Term
+from .name.term import Term, reshaped
 
 Array = NDArray[np.float64]
 
@@ -150,8 +150,8 @@ class _Model:
     samples `inside`.
 
     priors: coefficient -> mean and standard deviation; of the others nothing is known, the terms have some `effort`, and
-    the further ones, of a weight, no more than the drive can lift in any pose, however little of it this one shows. mean, covariance: of the coefficients (m,), (m, m); possible: their mode (m,) within what physics
-    allows.
+    the further ones, of a weight, no more than the drive can lift in any pose, however little of it this one shows.
+    mean, covariance: of the coefficients (m,), (m, m); possible: their mode (m,) within what physics allows.
     """
 
     def __init__(
@@ -229,7 +229,7 @@ def _beside_usual(station: Station, usual: Usual) -> Station:
         prediction = term.effect.clip(prediction, term.shape) if term.effect.clips else prediction
     w = balance.weights(rest) * balance.train
     read = Fit(
-        (*fit.terms[:at], Term(fit.terms[at].effect, {"sweep": sweep}), *fit.terms[at + 1 :]),
+        reshaped(fit.terms, at, {"sweep": sweep}),
         declared,
         (*amplitudes[:at], own, *amplitudes[at:]),
         prediction,

@@ -101,6 +101,10 @@ class Shape:
         """Whether it does in the form that a shape has."""
         return not self.forms or shape.get("form") in self.forms
 
+    def wider(self, value: float) -> float:
+        """Sign of the way from a value to the end of the range that is farther."""
+        return 1.0 if self.high - value > value - self.low else -1.0
+
 
 @runtime_checkable
 class DriveEffect(Protocol):

@@ -141,7 +141,8 @@ class Balance(Samples):
     def grid(self, effect: Any) -> Grid:
         """Starting shapes of an effect on these recordings."""
         if effect not in self._grids:
-            self._grids[effect] = Grid(effect, effect.grid(self.states))
+            shapes = effect.grid(self.states)
+            self._grids[effect] = Grid(effect, shapes, np.array([self.freedom(effect, s) for s in shapes], int))
         return self._grids[effect]
 
     def freedom(self, effect: Any, shape: Mapping[str, float]) -> int:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...effects.base import Shape
 from .balance import Balance, Fit
-from .term import DISCRETE, Term
+from .term import DISCRETE, reshaped
 
 SPREAD = 0.3  # mean absolute deviation of the logarithm of a motor's coefficients within one hand
 
@@ -88,7 +88,7 @@ def _occam(balance: Balance, fit: Fit, which: int, shape: Shape, scale: float) -
         return float(np.log(max(len(shape.starts), 1)))
     span = shape.high - shape.low
     value = fit.terms[which].shape[name]
-    toward = 1.0 if shape.high - value > value - shape.low else -1.0
+    toward = shape.wider(value)
     step = 0.02 * span
     width = span
     for _ in range(5):
@@ -101,6 +101,4 @@ def _occam(balance: Balance, fit: Fit, which: int, shape: Shape, scale: float) -
 
 
 def _moved(balance: Balance, fit: Fit, which: int, name: str, value: float) -> Fit:
-    terms = list(fit.terms)
-    terms[which] = Term(terms[which].effect, {**terms[which].shape, name: value})
-    return balance.fit(tuple(terms), held=False)
+    return balance.fit(reshaped(fit.terms, which, {**fit.terms[which].shape, name: value}), held=False)

@@ -16,10 +16,12 @@ SPARSE = 0.2  # share of entries that are not zero, below which a matrix is kept
 
 @dataclass(frozen=True)
 class Grid:
-    """The shapes from which the search for an effect's shape starts."""
+    """The shapes from which the search for an effect's shape starts, and how many parameters each has beside its
+    amplitudes (s,)."""
 
     effect: Any
     shapes: list[dict[str, float]]
+    freedom: NDArray[np.int64]
 
 
 @dataclass(frozen=True)

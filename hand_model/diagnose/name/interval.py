@@ -14,7 +14,7 @@ from .evidence import gain, oddity
 from .naming import Naming
 from .noise import loudness
 from .shapes import likeliest, polish, refit
-from .term import DISCRETE, Term
+from .term import DISCRETE, Term, reshaped
 
 Array = NDArray[np.float64]
 
@@ -104,8 +104,8 @@ def _forms(balance: Balance, fit: Fit, which: int, scale: float) -> list[tuple[f
     forms = next((s.starts for s in term.effect.shapes(balance.states) if s.name == "form"), ())
     out = []
     for form in (f for f in forms if f != term.shape.get("form")):
-        other = Term(term.effect, {**term.shape, "form": form})
-        out.append(polish(balance, balance.fit((*fit.terms[:which], other, *fit.terms[which + 1 :])), which))
+        other = reshaped(fit.terms, which, {**term.shape, "form": form})
+        out.append(polish(balance, balance.fit(other), which))
     ahead = np.array([gain(balance, f, fit, scale) + oddity(balance, fit) - oddity(balance, f) for f in out])
     chance = np.exp(np.minimum(ahead, 0.0))
     return list(zip((chance / (1 + chance.sum())).tolist(), out, strict=True))

@@ -16,7 +16,7 @@ from ...effects.base import Shape
 from .balance import Balance, Fit
 from .evidence import parameter_price
 from .grid import Grid
-from .term import DISCRETE, Term, additive, bending
+from .term import Term, additive, bending, reshaped
 
 Array = NDArray[np.float64]
 Error = Callable[[Mapping[str, float]], float]  # of a shape
@@ -83,8 +83,8 @@ def _project(balance: Balance, grid: Grid, terms: tuple[Term, ...], least: float
         else:
             gram = columns.gram(mine) - inside[mine] @ inside[mine].T
             gains[i] = float(right[mine] @ np.linalg.lstsq(gram, right[mine], rcond=None)[0])
-    size = np.diff(first) + np.array([balance.freedom(grid.effect, shape) for shape in grid.shapes])
-    worth = np.where(gains > max(least, 0.0), gains - parameter_price(balance) * size, -np.inf)
+    price = parameter_price(balance) * (np.diff(first) + grid.freedom)
+    worth = np.where(gains > max(least, 0.0), gains - price, -np.inf)
     return [grid.shapes[i] for i in np.argsort(worth)[::-1][:2] if np.isfinite(worth[i])]
 
 
@@ -121,7 +121,7 @@ def polish(balance: Balance, fit: Fit, which: int) -> Fit:
     """Optimise the shape of one term within its bounds, everything linear refitted at each step; as it was where no
     machine could be like the optimum."""
     term = fit.terms[which]
-    shapes = [s for s in term.effect.shapes(balance.states) if s.name not in DISCRETE and s.matters(term.shape)]
+    shapes = term.moving(balance.states)
     if not shapes:
         return fit
     others = tuple(t for i, t in enumerate(fit.terms) if i != which)
@@ -135,7 +135,7 @@ def polish(balance: Balance, fit: Fit, which: int) -> Fit:
             if error(moved) > error(best) - EDGE_GAIN:
                 break
             best = _descended(error, moved, shapes)
-        return balance.fit((*fit.terms[:which], Term(term.effect, best), *fit.terms[which + 1 :]))
+        return balance.fit(reshaped(fit.terms, which, best))
 
     best = optimum(error_beside(learning, others, term.effect, near))
     if (
@@ -204,9 +204,8 @@ def reform(balance: Balance, fit: Fit, which: int) -> Fit:
     fits = [fit]
     for form in forms:
         if form != term.shape["form"]:
-            terms = list(fit.terms)
-            terms[which] = Term(term.effect, {**term.shape, "form": form})
-            fits.append(polish(balance, balance.fit(tuple(terms)), which))
+            other = reshaped(fit.terms, which, {**term.shape, "form": form})
+            fits.append(polish(balance, balance.fit(other), which))
     return likeliest(balance, fits, which, priced(balance))
 
 

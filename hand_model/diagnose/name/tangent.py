@@ -18,7 +18,7 @@ from .candidates import allowed
 from .evidence import evidence, scale_of
 from .naming import CLASS_WIDTH, Rival
 from .shapes import refit
-from .term import DISCRETE, Term
+from .term import reshaped
 
 Array = NDArray[np.float64]
 
@@ -39,13 +39,10 @@ class Tangents:
         coefficients = np.array([*fit.declared.values(), *(v for a in fit.amplitudes for v in a.values())])
         here, columns, owner = balance.design(fit.terms)[0] @ coefficients, [], []
         for which, term in enumerate(fit.terms):
-            for shape in term.effect.shapes(balance.states):
-                value = term.shape.get(shape.name)
-                if value is None or shape.name in DISCRETE or not shape.matters(term.shape):
-                    continue
-                toward = 1.0 if shape.high - value > value - shape.low else -1.0
-                moved = {**term.shape, shape.name: value + toward * STEP * (shape.high - shape.low)}
-                terms = (*fit.terms[:which], Term(term.effect, moved), *fit.terms[which + 1 :])
+            for shape in (s for s in term.moving(balance.states) if s.name in term.shape):
+                value = term.shape[shape.name]
+                moved = value + shape.wider(value) * STEP * (shape.high - shape.low)
+                terms = reshaped(fit.terms, which, {**term.shape, shape.name: moved})
                 columns.append(balance.design(terms)[0] @ coefficients - here)
                 owner.append(which)
         return cls(np.reshape(columns, (-1, len(here))).T, np.array(owner, int))
@@ -72,15 +69,18 @@ def turned(
 ) -> list[Rival]:
     """The rivals of a term; those that may come near it where the terms `others` turn to them are fitted jointly with
     these. own: the term itself, beside which they have turned; without: the fit of the others alone."""
-    scale, out = scale_of(balance, own.fit), []
-    for rival in rivals:
-        best = rival
-        if min(rival.evidence, own.evidence) > 0:
-            may = 0.5 * tangents.gain(balance, rival.fit, others) / (scale * balance.inflation)
-            if may > max(own.evidence - rival.evidence - CLASS_WIDTH, 1.0):
-                fit = refit(balance, rival.fit)
-                if allowed(balance, fit):
-                    more = evidence(balance, fit, without, scale=min(scale, scale_of(balance, fit)))
-                    best = max(rival, Rival(rival.name, more, fit), key=lambda r: r.evidence)
-        out.append(best)
-    return out
+    scale = scale_of(balance, own.fit)
+
+    def beside_turned(rival: Rival) -> Rival:
+        if min(rival.evidence, own.evidence) <= 0:
+            return rival
+        may = 0.5 * tangents.gain(balance, rival.fit, others) / (scale * balance.inflation)
+        if may <= max(own.evidence - rival.evidence - CLASS_WIDTH, 1.0):
+            return rival
+        fit = refit(balance, rival.fit)
+        if not allowed(balance, fit):
+            return rival
+        jointly = evidence(balance, fit, without, scale=min(scale, scale_of(balance, fit)))
+        return max(rival, Rival(rival.name, jointly, fit), key=lambda r: r.evidence)
+
+    return [beside_turned(rival) for rival in rivals]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...effects.base import FRICTION, DriveState
+from ...effects.base import FRICTION, DriveState, Shape
 
 Array = NDArray[np.float64]
 
@@ -32,10 +32,21 @@ class Term:
         """What tells it from others, hashable."""
         return self.effect, key_of(self.shape)
 
+    def moving(self, states: tuple[DriveState, ...]) -> list[Shape]:
+        """What moves the term continuously: the shapes of its effect that matter in its form."""
+        return [s for s in self.effect.shapes(states) if s.name not in DISCRETE and s.matters(self.shape)]
+
     @property
     def coarse(self) -> Term:
         """The term with its shape in steps of COARSE."""
         return Term(self.effect, {k: v if k in DISCRETE else _coarse(v) for k, v in self.shape.items()})
+
+
+def reshaped(terms: tuple[Term, ...], which: int, shape: Mapping[str, float]) -> tuple[Term, ...]:
+    """The terms, one of them (counted from the end where `which` is negative) with another shape."""
+    out = list(terms)
+    out[which] = Term(out[which].effect, shape)
+    return tuple(out)
 
 
 def key_of(shape: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
