@@ -10,6 +10,7 @@ from passive_motion import DECLARED, DRIVE, ENCODER, FINGER, KINEMATIC, LINKAGE,
 
 from hand_model.effects import catalogue, effect
 from hand_model.effects.base import DriveState
+from hand_model.effects.driven import soft_play
 from hand_model.hand import Effect, EncoderMap, Estimate, Finger, Hand, Joint, Motor
 
 mujoco = pytest.importorskip("mujoco")
@@ -157,6 +158,45 @@ def test_a_play_before_a_stop_is_replayed_as_both_predict(tmp_path) -> None:
     # on which side it lay before is not asked
     begun = np.maximum.accumulate(np.abs(now.position - now.position[0]) > 4.0)
     assert np.quantile(np.abs(moved - wanted)[begun], 0.98) < 0.1
+
+
+def test_what_rubs_in_a_play_does_not_stretch_the_spring_of_a_bound(tmp_path) -> None:
+    bound, play = (
+        ("coupling_deadband", {"until": 10.0, "corner": 0.1}, {}),
+        ("linkage_backlash", {"gap": 0.8, "form": 0.0}, {}),
+    )
+    now = kinematic_state("linkage")
+    moved = replayed(tmp_path, now, "linkage", bound, play)
+    x = soft_play(np.maximum(now.position, 10.0), 0.8, 0.0)
+    wanted = np.stack([(x / now.extra["scale"][0]) ** k for k in range(now.declared.shape[1])], axis=-1) @ powers(
+        now, "linkage"
+    )
+    begun = np.maximum.accumulate(np.abs(now.position - now.position[0]) > 4.0)
+    assert np.quantile(np.abs(moved - wanted)[begun], 0.98) < 0.1  # of 0.8 deg; 0.29 with a soft spring
+
+
+def test_plays_are_compiled_behind_bounds(tmp_path) -> None:
+    """The spring that holds an input on its driver would pull a play ahead of it shut."""
+    from hand_model.compile.mjcf import in_order
+
+    names = ("linkage_backlash", "coupling_deadband", "drive_backlash", "distal_stop", "torque_ripple")
+    found = [Effect(name, {}, {}) for name in names]
+    assert [e.effect for e in in_order(found)] == [names[i] for i in (1, 3, 4, 0, 2)]  # as they stood otherwise
+
+
+def test_a_finger_on_the_path_is_not_pulled_back_to_its_lever(tmp_path) -> None:
+    from hand_model.diagnose.prove.forward import follower_along
+
+    now, bound = kinematic_state("linkage"), ("coupling_deadband", {"until": 5.0, "corner": 0.1}, {})
+    free = replayed(tmp_path, now, "linkage", bound)
+    root = etree.parse(str(tmp_path / "index.xml")).getroot()
+    (push,) = (t for t in root.iterfind("tendon/fixed") if t.get("name") == "index_push")
+    push.set("stiffness", "20")
+    push.set("damping", "0.1")
+    (tmp_path / "index.xml").write_bytes(etree.tostring(root))
+    where = {"finger": "index", "joint": "distal", "actuator": "index"}
+    firm = np.rad2deg(follower_along(tmp_path, now, where, "linkage"))
+    np.testing.assert_allclose(firm, free, atol=0.02)
 
 
 def test_every_effect_of_a_force_or_a_map_is_replayed() -> None:

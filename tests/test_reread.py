@@ -87,6 +87,16 @@ def test_what_belongs_to_the_recording_stays_with_it() -> None:
         np.testing.assert_allclose(own, 1.2 * np.sin(2 * np.pi * state.position / 12.0), atol=0.15)
 
 
+def test_where_a_force_from_outside_moved_a_finger_its_replay_is_given_that() -> None:
+    """No recording holds the force that keeps a slack finger bent: nothing in the file could do it."""
+    states = joint(5, add=lambda t, x, v: 0.3 * np.maximum(0.0, 30.0 - x), noise=0.3)
+    balance = Balance(states)
+    fit = balance.fit((Term(effect("spring_decoupling"), {"form": 1.0, "below": 30.0, "corner": 0.1}),))
+    for state in states:
+        own = of_recording(fit, state)
+        np.testing.assert_allclose(own, 0.3 * np.maximum(0.0, 30.0 - state.position), atol=0.25)
+
+
 @pytest.mark.parametrize(
     ("name", "shape", "start"),
     [("detent_load", {"form": 0.0, "width": 6.0}, {"centre": 55.0}), ("torque_ripple", {}, {"period": 9.02})],

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
 from ..effects import effect
-from ..hand import Hand
+from ..hand import Effect, Hand
 from .course import Tied, complete_courses, stiffen, write_joints
 from .drive import Drive, nominal_drives
 from .motor import complete_keyframes, write_motors
@@ -146,10 +147,16 @@ def _physics(root: Any, hand: Hand, newton_metre_per_unit: float | None) -> None
     """Identified motors and effects, as far as MJCF can hold them."""
     write_motors(root, hand, newton_metre_per_unit)
     fingers = {f.name for f in hand.fingers} | {None}
-    for found in hand.effects:
+    for found in in_order(hand.effects):
         if found.where.get("finger") in fingers:
             values = {name: estimate.value for name, estimate in found.parameters.items()}
             effect(found.effect).write_mjcf(root, found.where, values)
+
+
+def in_order(effects: Iterable[Effect]) -> list[Effect]:
+    """Effects as they are written one behind the other: lost motion last, for the spring that holds an input on its
+    driver, above or below a bound, would pull a play ahead of it shut."""
+    return sorted(effects, key=lambda e: effect(e.effect).family == "lost motion")
 
 
 def _keyframes(root: Any, plan: Plan) -> None:

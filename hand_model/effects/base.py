@@ -158,6 +158,8 @@ class Effect:
     signal: ClassVar[str | None] = None
     # of the recording, not of the machine: the machine is compared with what is left without it
     recorded: ClassVar[bool] = False
+    # moved by a force that no recording holds: a replay is given what it moved
+    forced: ClassVar[bool] = False
     # seen as a level that changes slowly or with the recording, as a zero that wanders is
     drifting: ClassVar[bool] = False
     unwritten: ClassVar[str | None] = None  # why no file can hold it or no replay show it, where that is so

@@ -77,20 +77,31 @@ def _hold_firmly(root: Any, follower: str, driver: str) -> None:
         finger, *lever = (j.get("joint") for j in tendon.findall("joint"))
         if not tendon.get("name", "").endswith("_push") or not {follower, driver} & {finger, *lever}:
             continue
-        stiffness, damping = float(tendon.get("stiffness")), float(tendon.get("damping"))
-        rate = 2 * stiffness / damping  # critically damped
         if follower in lever:
             next(j for j in root.find("worldbody").iter("joint") if j.get("name") == follower).set(
-                "armature", repr(stiffness / rate**2)
+                "armature", repr(float(tendon.get("stiffness")) / _rate(tendon) ** 2)
             )
-        more = max(FIRM_RATE / rate, 1.0)
-        tendon.set("stiffness", repr(stiffness * more**2))
-        tendon.set("damping", repr(damping * more))
+        _stiffen(tendon, FIRM_RATE)
+
+
+def _rate(tendon: Any) -> float:
+    """[rad/s] of what hangs on a critically damped spring."""
+    return 2 * float(tendon.get("stiffness")) / float(tendon.get("damping"))
+
+
+def _stiffen(tendon: Any, rate: float) -> None:
+    """Make a critically damped spring as fast as `rate` [rad/s] at least."""
+    more = max(rate / _rate(tendon), 1.0)
+    tendon.set("stiffness", repr(float(tendon.get("stiffness")) * more**2))
+    tendon.set("damping", repr(float(tendon.get("damping")) * more))
 
 
 def write_play(root: Any, equality: Any, gap: float) -> str:
     """The input lags by half the `gap` [driver's unit] and stays while the driver crosses it; path of the tendon."""
     driver, name = _put_between(root, equality)
+    for tendon in root.iterfind("tendon/fixed"):
+        if SUFFIX in driver and tendon.get("stiffness") and tendon.findall("joint")[-1].get("joint") == driver:
+            _stiffen(tendon, FIRM_RATE)  # what rubs in the play would stretch it
     joint = next(j for j in root.find("worldbody").iter("joint") if j.get("name") == name)
     joint.set("frictionloss", repr(HOLD))
     for key, value in FRICTION.items():

@@ -19,6 +19,7 @@ class SpringDecoupling(Effect):
 
     name = "spring_decoupling"
     station = "encoder"
+    forced = True
     unwritten = (
         "the finger runs ahead under a force from outside, which no recording holds; the compiled push tendon lets it"
     )

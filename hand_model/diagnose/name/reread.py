@@ -98,13 +98,13 @@ def _recorded(balance: Balance, fit: Fit) -> Fit:
 
 
 def of_recording(fit: Fit, state: DriveState) -> Array:
-    """Effort (n,) along a recording that belongs to the recording itself: effects that are none of the machine, and, of
-    an angle, its clock's offset and steps of slipped markers."""
+    """Effort (n,) along a recording that belongs to the recording itself: effects that are none of the machine or of a
+    force that only this recording had, and, of an angle, its clock's offset and steps of slipped markers."""
     out = np.zeros(len(state.time_s))
     if any(name.startswith("power_") for name in state.declared_names):
         own = [i for i, name in enumerate(state.declared_names) if not name.startswith("power_")]
         out = out + state.declared[:, own] @ np.array([fit.declared[state.declared_names[i]] for i in own])
     for which, term in enumerate(fit.terms):
-        if term.effect.recorded:
+        if term.effect.recorded or term.effect.forced:
             out = out + fit.added(which, state)
     return out

@@ -114,6 +114,7 @@ def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, pat
     address, dof = model.jnt_qposadr[list(held)], model.jnt_dofadr[list(held)]
     model.dof_armature[dof] = HOLD
     model.jnt_limited[list(held)] = 0  # a path a little beyond its range would be braked, and throw what it carries
+    _free(model, driver)
     mujoco.mj_setConst(model, mujoco.MjData(model))
     # ties of slides, stiff for the inertias as they were and for the file's own step
     absolute = model.eq_solref[:, 0] < 0
@@ -136,6 +137,14 @@ def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, pat
             out[i] = data.qpos[model.jnt_qposadr[follower]]
             mujoco.mj_step(model, data)
     return np.interp(time_s, grid, out)
+
+
+def _free(model: Any, driver: int) -> None:
+    """Take the lever off a finger that is itself on the path: pulled back to it, it would accelerate, and what it
+    carries with it."""
+    for t in range(model.ntendon):
+        if model.tendon(t).name.endswith("_push") and model.wrap_objid[model.tendon_adr[t]] == driver:
+            model.tendon_stiffness[t] = model.tendon_damping[t] = model.tendon_limited[t] = 0
 
 
 def _rub(model: Any, driver: int, inertia: float, fastest: float) -> None:
