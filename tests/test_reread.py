@@ -159,3 +159,27 @@ def test_a_sag_is_read_from_what_is_asked_beside_it() -> None:
     delivered = asked - np.array([law(type("Now", (), {"load": u})) for u in asked])
     assert np.all(np.diff(delivered) > 0)
     np.testing.assert_allclose(sag.reading(delivered, asked, values), asked, atol=1e-6)
+
+
+def test_preload_and_spring_of_the_file_hold_a_weight_in_the_pose_that_was_recorded() -> None:
+    """A hand that never turned: the weight itself is written nowhere."""
+    from hand_model.diagnose.prove.improve import holding_weight
+    from hand_model.diagnose.weight import PULL
+
+    states = tuple(
+        replace(
+            s,
+            declared=np.column_stack([s.declared, np.cos(np.deg2rad(20 + 0.8 * s.position))]),
+            declared_names=(*s.declared_names, PULL),
+        )
+        for s in drive(1)
+    )
+    declared = {**dict.fromkeys(states[0].declared_names, 0.0), "spring": 0.2, "preload": 15.0, PULL: 12.0}
+    held = holding_weight(states, declared)
+    for s in states:
+        wanted = s.declared @ np.array([declared[k] for k in s.declared_names])
+        own = s.declared[:, :-1] @ np.array([held[k] for k in s.declared_names[:-1]])
+        assert np.abs(own - wanted).max() < 2.0  # of 12: all but its bend
+        assert abs(np.mean(own - wanted)) < 0.05
+    without = {k: v for k, v in declared.items() if k != PULL}
+    assert holding_weight(states, without) is without

@@ -12,12 +12,14 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from ...effects import effect
+from ...effects.base import DriveState
 from ...errors import HandFileError
 from ...hand import Coupling, Effect, EncoderMap, Estimate, Finger, Hand, Joint, Motor, load_hand
 from ...session import Session
 from ..findings import UNWRITTEN, Finding
 from ..locate.course import FingerCourses
 from ..locate.markers import HINGE
+from ..weight import PULL
 from .markers import COMPILED, marker_fit, of_folder
 from .replays import Replay, errors_along, proved, untouched
 from .write_course import with_chains, written_courses
@@ -85,6 +87,7 @@ def _motor(
     station: Any, declared: Mapping[str, float], terms: Sequence[Any], counts: tuple[float, float], was: Motor | None
 ) -> Motor:
     states = station.naming.balance.states
+    declared = holding_weight(states, declared)
     values = {
         MOTOR[k][0]: Estimate(float(v), None, MOTOR[k][1], "diagnosis") for k, v in declared.items() if k in MOTOR
     }
@@ -103,6 +106,17 @@ def _motor(
     if was is not None:
         values |= {k: was.parameters[k] for k in DRIVE_KEPT if k in was.parameters}
     return Motor(station.actuator, *counts, values, station.naming.balance.sigma, tuple(s.trial for s in states))
+
+
+def holding_weight(states: Sequence[DriveState], declared: Mapping[str, float]) -> Mapping[str, float]:
+    """Declared coefficients whose preload and spring hold what a weight beside them pulls with in these recordings."""
+    if PULL not in declared:
+        return declared
+    pull = np.concatenate([s.declared[:, s.declared_names.index(PULL)] for s in states])
+    position = np.concatenate([s.position for s in states])
+    seen = np.isfinite(pull) & np.isfinite(position)
+    level, slope = declared[PULL] * Polynomial.fit(position[seen], pull[seen], 1).convert().coef
+    return {**declared, "preload": declared["preload"] + level, "spring": declared["spring"] + slope}
 
 
 def _with_map(finger: Finger, station: Any, declared: Mapping[str, float], counts: tuple[float, float]) -> Finger:
