@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..effects import effect
+from ..effects.base import LOST_MOTION
 from ..hand import Effect, Hand
 from .course import Tied, complete_courses, stiffen, write_joints
 from .drive import Drive, nominal_drives
@@ -156,7 +157,7 @@ def _physics(root: Any, hand: Hand, newton_metre_per_unit: float | None) -> None
 def in_order(effects: Iterable[Effect]) -> list[Effect]:
     """Effects as they are written one behind the other: lost motion last, for the spring that holds an input on its
     driver, above or below a bound, would pull a play ahead of it shut."""
-    return sorted(effects, key=lambda e: effect(e.effect).family == "lost motion")
+    return sorted(effects, key=lambda e: effect(e.effect).family == LOST_MOTION)
 
 
 def _keyframes(root: Any, plan: Plan) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
+from .base import LOST_MOTION, Amplitude, Array, DriveState, Effect, Shape, position_range
 from .driven import driven, path_behind, segment_gap, soft_play
 from .path import dahl
 
@@ -20,7 +20,7 @@ class Backlash(Effect):
     """follower = map(play(driver)), or play(map(driver)): the lag and the travel that crosses it are one gap."""
 
     replaces = "power_1"
-    family = "lost motion"
+    family = LOST_MOTION
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """Full width of the gap in the driver's unit; form 0: at the driver, hard ends; form 1: ends that give (half to

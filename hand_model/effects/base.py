@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from .law import Law
 
 FRICTION = "coulomb"  # the declared column whose sign friction has
+LOST_MOTION = "lost motion"  # family of plays and of what gives
 UNSEEN_DELAY, SURE_DELAY = 0.75, 4.0  # sample intervals, and standard deviations, from which a delay is told
 
 Array = NDArray[np.float64]

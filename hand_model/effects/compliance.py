@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .base import Amplitude, Array, DriveState, Effect, Shape, figure
+from .base import LOST_MOTION, Amplitude, Array, DriveState, Effect, Shape, figure
 from .law import Law, Moment
 from .path import lowpass
 
@@ -33,7 +33,7 @@ class Compliance(Effect):
     compliance is known from what friction and speed add.
     """
 
-    family = "lost motion"
+    family = LOST_MOTION
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """form 0: give at the driver's end, in its unit; form 1: at the end of what follows, in its unit; forms 2 and 3:

@@ -40,9 +40,13 @@ def map_of(root: Any, where: Mapping[str, Any], station: str) -> Any:
 def source(root: Any, joint: str) -> str:
     """The joint behind a chain of inputs."""
     while joint.endswith(SUFFIX) or SUFFIX + "_" in joint:
-        tendon = next(t for t in root.iterfind("tendon/fixed") if t.findall("joint")[-1].get("joint") == joint)
-        joint = tendon.find("joint").get("joint")
+        joint = _tie(root, joint).find("joint").get("joint")
     return joint
+
+
+def _tie(root: Any, joint: str) -> Any:
+    """The tendon by which an input follows what is ahead of it."""
+    return next(t for t in root.iterfind("tendon/fixed") if t.findall("joint")[-1].get("joint") == joint)
 
 
 def _put_between(root: Any, equality: Any) -> tuple[str, str]:
@@ -81,7 +85,7 @@ def _hold_firmly(root: Any, follower: str, driver: str) -> None:
             next(j for j in root.find("worldbody").iter("joint") if j.get("name") == follower).set(
                 "armature", repr(float(tendon.get("stiffness")) / _rate(tendon) ** 2)
             )
-        _stiffen(tendon, FIRM_RATE)
+        _make_firm(tendon)
 
 
 def _rate(tendon: Any) -> float:
@@ -89,9 +93,9 @@ def _rate(tendon: Any) -> float:
     return 2 * float(tendon.get("stiffness")) / float(tendon.get("damping"))
 
 
-def _stiffen(tendon: Any, rate: float) -> None:
-    """Make a critically damped spring as fast as `rate` [rad/s] at least."""
-    more = max(rate / _rate(tendon), 1.0)
+def _make_firm(tendon: Any) -> None:
+    """Make a critically damped spring as fast as `FIRM_RATE` at least."""
+    more = max(FIRM_RATE / _rate(tendon), 1.0)
     tendon.set("stiffness", repr(float(tendon.get("stiffness")) * more**2))
     tendon.set("damping", repr(float(tendon.get("damping")) * more))
 
@@ -99,9 +103,8 @@ def _stiffen(tendon: Any, rate: float) -> None:
 def write_play(root: Any, equality: Any, gap: float) -> str:
     """The input lags by half the `gap` [driver's unit] and stays while the driver crosses it; path of the tendon."""
     driver, name = _put_between(root, equality)
-    for tendon in root.iterfind("tendon/fixed"):
-        if SUFFIX in driver and tendon.get("stiffness") and tendon.findall("joint")[-1].get("joint") == driver:
-            _stiffen(tendon, FIRM_RATE)  # what rubs in the play would stretch it
+    if SUFFIX in driver and _tie(root, driver).get("stiffness"):
+        _make_firm(_tie(root, driver))  # what rubs in the play would stretch it
     joint = next(j for j in root.find("worldbody").iter("joint") if j.get("name") == name)
     joint.set("frictionloss", repr(HOLD))
     for key, value in FRICTION.items():

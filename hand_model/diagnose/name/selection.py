@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...background import Pair
+from ...effects.base import LOST_MOTION
 from .balance import Balance, Fit
 from .bristles import with_bristles
 from .candidates import EVIDENCE_LEAST, allowed, exchanged, least_evidence, rank, settle, twice
@@ -31,8 +32,8 @@ Array = NDArray[np.float64]
 
 MOST_SEARCHES = 3  # each with noise that knows what did not repeat beside the effects of the one before
 SMALL = 0.07  # share of the explained mismatch: less beside a larger effect may be no more than its form being another
-# a family, and the change of its map's slope from which another search is worth its time
-LOST_MOTION, BENT = "lost motion", 0.01
+# change of the map's slope beside lost motion, from which another search is worth its time
+BENT = 0.01
 ABSORBED = 0.5  # of a column squared, at most, is left of what is mostly a level per while
 GROWN = 1.3  # change of that noise, from which another search is worth its time
 

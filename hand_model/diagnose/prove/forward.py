@@ -142,8 +142,8 @@ def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, pat
 def _free(model: Any, driver: int) -> None:
     """Take the lever off a finger that is itself on the path: pulled back to it, it would accelerate, and what it
     carries with it."""
-    for t in range(model.ntendon):
-        if model.tendon(t).name.endswith("_push") and model.wrap_objid[model.tendon_adr[t]] == driver:
+    for t, finger, _ in _pushes(model):
+        if finger == driver:
             model.tendon_stiffness[t] = model.tendon_damping[t] = model.tendon_limited[t] = 0
 
 
@@ -202,12 +202,14 @@ def _within(model: Any, qpos: Array, joint: int, driver: int) -> float:
 
 def _pushed(model: Any, qpos: Array) -> Array:
     """qpos (nq,) with every finger on its lever, and what follows it on its maps."""
-    import mujoco
-
     out = qpos.copy()
-    for t in range(model.ntendon):
-        name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_TENDON, t) or ""
-        if name.endswith("_push"):
-            finger, lever = model.wrap_objid[model.tendon_adr[t]], model.wrap_objid[model.tendon_adr[t] + 1]
-            out[model.jnt_qposadr[finger]] = max(out[model.jnt_qposadr[finger]], out[model.jnt_qposadr[lever]])
+    for _, finger, lever in _pushes(model):
+        out[model.jnt_qposadr[finger]] = max(out[model.jnt_qposadr[finger]], out[model.jnt_qposadr[lever]])
     return on_linkages(model, out)
+
+
+def _pushes(model: Any) -> Iterator[tuple[int, int, int]]:
+    """The tendons that hold fingers on their levers, each with the joints of both."""
+    for t in range(model.ntendon):
+        if model.tendon(t).name.endswith("_push"):
+            yield t, *model.wrap_objid[model.tendon_adr[t] :][:2].tolist()
