@@ -171,6 +171,7 @@ def test_no_slip_is_found_where_there_is_none():
         assert find_slip(fitted(recording(20 + seed)[1])) is None
 
 
+@pytest.mark.slow
 def test_short_arcs_admit_that_they_are_short():
     long = fitted(recording(12)[1])
     short = fitted(recording(12, arcs_deg=(6, 4), noise_m=4e-4)[1])

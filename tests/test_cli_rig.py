@@ -83,6 +83,7 @@ def test_the_python_call_diagnoses_a_rig_as_the_command_does(rig):
     assert findings.protocol["held_out"] == ["log/b.csv"]
 
 
+@pytest.mark.slow
 def test_a_diagnosis_of_a_rig_without_a_model_leaves_none(rig, tmp_path):
     out = tmp_path / "out"
     assert main(["diagnose", str(rig), "--output", str(out)]) == 0

@@ -194,7 +194,7 @@ def test_two_effects_are_both_named() -> None:
     assert {f.term.effect.name for f in naming.found} == {"stribeck_friction", "detent_load"}
 
 
-@pytest.mark.parametrize("colour", [0.0, 0.5])
+@pytest.mark.parametrize("colour", [pytest.param(0.0, marks=pytest.mark.slow), 0.5])
 def test_healthy_drives_stay_consistent(colour: float) -> None:
     alarms = [seed for seed in range(6) if not name_effects(drive(seed, colour=colour), catalogue("drive")).consistent]
     assert not alarms  # nominal rate 0.3 %
@@ -236,7 +236,7 @@ def test_a_faint_effect_needs_the_word_of_untouched_recordings(seed: int) -> Non
     assert not refuted.missing
 
 
-@pytest.mark.parametrize("seed", [22, 32])
+@pytest.mark.parametrize("seed", [pytest.param(22, marks=pytest.mark.slow), 32])
 def test_what_half_of_the_recordings_are_too_few_for_all_of_them_tell_and_each_half_bears_out(seed: int) -> None:
     faint, healthy = (
         half_untouched(drive(seed, planted("nonlinear_spring", {"form": 1.0, "knee": 50.0}, [0.0, size])))

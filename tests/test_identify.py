@@ -166,6 +166,7 @@ def test_unknown_probe_tip_is_found_from_pivoting(tmp_path):
     assert np.abs(np.linalg.norm(probe.position_probe, axis=1) - np.linalg.norm(truth_positions, axis=1)).max() < 5e-4
 
 
+@pytest.mark.slow
 def test_a_finger_that_hardly_moves_is_called_undetermined(tmp_path):
     truth = bebionic("left", 7, ["index"])
     truth = replace(truth, mocap=replace(truth.mocap, noise_m=3e-4))

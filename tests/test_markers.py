@@ -82,7 +82,7 @@ def test_healthy_markers_are_consistent() -> None:
     assert not naming.found and naming.p_before > 0.003
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(s, marks=pytest.mark.slow) for s in (1, 2, 3))])
 def test_noise_that_lasts_is_no_misfit_and_hides_none(monkeypatch, seed: int) -> None:
     healthy = seen(lambda share, turn, arm: np.zeros((len(share), 4, 3)), seed, lasting=0.5)
     assert not healthy.found and healthy.p_before > 0.003
@@ -122,6 +122,7 @@ def test_slips_close_to_each_other_are_told_apart_whatever_was_found_first() -> 
     }
 
 
+@pytest.mark.slow
 def test_a_support_that_turns_all_the_time_does_not_slip() -> None:
     naming = seen(creeping)
     assert naming.believed and places(naming) == {(CREEP, None)}

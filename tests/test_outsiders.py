@@ -60,10 +60,10 @@ def grease(state: DriveState) -> np.ndarray:
     [
         ("gain_change", gain),
         ("friction_jump", jump),
-        ("load_jump", hung),
-        ("gain_jump", amplified),
-        ("cycle_memory", tooth),
-        ("thixotropy", grease),
+        pytest.param("load_jump", hung, marks=pytest.mark.slow),
+        pytest.param("gain_jump", amplified, marks=pytest.mark.slow),
+        pytest.param("cycle_memory", tooth, marks=pytest.mark.slow),
+        pytest.param("thixotropy", grease, marks=pytest.mark.slow),
     ],
 )
 def test_an_outsider_is_unexplained_and_said(name: str, add) -> None:
@@ -104,7 +104,9 @@ def weighed(
     return tuple(out)
 
 
-@pytest.mark.parametrize(("load_raw", "noise", "within"), [(20.0, 5.0, 0.15), (1.5, 8.0, 0.9)])
+@pytest.mark.parametrize(
+    ("load_raw", "noise", "within"), [pytest.param(20.0, 5.0, 0.15, marks=pytest.mark.slow), (1.5, 8.0, 0.9)]
+)
 def test_a_weight_is_named_where_only_the_recording_kept_out_shows_another_pose(
     load_raw: float, noise: float, within: float
 ) -> None:
@@ -237,7 +239,7 @@ def test_the_share_that_a_ceiling_cuts_is_what_the_motion_requires_beyond_it(for
     assert abs(entry["share_cut"]["value"] - 0.2) < 0.01
 
 
-@pytest.mark.parametrize("hz", [1.7, 5.1])
+@pytest.mark.parametrize("hz", [pytest.param(1.7, marks=pytest.mark.slow), 5.1])
 def test_a_rhythm_in_time_is_no_ripple(hz: float) -> None:
     station = heard(indexed(drive(4, lambda s: 6.0 * np.sin(2 * np.pi * hz * s.time_s + 2.0 * float(s.elapsed_s[0])))))
     assert not station.kept and [f.term.effect.name for f in station.outsiders] == ["vibration"]
@@ -303,6 +305,7 @@ def test_clocks_that_part_as_crystals_do_are_two_healthy_ones(rate: float) -> No
     assert "clock_wander" not in {f.term.effect.name for f in station.outsiders}
 
 
+@pytest.mark.slow
 def test_names_that_leave_what_recordings_kept_out_show_are_not_believed() -> None:
     def at_speed(state):  # a spring that is there at speed only: no row of the table, and no outsider
         return 0.5 * np.maximum(state.position - 50, 0) * (np.abs(state.velocity) > 45) * np.sign(state.velocity)
@@ -334,6 +337,7 @@ def test_a_drifting_clock_is_named_beside_outsiders() -> None:
     assert [f.term.effect.name for f in station.kept] == ["clock_drift"] and not station.outsiders
 
 
+@pytest.mark.slow
 def test_a_level_that_wanders_names_no_obstacle() -> None:
     rng = np.random.default_rng(2)
 
@@ -383,6 +387,7 @@ def test_five_effects_that_leave_most_of_a_plain_mismatch_are_enough(
     assert replace(naming, before=before, after=after, found=naming.found[:1] * count).overwhelmed is overwhelmed
 
 
+@pytest.mark.slow
 def test_an_outsider_that_no_test_sees_must_be_plainer_than_an_effect() -> None:
     """Faint grease beats the noise as an effect would, and is not said; twice as much is."""
     faint, plain = (heard(drive(2, lambda s, k=k: k * grease(s))) for k in (0.115, 0.2))

@@ -56,6 +56,7 @@ def test_the_lopsided_one_is_named_in_a_class_with_another_preload(half: float) 
     assert "the same" in finding.statement
 
 
+@pytest.mark.slow
 def test_of_two_that_differ_the_heavier_is_odd_unless_one_has_lost_its_preload() -> None:
     for scale in (1.0, OTHER):
         assert [f.where["finger"] for _, f in preload_findings(hand(25.0, 0.0, scale=scale))] == ["finger_0"]

@@ -29,7 +29,11 @@ def planted_load(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize(
     ("effect", "name"),
-    [("drag", "quadratic_damping"), ("offset", "asymmetric_friction"), ("stribeck", "stribeck_friction")],
+    [
+        ("drag", "quadratic_damping"),
+        pytest.param("offset", "asymmetric_friction", marks=pytest.mark.slow),
+        ("stribeck", "stribeck_friction"),
+    ],
 )
 def test_planted_effects_are_named_first(tmp_path: Path, effect: str, name: str) -> None:
     """What was planted leads the list, or is in its class, and the held-out error falls by a fifth or more."""
@@ -122,6 +126,7 @@ def test_screw_drive_differs_by_direction() -> None:
     assert findings.lack_of_fit["after"] < 0.85
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("zero", [0.0, 0.006])
 def test_a_passive_session_without_validation_is_diagnosed(tmp_path: Path, zero: float) -> None:
     """Air drag of a free swing is named from encoder alone; two recordings, none held out. So it is with an encoder
@@ -195,6 +200,7 @@ def test_noise_floor_of_a_balance_is_that_of_its_sensors(tmp_path: Path) -> None
     assert left["noise_floor"] == pytest.approx(left["after"], rel=0.35)
 
 
+@pytest.mark.slow
 def test_shapes_lie_between_those_that_were_tried(tmp_path: Path) -> None:
     """A channel read 13 ms apart: the delay is none of the grid's, and is found to a millisecond."""
     folder = planted(tmp_path / "s")

@@ -100,6 +100,7 @@ def test_mujoco_moves_so(step: float, within: float) -> None:
     assert np.abs(q - np.interp(np.arange(len(q)) / 150, step * np.arange(len(out)), out)).max() < within
 
 
+@pytest.mark.slow
 def test_a_fit_finds_the_law_whatever_it_starts_from() -> None:
     """Friction that falls with speed, and drag, from a recording of encoder steps, its start unknown; another start,
     or one that differs by a rounding, comes to the same."""

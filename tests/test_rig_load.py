@@ -135,6 +135,7 @@ def test_bristles_that_slacken_with_speed_are_in_open_loop_what_they_are_in_the_
     assert np.ptp(column) > 0.1
 
 
+@pytest.mark.slow
 def test_a_stribeck_rise_beside_friction_by_load_is_read_at_its_size(tmp_path: Path) -> None:
     """Where it is largest friction turns round: what is read there must not be blurred by how the log is thinned."""
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rig_bench import ARM, HEAD, Motion, recorded
+from scipy.interpolate import CubicSpline
 from scipy.signal import butter, filtfilt
 
 from hand_model.effects.path import jenkins
@@ -15,7 +16,7 @@ from hand_model.rig import diagnose_rig, fit_declared, load_rig, replay_rig
 from hand_model.rig.channels import check_channels, sinusoids_left
 from hand_model.rig.diagnose import trusted_fit
 from hand_model.rig.name.candidates import candidates
-from hand_model.rig.states import low_pass, noise_std
+from hand_model.rig.states import later, low_pass, noise_std
 from hand_model.session import read_session
 
 VOLTAGE = ARM.replace(
@@ -162,6 +163,19 @@ def test_uneven_stamps_are_no_noise() -> None:
     noisy = np.sin(9 * t) + 1e-4 * random.standard_normal(len(t))
     assert noise_std(noisy, t) == pytest.approx(1e-4, rel=0.1)
     assert noise_std(noisy, even) == pytest.approx(noise_std(noisy), rel=1e-6)
+
+
+@pytest.mark.parametrize("delay_s", [0.0237, -0.0037, 0.02, 5.0])
+@pytest.mark.parametrize("shape", [(), (2,)])
+def test_what_comes_later_is_the_cubic_spline_of_scipy(shape: tuple[int, ...], delay_s: float) -> None:
+    time_s = 3.0 + 0.01 * np.arange(300)
+    x = np.random.default_rng(0).normal(size=(300, *shape))
+    at = np.clip(time_s - delay_s, time_s[0], time_s[-1])
+    inner = slice(40, -40)
+    assert later(time_s, x, delay_s)[inner] == pytest.approx(CubicSpline(time_s, x)(at)[inner], abs=1e-9)
+    smooth = np.sin(2 * time_s)
+    assert later(time_s, smooth, delay_s) == pytest.approx(np.sin(2 * at), abs=1e-5)
+    assert np.array_equal(later(time_s[:1], x[:1], delay_s), x[:1])
 
 
 @pytest.mark.parametrize("shape", [(400,), (400, 3), (35,)])

@@ -121,6 +121,7 @@ def test_a_law_that_turns_round_over_a_distance_knows_what_holds(tmp_path: Path)
         assert known_at_rest(fit, terms, solution(pose(fit), terms)) == known
 
 
+@pytest.mark.slow
 def test_a_healthy_slide_that_stands_between_strokes_gets_no_name(tmp_path: Path) -> None:
     """It is held by half of its friction: no Stribeck rise, nor friction by load."""
     findings = diagnose_rig(read_session(session(tmp_path / "s", 7.0)))

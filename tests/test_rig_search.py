@@ -32,6 +32,7 @@ def bench(folder: Path, by_load: float, noise: float, late: float = 0.0, last: f
     return recorded(folder, ARM, 6, torque, noise, last)
 
 
+@pytest.mark.slow
 def test_friction_by_load_that_turns_round_over_a_distance(tmp_path: Path) -> None:
     """Load-dependent friction is named first, with its size and the distance within 10 %, and leaves little of the
     mismatch."""
@@ -52,6 +53,7 @@ def test_a_noisy_torque_is_no_mismatch(tmp_path: Path) -> None:
     assert friction == pytest.approx([0.03, 0.08], rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_torque_that_acts_a_fraction_of_a_sample_late_is_a_delay_and_no_spring(tmp_path: Path) -> None:
     """Loudest in one fast recording: the delay wins, as long as it is; without it nothing does."""
     for late in (0.0, 0.0015):

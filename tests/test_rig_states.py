@@ -69,6 +69,7 @@ def test_slopes_of_what_is_resolved_lose_nothing() -> None:
     assert np.all(differentiate((t > 1).astype(float), 100.0, resolved=False) >= 0)
 
 
+@pytest.mark.slow
 def test_drag_of_a_passive_double_pendulum(tmp_path: Path) -> None:
     """Behind coarse encoders drag is named at the lower joint and nothing else anywhere; where there is none, nothing
     is, and the model leaves what the encoders' noise is."""

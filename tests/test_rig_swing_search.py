@@ -164,7 +164,7 @@ def test_recordings_are_left_out_one_by_one_while_they_are_few() -> None:
         assert all(sorted((*kept, *left)) == list(range(count)) for kept, left in folds)
 
 
-@pytest.mark.parametrize("planted", [True, False])
+@pytest.mark.parametrize("planted", [pytest.param(True, marks=pytest.mark.slow), False])
 def test_what_one_effect_hides_is_sought_beside_another(monkeypatch: pytest.MonkeyPatch, planted: bool) -> None:
     """A drive that sags and friction that rises at low speed, neither of which is taken alone: both, or none."""
     line = {"inertia": 0.02, "gain": 0.19, "back_emf": 0.28, "damping": 0.02, "coulomb": 0.06}
@@ -192,6 +192,7 @@ def test_what_one_effect_hides_is_sought_beside_another(monkeypatch: pytest.Monk
     ]
 
 
+@pytest.mark.slow
 def test_a_second_effect_is_sought_beside_other_forms_of_the_first() -> None:
     """Friction by the load of the gear and a drive that sags: with the form of friction that alone makes up for the sag,
     the sag is sought beside the true one."""

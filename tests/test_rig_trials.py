@@ -289,6 +289,7 @@ def test_effort_recorded_of_a_voltage_drive_is_the_effort(tmp_path: Path, torque
     assert np.isnan(replay_rig(read_session(folder), efforts=False, validate=False).joints[0].position_rmse)
 
 
+@pytest.mark.slow
 def test_the_form_of_a_friction_by_load_is_the_one_that_was_planted(tmp_path: Path) -> None:
     """Friction by the gear's load, by what the joint carries with its inertia, or by the square of the load that the motor
     drives at low speed: the first effect is it, in that form, and explains the recordings down to their noise."""
@@ -336,6 +337,7 @@ load = "actuator:l:force"
 """
 
 
+@pytest.mark.slow
 def test_lost_motion_between_encoders_makes_no_load(tmp_path: Path) -> None:
     """Play of 0.03 rad between two encoders is found with its size, and nothing is named of the efforts, which are
     healthy: the polynomial that projects them has not bent to the play."""

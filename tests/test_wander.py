@@ -55,7 +55,7 @@ def walk(seed: int, size: float, memory_s: float = 6.0):
     return add
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [pytest.param(0, marks=pytest.mark.slow), 1, pytest.param(2, marks=pytest.mark.slow)])
 def test_a_wandering_zero_is_noise_and_not_physics(seed):
     states = drive(seed, walk(seed, 4.0))
     station = judged("current", "index", "index", None, states, catalogue("drive"))
@@ -94,6 +94,7 @@ def test_the_while_of_a_weak_obstacle_is_found_between_its_starts(since, until, 
     assert figures["begin"]["value"] == pytest.approx(58.0, abs=4.0)
 
 
+@pytest.mark.slow
 def test_an_obstacle_in_recordings_that_others_do_not_foretell_is_no_spring():
     """It is there in two of those that teach and in the one kept out, each time for another while."""
     spans = {0.0: (0.1, 0.8), 2.0: (0.3, 0.7), 3.0: (0.05, 0.65)}
@@ -116,7 +117,7 @@ def test_physics_is_found_through_a_wandering_zero():
     assert naming.found[0].amplitudes["extra_friction"] == pytest.approx(15.0, rel=0.2)
 
 
-@pytest.mark.parametrize(("seed", "before", "share"), [(1, 12, 0.5), (2, 8, 0.7)])
+@pytest.mark.parametrize(("seed", "before", "share"), [pytest.param(1, 12, 0.5, marks=pytest.mark.slow), (2, 8, 0.7)])
 def test_a_jump_of_friction_is_found_between_the_moments_that_are_tried(seed, before, share):
     """Beside levels per stroke only the stroke in which it happens tells the moment, and every start may be in another
     one."""

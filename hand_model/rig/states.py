@@ -21,6 +21,7 @@ PASSED = 0.45  # of the sampling rate: a filter above lets everything through
 WINDOWS = (5, 7, 11, 15, 21, 29, 41, 57, 81, 113, 159, 225, 317, 447)  # samples
 ROUNDING = 8.2 / 70.0**0.5  # steps: weights of a fourth difference add up to 16; a little for the motion itself
 OFF_RUNG = 0.1  # steps: digits of a log do not hold an encoder's step exactly
+KNOTS = 16  # after which a spline has forgotten how it began: 0.27^16 is 1e-9
 SURE = 2.0  # half width of a confidence interval, in standard deviations
 
 
@@ -96,7 +97,7 @@ def low_pass(values: Array, rate_hz: float, cutoff_hz: float, order: int = ORDER
         return values
     pad = min(len(values) - 2, int(3 * rate_hz / cutoff_hz))
     b, a, settled = _butterworth(cutoff_hz / (0.5 * rate_hz), order)
-    out = np.concatenate([2 * values[:1] - values[pad:0:-1], values, 2 * values[-1:] - values[-2 : -pad - 2 : -1]])
+    out = _reflected(values, pad)
     settled = settled.reshape(-1, *[1] * (out.ndim - 1))
     for _ in range(2):
         out = lfilter(b, a, out, axis=0, zi=settled * out[:1])[0][::-1]
@@ -114,11 +115,29 @@ def _butterworth(cutoff: float, order: int) -> tuple[Array, Array, Array]:
 
 
 def later(time_s: Array, values: Array, delay_s: float) -> Array:
-    """Values (n, ...) that come later by delay_s (earlier where negative), constant beyond the ends: cubic spline,
-    since a line between samples of a thinned grid would smooth and so favour delays of whole samples."""
-    from scipy.interpolate import CubicSpline
+    """Values (n, ...) on an even grid (n,) that come later by delay_s (earlier where negative), constant beyond the
+    ends: cubic spline, since a line between samples of a thinned grid would smooth and so favour delays of whole
+    samples.
 
-    return CubicSpline(time_s, values)(np.clip(time_s - delay_s, time_s[0], time_s[-1]))
+    A spline on even knots is a filter (Unser 1999); ends are extended by their point reflection, as in `low_pass`.
+    """
+    from scipy.ndimage import spline_filter1d
+
+    count = len(time_s)
+    if count < 2:
+        return values
+    pad = min(count - 1, KNOTS)
+    weights = spline_filter1d(_reflected(values, pad), axis=0)
+    at = np.clip(np.arange(count) - delay_s * (count - 1) / (time_s[-1] - time_s[0]), 0, count - 1)
+    before = np.minimum(at.astype(int), count - 2)
+    u = (at - before).reshape(-1, *[1] * (values.ndim - 1))
+    pieces = ((1 - u) ** 3, 4 - 3 * u**2 * (2 - u), 4 - 3 * (1 - u) ** 2 * (1 + u), u**3)
+    return sum(piece * weights[before + pad - 1 + k] for k, piece in enumerate(pieces)) / 6.0
+
+
+def _reflected(values: Array, pad: int) -> Array:
+    """Values (n, ...) with so many more at either end, less than n, by point reflection there."""
+    return np.concatenate([2 * values[:1] - values[pad:0:-1], values, 2 * values[-1:] - values[-2 : -pad - 2 : -1]])
 
 
 def differentiate(values: Array, rate_hz: float, resolved: bool = True) -> Array:
