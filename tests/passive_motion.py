@@ -87,9 +87,11 @@ FINGER = """<mujoco><compiler angle="radian"/><option timestep="0.001" integrato
 ENCODER, LINKAGE = np.array([0.02, 1.1, 0.25, -0.1]), np.array([0.02, 0.7, 0.15, 0.0, 0.0])
 KINEMATIC = [
     ("drive_backlash", {"gap": 2.5, "form": 0.0}, {}),
+    ("drive_backlash", {"gap": 2.5, "form": 2.0}, {}),
     ("series_elasticity", {"form": 0.0}, {"compliance": 0.02, "drag_compliance": 0.0}),
     ("series_elasticity", {"form": 1.0}, {"compliance": 0.02, "drag_compliance": 0.0}),
     ("linkage_backlash", {"gap": 2.0, "form": 0.0}, {}),
+    ("linkage_backlash", {"gap": 2.0, "form": 2.0}, {}),
     ("linkage_compliance", {"form": 0.0}, {"compliance": 0.03, "drag_compliance": 0.0}),
     ("linkage_compliance", {"form": 1.0}, {"compliance": 0.02, "drag_compliance": 0.0}),
     ("series_elasticity", {"form": 2.0, "lag": 0.25}, {"compliance": 0.02, "drag_compliance": 0.0}),

@@ -10,7 +10,7 @@ from passive_motion import DECLARED, DRIVE, ENCODER, FINGER, KINEMATIC, LINKAGE,
 
 from hand_model.effects import catalogue, effect
 from hand_model.effects.base import DriveState
-from hand_model.effects.driven import soft_play
+from hand_model.effects.driven import segment_gap, soft_play
 from hand_model.hand import Effect, EncoderMap, Estimate, Finger, Hand, Joint, Motor
 
 mujoco = pytest.importorskip("mujoco")
@@ -174,6 +174,21 @@ def test_what_rubs_in_a_play_does_not_stretch_the_spring_of_a_bound(tmp_path) ->
     assert off_the_map(now, moved, x) < 0.1  # of 0.8 deg; 0.29 with a soft spring
 
 
+def test_a_play_behind_the_map_is_replayed_behind_a_bound(tmp_path) -> None:
+    bound, play = (
+        ("coupling_deadband", {"until": 10.0, "corner": 0.1}, {}),
+        ("linkage_backlash", {"gap": 1.5, "form": 2.0}, {}),
+    )
+    now = kinematic_state("linkage")
+    moved = replayed(tmp_path, now, "linkage", bound, play)
+    driven = np.maximum(now.position, 10.0)
+    scaled = driven / now.extra["scale"][0]
+    mapped = np.stack([scaled**k for k in range(now.declared.shape[1])], axis=-1) @ powers(now, "linkage")
+    wanted = soft_play(mapped, segment_gap((now,), {"value": 1.5})["value"], 0.0)
+    begun = np.maximum.accumulate(np.abs(driven - driven[0]) > 4.0)
+    assert np.quantile(np.abs(moved - wanted)[begun], 0.98) < 0.1
+
+
 def test_plays_are_compiled_behind_bounds() -> None:
     """The spring that holds an input on its driver would pull a play ahead of it shut."""
     from hand_model.compile.mjcf import in_order
@@ -214,6 +229,20 @@ def test_keyframes_satisfy_maps_behind_inputs() -> None:
     settle(root, pose)
     assert pose["index_linkage_input"] == pytest.approx(np.deg2rad(20.0))
     assert pose["index_distal"] == pytest.approx(np.polynomial.polynomial.polyval(np.deg2rad(20.0), LINKAGE))
+
+
+def test_keyframes_satisfy_a_map_ahead_of_a_play() -> None:
+    from hand_model.effects.input import settle, source
+
+    root = etree.fromstring(FINGER)
+    where = {"finger": "index", "joint": "distal", "actuator": "index"}
+    play = {"gap": 2.0, "form": 2.0, "segment_gap": 1.6}
+    assert effect("linkage_backlash").write_mjcf(root, where, play) is not None
+    pose = {"index_proximal": 0.4} | dict.fromkeys(("index_distal", "index_linkage_mapped", "index_linkage_input"), 0.0)
+    settle(root, pose)
+    for joint in ("index_distal", "index_linkage_mapped", "index_linkage_input"):
+        assert pose[joint] == pytest.approx(np.polynomial.polynomial.polyval(0.4, LINKAGE))
+    assert source(root, "index_linkage_input") == "index_proximal"
 
 
 def test_compliance_moves_the_target_within_the_step() -> None:

@@ -89,3 +89,8 @@ def ends(parameters: Mapping[str, float]) -> str:
 def gives_way(parameters: Mapping[str, float]) -> bool:
     """Whether the ends of a gap give."""
     return parameters.get("form", HARD) in (SOFT, SOFT_BEHIND)
+
+
+def behind_map(parameters: Mapping[str, float]) -> bool:
+    """Whether a gap lies behind the map, as wide everywhere in the unit of what follows."""
+    return HARD_BEHIND <= parameters.get("form", HARD) < GRADUAL and "segment_gap" in parameters

@@ -8,6 +8,7 @@ the palm.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ FIRM_RATE = 400.0
 HARD = {"solreflimit": (0.002, 1.0), "solimplimit": (0.9999, 0.9999, 0.001, 0.5, 2.0)}
 FRICTION = {"solreffriction": "0.004 1", "solimpfriction": "0.9999 0.9999 0.001 0.5 2"}
 SUFFIX = "_input"
+MAPPED = "_mapped"  # of a joint that a map moves, behind which something is lost
 
 
 def map_of(root: Any, where: Mapping[str, Any], station: str) -> Any:
@@ -38,10 +40,24 @@ def map_of(root: Any, where: Mapping[str, Any], station: str) -> Any:
 
 
 def source(root: Any, joint: str) -> str:
-    """The joint behind a chain of inputs."""
-    while joint.endswith(SUFFIX) or SUFFIX + "_" in joint:
-        joint = _tie(root, joint).find("joint").get("joint")
-    return joint
+    """The joint behind a chain of inputs and maps."""
+    while True:
+        if MAPPED in joint:
+            joint = _map_to(root, joint).get("joint2")
+        elif SUFFIX in joint:
+            joint = _ahead(root, joint)
+        else:
+            return joint
+
+
+def _map_to(root: Any, joint: str) -> Any:
+    """The equality that moves a joint."""
+    return next(e for e in root.iterfind("equality/joint") if e.get("joint1") == joint)
+
+
+def _ahead(root: Any, joint: str) -> str:
+    """The joint that an input follows."""
+    return _tie(root, joint).find("joint").get("joint")
 
 
 def _tie(root: Any, joint: str) -> Any:
@@ -51,11 +67,30 @@ def _tie(root: Any, joint: str) -> Any:
 
 def _put_between(root: Any, equality: Any) -> tuple[str, str]:
     """Put an input joint between an equality and its driver; names of driver and input."""
-    from lxml import etree
-
     driver = equality.get("joint2")
     _hold_firmly(root, equality.get("joint1"), source(root, driver))
-    name = free_name(root, f"{equality.get('name')}{SUFFIX}")
+    name = _loose_joint(root, f"{equality.get('name')}{SUFFIX}")
+    equality.set("joint2", name)
+    return driver, name
+
+
+def _map_ahead(root: Any, equality: Any) -> None:
+    """Let an equality's map move a joint of its own, which the follower follows at its size: what is put between them is
+    behind the map."""
+    name = _loose_joint(root, f"{equality.get('name')}{MAPPED}")
+    ahead = deepcopy(equality)
+    ahead.set("name", free_name(root, f"{equality.get('name')}_map"))
+    ahead.set("joint1", name)
+    equality.addprevious(ahead)
+    equality.set("joint2", name)
+    equality.set("polycoef", "0 1 0 0 0")
+
+
+def _loose_joint(root: Any, name: str) -> str:
+    """A joint without mass worth mentioning on the palm; its name."""
+    from lxml import etree
+
+    name = free_name(root, name)
     palm = root.find("worldbody").find("body")
     body = etree.SubElement(palm, "body", name=free_name(root, f"{name}_link"))
     etree.SubElement(body, "inertial", pos="0 0 0", mass="1e-9", diaginertia="1e-9 1e-9 1e-9")
@@ -70,8 +105,7 @@ def _put_between(root: Any, equality: Any) -> tuple[str, str]:
         limited="false",
         armature=repr(INERTIA),
     )
-    equality.set("joint2", name)
-    return driver, name
+    return name
 
 
 def _hold_firmly(root: Any, follower: str, driver: str) -> None:
@@ -100,11 +134,15 @@ def _make_firm(tendon: Any) -> None:
     tendon.set("damping", repr(float(tendon.get("damping")) * more))
 
 
-def write_play(root: Any, equality: Any, gap: float) -> str:
-    """The input lags by half the `gap` [driver's unit] and stays while the driver crosses it; path of the tendon."""
+def write_play(root: Any, equality: Any, gap: float, behind: bool = False) -> str:
+    """The input lags by half the `gap` [driver's unit] and stays while the driver crosses it; path of the tendon.
+    behind: the follower does so behind its map, by half the `gap` [its unit]."""
+    ahead = equality.get("joint2")
+    if SUFFIX in ahead and _tie(root, ahead).get("stiffness"):
+        _make_firm(_tie(root, ahead))  # what rubs in the play would stretch it
+    if behind:
+        _map_ahead(root, equality)
     driver, name = _put_between(root, equality)
-    if SUFFIX in driver and _tie(root, driver).get("stiffness"):
-        _make_firm(_tie(root, driver))  # what rubs in the play would stretch it
     joint = next(j for j in root.find("worldbody").iter("joint") if j.get("name") == name)
     joint.set("frictionloss", repr(HOLD))
     for key, value in FRICTION.items():
@@ -155,17 +193,24 @@ def settle(root: Any, pose: dict[str, float]) -> None:
         if t.get("range")
     ]
     for equality in root.iterfind("equality/joint"):
-        driver = equality.get("joint2")
+        driver, follower = equality.get("joint2"), equality.get("joint1")
         if driver not in pose:
             continue
         if SUFFIX in driver:
-            behind = source(root, driver)
             low, high = -np.inf, np.inf
             for a, b, joints in tendons:
                 if driver in joints:
                     rest = sum(c * pose[j] for j, c in joints.items() if j != driver)
                     ends = sorted(((a - rest) / joints[driver], (b - rest) / joints[driver]))
                     low, high = max(low, ends[0]), min(high, ends[1])
-            pose[driver] = float(np.clip(pose[behind], low, high))
+            pose[driver] = float(np.clip(pose[_behind_inputs(root, driver)], low, high))
+        if SUFFIX in driver or MAPPED in follower:
             coefficients = [float(x) for x in equality.get("polycoef").split()]
-            pose[equality.get("joint1")] = float(np.polynomial.polynomial.polyval(pose[driver], coefficients))
+            pose[follower] = float(np.polynomial.polynomial.polyval(pose[driver], coefficients))
+
+
+def _behind_inputs(root: Any, joint: str) -> str:
+    """The joint that a chain of inputs follows, of a map or the driver itself."""
+    while SUFFIX in joint:
+        joint = _ahead(root, joint)
+    return joint

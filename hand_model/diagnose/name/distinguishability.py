@@ -48,11 +48,11 @@ def distinguishability(balance: Balance, effects: Iterable[Any]) -> dict[tuple[s
         if parts:
             spans[effect.name] = parts
     count = balance.train.sum() * SIZE**2 / (2 * balance.inflation)
-    products = _products(spans)
-    return {
-        (a, b): float(count * min(1 - _mimicked(products[a, b]), 1 - _mimicked(_turned(products[a, b]))))
-        for a, b in combinations(spans, 2)
-    }
+    alike = {}
+    for a, b in combinations(spans, 2):
+        shared = _shared(spans[a], spans[b])
+        alike[a, b] = min(1 - _mimicked(shared, spans[a]), 1 - _mimicked(shared.T, spans[b]))
+    return {pair: float(count * told) for pair, told in alike.items()}
 
 
 def protocol_pairs(balance: Balance, effects: Sequence[Any]) -> tuple[list[list[Any]], list[list[str]]]:
@@ -96,21 +96,15 @@ def _added(balance: Balance, term: Term, fit: Fit) -> Array:
     return np.concatenate([balance.gather(changed), balance.columns(effect, shape)], axis=1)
 
 
-def _products(spans: dict[str, list[Array]]) -> dict[tuple[str, str], list[list[Array]]]:
-    """Products of the orthonormal bases of every shape of one effect with those of every shape of another."""
-    stacked = {name: np.concatenate(parts, axis=1) for name, parts in spans.items()}
-    edges = {name: np.cumsum([p.shape[1] for p in parts])[:-1] for name, parts in spans.items()}
-    out = {}
-    for a, b in combinations(spans, 2):
-        gram = stacked[a].T @ stacked[b]
-        out[a, b] = [np.split(row, edges[b], axis=1) for row in np.split(gram, edges[a], axis=0)]
-    return out
+def _shared(some: list[Array], others: list[Array]) -> Array:
+    """Squared products of the orthonormal bases of every shape of one effect with those of every shape of another, summed
+    (k, l): what the two spaces share."""
+    square = (np.concatenate(some, axis=1).T @ np.concatenate(others, axis=1)) ** 2
+    begins = [np.cumsum([0, *(basis.shape[1] for basis in bases[:-1])]) for bases in (some, others)]
+    return np.add.reduceat(np.add.reduceat(square, begins[0], axis=0), begins[1], axis=1)
 
 
-def _turned(products: list[list[Array]]) -> list[list[Array]]:
-    return [[block.T for block in column] for column in zip(*products, strict=True)]
-
-
-def _mimicked(products: list[list[Array]]) -> float:
-    """Share of an effect's variance, at the median of its shapes, that the other's best shape reproduces."""
-    return float(np.median([max(float(np.mean(np.sum(block**2, axis=1))) for block in row) for row in products]))
+def _mimicked(shared: Array, bases: list[Array]) -> float:
+    """Share of an effect's variance, at the median of its shapes (k), that the other's best shape reproduces. shared:
+    (k, l)."""
+    return float(np.median(np.max(shared, axis=1) / [basis.shape[1] for basis in bases]))

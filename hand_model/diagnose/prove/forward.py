@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ...effects import effect
 from ...effects.base import DriveState
-from ...effects.input import SUFFIX
+from ...effects.input import MAPPED, SUFFIX
 from ...engines.mujoco import HOLD, divergence, on_linkages
 from ...hand import load_hand
 from ...passive import effects_on
@@ -64,8 +64,23 @@ def _driver(model: Any, actuator_name: str, follower: int, station: str) -> int 
         joint = int(model.actuator_trnid[actuator, 0]) if actuator >= 0 else -1
         # a nominal actuator acts on the finger itself: such a file has no motor
         return joint if joint >= 0 and joint != follower else None
+    row = _map_to(model, follower)
+    return None if row is None else _source(model, int(model.eq_obj2id[row]))
+
+
+def _map_to(model: Any, follower: int) -> int | None:
+    """The equality that moves a joint; None where none does."""
+    import mujoco
+
     rows = np.flatnonzero((model.eq_obj1id == follower) & (model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)))
-    return _behind_inputs(model, int(model.eq_obj2id[rows[0]])) if len(rows) else None
+    return int(rows[0]) if len(rows) else None
+
+
+def _source(model: Any, joint: int) -> int:
+    """The joint behind a chain of inputs and maps."""
+    joint = _behind_inputs(model, joint)
+    row = _map_to(model, joint) if MAPPED in model.joint(joint).name else None
+    return joint if row is None else _source(model, int(model.eq_obj2id[row]))
 
 
 def _behind_inputs(model: Any, joint: int) -> int:
@@ -155,11 +170,13 @@ def _rub(model: Any, driver: int, inertia: float, fastest: float) -> None:
 
     for row in np.flatnonzero(model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)):
         last = int(model.eq_obj2id[row])
-        if _behind_inputs(model, last) == driver:
+        if _source(model, last) == driver:
             loose = [
                 model.jnt_dofadr[joint] for joint, tendon in _inputs(model, last) if not model.tendon_stiffness[tendon]
             ]
-            model.dof_frictionloss[loose] = inertia * model.eq_data[row, 1] ** 2 * fastest / COASTING_S
+            ahead = _behind_inputs(model, last)
+            speed = fastest if ahead == driver else fastest * abs(model.eq_data[_map_to(model, ahead), 1])
+            model.dof_frictionloss[loose] = inertia * model.eq_data[row, 1] ** 2 * speed / COASTING_S
 
 
 def _unit(model: Any, motor: str) -> float:
@@ -175,14 +192,15 @@ def _started(model: Any, qpos: Array, driver: int) -> Array:
     maps."""
     out = on_linkages(model, qpos)
     for joint in range(model.njnt):
-        if SUFFIX in model.joint(joint).name and _behind_inputs(model, joint) == driver:
-            out[model.jnt_qposadr[joint]] = _within(model, out, joint, driver)
-    out = on_linkages(model, out)
+        if SUFFIX in model.joint(joint).name and _source(model, joint) == driver:
+            out[model.jnt_qposadr[joint]] = _within(model, out, joint)
+            out = on_linkages(model, out)
     return _pushed(model, out)
 
 
-def _within(model: Any, qpos: Array, joint: int, driver: int) -> float:
-    """Coordinate of an input joint: the driver's plus half the gap of its play, within the tendons that bound it."""
+def _within(model: Any, qpos: Array, joint: int) -> float:
+    """Coordinate of an input joint: that of what inputs follow there plus half the gap of its play, within the tendons
+    that bound it."""
     low, high, gap = -np.inf, np.inf, 0.0
     for t in range(model.ntendon):
         parts = slice(model.tendon_adr[t], model.tendon_adr[t] + model.tendon_num[t])
@@ -197,7 +215,7 @@ def _within(model: Any, qpos: Array, joint: int, driver: int) -> float:
         low, high = max(low, ends[0]), min(high, ends[1])
         if np.ptp(model.tendon_range[t]) < 1e5:
             gap = float(np.ptp(ends))
-    return float(np.clip(qpos[model.jnt_qposadr[driver]] + 0.5 * gap, low, high))
+    return float(np.clip(qpos[model.jnt_qposadr[_behind_inputs(model, joint)]] + 0.5 * gap, low, high))
 
 
 def _pushed(model: Any, qpos: Array) -> Array:
