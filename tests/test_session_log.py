@@ -46,6 +46,15 @@ def test_csv_dialects(dialect, tmp_path):
     assert list(log.columns) == ["position", "current"] and log.notes == ()
 
 
+def test_a_column_of_text_that_nobody_asked_for_is_left_out(tmp_path):
+    log = read_log(csv(tmp_path, "time,mode,position,stamp\n0.00,idle,100,2026-01-01\n0.01,run,101,2026-01-01\n"))
+    assert list(log.columns) == ["position"] and log.columns["position"].tolist() == [100, 101]
+    assert [n for n in log.notes if "mode" in n] and [n for n in log.notes if "stamp" in n]
+    for bad in ("time,extra,position\n0.00,1,2\n0.01,x,3\n0.02,3,4\n", "time,position\n0.00,open\n0.01,shut\n"):
+        with pytest.raises(SessionError, match="a number or an empty cell is needed"):
+            read_log(csv(tmp_path, bad))
+
+
 def test_csv_numbers_keep_every_digit(tmp_path):
     rng = np.random.default_rng(3)
     values = np.column_stack([np.cumsum(rng.uniform(0.01, 0.02, 50)) + 1e9, rng.normal(0, 1e-3, 50)])

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..session.log import rows_lost
 from .dynamics import INERTIAL, inertial_columns, inertial_parameters
 from .model import RigModel, RigTrial
 from .overrides import body_names, compile_model
@@ -34,6 +35,7 @@ MAX_RATE_HZ = 250.0  # faster recordings are thinned to this: joints move below 
 STATE_CUTOFF = 3.0  # of the states, in cut-offs of the balance
 MOST_ENDS = 0.05  # of a recording are left out at most at each end
 RINGING = 1e-2  # of a joint's mean speed [rms]: what a filter leaves of it in a pause, which is no motion
+GAP = 0.25  # of what the filter reaches: a shorter stretch without samples is bridged
 MAX_SAMPLES = 4000  # per trial: residuals are correlated over far longer than this spacing
 
 
@@ -219,6 +221,7 @@ def trial_rows(
     external = np.array([c.kind in ("inertial", "spring", "stiffness") for c in columns])
     away = np.minimum(grid - grid[0], grid[-1] - grid)
     settled = away >= (min(1.0 / cutoff, MOST_ENDS * (grid[-1] - grid[0])) if trim_s is None else trim_s)
+    settled &= ~_near_gap(rig, trial, grid, 1.0 / cutoff)
     rows = []
     for joint in rig.independent:
         jacobian = _jacobian(rig, joint, q)
@@ -259,6 +262,21 @@ def trial_rows(
             )
         )
     return tuple(rows)
+
+
+def _near_gap(rig: RigModel, trial: RigTrial, grid: Array, reach_s: float) -> NDArray[np.bool_]:
+    """Which times (n,) [s] lie within `reach_s` of a stretch in which samples of a position or an effort were lost, more
+    than a line between its ends stands for: a quarter of that, and more than is usual between two."""
+    near = np.zeros(len(grid), bool)
+    for values in (*(trial.position[j] for j in rig.joints), *trial.effort.values(), *trial.voltage.values()):
+        time_s = trial.time_s[np.isfinite(values)]
+        interval = np.diff(time_s)
+        if not len(interval):
+            continue
+        lost = rows_lost(time_s) & (interval > GAP * reach_s)
+        for begin, end in zip(time_s[:-1][lost], time_s[1:][lost], strict=True):
+            near |= (grid > begin - reach_s) & (grid < end + reach_s)
+    return near
 
 
 def _weighed(values: Array, weight: Array) -> Array:

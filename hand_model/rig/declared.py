@@ -159,7 +159,7 @@ def _choose_cutoff(
             if stands
             else moving
         )
-        if not rows or cutoff > 0.3 * min(r.rate_hz for r in rows):
+        if not any(r.moving.sum() > 10 for r in moving) or cutoff > 0.3 * min(r.rate_hz for r in rows):
             continue
         seen = float(np.mean([r.moving.mean() for r in rows]))
         most = max(most, seen)

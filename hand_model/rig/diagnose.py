@@ -120,10 +120,18 @@ def diagnose_rig(
         xml=xml,
         declared_xml=declared_xml,
         couplings=tuple(angles),
+        notes=(*rig.notes, *_silence(rig, fit, found)),
     )
     if output is not None:
         findings.write(output, model)
     return findings
+
+
+def _silence(rig: RigModel, fit: DeclaredFit, found: Sequence[Finding]) -> tuple[str, ...]:
+    """Why nothing of the rig could be balanced, where nothing could."""
+    if fit.rows or found or can_swing(rig):
+        return ()
+    return (f"nothing could be analysed: {rig.untold() or 'no joint moves long enough'}",)
 
 
 def _rank(finding: Finding) -> tuple[int, int]:

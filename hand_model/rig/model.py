@@ -11,15 +11,18 @@ from numpy.typing import NDArray
 
 from ..errors import DescriptionError, SessionError, did_you_mean
 from ..session import Session, Trial
+from .complete import completed
 
 Array = NDArray[np.float64]
+LEAST_SAMPLES = 30  # of a recording: fewer pass no filter
+SLOWEST_S = 1.0  # between rows
 QUANTITIES = {"joint": ("position", "velocity"), "actuator": ("force", "ctrl", "setpoint")}
 
 
 @dataclass(frozen=True)
 class Drive:
     """An actuator on one joint. kind: "force" (torque or force is the control), "voltage" (dcmotor), "position"
-    (servo).
+    (servo on position), "velocity" (servo on velocity).
 
     gear: control to joint transmission. gain: joint effort per unit of ctrl. offset: declares a constant (affine bias).
     """
@@ -71,7 +74,7 @@ class RigModel:
     """The declared model (or a patched one) and the recordings mapped onto it.
 
     xml: the MJCF as bytes. joints: names in qpos order. couplings, drives: see there. trials: all of the session.
-    quantity: column -> (kind, name, attribute).
+    quantity: column -> (kind, name, attribute). notes: what of the session was left out, and why.
     """
 
     name: str
@@ -82,6 +85,7 @@ class RigModel:
     couplings: tuple[Coupling, ...]
     trials: tuple[RigTrial, ...]
     quantity: Mapping[str, tuple[str, str, str]] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def unit(self, joint: str) -> str:
         """[m] for a slide, [rad] for a hinge."""
@@ -106,12 +110,32 @@ class RigModel:
         """The drive of a joint, or None where it is passive."""
         return next((d for d in self.drives if d.joint == joint), None)
 
+    def untold(self) -> str:
+        """What no training recording tells that a balance needs, "" where one tells all."""
+        blind = [{j for j in self.joints if j not in t.position} for t in self.select(validate=False)]
+        unseen = set.intersection(*blind) if blind else set()
+        if unseen:
+            return f'no position of joint "{min(unseen)}" is recorded; that of every joint of the model is needed'
+        deaf = [
+            {d.name for d in self.drives if d.joint in t.live and not (d.joint in t.effort or d.joint in t.voltage)}
+            for t in self.select(validate=False)
+        ]
+        unheard = set.intersection(*deaf) if deaf else set()
+        unheard -= {d.name for d in self.drives if d.kind == "position" and self._told(d.joint)}
+        if unheard:
+            return f'nothing that "{min(unheard)}" gives is recorded; its force, or what it is told, is needed'
+        return ""
+
+    def _told(self, joint: str) -> bool:
+        return any(joint in t.setpoint for t in self.trials)
+
 
 def load_rig(session: Session, xml: bytes | None = None) -> RigModel:
     """Read the session's MJCF (or `xml` in its place) and map every `motion` trial onto it.
 
-    Raises SessionError where the session has no rig, a signal names nothing in the model, or a trial's log lacks a
-    position; DescriptionError where MuJoCo cannot compile the file.
+    Trials of a few samples are left out, with a note. Raises SessionError where the session has no rig, a signal names
+    nothing in the model, a trial's log lacks a position or is not in seconds, or none is long enough; DescriptionError
+    where MuJoCo cannot compile the file, or two drives act on one joint.
     """
     import mujoco
 
@@ -122,9 +146,10 @@ def load_rig(session: Session, xml: bytes | None = None) -> RigModel:
             raise SessionError(f"{session.rig.model}: no such file; [rig] model must be an MJCF file in the session")
         xml = session.rig.model.read_bytes()
     try:
-        model = mujoco.MjModel.from_xml_string(xml.decode())
-    except ValueError as error:
-        raise DescriptionError(f"{session.rig.model}: MuJoCo cannot read it: {error}") from None
+        xml = completed(xml, session.rig.model.parent)
+    except DescriptionError as error:
+        raise DescriptionError(f"{session.rig.model}: {error}") from None
+    model = mujoco.MjModel.from_xml_string(xml.decode())
     for j in range(model.njnt):
         if model.jnt_type[j] not in (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)):
             raise DescriptionError(f'{session.rig.model}: joint "{model.joint(j).name}" is neither hinge nor slide')
@@ -139,6 +164,12 @@ def load_rig(session: Session, xml: bytes | None = None) -> RigModel:
     if not chosen:
         raise SessionError(f'{session.path}: a rig needs trials of kind "motion"; there is none')
     trials = tuple(_map_trial(t, quantity, drives, model) for t in chosen)
+    short = [t for t in trials if len(t.time_s) < LEAST_SAMPLES]
+    if len(short) == len(trials):
+        raise SessionError(
+            f"{session.path}: {short[0].name} holds {len(short[0].time_s)} samples, and no trial more than "
+            f"{max(len(t.time_s) for t in short)}; {LEAST_SAMPLES} or more are needed"
+        )
     return RigModel(
         name=session.hand,
         xml=xml,
@@ -146,15 +177,19 @@ def load_rig(session: Session, xml: bytes | None = None) -> RigModel:
         slides=frozenset(n for j, n in enumerate(joints) if model.jnt_type[j] == int(mujoco.mjtJoint.mjJNT_SLIDE)),
         drives=drives,
         couplings=_couplings(model, mujoco),
-        trials=trials,
+        trials=tuple(t for t in trials if t not in short),
         quantity=quantity,
+        notes=tuple(
+            f"{t.name}: {len(t.time_s)} samples are too few, and are left out; {LEAST_SAMPLES} or more are needed"
+            for t in short
+        ),
     )
 
 
 def _drives(model: Any, mujoco: Any) -> tuple[Drive, ...]:
     drives = []
     for a in range(model.nu):
-        if model.actuator_trntype[a] != int(mujoco.mjtTrn.mjTRN_JOINT):
+        if model.actuator_trntype[a] not in (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)):
             continue
         gear, gain = float(model.actuator_gear[a, 0]), float(model.actuator_gainprm[a, 0])
         bias, kind, offset = model.actuator_biastype[a], "force", False
@@ -162,7 +197,8 @@ def _drives(model: Any, mujoco: Any) -> tuple[Drive, ...]:
             resistance, constant = (float(x) for x in model.actuator_gainprm[a, :2])
             kind, gain = "voltage", constant / resistance
         elif bias == int(mujoco.mjtBias.mjBIAS_AFFINE):
-            kind = "position" if model.actuator_biasprm[a, 1] != 0 else "force"
+            by_position, by_velocity = model.actuator_biasprm[a, 1:3]
+            kind = "position" if by_position != 0 else "velocity" if by_velocity != 0 else "force"
             offset = kind == "force"
         joint = model.joint(int(model.actuator_trnid[a, 0])).name
         drives.append(Drive(model.actuator(a).name, joint, kind, gear, gain * gear, offset))
@@ -190,7 +226,8 @@ def _parse(session: Session, column: str, quantity: str, joints: tuple[str, ...]
     kind, name, attribute = parts
     names = joints if kind == "joint" else drives
     if name not in names:
-        raise SessionError(f'{where}: no {kind} "{name}" in the model; {did_you_mean(name, names)}')
+        what = "joint" if kind == "joint" else "actuator that drives a joint"
+        raise SessionError(f'{where}: no {what} "{name}" in the model; {did_you_mean(name, names)}')
     if attribute not in QUANTITIES[kind]:
         raise SessionError(f"{where}: {did_you_mean(attribute, QUANTITIES[kind])}")
     return kind, name, attribute
@@ -198,6 +235,11 @@ def _parse(session: Session, column: str, quantity: str, joints: tuple[str, ...]
 
 def _map_trial(trial: Trial, quantity: Mapping[str, tuple], drives: tuple[Drive, ...], model: Any) -> RigTrial:
     log = trial.log()
+    step = float(np.median(np.diff(log.time_s)))
+    if step > SLOWEST_S:
+        raise SessionError(
+            f'{log.path}: rows are {step:.3g} s apart; "time" in seconds is needed, several rows in each'
+        )
     keep = np.concatenate(([True], np.diff(log.time_s) > 0))  # a repeated time stamp holds no new sample
     time_s = log.time_s[keep] - log.time_s[0]
     maps: dict[str, dict[str, Array]] = {k: {} for k in ("position", "velocity", "force", "ctrl", "setpoint")}
@@ -215,6 +257,11 @@ def _map_trial(trial: Trial, quantity: Mapping[str, tuple], drives: tuple[Drive,
         raise SessionError(f"{log.path}: no sample of a position in {named}; a log with one is needed")
     gears = {k.split(":")[1]: np.atleast_1d(v)[0] for k, v in trial.set.items() if k.endswith(":gear")}
     live = tuple(d.joint for d in drives if gears.get(d.name, d.gear) != 0)
+    for joint in {j for j in live if live.count(j) > 1}:
+        raise DescriptionError(
+            f'{log.path}: {live.count(joint)} actuators drive the joint "{joint}"; one is needed (of those that pull '
+            "together, their sum)"
+        )
     effort, voltage = {}, {}
     for drive in drives:
         joint = drive.joint

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import csv
 from collections import Counter
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,8 @@ from .text import number_table, read_lines
 
 
 def read_csv_log(path: Path) -> Log:
-    """Read a CSV log; an empty cell is a lost sample (nan).
+    """Read a CSV log; an empty cell is a lost sample (nan). A column that the format does not name and that holds text is
+    left out, with a note.
 
     Raises SessionError where the header is missing, names a column twice or has no `time`, or a line has the wrong
     width or a cell that is no finite number.
@@ -40,6 +42,11 @@ def read_csv_log(path: Path) -> Log:
             raise SessionError(
                 f"{path}: line {numbers[i] + 1} has {len(row)} cells; {width} are needed, one for each column"
             )
+    text = [i for i, name in enumerate(header) if name not in COLUMNS and _is_text(row[i] for row in rows)]
+    notes = [f'column "{header[i]}" holds text and is ignored' for i in text]
+    if text:
+        rows = [[cell for i, cell in enumerate(row) if i not in text] for row in rows]
+        header = [name for i, name in enumerate(header) if i not in text]
     table = number_table(rows, [i + 1 for i in numbers], path)
     if np.isinf(table).any():
         row, column = np.argwhere(np.isinf(table))[0]
@@ -48,7 +55,7 @@ def read_csv_log(path: Path) -> Log:
             "a number or an empty cell is needed"
         )
     columns = {name: table[:, i] for i, name in enumerate(header)}
-    return build_log(columns.pop("time"), columns, path)
+    return build_log(columns.pop("time"), columns, path, notes)
 
 
 def _cells(line: str, separator: str) -> list[str]:
@@ -71,6 +78,12 @@ def _check_header(header: list[str], path: Path) -> None:
         raise SessionError(
             f"{path}: column {header.index('') + 1} has no name; a header cell for each column is needed"
         )
+
+
+def _is_text(cells: Iterable[str]) -> bool:
+    """Whether most of a column's cells that are not empty are no numbers: of few of them, something went wrong."""
+    told = [_is_number(cell) for cell in cells if cell.strip()]
+    return sum(told) < 0.5 * len(told)
 
 
 def _is_number(text: str) -> bool:
