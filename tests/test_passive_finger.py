@@ -143,6 +143,35 @@ def test_a_distal_segment_held_back_does_not_lift_the_finger_off_its_lever(bound
     assert np.abs(held - free).max() < 0.5  # of a segment held back by 15 to 20 deg
 
 
+def test_what_is_lost_behind_a_finger_is_not_asked_of_it(tmp_path) -> None:
+    bound, play = (
+        ("coupling_deadband", {"until": 15.0, "corner": 0.1}, {}),
+        ("linkage_backlash", {"gap": 0.8, "form": 0.0}, {}),
+    )
+    now = kinematic_state("encoder")
+    held, free = (
+        replayed(folder, now, "encoder", *written) for folder, written in ((tmp_path, (bound, play)), (tmp_path, ()))
+    )
+    assert np.abs(held - free).max() < 0.1  # 1.9 with them
+
+
+def test_a_firm_tie_does_not_lift_the_finger_off_its_lever(tmp_path) -> None:
+    """In the file as it is: the motor rests where the distal segment's dead band stretches its tie."""
+    bound, play = (
+        ("coupling_deadband", {"until": 15.0, "corner": 0.1}, {}),
+        ("linkage_backlash", {"gap": 0.8, "form": 0.0}, {}),
+    )
+    replayed(tmp_path, kinematic_state("encoder"), "encoder", bound, play)
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "index.xml"))
+    model.opt.gravity[:] = 0
+    data = mujoco.MjData(model)
+    motor, finger = model.joint("index_motor"), model.joint("index_proximal")
+    model.dof_armature[motor.dofadr] = 1e6
+    for _ in range(2000):
+        mujoco.mj_step(model, data)
+    assert np.rad2deg(abs(data.qpos[finger.qposadr[0]] - ENCODER[0])) < 0.4  # of 15
+
+
 def off_the_map(now: DriveState, moved: np.ndarray, x: np.ndarray) -> float:
     """By how much [deg] a segment is off the linkage's map of a driver at x [deg], but for a fiftieth of the samples
     since its motion began: on which side of a play it lay before is not asked."""

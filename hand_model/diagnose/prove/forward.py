@@ -130,6 +130,7 @@ def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, pat
     model.dof_armature[dof] = HOLD
     model.jnt_limited[list(held)] = 0  # a path a little beyond its range would be braked, and throw what it carries
     _free(model, driver)
+    _let_follow(model, follower)
     mujoco.mj_setConst(model, mujoco.MjData(model))
     # ties of slides, stiff for the inertias as they were and for the file's own step
     absolute = model.eq_solref[:, 0] < 0
@@ -159,6 +160,20 @@ def _free(model: Any, driver: int) -> None:
     carries with it."""
     for t, finger, _ in _pushes(model):
         if finger == driver:
+            model.tendon_stiffness[t] = model.tendon_damping[t] = model.tendon_limited[t] = 0
+
+
+def _let_follow(model: Any, joint: int) -> None:
+    """Let what follows a joint do so by its maps alone: what is lost there is not asked, and would pull at it."""
+    import mujoco
+
+    lost = {i for i in range(model.njnt) if SUFFIX in model.joint(i).name and _source(model, i) == joint}
+    ahead = {i: _behind_inputs(model, i) for i in lost}
+    for row in np.flatnonzero(model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)):
+        model.eq_obj2id[row] = ahead.get(int(model.eq_obj2id[row]), model.eq_obj2id[row])
+    for t in range(model.ntendon):
+        parts = slice(model.tendon_adr[t], model.tendon_adr[t] + model.tendon_num[t])
+        if lost & set(model.wrap_objid[parts].tolist()):
             model.tendon_stiffness[t] = model.tendon_damping[t] = model.tendon_limited[t] = 0
 
 
