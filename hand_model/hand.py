@@ -191,8 +191,8 @@ class Hand:
 
 
 def load_hand(path: str | Path) -> Hand:
-    """Read a `.hand` file; raises HandFileError where it is missing, foreign or incomplete."""
-    file = Path(path)
+    """Read a `.hand` file, or a compiled folder's; raises HandFileError where it is missing, foreign or incomplete."""
+    file = Path(path) / "hand.json" if Path(path).is_dir() else Path(path)
     if not file.is_file():
         raise HandFileError(
             f"{file}: no such file; a .hand file, from identify, or a compiled folder with its hand.json is needed"

@@ -13,18 +13,40 @@ from .errors import HandModelError
 
 
 def refuse_file(folder: str | Path) -> None:
-    """Raise HandModelError where a file stands where a folder is to be written."""
+    """Raise HandModelError where a file stands where a folder is to be written, or nothing can be written there."""
     for place in (Path(folder), *Path(folder).parents):
         if place.exists() and not place.is_dir():
             raise HandModelError(f"{place}: is a file; name a folder to write into")
+    place = next(p for p in (Path(folder), *Path(folder).absolute().parents) if p.exists())
+    try:
+        os.rmdir(tempfile.mkdtemp(prefix=".", dir=place))
+    except OSError as error:
+        raise HandModelError(
+            f"{folder}: nothing can be written into {place} ({error.strerror}); name a folder that can be written to"
+        ) from None
 
 
-def forget(folder: str | Path, names: Collection[str], mark: str) -> None:
-    """Remove the folders of these names that an earlier run wrote into `folder`, which its file `mark` shows; without
-    it nothing."""
-    if (Path(folder) / mark).is_file():
-        for name in names:
-            shutil.rmtree(Path(folder) / name, ignore_errors=True)
+@contextmanager
+def replacing(folder: str | Path, folders: Collection[str], files: Collection[str]) -> Iterator[None]:
+    """What an earlier run wrote into `folder`, which the first of its `files` shows, makes room for what the block
+    writes: its folders of these names go. Where the block fails or is stopped nothing of either is left."""
+    target, mark = Path(folder), next(iter(files))
+    ours = (target / mark).is_file()
+    theirs = {n for n in (*folders, *files) if (target / n).exists()} if not ours else set()
+
+    def clear(names: Collection[str]) -> None:
+        for name in (n for n in names if n not in theirs):
+            shutil.rmtree(target / name, ignore_errors=True)
+            if (target / name).is_file():
+                (target / name).unlink()
+
+    if ours:
+        clear(folders)
+    try:
+        yield
+    except BaseException:
+        clear((*files, *folders))
+        raise
 
 
 def refuse_foreign(folder: str | Path, ours: Collection[str]) -> None:

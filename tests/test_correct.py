@@ -14,7 +14,7 @@ from folder_contents import contents
 from hand_model.diagnose.findings import Finding
 from hand_model.diagnose.prove.correct import corrected_markers, refuse_output, write_corrected, write_csv, write_tsv
 from hand_model.errors import HandModelError
-from hand_model.output import forget
+from hand_model.output import replacing
 from hand_model.session import Mocap, read_session
 from hand_model.session.csv_log import read_csv_log
 from hand_model.session.qtm_tsv import read_qtm_tsv
@@ -154,9 +154,29 @@ def test_an_output_that_is_a_file_or_holds_somebodys_corrections_is_refused_and_
     theirs.write_text("x")
     with pytest.raises(HandModelError, match='"corrected", which no diagnosis wrote'):
         refuse_output(tmp_path / "out")
-    forget(tmp_path / "out", ("corrected",), "findings.json")
-    assert theirs.is_file()
+    with replacing(tmp_path / "out", ("corrected",), ("findings.json",)):
+        assert theirs.is_file()
     (tmp_path / "out" / "findings.json").write_text("{}")
     refuse_output(tmp_path / "out")
-    forget(tmp_path / "out", ("corrected", "model"), "findings.json")
+    with replacing(tmp_path / "out", ("corrected", "model"), ("findings.json",)):
+        pass
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["findings.json"]
+
+
+def test_what_a_stopped_run_wrote_is_not_left(tmp_path: Path) -> None:
+    (tmp_path / "model").mkdir()  # somebody's
+    with pytest.raises(KeyboardInterrupt), replacing(tmp_path, ("model", "model_before"), ("findings.json", "r.html")):
+        (tmp_path / "model_before").mkdir()
+        (tmp_path / "r.html").write_text("x")
+        raise KeyboardInterrupt
+    assert [p.name for p in tmp_path.iterdir()] == ["model"]
+    (tmp_path / "findings.json").write_text("{}")  # an earlier run's
+    with pytest.raises(KeyboardInterrupt), replacing(tmp_path, ("model", "model_before"), ("findings.json", "r.html")):
+        assert [p.name for p in tmp_path.iterdir()] == ["findings.json"]
+        raise KeyboardInterrupt
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_output_that_cannot_be_written_is_refused_at_once() -> None:
+    with pytest.raises(HandModelError, match="nothing can be written into /proc"):
+        refuse_output(Path("/proc/nope/deeper"))

@@ -13,7 +13,7 @@ import numpy as np
 from ..background import Pair, single_threaded
 from ..errors import HandModelError, SessionError
 from ..hand import Hand
-from ..output import forget
+from ..output import replacing
 from ..session import Session, read_session
 from .assemble import assemble
 from .findings import FILES, FOLDERS, Findings
@@ -83,13 +83,13 @@ def diagnose(
     findings = replace(findings, findings=listed)
     if output is not None:
         replays: tuple[Replay, ...] = ()
-        forget(output, FOLDERS, FILES[0])
-        if model is not False:
-            known = told[-1] if owned else hand
-            with Pair((findings, session, known, written, heard, Path(output))) as pair:
-                (findings, replays), _ = pair.map(_written, ("model", "corrected"))
-        write_page(findings, stations, replays, session.path.name, Path(output))
-        findings.save(output)
+        with replacing(output, FOLDERS, FILES):
+            if model is not False:
+                known = told[-1] if owned else hand
+                with Pair((findings, session, known, written, heard, Path(output))) as pair:
+                    (findings, replays), _ = pair.map(_written, ("model", "corrected"))
+            write_page(findings, stations, replays, session.path.name, Path(output))
+            findings.save(output)
     if progress is not None:
         progress(1.0)
     return findings
@@ -151,4 +151,7 @@ def _modelled(
         )
     except HandModelError as error:
         return replace(findings, notes=(*findings.notes, f"no model was written: {error}")), ()
-    return replace(findings, findings=named), replays
+    known = {f.name for f in hand.fingers}
+    absent = dict.fromkeys(f.where["finger"] for f in named if f.correction is None and f.where["finger"] not in known)
+    notes = tuple(f"the model has no {finger or 'such finger'}: what was named there is not in it" for finger in absent)
+    return replace(findings, findings=named, notes=(*findings.notes, *notes)), replays

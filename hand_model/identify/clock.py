@@ -68,7 +68,10 @@ def align(mocap_time_s: Array, angle_rad: Array, log_time_s: Array, counts: Arra
     if explained < FALLING:
         lowest = float(lags[np.argmin(np.where(correlation > -1, correlation, 1.0))])
         if _refine(t, q, s, -c, lowest)[-1] > FALLING:
-            raise SessionError(f"{name}: `position` falls as the finger flexes; it must increase with flexion")
+            raise SessionError(
+                f"{name}: `position` falls as the finger flexes; it must increase with flexion, and the markers must "
+                "begin with the hand open and at rest"
+            )
     if explained < LEAST_EXPLAINED:
         raise IdentificationError(
             f"{name}: mocap and log never correlate (best alignment explains {100 * max(explained, 0):.0f} % of the "

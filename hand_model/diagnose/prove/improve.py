@@ -40,10 +40,7 @@ DRIVE_KEPT = ("gain", "damping")  # of an identified motor, beside what the bala
 
 def read_model(model: Any) -> Hand:
     """A Hand from itself, a .hand file, or a compiled folder; raises HandFileError for anything else."""
-    if isinstance(model, Hand):
-        return model
-    path = Path(model)
-    return load_hand(path / "hand.json" if path.is_dir() else path)
+    return model if isinstance(model, Hand) else load_hand(model)
 
 
 def refuse_other(hand: Hand, session: Session) -> None:
