@@ -155,7 +155,7 @@ def test_what_is_lost_behind_a_finger_is_not_asked_of_it(tmp_path) -> None:
     assert np.abs(held - free).max() < 0.1  # 1.9 with them
 
 
-def test_a_firm_tie_does_not_lift_the_finger_off_its_lever(tmp_path) -> None:
+def test_a_tie_that_a_bound_stretches_does_not_lift_the_finger_off_its_lever(tmp_path) -> None:
     """In the file as it is: the motor rests where the distal segment's dead band stretches its tie."""
     bound, play = (
         ("coupling_deadband", {"until": 15.0, "corner": 0.1}, {}),

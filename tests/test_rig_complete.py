@@ -11,6 +11,7 @@ from rig_pendulum import MASS, PENDULUM, planted
 
 from hand_model.errors import DescriptionError, SessionError
 from hand_model.rig import diagnose_rig, fit_declared, load_rig
+from hand_model.rig.channels import check_channels
 from hand_model.rig.complete import completed
 from hand_model.rig.patch import write_declared
 from hand_model.session import read_session
@@ -119,6 +120,22 @@ def test_milliseconds_and_two_drives_of_a_joint_are_refused(tmp_path: Path) -> N
     (two / "rig.xml").write_text(PENDULUM.replace("</actuator>", '<motor name="b" joint="hinge"/></actuator>'))
     with pytest.raises(DescriptionError, match='2 actuators drive the joint "hinge"'):
         load_rig(read_session(two))
+
+
+def test_a_linear_machine_that_is_moved_in_a_sine_takes_one(tmp_path: Path) -> None:
+    """Viscous friction alone: what the drive gives is a sinusoid as the motion is, and no command for that."""
+    folder = planted(tmp_path / "s")
+    slide = PENDULUM.replace(
+        'axis="0 -1 0" damping="0.02" frictionloss="0.05"', 'type="slide" axis="1 0 0" damping="2"'
+    )
+    (folder / "rig.xml").write_text(slide)
+    random = np.random.default_rng(0)
+    for k in range(4):
+        t, w = np.arange(0, 12, 0.005), 2 * np.pi * (0.5 + 0.2 * k)
+        q, torque = 0.1 * np.sin(w * t), 0.3 * w * np.cos(w * t) - 0.05 * w**2 * np.sin(w * t)
+        table = np.stack([t, q, torque + 0.002 * random.standard_normal(len(t))], 1)
+        np.savetxt(folder / f"log/run_{k}.csv", table, delimiter=",", header="time,position,torque", comments="")
+    assert check_channels(load_rig(read_session(folder))) == ()
 
 
 @pytest.mark.parametrize(

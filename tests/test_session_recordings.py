@@ -167,6 +167,24 @@ def test_recordings_refused(case, root):
         assert any(part in message for part in word.split("|")), (word, message)
 
 
+def test_one_marker_of_four_may_stay_hidden_in_a_recording_where_another_shows_it(root):
+    edit(root, '"ID3"]', '"ID3", "ID4"]')
+    edit(
+        root,
+        '[[trial]]\nkind = "grasp"',
+        '[[trial]]\nkind = "flexion"\nfinger = "index"\nmocap = "mocap/b.c3d"\n\n[[trial]]\nkind = "grasp"',
+    )
+    labels = [*PALM, *FINGERS["index"][0], *FINGERS["index"][1], "ID4"]
+    x = rigid_markers(labels, 300)
+    write_c3d(root / "mocap/index.c3d", labels, x)
+    x[:, -1] = np.nan
+    write_c3d(root / "mocap/b.c3d", labels, x)
+    (note,) = [n for n in check_session(read_session(root)) if "never seen" in n and "index/distal" in n]
+    assert note.startswith("mocap/b.c3d") and '"ID4"' in note
+    write_c3d(root / "mocap/index.c3d", labels, x)  # nobody knows where it is
+    assert '"ID4" (index/distal) is occluded in every frame' in refusal(lambda: check_session(read_session(root)))
+
+
 def test_a_diagnosis_leaves_out_a_finger_with_markers_on_one_line_and_hears_the_others(root):
     assert not any("one line" in note for note in check_session(read_session(root), dead=True))
     spoil_line(0.0)(root)

@@ -21,9 +21,7 @@ INERTIA = 1e-7  # of an input joint, that of a compiled lever
 YIELD_RATE = 150.0  # rad/s: of a follower on the spring that lets a stop hold it back, as of a finger on its actuator
 # rad/s: of a finger on its lever then; what is tied to it by springs or rubs would lift it off otherwise
 FIRM_RATE = 400.0
-AGAINST = (
-    50.0  # times as stiff as an input's tie, at least, the spring on the lever is: else that would lift the finger
-)
+STRETCHED = 1e-3  # rad: by what rubs in a play, a spring that holds an input may be stretched
 HARD = {"solreflimit": (0.002, 1.0), "solimplimit": (0.9999, 0.9999, 0.001, 0.5, 2.0)}
 FRICTION = {"solreffriction": "0.004 1", "solimpfriction": "0.9999 0.9999 0.001 0.5 2"}
 SUFFIX = "_input"
@@ -137,28 +135,16 @@ def _make_firm(tendon: Any) -> None:
     tendon.set("damping", repr(float(tendon.get("damping")) * more))
 
 
-def _hold_against(root: Any, tie: Any) -> None:
-    """Make the spring that holds a finger on its lever stiff enough for a tie that a bound stretches."""
-    finger = source(root, tie.find("joint").get("joint"))
-    for tendon in root.iterfind("tendon/fixed"):
-        if tendon.get("name", "").endswith("_push") and tendon.find("joint").get("joint") == finger:
-            more = max(AGAINST * float(tie.get("stiffness")) / float(tendon.get("stiffness")), 1.0)
-            tendon.set("stiffness", repr(float(tendon.get("stiffness")) * more))
-            tendon.set("damping", repr(float(tendon.get("damping")) * more**0.5))
-
-
 def write_play(root: Any, equality: Any, gap: float, behind: bool = False) -> str:
     """The input lags by half the `gap` [driver's unit] and stays while the driver crosses it; path of the tendon.
     behind: the follower does so behind its map, by half the `gap` [its unit]."""
     ahead = equality.get("joint2")
-    if SUFFIX in ahead and _tie(root, ahead).get("stiffness"):
-        _make_firm(_tie(root, ahead))  # what rubs in the play would stretch it
-        _hold_against(root, _tie(root, ahead))
+    tie = _tie(root, ahead).get("stiffness") if SUFFIX in ahead else None
     if behind:
         _map_ahead(root, equality)
     driver, name = _put_between(root, equality)
     joint = next(j for j in root.find("worldbody").iter("joint") if j.get("name") == name)
-    joint.set("frictionloss", repr(HOLD))
+    joint.set("frictionloss", repr(HOLD if tie is None else min(HOLD, STRETCHED * float(tie))))
     for key, value in FRICTION.items():
         joint.set(key, value)
     return _limit(root, f"{name}_gap", {driver: 1.0, name: -1.0}, -0.5 * gap, 0.5 * gap)

@@ -7,6 +7,7 @@ drives is unsigned.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -88,7 +89,7 @@ def _looks(trial: RigTrial, joint: str, values: Array, measured: bool) -> list[t
     ):
         out.append(("current_saturation", float(sum(limits)), "stands on its limits, the same both ways"))
     share = sinusoids_left(trial.time_s, values)
-    if share < SAME:
+    if share < SAME and not _linear(trial, joint, values):
         out.append(("command_as_measurement", share, SINUSOID))
     share = static_left(trial, joint, values)
     if share < SAME:
@@ -126,36 +127,62 @@ def _gather(rig: RigModel, joint: str, channel: str, found: dict, usable: int) -
     return out
 
 
+def _linear(trial: RigTrial, joint: str, values: Array) -> bool:
+    """Whether a joint moves in sinusoids and a channel is of the same frequencies: a linear machine takes such a torque,
+    which says nothing."""
+    frequencies, left = _sinusoids(trial.time_s, fill_gaps(trial.time_s, trial.position[joint]), 2)
+    return left < SAME and _left_of(trial.time_s, values, frequencies) < SAME
+
+
 def sinusoids_left(time_s: Array, values: Array, most: int = 2) -> float:
     """Share (residual rms over rms) that up to `most` sinusoids and a mean leave; frequencies refined from the
     spectrum. One where the first does not come twice: any smooth curve is a piece of some sinusoid."""
+    return _sinusoids(time_s, values, most)[1]
+
+
+def _sinusoids(time_s: Array, values: Array, most: int) -> tuple[tuple[float, ...], float]:
+    """Frequencies [Hz] of sinusoids, and the share that `sinusoids_left` says."""
     from scipy.optimize import minimize_scalar
 
-    grid = uniform_time(time_s)
-    y = np.interp(grid, time_s, values)
-    total = _rms(y - y.mean())
-    if total == 0 or len(y) < 50:
-        return 1.0
-    trim = slice(int(0.02 * len(y)), None)  # the first instants, before the generator runs
-    grid, y = grid[trim], y[trim]
-    design = [np.ones_like(grid)]
-    left = y - y.mean()
+    grid, y = _begun(time_s, values)
+    if np.ptp(y) == 0 or len(y) < 49:
+        return (), 1.0
+    found: tuple[float, ...] = ()
+    left, step = y - y.mean(), 1.0 / (grid[-1] - grid[0])
     for _ in range(most):
         spectrum = np.abs(np.fft.rfft(left * np.hanning(len(left))))
         k = int(np.argmax(spectrum[1:])) + 1
-        step = 1.0 / (grid[-1] - grid[0])
 
-        def cost(f: float, base: list = design) -> float:
-            return _rms(_solve([*base, np.sin(2 * np.pi * f * grid), np.cos(2 * np.pi * f * grid)], y))
+        def cost(f: float, base: tuple[float, ...] = found) -> float:
+            return _rms(_solve(_waves(grid, (*base, f)), y))
 
         f = minimize_scalar(
             cost, bounds=((k - 1) * step, (k + 1) * step), method="bounded", options={"xatol": 1e-6 * step}
         ).x
-        if f < LEAST_PERIODS * step and len(design) == 1:
-            return 1.0
-        design += [np.sin(2 * np.pi * f * grid), np.cos(2 * np.pi * f * grid)]
-        left = _solve(design, y)
-    return float(np.median(np.abs(left)) / 0.6745 / total)
+        if f < LEAST_PERIODS * step and not found:
+            return (), 1.0
+        found = (*found, float(f))
+        left = _solve(_waves(grid, found), y)
+    return found, _left_of(time_s, values, found)
+
+
+def _begun(time_s: Array, values: Array) -> tuple[Array, Array]:
+    """Even times (n,) [s] and values, without the first instants, before the generator runs."""
+    grid = uniform_time(time_s)
+    trim = slice(int(0.02 * len(grid)), None)
+    return grid[trim], np.interp(grid, time_s, values)[trim]
+
+
+def _waves(grid: Array, frequencies: Sequence[float]) -> list[Array]:
+    """A mean, and sine and cosine of each frequency [Hz], (n,) each."""
+    return [np.ones_like(grid), *(f(2 * np.pi * hz * grid) for hz in frequencies for f in (np.sin, np.cos))]
+
+
+def _left_of(time_s: Array, values: Array, frequencies: Sequence[float]) -> float:
+    """Share (residual rms over rms, by medians) that sinusoids of these frequencies [Hz] leave."""
+    grid, y = _begun(time_s, values)
+    left = _solve(_waves(grid, frequencies), y)
+    return float(np.median(np.abs(left)) / 0.6745 / _rms(y - y.mean()))
 
 
 def _solve(columns: list[Array], y: Array) -> Array:

@@ -92,9 +92,12 @@ def check_mocap(session: Session, trial: Trial, mocap: Mocap, dead: bool = False
     for body, labels in bodies.items():
         position = mocap.markers(labels)
         seen = np.isfinite(position[..., 0])
-        if body != "probe" and not seen.any(axis=0).all():
-            label = labels[int(np.argmin(seen.any(axis=0)))]
-            raise SessionError(f'{mocap.path}: marker "{label}" ({body}) is occluded in every frame; it must be seen')
+        hidden = [label for label, ever in zip(labels, seen.any(axis=0), strict=True) if not ever and body != "probe"]
+        if hidden and (len(labels) - len(hidden) < 3 or not _seen_elsewhere(session, trial, hidden)):
+            raise SessionError(
+                f'{mocap.path}: marker "{hidden[0]}" ({body}) is occluded in every frame; it must be seen'
+            )
+        notes += [f'{_place(session, mocap)}: marker "{label}" ({body}) is never seen' for label in hidden]
         together = int((seen.sum(axis=1) >= min(3, len(labels))).sum())
         needed = FLEXION_FRAMES if trial.kind == "flexion" else 1
         if together < needed:
@@ -117,6 +120,16 @@ def check_mocap(session: Session, trial: Trial, mocap: Mocap, dead: bool = False
     if "probe" in bodies and session.probe.position_probe is not None:
         _check_probe_size(session, mocap)
     return notes
+
+
+def _seen_elsewhere(session: Session, trial: Trial, labels: Sequence[str]) -> bool:
+    """Whether markers that one trial never shows are seen in another flexion of its finger that is fitted."""
+    others = [
+        t.mocap().markers(labels)
+        for t in session.select("flexion", trial.finger)
+        if t.name != trial.name and not t.validate and all(label in t.mocap().labels for label in labels)
+    ]
+    return any(np.isfinite(position[..., 0]).any(axis=0).all() for position in others)
 
 
 def _bodies(session: Session, trial: Trial) -> dict[str, tuple[str, ...]]:

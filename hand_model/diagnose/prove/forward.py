@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ...effects import effect
 from ...effects.base import DriveState
-from ...effects.input import MAPPED, SUFFIX
+from ...effects.input import FIRM_RATE, MAPPED, SUFFIX
 from ...engines.mujoco import HOLD, divergence, on_linkages
 from ...hand import load_hand
 from ...passive import effects_on
@@ -179,19 +179,37 @@ def _let_follow(model: Any, joint: int) -> None:
 
 def _rub(model: Any, driver: int, inertia: float, fastest: float) -> None:
     """Let inputs that lie loose in a play behind a driver stand within `COASTING_S`, as friction, which the gap's ends
-    push without lag and no spring has to bear. inertia: of the joint that is moved [kg m^2]; fastest: of the driver,
+    push without lag; springs that hold inputs ahead of them, which would have to bear it, as firm as can be. inertia: of the joint that is moved [kg m^2]; fastest: of the driver,
     its unit per second."""
     import mujoco
 
     for row in np.flatnonzero(model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)):
         last = int(model.eq_obj2id[row])
         if _source(model, last) == driver:
-            loose = [
-                model.jnt_dofadr[joint] for joint, tendon in _inputs(model, last) if not model.tendon_stiffness[tendon]
-            ]
+            inputs = list(_inputs(model, last))
+            loose = [model.jnt_dofadr[joint] for joint, tendon in inputs if not model.tendon_stiffness[tendon]]
+            for tendon in _ties_ahead(model, last):
+                rate = 2 * model.tendon_stiffness[tendon] / model.tendon_damping[tendon]
+                firmer = max(FIRM_RATE / rate, 1.0)
+                model.tendon_stiffness[tendon] *= firmer**2
+                model.tendon_damping[tendon] *= firmer
             ahead = _behind_inputs(model, last)
             speed = fastest if ahead == driver else fastest * abs(model.eq_data[_map_to(model, ahead), 1])
             model.dof_frictionloss[loose] = inertia * model.eq_data[row, 1] ** 2 * speed / COASTING_S
+
+
+def _ties_ahead(model: Any, joint: int, loose: bool = False) -> list[int]:
+    """The springs that hold inputs on what they follow, towards the driver from the first that lies loose in a play on,
+    or from the joint on."""
+    ties = []
+    for _, tendon in _inputs(model, joint):
+        if not model.tendon_stiffness[tendon]:
+            loose = True
+        elif loose:
+            ties.append(tendon)
+    ahead = _behind_inputs(model, joint)
+    row = _map_to(model, ahead) if MAPPED in model.joint(ahead).name else None
+    return ties if row is None else [*ties, *_ties_ahead(model, int(model.eq_obj2id[row]), loose)]
 
 
 def _unit(model: Any, motor: str) -> float:
