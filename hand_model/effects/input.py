@@ -15,7 +15,7 @@ import numpy as np
 
 from .mjcf import fixed_tendon, free_name, motor_joint
 
-# friction that keeps a loose part where it is [N m per unit of the driver]; the weight of a finger may move it
+# friction that keeps a loose part where it is, at the driver [N m per its unit]; the weight of a finger may move it
 HOLD = 2e-4
 INERTIA = 1e-7  # of an input joint, that of a compiled lever
 YIELD_RATE = 150.0  # rad/s: of a follower on the spring that lets a stop hold it back, as of a finger on its actuator
@@ -140,11 +140,13 @@ def write_play(root: Any, equality: Any, gap: float, behind: bool = False) -> st
     behind: the follower does so behind its map, by half the `gap` [its unit]."""
     ahead = equality.get("joint2")
     tie = _tie(root, ahead).get("stiffness") if SUFFIX in ahead else None
+    hold = HOLD if tie is None else min(HOLD, STRETCHED * float(tie))
     if behind:
+        hold /= _slope(equality)  # the same at the driver
         _map_ahead(root, equality)
     driver, name = _put_between(root, equality)
     joint = next(j for j in root.find("worldbody").iter("joint") if j.get("name") == name)
-    joint.set("frictionloss", repr(HOLD if tie is None else min(HOLD, STRETCHED * float(tie))))
+    joint.set("frictionloss", repr(hold))
     for key, value in FRICTION.items():
         joint.set(key, value)
     return _limit(root, f"{name}_gap", {driver: 1.0, name: -1.0}, -0.5 * gap, 0.5 * gap)
@@ -176,8 +178,12 @@ def _inertia(root: Any, equality: Any) -> float:
     joint = next(j for j in root.find("worldbody").iter("joint") if j.get("name") == equality.get("joint1"))
     inertial = joint.getparent().find("inertial")
     position = np.array([float(x) for x in inertial.get("pos").split()])
-    slope = max(abs(float(equality.get("polycoef").split()[1])), 1e-3)
-    return (float(inertial.get("mass")) * float(position @ position) + 1e-6) * slope**2
+    return (float(inertial.get("mass")) * float(position @ position) + 1e-6) * _slope(equality) ** 2
+
+
+def _slope(equality: Any) -> float:
+    """How fast an equality's follower goes with its driver where both begin."""
+    return max(abs(float(equality.get("polycoef").split()[1])), 1e-3)
 
 
 def settle(root: Any, pose: dict[str, float]) -> None:
