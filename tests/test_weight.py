@@ -14,6 +14,8 @@ from hand_model.diagnose import weight
 from hand_model.diagnose.name import entries, reread
 from hand_model.diagnose.name.balance import Balance
 from hand_model.diagnose.name.judgement import judged
+from hand_model.diagnose.name.selection import name_effects
+from hand_model.diagnose.name.station import Station
 from hand_model.diagnose.name.term import Term
 from hand_model.effects import effect
 from hand_model.effects.path import dahl
@@ -121,19 +123,43 @@ def test_a_weight_is_told_beside_a_drive_that_lacks_something_else(monkeypatch: 
     assert named == {("finger_0", "presliding_friction"), ("finger_1", "gravity_load")}
 
 
-@pytest.mark.parametrize("beside_bend", [True, False])
-def test_a_bend_that_a_weight_explains_is_not_looked_for_beside_it(
-    monkeypatch: pytest.MonkeyPatch, beside_bend: bool
-) -> None:
-    """A weight's two columns and a bent spring's nearly cancel each other: together they may be of any size."""
+@pytest.mark.parametrize("bent", [True, False])
+def test_a_bend_that_a_weight_explains_is_not_looked_for_beside_it(monkeypatch: pytest.MonkeyPatch, bent: bool) -> None:
+    """A weight's two columns and a bent spring's nearly cancel each other: together they may be of any size. Where one
+    seems to need the other, what else may be named in the bend's place is asked, too."""
     asked = []
-    pull = weight.Pull(np.array([-10.0, 10.0]), np.eye(2), 0.99, beside_bend)
+    alone = weight.Pull(np.array([-10.0, 10.0]), np.eye(2), 0.99)
+    pull = replace(alone, alone=alone) if bent else alone
     monkeypatch.setattr(weight, "_pulled", lambda *_: pull)
     monkeypatch.setattr(weight, "_named", lambda *_: None)
     monkeypatch.setattr(weight, "judged", lambda *call: asked.append(call[5]) or judged(*call))
     heard(monkeypatch, lambda s: 60 * (s.position / 100) ** 2 - 40.0)
-    ((*effects,),) = asked
-    assert ("nonlinear_spring" in {e.name for e in effects}) == beside_bend
+    assert ["nonlinear_spring" in {e.name for e in effects} for effects in asked] == (
+        [True, False] if bent else [False]
+    )
+
+
+@pytest.mark.parametrize(("at_the_lowest", "weighs"), [(-150.0, True), (-101.0, False)])
+def test_a_weight_is_held_against_the_lowest_preload_that_there_may_be(
+    monkeypatch: pytest.MonkeyPatch, at_the_lowest: float, weighs: bool
+) -> None:
+    """A preload of -45 that cannot be is likelier by 25 units than a weight beside the names that were found without
+    it. What counts is how likely the lowest is that can be."""
+
+    class Known:
+        names = ("inertia", "viscous", "coulomb", "spring", "preload")
+
+        def __init__(self, *given: Any) -> None:
+            lowest, weighed = given[3]["preload"][0] == pytest.approx(8.0 - 0.9 * 35.0), len(given) > 5
+            self.log_evidence = -125.0 if weighed else at_the_lowest if lowest else -100.0
+            self.mean = np.array([0.01, 0.1, 35.0, 0.4, -45.0, *([-40.0, 5.0] if weighed else [])])
+            self.covariance = np.eye(len(self.mean))
+
+    states = posed(drive(2))
+    station = Station("current", "index", "index", None, name_effects(states, []))
+    monkeypatch.setattr(weight, "_Model", Known)
+    usual = {"preload": (8.0, 2.0), "spring": (0.4, 0.1)}
+    assert (weight._pulled(usual, station, states, odd_preload=True) is not None) == weighs
 
 
 def test_a_weight_is_no_more_than_its_drive_could_lift() -> None:

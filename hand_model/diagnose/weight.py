@@ -23,6 +23,7 @@ from .name.candidates import EVIDENCE_LEAST
 from .name.judgement import judged
 from .name.least_squares import from_products
 from .name.naming import CLASS_WIDTH
+from .name.shapes import priced
 from .name.station import Station
 from .name.term import Term, reshaped
 
@@ -63,9 +64,7 @@ def with_weights(
         if other is None:
             if any(out[at].standing(name) is not None for name in BENDING):
                 # a bend of the spring that a weight explains is none beside it
-                effects = [e for e in call[5] if e.name != BENT or pull.beside_bend]
-                posed = tuple(_declaring(s, pull.weight) for s in states)
-                out[at] = judged(*call[:4], posed, effects, *call[6:])
+                out[at], pull = _beside(call, states, pull)
             size, finding = odd[actuator]
             weights.append((size, _finding(finding, pull, _sweep(states[0]))))
         else:
@@ -86,13 +85,29 @@ def _named(call: tuple[Any, ...], states: tuple[DriveState, ...], station: Stati
 
 @dataclass(frozen=True)
 class Pull:
-    """A weight along the finger and across it (2,), its covariance (2, 2) and its probability. beside_bend: whether the
-    spring is bent beside it all the same."""
+    """A weight along the finger and across it (2,), its covariance (2, 2) and its probability. alone: the weight without
+    a bent spring, where this one is beside such a spring."""
 
     weight: Array
     covariance: Array
     probability: float
-    beside_bend: bool
+    alone: Pull | None = None
+
+
+def _beside(call: tuple[Any, ...], states: tuple[DriveState, ...], pull: Pull) -> tuple[Station, Pull]:
+    """The drive judged beside a weight, and that weight: of one that needs a bent spring the one without, where others
+    that are named beside it then explain as much."""
+
+    def heard(weight: Pull) -> Station:
+        effects = [e for e in call[5] if e.name != BENT or weight.alone is not None]
+        return judged(*call[:4], tuple(_declaring(s, weight.weight) for s in states), effects, *call[6:])
+
+    found = heard(pull)
+    if pull.alone is None:
+        return found, pull
+    other = heard(pull.alone)
+    costs = [priced(s.naming.balance)(s.naming.fit) for s in (found, other)]
+    return (other, pull.alone) if other.believed and costs[1] <= costs[0] else (found, pull)
 
 
 Usual = Mapping[str, tuple[float, float]]  # declared coefficient -> what to expect of it, and how surely
@@ -123,26 +138,37 @@ def _pulled(usual: Usual, station: Station, states: tuple[DriveState, ...], odd_
     weighed = _Model(balance, plain, inside, usual, effort, weights)
     spared = EVIDENCE_LEAST if len(plain) < len(terms) else 0.0  # one effect for two
     likelier = weighed.log_evidence - odd.log_evidence + (spared if odd_preload else -CLASS_WIDTH)
-    beside_bend = False
+    alone = None
     if odd_preload and _impossible(odd, *usual["preload"]):
+        # with the lowest preload that there may be, as sure as the usual one is: that is not what was recorded
+        lowest = _lowest(odd, usual["preload"][0]), usual["preload"][1]
+        odd = _Model(balance, terms, inside, {**others, "preload": lowest}, effort)
+        likelier = weighed.log_evidence - odd.log_evidence + spared
+        likelier = weighed.log_evidence - odd.log_evidence + spared
         both = _Model(balance, terms, inside, usual, effort, weights)
         if both.log_evidence > weighed.log_evidence + spared:
+            alone = weighed if len(plain) < len(terms) else None
             weighed, likelier = both, both.log_evidence - odd.log_evidence
-            beside_bend = len(plain) < len(terms)
         likelier += CLASS_WIDTH + EVIDENCE_LEAST
     largest = {"largest": float(np.hypot(*weighed.mean[-2:]))}
     if likelier <= 0 or not effect(WEIGHT).possible(states, largest):
         return None
     probability = float(1 / (1 + np.exp(-likelier)))
-    return Pull(weighed.mean[-2:], weighed.covariance[-2:, -2:], probability, beside_bend)
+    first = None if alone is None else Pull(alone.mean[-2:], alone.covariance[-2:, -2:], probability)
+    return Pull(weighed.mean[-2:], weighed.covariance[-2:, -2:], probability, first)
 
 
 def _impossible(odd: _Model, usual: float, doubt: float) -> bool:
     """Whether no odd preload is as low as the one found, for sure: a spring pulls, and friction that is lopsided takes
     at most as much off a usual preload as there is of it, for it never quite vanishes in one direction."""
-    preload, coulomb = (odd.names.index(name) for name in ("preload", "coulomb"))
+    preload = odd.names.index("preload")
     surely = odd.mean[preload] + 2 * np.hypot(np.sqrt(odd.covariance[preload, preload]), doubt)
-    return bool(surely < min(0.0, usual - LOPSIDED * odd.mean[coulomb]))
+    return bool(surely < _lowest(odd, usual))
+
+
+def _lowest(odd: _Model, usual: float) -> float:
+    """The lowest preload that may be read where there is a usual one."""
+    return min(0.0, usual - LOPSIDED * float(odd.mean[odd.names.index("coulomb")]))
 
 
 class _Model:
