@@ -143,25 +143,21 @@ def test_a_distal_segment_held_back_does_not_lift_the_finger_off_its_lever(bound
     assert np.abs(held - free).max() < 0.5  # of a segment held back by 15 to 20 deg
 
 
+LOST = (  # between a finger and its distal segment
+    ("coupling_deadband", {"until": 15.0, "corner": 0.1}, {}),
+    ("linkage_backlash", {"gap": 0.8, "form": 0.0}, {}),
+)
+
+
 def test_what_is_lost_behind_a_finger_is_not_asked_of_it(tmp_path) -> None:
-    bound, play = (
-        ("coupling_deadband", {"until": 15.0, "corner": 0.1}, {}),
-        ("linkage_backlash", {"gap": 0.8, "form": 0.0}, {}),
-    )
     now = kinematic_state("encoder")
-    held, free = (
-        replayed(folder, now, "encoder", *written) for folder, written in ((tmp_path, (bound, play)), (tmp_path, ()))
-    )
+    held, free = (replayed(folder, now, "encoder", *written) for folder, written in ((tmp_path, LOST), (tmp_path, ())))
     assert np.abs(held - free).max() < 0.1  # 1.9 with them
 
 
 def test_a_tie_that_a_bound_stretches_does_not_lift_the_finger_off_its_lever(tmp_path) -> None:
     """In the file as it is: the motor rests where the distal segment's dead band stretches its tie."""
-    bound, play = (
-        ("coupling_deadband", {"until": 15.0, "corner": 0.1}, {}),
-        ("linkage_backlash", {"gap": 0.8, "form": 0.0}, {}),
-    )
-    replayed(tmp_path, kinematic_state("encoder"), "encoder", bound, play)
+    replayed(tmp_path, kinematic_state("encoder"), "encoder", *LOST)
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "index.xml"))
     model.opt.gravity[:] = 0
     data = mujoco.MjData(model)
@@ -172,13 +168,22 @@ def test_a_tie_that_a_bound_stretches_does_not_lift_the_finger_off_its_lever(tmp
     assert np.rad2deg(abs(data.qpos[finger.qposadr[0]] - ENCODER[0])) < 0.4  # of 15
 
 
-def off_the_map(now: DriveState, moved: np.ndarray, x: np.ndarray) -> float:
-    """By how much [deg] a segment is off the linkage's map of a driver at x [deg], but for a fiftieth of the samples
-    since its motion began: on which side of a play it lay before is not asked."""
+def on_the_map(now: DriveState, x: np.ndarray) -> np.ndarray:
+    """Angle [deg] of a segment on the linkage's map of a driver at x [deg]."""
     scaled = x / now.extra["scale"][0]
-    wanted = np.stack([scaled**k for k in range(now.declared.shape[1])], axis=-1) @ powers(now, "linkage")
-    begun = np.maximum.accumulate(np.abs(now.position - now.position[0]) > 4.0)
+    return np.stack([scaled**k for k in range(now.declared.shape[1])], axis=-1) @ powers(now, "linkage")
+
+
+def off(wanted: np.ndarray, moved: np.ndarray, x: np.ndarray) -> float:
+    """By how much [deg] a segment is off where it is wanted, but for a fiftieth of the samples since the motion of x
+    [deg] began: on which side of a play it lay before is not asked."""
+    begun = np.maximum.accumulate(np.abs(x - x[0]) > 4.0)
     return float(np.quantile(np.abs(moved - wanted)[begun], 0.98))
+
+
+def off_the_map(now: DriveState, moved: np.ndarray, x: np.ndarray) -> float:
+    """By how much [deg] a segment is off the linkage's map of a driver at x [deg]."""
+    return off(on_the_map(now, x), moved, now.position)
 
 
 def test_a_play_before_a_stop_is_replayed_as_both_predict(tmp_path) -> None:
@@ -211,11 +216,8 @@ def test_a_play_behind_the_map_is_replayed_behind_a_bound(tmp_path) -> None:
     now = kinematic_state("linkage")
     moved = replayed(tmp_path, now, "linkage", bound, play)
     driven = np.maximum(now.position, 10.0)
-    scaled = driven / now.extra["scale"][0]
-    mapped = np.stack([scaled**k for k in range(now.declared.shape[1])], axis=-1) @ powers(now, "linkage")
-    wanted = soft_play(mapped, segment_gap((now,), {"value": 1.5})["value"], 0.0)
-    begun = np.maximum.accumulate(np.abs(driven - driven[0]) > 4.0)
-    assert np.quantile(np.abs(moved - wanted)[begun], 0.98) < 0.1
+    wanted = soft_play(on_the_map(now, driven), segment_gap((now,), {"value": 1.5})["value"], 0.0)
+    assert off(wanted, moved, driven) < 0.1
 
 
 def test_plays_are_compiled_behind_bounds() -> None:

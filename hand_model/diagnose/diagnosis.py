@@ -26,7 +26,7 @@ from .name.reread import reread
 from .name.station import Station
 from .page import write_page
 from .prove.correct import refuse_output, write_corrected
-from .prove.improve import read_model, refuse_other, write_improved
+from .prove.improve import absent, read_model, refuse_other, write_improved
 from .prove.replays import Replay
 
 
@@ -152,6 +152,6 @@ def _modelled(
     except HandModelError as error:
         return replace(findings, notes=(*findings.notes, f"no model was written: {error}")), ()
     known = {f.name for f in hand.fingers}
-    absent = dict.fromkeys(f.where["finger"] for f in named if f.correction is None and f.where["finger"] not in known)
-    notes = tuple(f"the model has no {finger or 'such finger'}: what was named there is not in it" for finger in absent)
+    lacks = dict.fromkeys(absent(f) for f in named if f.correction is None and f.where["finger"] not in known)
+    notes = tuple(f"{what}: what was named there is not in it" for what in lacks)
     return replace(findings, findings=named, notes=(*findings.notes, *notes)), replays

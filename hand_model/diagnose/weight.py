@@ -144,7 +144,6 @@ def _pulled(usual: Usual, station: Station, states: tuple[DriveState, ...], odd_
         lowest = _lowest(odd, usual["preload"][0]), usual["preload"][1]
         odd = _Model(balance, terms, inside, {**others, "preload": lowest}, effort)
         likelier = weighed.log_evidence - odd.log_evidence + spared
-        likelier = weighed.log_evidence - odd.log_evidence + spared
         both = _Model(balance, terms, inside, usual, effort, weights)
         if both.log_evidence > weighed.log_evidence + spared:
             alone = weighed if len(plain) < len(terms) else None

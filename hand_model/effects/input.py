@@ -42,23 +42,17 @@ def map_of(root: Any, where: Mapping[str, Any], station: str) -> Any:
 
 def source(root: Any, joint: str) -> str:
     """The joint behind a chain of inputs and maps."""
-    while True:
-        if MAPPED in joint:
-            joint = _map_to(root, joint).get("joint2")
-        elif SUFFIX in joint:
-            joint = _ahead(root, joint)
-        else:
-            return joint
+    joint = _behind_inputs(root, joint)
+    if MAPPED not in joint:
+        return joint
+    return source(root, next(e for e in root.iterfind("equality/joint") if e.get("joint1") == joint).get("joint2"))
 
 
-def _map_to(root: Any, joint: str) -> Any:
-    """The equality that moves a joint."""
-    return next(e for e in root.iterfind("equality/joint") if e.get("joint1") == joint)
-
-
-def _ahead(root: Any, joint: str) -> str:
-    """The joint that an input follows."""
-    return _tie(root, joint).find("joint").get("joint")
+def _behind_inputs(root: Any, joint: str) -> str:
+    """The joint that a chain of inputs follows: one that a map moves, or the driver itself."""
+    while SUFFIX in joint:
+        joint = _tie(root, joint).find("joint").get("joint")
+    return joint
 
 
 def _tie(root: Any, joint: str) -> Any:
@@ -213,10 +207,3 @@ def settle(root: Any, pose: dict[str, float]) -> None:
         if SUFFIX in driver or MAPPED in follower:
             coefficients = [float(x) for x in equality.get("polycoef").split()]
             pose[follower] = float(np.polynomial.polynomial.polyval(pose[driver], coefficients))
-
-
-def _behind_inputs(root: Any, joint: str) -> str:
-    """The joint that a chain of inputs follows, of a map or the driver itself."""
-    while SUFFIX in joint:
-        joint = _ahead(root, joint)
-    return joint

@@ -163,7 +163,7 @@ def _sinusoids(time_s: Array, values: Array, most: int) -> tuple[tuple[float, ..
             return (), 1.0
         found = (*found, float(f))
         left = _solve(_waves(grid, found), y)
-    return found, _left_of(time_s, values, found)
+    return found, _share(left, y)
 
 
 def _begun(time_s: Array, values: Array) -> tuple[Array, Array]:
@@ -179,9 +179,13 @@ def _waves(grid: Array, frequencies: Sequence[float]) -> list[Array]:
 
 
 def _left_of(time_s: Array, values: Array, frequencies: Sequence[float]) -> float:
-    """Share (residual rms over rms, by medians) that sinusoids of these frequencies [Hz] leave."""
+    """Share (as `_share`) that sinusoids of these frequencies [Hz] leave."""
     grid, y = _begun(time_s, values)
-    left = _solve(_waves(grid, frequencies), y)
+    return _share(_solve(_waves(grid, frequencies), y), y)
+
+
+def _share(left: Array, y: Array) -> float:
+    """What is left of a signal over what it varies by, by the median of the one and the rms of the other."""
     return float(np.median(np.abs(left)) / 0.6745 / _rms(y - y.mean()))
 
 

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from ..errors import DescriptionError, SessionError, did_you_mean
 from ..session import Session, Trial
+from ..session.check import check_interval
 from .complete import completed
+from .states import LEAST_SAMPLES
 
 Array = NDArray[np.float64]
-LEAST_SAMPLES = 30  # of a recording: fewer pass no filter
 SLOWEST_S = 1.0  # between rows
 QUANTITIES = {"joint": ("position", "velocity"), "actuator": ("force", "ctrl", "setpoint")}
 
@@ -68,6 +69,11 @@ class RigTrial:
     set: Mapping[str, Any]
     live: tuple[str, ...]
 
+    def tells(self, drive: Drive) -> bool:
+        """Whether what a drive puts in is recorded, or what it is told, or it is not connected."""
+        told = {"voltage": self.voltage, "position": self.setpoint}.get(drive.kind, {})
+        return drive.joint not in self.live or drive.joint in self.effort or drive.joint in told
+
 
 @dataclass(frozen=True)
 class RigModel:
@@ -116,18 +122,11 @@ class RigModel:
         unseen = set.intersection(*blind) if blind else set()
         if unseen:
             return f'no position of joint "{min(unseen)}" is recorded; that of every joint of the model is needed'
-        deaf = [
-            {d.name for d in self.drives if d.joint in t.live and not (d.joint in t.effort or d.joint in t.voltage)}
-            for t in self.select(validate=False)
-        ]
+        deaf = [{d.name for d in self.drives if not t.tells(d)} for t in self.select(validate=False)]
         unheard = set.intersection(*deaf) if deaf else set()
-        unheard -= {d.name for d in self.drives if d.kind == "position" and self._told(d.joint)}
         if unheard:
             return f'nothing that "{min(unheard)}" gives is recorded; its force, or what it is told, is needed'
         return ""
-
-    def _told(self, joint: str) -> bool:
-        return any(joint in t.setpoint for t in self.trials)
 
 
 def load_rig(session: Session, xml: bytes | None = None) -> RigModel:
@@ -235,11 +234,7 @@ def _parse(session: Session, column: str, quantity: str, joints: tuple[str, ...]
 
 def _map_trial(trial: Trial, quantity: Mapping[str, tuple], drives: tuple[Drive, ...], model: Any) -> RigTrial:
     log = trial.log()
-    step = float(np.median(np.diff(log.time_s)))
-    if step > SLOWEST_S:
-        raise SessionError(
-            f'{log.path}: rows are {step:.3g} s apart; "time" in seconds is needed, several rows in each'
-        )
+    check_interval(log, SLOWEST_S)
     keep = np.concatenate(([True], np.diff(log.time_s) > 0))  # a repeated time stamp holds no new sample
     time_s = log.time_s[keep] - log.time_s[0]
     maps: dict[str, dict[str, Array]] = {k: {} for k in ("position", "velocity", "force", "ctrl", "setpoint")}

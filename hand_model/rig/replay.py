@@ -254,10 +254,7 @@ def _simulated(
 
 def can_simulate(rig: RigModel, trial: RigTrial) -> bool:
     """Whether the trial holds every joint's position and all that its drives put in, or are told."""
-    told = {"voltage": trial.voltage, "position": trial.setpoint, "force": trial.effort}
-    return all(j in trial.position for j in rig.joints) and all(
-        d.joint in told.get(d.kind, ()) or d.joint in trial.effort for d in rig.drives if d.joint in trial.live
-    )
+    return all(j in trial.position for j in rig.joints) and all(trial.tells(d) for d in rig.drives)
 
 
 def recorded_states(rig: RigModel, trial: RigTrial) -> States:

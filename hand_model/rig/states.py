@@ -21,6 +21,7 @@ PASSED = 0.45  # of the sampling rate: a filter above lets everything through
 WINDOWS = (5, 7, 11, 15, 21, 29, 41, 57, 81, 113, 159, 225, 317, 447)  # samples
 ROUNDING = 8.2 / 70.0**0.5  # steps: weights of a fourth difference add up to 16; a little for the motion itself
 OFF_RUNG = 0.1  # steps: digits of a log do not hold an encoder's step exactly
+LEAST_SAMPLES = 30  # of a recording: fewer pass no filter
 KNOTS = 16  # after which a spline has forgotten how it began: 0.27^16 is 1e-9
 SURE = 2.0  # half width of a confidence interval, in standard deviations
 
@@ -93,7 +94,7 @@ def low_pass(values: Array, rate_hz: float, cutoff_hz: float, order: int = ORDER
     """
     from scipy.signal import lfilter
 
-    if cutoff_hz >= PASSED * rate_hz or len(values) < 30:
+    if cutoff_hz >= PASSED * rate_hz or len(values) < LEAST_SAMPLES:
         return values
     pad = min(len(values) - 2, int(3 * rate_hz / cutoff_hz))
     b, a, settled = _butterworth(cutoff_hz / (0.5 * rate_hz), order)

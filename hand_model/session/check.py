@@ -238,12 +238,17 @@ def _check_palm_sizes(sizes: dict[str, float]) -> None:
             )
 
 
+def check_interval(log: Log, longest_s: float = INTERVAL_S) -> None:
+    """Raise SessionError where rows are so far apart [s] that the `time` of a log cannot be in seconds."""
+    interval_s = float(np.median(np.diff(log.time_s)))
+    if interval_s > longest_s:
+        raise SessionError(f"{log.path}: samples are {interval_s:.3g} s apart by `time`; `time` in seconds is needed")
+
+
 def check_log(session: Session, trial: Trial, log: Log, dead: bool = False) -> list[str]:
     """Columns of one log: there, not empty, in seconds, and moving where they must (unless `dead`). Returns notes;
     raises SessionError."""
-    interval_s = float(np.median(np.diff(log.time_s)))
-    if interval_s > INTERVAL_S:
-        raise SessionError(f"{log.path}: samples are {interval_s:.3g} s apart by `time`; `time` in seconds is needed")
+    check_interval(log)
     if session.rig is not None:
         return _check_signals(session, log)
     if trial.kind not in ("flexion", "excitation", "grasp"):

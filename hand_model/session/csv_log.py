@@ -42,12 +42,16 @@ def read_csv_log(path: Path) -> Log:
             raise SessionError(
                 f"{path}: line {numbers[i] + 1} has {len(row)} cells; {width} are needed, one for each column"
             )
-    text = [i for i, name in enumerate(header) if name not in COLUMNS and _is_text(row[i] for row in rows)]
-    notes = [f'column "{header[i]}" holds text and is ignored' for i in text]
-    if text:
-        rows = [[cell for i, cell in enumerate(row) if i not in text] for row in rows]
+    at, notes = [i + 1 for i in numbers], list[str]()
+    try:
+        table = number_table(rows, at, path)
+    except SessionError:
+        text = [i for i, name in enumerate(header) if name not in COLUMNS and _is_text(row[i] for row in rows)]
+        if not text:
+            raise
+        notes = [f'column "{header[i]}" holds text and is ignored' for i in text]
         header = [name for i, name in enumerate(header) if i not in text]
-    table = number_table(rows, [i + 1 for i in numbers], path)
+        table = number_table([[cell for i, cell in enumerate(row) if i not in text] for row in rows], at, path)
     if np.isinf(table).any():
         row, column = np.argwhere(np.isinf(table))[0]
         raise SessionError(

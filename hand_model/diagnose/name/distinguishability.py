@@ -48,11 +48,11 @@ def distinguishability(balance: Balance, effects: Iterable[Any]) -> dict[tuple[s
         if parts:
             spans[effect.name] = parts
     count = balance.train.sum() * SIZE**2 / (2 * balance.inflation)
-    alike = {}
+    out = {}
     for a, b in combinations(spans, 2):
         shared = _shared(spans[a], spans[b])
-        alike[a, b] = min(1 - _mimicked(shared, spans[a]), 1 - _mimicked(shared.T, spans[b]))
-    return {pair: float(count * told) for pair, told in alike.items()}
+        out[a, b] = float(count * min(1 - _mimicked(shared, spans[a]), 1 - _mimicked(shared.T, spans[b])))
+    return out
 
 
 def protocol_pairs(balance: Balance, effects: Sequence[Any]) -> tuple[list[list[Any]], list[list[str]]]:

@@ -79,8 +79,13 @@ def _map_to(model: Any, follower: int) -> int | None:
 def _source(model: Any, joint: int) -> int:
     """The joint behind a chain of inputs and maps."""
     joint = _behind_inputs(model, joint)
-    row = _map_to(model, joint) if MAPPED in model.joint(joint).name else None
+    row = _map_ahead(model, joint)
     return joint if row is None else _source(model, int(model.eq_obj2id[row]))
+
+
+def _map_ahead(model: Any, joint: int) -> int | None:
+    """The equality that moves a joint of a map's own, ahead of what lies behind that map; None where it is none."""
+    return _map_to(model, joint) if MAPPED in model.joint(joint).name else None
 
 
 def _behind_inputs(model: Any, joint: int) -> int:
@@ -160,7 +165,7 @@ def _free(model: Any, driver: int) -> None:
     carries with it."""
     for t, finger, _ in _pushes(model):
         if finger == driver:
-            model.tendon_stiffness[t] = model.tendon_damping[t] = model.tendon_limited[t] = 0
+            _cut(model, t)
 
 
 def _let_follow(model: Any, joint: int) -> None:
@@ -172,15 +177,24 @@ def _let_follow(model: Any, joint: int) -> None:
     for row in np.flatnonzero(model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)):
         model.eq_obj2id[row] = ahead.get(int(model.eq_obj2id[row]), model.eq_obj2id[row])
     for t in range(model.ntendon):
-        parts = slice(model.tendon_adr[t], model.tendon_adr[t] + model.tendon_num[t])
-        if lost & set(model.wrap_objid[parts].tolist()):
-            model.tendon_stiffness[t] = model.tendon_damping[t] = model.tendon_limited[t] = 0
+        if lost & set(model.wrap_objid[_parts(model, t)].tolist()):
+            _cut(model, t)
+
+
+def _cut(model: Any, tendon: int) -> None:
+    """Let a tendon do nothing."""
+    model.tendon_stiffness[tendon] = model.tendon_damping[tendon] = model.tendon_limited[tendon] = 0
+
+
+def _parts(model: Any, tendon: int) -> slice:
+    """Where the joints of a tendon and their coefficients lie among those of all."""
+    return slice(model.tendon_adr[tendon], model.tendon_adr[tendon] + model.tendon_num[tendon])
 
 
 def _rub(model: Any, driver: int, inertia: float, fastest: float) -> None:
     """Let inputs that lie loose in a play behind a driver stand within `COASTING_S`, as friction, which the gap's ends
-    push without lag; springs that hold inputs ahead of them, which would have to bear it, as firm as can be. inertia: of the joint that is moved [kg m^2]; fastest: of the driver,
-    its unit per second."""
+    push without lag; springs that hold inputs ahead of them, which would have to bear it, as firm as `FIRM_RATE`.
+    inertia: of the joint that is moved [kg m^2]; fastest: of the driver, its unit per second."""
     import mujoco
 
     for row in np.flatnonzero(model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)):
@@ -207,8 +221,7 @@ def _ties_ahead(model: Any, joint: int, loose: bool = False) -> list[int]:
             loose = True
         elif loose:
             ties.append(tendon)
-    ahead = _behind_inputs(model, joint)
-    row = _map_to(model, ahead) if MAPPED in model.joint(ahead).name else None
+    row = _map_ahead(model, _behind_inputs(model, joint))
     return ties if row is None else [*ties, *_ties_ahead(model, int(model.eq_obj2id[row]), loose)]
 
 
@@ -236,7 +249,7 @@ def _within(model: Any, qpos: Array, joint: int) -> float:
     that bound it."""
     low, high, gap = -np.inf, np.inf, 0.0
     for t in range(model.ntendon):
-        parts = slice(model.tendon_adr[t], model.tendon_adr[t] + model.tendon_num[t])
+        parts = _parts(model, t)
         joints, coefficients = model.wrap_objid[parts].tolist(), model.wrap_prm[parts]
         if joint not in joints or not model.tendon_limited[t]:
             continue

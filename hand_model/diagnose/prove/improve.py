@@ -193,7 +193,7 @@ def written(before: Path, after: Path, finding: Finding, fingers: Collection[str
     from lxml import etree
 
     if finding.where.get("finger") not in fingers:
-        return {**UNWRITTEN, "callback": None, "note": _absent(finding)}
+        return {**UNWRITTEN, "callback": None, "note": absent(finding)}
     values = {k: v["value"] for k, v in finding.parameters.items()}
     kind = effect(finding.effect)
     urdf = "not expressible: kept in hand.json"
@@ -217,7 +217,8 @@ def written(before: Path, after: Path, finding: Finding, fingers: Collection[str
     }
 
 
-def _absent(finding: Finding) -> str:
+def absent(finding: Finding) -> str:
+    """What a model lacks that holds nothing of a finding."""
     return f"the model has no {finding.where.get('finger') or 'finger of it'}"
 
 
@@ -263,7 +264,7 @@ def write_improved(
             finding = replace(finding, model=written(*files, finding, known))
             fit, replay = proved(finding, station, errors)
             if finding.effect in HINGE:
-                note = OTHER_MARKERS if finding.where["finger"] in known else _absent(finding)
+                note = OTHER_MARKERS if finding.where["finger"] in known else absent(finding)
                 fit = fits.get(finding.where["finger"], {**finding.fit, "note": note})
             finding = replace(finding, fit=fit)
             replays += [] if replay is None else [replace(replay, finding=finding)]
