@@ -13,6 +13,7 @@ from test_diagnose import drive
 from hand_model.diagnose import weight
 from hand_model.diagnose.name import entries, reread
 from hand_model.diagnose.name.balance import Balance
+from hand_model.diagnose.name.candidates import EVIDENCE_LEAST
 from hand_model.diagnose.name.judgement import judged
 from hand_model.diagnose.name.selection import name_effects
 from hand_model.diagnose.name.station import Station
@@ -137,6 +138,30 @@ def test_a_bend_that_a_weight_explains_is_not_looked_for_beside_it(monkeypatch: 
     assert ["nonlinear_spring" in {e.name for e in effects} for effects in asked] == (
         [True, False] if bent else [False]
     )
+
+
+@pytest.mark.parametrize(("gain", "stays"), [(EVIDENCE_LEAST - 0.1, False), (EVIDENCE_LEAST + 0.1, True)])
+def test_a_bend_beside_a_weight_must_bring_what_any_further_effect_must(
+    monkeypatch: pytest.MonkeyPatch, gain: float, stays: bool
+) -> None:
+    """What is named beside a weight with its bend, and without, are held against each other on the same samples."""
+    seen = []
+
+    def judged_as(*call: Any) -> Any:
+        bent = any(e.name == "nonlinear_spring" for e in call[5])
+        balance = SimpleNamespace(unclipped=lambda terms: np.array([True, True, not bent]))
+        return SimpleNamespace(believed=True, naming=SimpleNamespace(fit=SimpleNamespace(terms=bent), balance=balance))
+
+    def weighed(terms: Any, inside: np.ndarray) -> Any:
+        seen.append(inside.tolist())
+        return SimpleNamespace(log_evidence=gain if terms else 0.0)
+
+    monkeypatch.setattr(weight, "judged", judged_as)
+    alone = weight.Pull(np.array([-10.0, 10.0]), np.eye(2), 0.99)
+    call = (None,) * 5 + ([effect("nonlinear_spring"), effect("detent_load")],)
+    station, pull = weight._beside(call, (), replace(alone, alone=alone), weighed)
+    assert (station.naming.fit.terms, pull.alone is not None) == (stays, stays)
+    assert seen == [[True, True, False]] * 2
 
 
 @pytest.mark.parametrize(("at_the_lowest", "weighs"), [(-150.0, True), (-101.0, False)])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import partial
@@ -23,7 +23,6 @@ from .name.candidates import EVIDENCE_LEAST
 from .name.judgement import judged
 from .name.least_squares import from_products
 from .name.naming import CLASS_WIDTH
-from .name.shapes import priced
 from .name.station import Station
 from .name.term import Term, reshaped
 
@@ -64,7 +63,7 @@ def with_weights(
         if other is None:
             if any(out[at].standing(name) is not None for name in BENDING):
                 # a bend of the spring that a weight explains is none beside it
-                out[at], pull = _beside(call, states, pull)
+                out[at], pull = _beside(call, states, pull, partial(_weighed, usual, out[at].naming.balance, states))
             size, finding = odd[actuator]
             weights.append((size, _finding(finding, pull, _sweep(states[0]))))
         else:
@@ -94,9 +93,14 @@ class Pull:
     alone: Pull | None = None
 
 
-def _beside(call: tuple[Any, ...], states: tuple[DriveState, ...], pull: Pull) -> tuple[Station, Pull]:
-    """The drive judged beside a weight, and that weight: of one that needs a bent spring the one without, where others
-    that are named beside it then explain as much."""
+def _beside(
+    call: tuple[Any, ...],
+    states: tuple[DriveState, ...],
+    pull: Pull,
+    weighed: Callable[[tuple[Term, ...], NDArray[np.bool_]], _Model],
+) -> tuple[Station, Pull]:
+    """The drive judged beside a weight, and that weight: of one that needs a bent spring the one without, unless what is
+    named beside that spring is then likelier by what any further effect must bring. weighed: a weight beside terms, of some samples."""
 
     def heard(weight: Pull) -> Station:
         effects = [e for e in call[5] if e.name != BENT or weight.alone is not None]
@@ -106,8 +110,10 @@ def _beside(call: tuple[Any, ...], states: tuple[DriveState, ...], pull: Pull) -
     if pull.alone is None:
         return found, pull
     other = heard(pull.alone)
-    costs = [priced(s.naming.balance)(s.naming.fit) for s in (found, other)]
-    return (other, pull.alone) if other.believed and costs[1] <= costs[0] else (found, pull)
+    both = [s.naming.fit.terms for s in (found, other)]
+    inside = found.naming.balance.unclipped(both[0]) & found.naming.balance.unclipped(both[1])
+    bent, straight = (weighed(terms, inside).log_evidence for terms in both)
+    return (other, pull.alone) if other.believed and bent - straight < EVIDENCE_LEAST else (found, pull)
 
 
 Usual = Mapping[str, tuple[float, float]]  # declared coefficient -> what to expect of it, and how surely
@@ -129,13 +135,11 @@ def _pulled(usual: Usual, station: Station, states: tuple[DriveState, ...], odd_
     balance = station.naming.balance
     effort = float(np.std(balance.effort[balance.train]))
     terms = station.naming.fit.terms
-    posed = dict(zip((s.trial for s in states), states, strict=True))
-    weights = balance.gather(lambda s: _weight(posed[s.trial]))
     plain = tuple(t for t in terms if t.effect.name != BENT)
     inside = balance.unclipped(terms)
     others = {"spring": usual["spring"], "preload": (0.0, effort)} if odd_preload else usual
     odd = _Model(balance, terms, inside, others, effort)
-    weighed = _Model(balance, plain, inside, usual, effort, weights)
+    weighed = _weighed(usual, balance, states, plain, inside)
     spared = EVIDENCE_LEAST if len(plain) < len(terms) else 0.0  # one effect for two
     likelier = weighed.log_evidence - odd.log_evidence + (spared if odd_preload else -CLASS_WIDTH)
     alone = None
@@ -144,7 +148,7 @@ def _pulled(usual: Usual, station: Station, states: tuple[DriveState, ...], odd_
         lowest = _lowest(odd, usual["preload"][0]), usual["preload"][1]
         odd = _Model(balance, terms, inside, {**others, "preload": lowest}, effort)
         likelier = weighed.log_evidence - odd.log_evidence + spared
-        both = _Model(balance, terms, inside, usual, effort, weights)
+        both = _weighed(usual, balance, states, terms, inside)
         if both.log_evidence > weighed.log_evidence + spared:
             alone = weighed if len(plain) < len(terms) else None
             weighed, likelier = both, both.log_evidence - odd.log_evidence
@@ -155,6 +159,20 @@ def _pulled(usual: Usual, station: Station, states: tuple[DriveState, ...], odd_
     probability = float(1 / (1 + np.exp(-likelier)))
     first = None if alone is None else Pull(alone.mean[-2:], alone.covariance[-2:, -2:], probability)
     return Pull(weighed.mean[-2:], weighed.covariance[-2:, -2:], probability, first)
+
+
+def _weighed(
+    usual: Usual,
+    balance: Balance,
+    states: tuple[DriveState, ...],
+    terms: tuple[Term, ...],
+    inside: NDArray[np.bool_],
+) -> _Model:
+    """The terms and a weight as `states` have it, preload and spring as usual, of the samples `inside`."""
+    posed = {s.trial: s for s in states}
+    weights = balance.gather(lambda s: _weight(posed[s.trial]))
+    effort = float(np.std(balance.effort[balance.train]))
+    return _Model(balance, terms, inside, usual, effort, weights)
 
 
 def _impossible(odd: _Model, usual: float, doubt: float) -> bool:
