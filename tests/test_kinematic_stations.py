@@ -11,8 +11,11 @@ import pytest
 from hand_model.diagnose.locate.decoupled import TRIFLE, pulls
 from hand_model.diagnose.locate.excursions import with_excursions
 from hand_model.diagnose.locate.slips import _swaps
+from hand_model.diagnose.name.balance import Balance
+from hand_model.diagnose.name.evidence import gain
 from hand_model.diagnose.name.judgement import judged
 from hand_model.diagnose.name.selection import name_effects
+from hand_model.diagnose.name.shapes import polish, scan
 from hand_model.diagnose.name.station import Station
 from hand_model.effects import catalogue, effect, outsiders
 from hand_model.effects.backlash import GRADUAL
@@ -277,6 +280,21 @@ def test_deadband_and_stop_are_told_apart_and_placed() -> None:
     stop = named(joint(3, move=lambda x: np.minimum(x, 88.0)), "linkage")
     assert list(stop) == ["distal_stop"]
     assert stop["distal_stop"]["from"] == pytest.approx(88.0, abs=0.7)
+
+
+@pytest.mark.parametrize("width", [1.4, 2.1, 3.2, 5.0, 11.0])
+@pytest.mark.parametrize("noise", [0.2, 0.6])
+def test_a_bound_is_looked_for_the_closer_the_nearer_it_is_to_the_end(width: float, noise: float) -> None:
+    """A start that misses a bound by as much as it is wide looks worse than none, and would never be optimised."""
+    bounds = {
+        "distal_stop": lambda x: np.minimum(x, 100 - width),
+        "coupling_deadband": lambda x: np.maximum(x, width),
+    }
+    for name, move in bounds.items():
+        balance = Balance(joint(3, move=move, noise=noise))
+        start = scan(balance, effect(name), ())
+        none, best = balance.fit(), polish(balance, start, 0)
+        assert gain(balance, start, none) > 0.9 * gain(balance, best, none) > 50
 
 
 @pytest.mark.parametrize("passing", [0.0, 0.2])

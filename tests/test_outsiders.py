@@ -27,7 +27,8 @@ BY_NAME = {e.name: e for e in outsiders("drive")}
 def heard(states: tuple[DriveState, ...]) -> Station:
     total = max(float(s.elapsed_s[-1]) for s in states)
     states = tuple(replace(s, extra={**s.extra, "session_s": np.full(len(s.time_s), total)}) for s in states)
-    return judged("current", "index", "index", None, with_required(states), [*catalogue("drive"), *outsiders("drive")])
+    effects = [e.among(states) for e in (*catalogue("drive"), *outsiders("drive"))]
+    return judged("current", "index", "index", None, with_required(states), effects)
 
 
 def gain(state: DriveState) -> np.ndarray:
@@ -88,18 +89,23 @@ def test_no_outsider_is_a_row_of_the_table() -> None:
 
 
 def weighed(
-    states: tuple[DriveState, ...], poses: list[tuple[float, float] | None], load_raw: float = 20.0
+    states: tuple[DriveState, ...],
+    poses: list[tuple[float, float] | None],
+    load_raw: float = 20.0,
+    unseen: tuple[tuple[float, float], ...] = ((9.0, -3.0),),
 ) -> tuple[DriveState, ...]:
-    """The states with a weight of `load_raw` whose poses (along, across) are recorded, or not."""
-    out = []
+    """The states with a weight of `load_raw` whose poses (along, across) are recorded, or not: then each as the next of
+    `unseen`."""
+    out, numbers = [], iter(range(len(poses)))
     for state, pose in zip(states, poses, strict=True):
-        along, across = pose or (9.0, -3.0)
+        number = 0 if pose else next(numbers)
+        along, across = pose or unseen[number % len(unseen)]
         n = np.ones(len(state.time_s))
         seen = replace(
             state, extra={**state.extra, "gravity_along": along * n, "gravity_across": across * n, "pose_seen": n}
         )
         load = effect("gravity_load").columns(seen, {"sweep": 1.4}) @ np.array([load_raw, 0.0, 0.0, 0.0])
-        bare = {**state.extra, "pose_unseen": n}
+        bare = {**state.extra, "pose_unseen": number * n}
         out.append(replace(seen if pose else replace(state, extra=bare), effort=state.effort + load))
     return tuple(out)
 
@@ -117,6 +123,18 @@ def test_a_weight_is_named_where_only_the_recording_kept_out_shows_another_pose(
     size = station.parameters[station.naming.fit.terms.index(station.kept[0].term)]
     assert set(size) == {"sweep", "along", "across", "largest"}
     assert abs(np.hypot(size["along"]["value"], size["across"]["value"]) / load_raw - 1) < within
+
+
+def test_a_weight_is_named_where_each_recording_without_markers_has_another_pose() -> None:
+    states = drive(8, trials=6)
+    poses = [(9.81, 0.0), None, None, None, (-8.0, 5.0), (3.0, 9.0)]
+    unseen = ((9.0, -3.0), (-9.5, 2.0), (1.0, 9.5))
+    station = heard(weighed(tuple(replace(s, validate=k > 4) for k, s in enumerate(states)), poses, unseen=unseen))
+    assert [f.term.effect.name for f in station.kept] == ["gravity_load"]
+    assert station.kept[0].term.shape["form"] == 1.0 and station.naming.after.p > 0.01
+    size = station.parameters[station.naming.fit.terms.index(station.kept[0].term)]
+    assert set(size) == {"sweep", "along", "across", "largest"}
+    assert abs(np.hypot(size["along"]["value"], size["across"]["value"]) / 20.0 - 1) < 0.15
 
 
 @pytest.mark.parametrize(

@@ -133,7 +133,8 @@ class Heard:
         alone = {a: Balance(states).fit() for a, states in drives.items()}
         calls = []
         for actuator, states in drives.items():
-            effects = [*(e for e in catalogue("drive") if not e.warps or late[actuator]), *outsiders("drive")]
+            kinds = (*(e for e in catalogue("drive") if not e.warps or late[actuator]), *outsiders("drive"))
+            effects = [e.among(states) for e in kinds]
             typical = typical_coefficients([fit for a, fit in alone.items() if a != actuator])
             calls.append(("current", _finger_of(self.session, actuator), actuator, None, states, effects, typical))
         for station in Background(judged, calls).results():

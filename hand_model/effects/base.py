@@ -212,6 +212,10 @@ class Effect:
         """The effect, where it may be of one recording or of several as one, as that of one alone; itself."""
         return self
 
+    def among(self, states: tuple[DriveState, ...]) -> Effect:
+        """The effect with as many amplitudes as these recordings ask for; itself."""
+        return self
+
     def told_by(self, state: DriveState) -> bool:
         """Whether a recording says what the effect depends on, so that it can bear the effect out: every one."""
         return True

@@ -6,10 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from .base import Amplitude, Array, DriveState, Effect, Shape, position_range, rounded
-from .driven import driven
+from .driven import NEARER, driven
 from .input import map_of, write_bound
 
 
@@ -26,7 +24,7 @@ class CouplingDeadband(Effect):
         low, high = position_range(states)
         span, unit = high - low, states[0].position_unit
         return (
-            Shape("until", unit, low + 0.01 * span, low + 0.5 * span, tuple(low + span * np.linspace(0.03, 0.45, 12))),
+            Shape("until", unit, low + 0.01 * span, low + 0.5 * span, tuple(low + span * NEARER)),
             Shape("corner", unit, 1e-4 * span, 0.05 * span, (0.002 * span, 0.015 * span)),
         )
 

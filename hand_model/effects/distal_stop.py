@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, position_range
-from .driven import driven, mean_slope
+from .driven import NEARER, driven, mean_slope
 from .input import map_of, write_bound
 
 
@@ -30,7 +30,7 @@ class DistalStop(Effect):
                 states[0].position_unit,
                 high - 0.5 * span,
                 high - 0.01 * span,
-                tuple(high - span * np.linspace(0.03, 0.45, 12)),
+                tuple(high - span * NEARER),
             ),
             Shape("passing", "1", 0.0, 0.5, (0.0, 0.2)),
         )

@@ -10,6 +10,8 @@ import numpy as np
 from .base import Array, DriveState
 from .path import strokes
 
+# of the range: distances from its end at which a bound is looked for first, the closer the smaller it is
+NEARER = np.geomspace(0.01, 0.45, 14)
 LEAST_SLOPE = 0.1  # of the mean: flatter, what follows as good as stands
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from .base import Amplitude, Array, DriveState, Effect, Shape, figure
 from .law import Law, Moment
 
+ONE_POSE, OWN_POSES = 0.0, 1.0  # forms: of the recordings that show none
 LIFTED = 2.0  # of the largest effort, at most, is a weight: in other poses friction and spring may hold some of it
 NEAR = 0.2  # share by which the angle that matters may differ: the map to the joint is no line
 
@@ -20,33 +21,45 @@ class GravityLoad(Effect):
 
     name = "gravity_load"
 
+    def __init__(self, unseen: int = 1) -> None:
+        """unseen: of the recordings, which show no pose."""
+        self.unseen = unseen
+
+    def among(self, states: tuple[DriveState, ...]) -> GravityLoad:
+        """With a pose for each of these recordings that shows none."""
+        return GravityLoad(max((1 + int(s.extra["pose_unseen"][0]) for s in states if _unseen(s)), default=1))
+
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """Angle swept over the range of positions, [rad], between those of the first joint and of all as the markers
-        show them; with a recorded pose only."""
+        show them; with a recorded pose only. form 0: in all recordings that show no pose it was the same; form 1: in
+        each another."""
         if not any("gravity_along" in s.extra for s in states):
             return ()
+        forms = (Shape("form", "1", ONE_POSE, OWN_POSES, (ONE_POSE, OWN_POSES)),) if self.unseen > 1 else ()
         seen = next((s.extra["sweep"][0] for s in states if "sweep" in s.extra and len(s.time_s)), None)
         if seen is not None:
             first, last = sorted(float(angle) for angle in seen)
             starts = tuple(np.unique([first, 0.5 * (first + last), last]).tolist())
-            return (Shape("sweep", "rad", (1 - NEAR) * first, (1 + NEAR) * last, starts),)
-        return (Shape("sweep", "rad", 0.5, 2.5, (0.8, 1.4, 2.0)),)
+            return (*forms, Shape("sweep", "rad", (1 - NEAR) * first, (1 + NEAR) * last, starts))
+        return (*forms, Shape("sweep", "rad", 0.5, 2.5, (0.8, 1.4, 2.0)))
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
-        """Weight times lever along the open finger and across it; and what it does in the one pose of all recordings
-        that show none."""
-        return tuple((name, "effort", -np.inf, np.inf) for name in ("along", "across", "unseen_cosine", "unseen_sine"))
+        """Weight times lever along the open finger and across it; and what it does in the poses of recordings that show
+        none."""
+        unseen = (f"unseen_{part}{i or ''}" for i in range(self.unseen) for part in ("cosine", "sine"))
+        return tuple((name, "effort", -np.inf, np.inf) for name in ("along", "across", *unseen))
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """Torque of a unit weight on the finger's line and across it, in parts of 9.81 m/s^2, and cosine and sine of
-        the angle where the pose was not recorded, (n, 4); none where no recording has a pose."""
-        out = np.zeros((len(state.time_s), 4))
-        if not shape or not ("gravity_along" in state.extra or "pose_unseen" in state.extra):
+        the angle where the pose was not recorded, (n, 2 + 2 unseen); none where no recording has a pose."""
+        out = np.zeros((len(state.time_s), 2 + 2 * self.unseen))
+        if not shape or not ("gravity_along" in state.extra or _unseen(state)):
             return out
         angle = shape["sweep"] * state.position / 100.0
         cosine, sine = np.cos(angle), np.sin(angle)
-        if "pose_unseen" in state.extra:
-            out[:, 2], out[:, 3] = cosine, sine
+        if _unseen(state):
+            own = 2 + 2 * int(state.extra["pose_unseen"][0]) if shape.get("form") == OWN_POSES else 2
+            out[:, own], out[:, own + 1] = cosine, sine
             return out
         along, across = state.extra["gravity_along"] / 9.81, state.extra["gravity_across"] / 9.81
         out[:, 0], out[:, 1] = across * cosine - along * sine, along * cosine + across * sine
@@ -58,7 +71,8 @@ class GravityLoad(Effect):
         """The weight, and the largest load that it can be (which is known better than either part); not what it did in a
         pose that nobody knows."""
         along, across = amplitude["along"], amplitude["across"]
-        return {**shape, "along": along, "across": across, "largest": math.hypot(along, across)}
+        figures = {"along": along, "across": across, "largest": math.hypot(along, across)}
+        return {**{k: v for k, v in shape.items() if k != "form"}, **figures}
 
     def possible(self, states: tuple[DriveState, ...], parameters: Mapping[str, float]) -> bool:
         """Whether the drive could lift the weight in any pose, with what it was seen to give."""
@@ -92,6 +106,10 @@ class GravityLoad(Effect):
             )
 
         return load
+
+
+def _unseen(state: DriveState) -> bool:
+    return "pose_unseen" in state.extra
 
 
 EFFECT = GravityLoad()

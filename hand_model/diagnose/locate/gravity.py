@@ -30,18 +30,21 @@ def with_gravity(
     it, and `sweep` [rad], the angles that the finger's first joint and all together turn through over the range,
     where a flexion shows them.
 
-    fingers: by name. Recordings with markers have `pose_seen`; those without get `pose_unseen` instead. Unchanged where
+    fingers: by name. Recordings with markers have `pose_seen`; those without get `pose_unseen` instead, their number from 0. Unchanged where
     the session names no gravity, where no recording shows the palm, or where it never turned.
     """
     seen, sweep = _seen(session, fingers, states)
     if not _turned(session, seen):
         return states
-    out = []
+    out, unseen = [], 0
     for state in states:
         extra: dict[str, Array] = {**state.extra, **_swept(state, sweep)}
         if state.trial in seen:
             extra["gravity_along"], extra["gravity_across"] = seen[state.trial].T
-        extra["pose_seen" if state.trial in seen else "pose_unseen"] = np.ones(len(state.time_s))
+            extra["pose_seen"] = np.ones(len(state.time_s))
+        else:
+            extra["pose_unseen"] = np.full(len(state.time_s), float(unseen))
+            unseen += 1
         out.append(replace(state, extra=extra))
     return tuple(out)
 
