@@ -317,7 +317,9 @@ def test_the_less_a_test_sees_the_larger_must_a_finding_be_for_its_kind(
     station = SimpleNamespace(
         naming=SimpleNamespace(before=SimpleNamespace(p=p)), signal=signal, steadily=lambda _: steady
     )
-    assert _beneath(station, None) == (0.0 if signal == "current" and steady else least)
+    faint, plain = (SimpleNamespace(evidence=value) for value in (20.0, 40.0))
+    assert _beneath(station, faint) == (0.0 if signal == "current" and steady else least)
+    assert _beneath(station, plain) == (0.0 if signal == "current" and steady else min(least, 0.05))
 
 
 @pytest.mark.parametrize(("probability", "stands"), [(0.98, False), (0.999, True)])

@@ -48,7 +48,9 @@ ANGULAR = {e.name for station in ("encoder", "linkage") for e in catalogue(stati
 # of that magnitude: less, where the lack-of-fit test sees nothing, is left to the imperfections of reading angles and
 # speeds
 MINUTE = 0.15
-TINY = 0.05  # the same where that test nearly sees something, or what one of a session's channels shows by chance
+# the same where that test nearly sees something, or what one of a session's channels shows by chance, or of what is plain
+TINY = 0.05
+PLAIN = 30.0  # log evidence from which a name is: neither chance nor those imperfections have brought as much
 CHANNELS = 15
 # of a weight counts where the declared model takes up what is named, so that nothing of the mismatch is its: only the
 # hand's other motors speak for it
@@ -150,7 +152,7 @@ def _beneath(station: Station, named: Named) -> float:
     """Magnitude beneath which what was named at a station says nothing, since the lack-of-fit test sees no mismatch there,
     or one that may be chance. A motor's steady speed is read as well as its place, which a joint's angle is not."""
     p = station.naming.before.p
-    least = MINUTE if p >= UNSEEN else TINY if p >= ALPHA / CHANNELS else 0.0
+    least = MINUTE if p >= UNSEEN and named.evidence < PLAIN else TINY if p >= ALPHA / CHANNELS else 0.0
     return 0.0 if least and station.signal == "current" and station.steadily(named) else least
 
 

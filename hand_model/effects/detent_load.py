@@ -10,6 +10,10 @@ import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, figure, position_range
 from .law import Law, Moment
+from .spot import spots
+
+EDGE = 0.08  # of the range, at either end, where no centre is
+APART = {0.0: 1.8, 1.0: 1.2}  # form -> widths
 
 
 class DetentLoad(Effect):
@@ -26,10 +30,19 @@ class DetentLoad(Effect):
         return (
             Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),
             Shape(
-                "centre", unit, low + 0.08 * span, high - 0.08 * span, tuple(low + span * np.linspace(0.08, 0.92, 18))
+                "centre",
+                unit,
+                low + EDGE * span,
+                high - EDGE * span,
+                tuple(low + span * np.linspace(EDGE, 1 - EDGE, 18)),
             ),
             Shape("width", unit, 0.015 * span, 0.125 * span, (0.03 * span, 0.06 * span, 0.12 * span)),
         )
+
+    def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
+        """Both forms, side by side over the range: one that changes its sign within its width the closer."""
+        low, high = position_range(states)
+        return [{"form": form, **spot} for form, apart in APART.items() for spot in spots(low, high, EDGE, apart)]
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Load at the centre, either sign."""

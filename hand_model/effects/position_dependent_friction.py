@@ -10,6 +10,9 @@ import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, figure, position_range
 from .law import Law, Moment
+from .spot import spots
+
+EDGE, APART = 0.05, 1.8  # of the range, at either end, where none begins to be looked for, and widths between them
 
 
 class PositionDependentFriction(Effect):
@@ -29,6 +32,10 @@ class PositionDependentFriction(Effect):
             ),
             Shape("width", unit, 0.015 * span, 0.125 * span, (0.03 * span, 0.06 * span, 0.12 * span)),
         )
+
+    def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
+        """Side by side over the range."""
+        return spots(*position_range(states), EDGE, APART)
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Extra friction at the centre, never negative."""
