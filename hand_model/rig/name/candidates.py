@@ -133,7 +133,7 @@ def _usable(found: Any) -> bool:
 def _from_catalogue(
     found: Any, joint: str, train: tuple[DriveState, ...], states: Mapping[str, DriveState]
 ) -> Candidate:
-    grid = ({},) if found.name in SMOOTH else tuple(found.grid(train))
+    grid = ({},) if found.name in SMOOTH else tuple(found.coarse_grid(train))
     if len(grid) > 16 and found.name not in PERIODIC:  # a coarse look first; the winner's shape is refined
         grid = grid[:: int(np.ceil(len(grid) / 16))]
     return Candidate(
