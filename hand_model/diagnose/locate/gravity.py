@@ -30,8 +30,8 @@ def with_gravity(
     it, and `sweep` [rad], the angles that the finger's first joint and all together turn through over the range,
     where a flexion shows them.
 
-    fingers: by name. Recordings with markers have `pose_seen`; those without get `pose_unseen` instead, their number from 0. Unchanged where
-    the session names no gravity, where no recording shows the palm, or where it never turned.
+    fingers: by name. Recordings with markers have `pose_seen`; those without get `pose_unseen` instead, their number
+    from 0. Unchanged where the session names no gravity, where no recording shows the palm, or where it never turned.
     """
     seen, sweep = _seen(session, fingers, states)
     if not _turned(session, seen):
