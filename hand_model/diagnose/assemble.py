@@ -150,7 +150,8 @@ def _worn(stations: Sequence[Station], of_markers: Sequence[Finding]) -> set[str
 
 def _beneath(station: Station, named: Named) -> float:
     """Magnitude beneath which what was named at a station says nothing, since the lack-of-fit test sees no mismatch there,
-    or one that may be chance. A motor's steady speed is read as well as its place, which a joint's angle is not."""
+    or one that may be chance. What is plain is none. A motor's steady speed is read as well as its place, which a joint's
+    angle is not."""
     p = station.naming.before.p
     least = MINUTE if p >= UNSEEN and named.evidence < PLAIN else TINY if p >= ALPHA / CHANNELS else 0.0
     return 0.0 if least and station.signal == "current" and station.steadily(named) else least

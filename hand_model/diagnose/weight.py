@@ -92,6 +92,11 @@ class Pull:
     probability: float
     alone: Pull | None = None
 
+    @classmethod
+    def of(cls, weighed: _Model, probability: float, alone: Pull | None = None) -> Pull:
+        """The weight among the coefficients of a model, where it comes last."""
+        return cls(weighed.mean[-2:], weighed.covariance[-2:, -2:], probability, alone)
+
 
 def _beside(
     call: tuple[Any, ...],
@@ -100,7 +105,10 @@ def _beside(
     weighed: Callable[[tuple[Term, ...], NDArray[np.bool_]], _Model],
 ) -> tuple[Station, Pull]:
     """The drive judged beside a weight, and that weight: of one that needs a bent spring the one without, unless what is
-    named beside that spring is then likelier by what any further effect must bring. weighed: a weight beside terms, of some samples."""
+    named beside that spring is then likelier by what any further effect must bring.
+
+    weighed: a weight beside terms, of some samples.
+    """
 
     def heard(weight: Pull) -> Station:
         effects = [e for e in call[5] if e.name != BENT or weight.alone is not None]
@@ -133,12 +141,11 @@ def _pulled(usual: Usual, station: Station, states: tuple[DriveState, ...], odd_
     those of the hand's others: an odd preload alone says nothing of the spring's shape, a weight foretells it.
     """
     balance = station.naming.balance
-    effort = float(np.std(balance.effort[balance.train]))
     terms = station.naming.fit.terms
     plain = tuple(t for t in terms if t.effect.name != BENT)
     inside = balance.unclipped(terms)
-    others = {"spring": usual["spring"], "preload": (0.0, effort)} if odd_preload else usual
-    odd = _Model(balance, terms, inside, others, effort)
+    others = {"spring": usual["spring"], "preload": (0.0, _size(balance))} if odd_preload else usual
+    odd = _Model(balance, terms, inside, others)
     weighed = _weighed(usual, balance, states, plain, inside)
     spared = EVIDENCE_LEAST if len(plain) < len(terms) else 0.0  # one effect for two
     likelier = weighed.log_evidence - odd.log_evidence + (spared if odd_preload else -CLASS_WIDTH)
@@ -146,19 +153,17 @@ def _pulled(usual: Usual, station: Station, states: tuple[DriveState, ...], odd_
     if odd_preload and _impossible(odd, *usual["preload"]):
         # with the lowest preload that there may be, as sure as the usual one is: that is not what was recorded
         lowest = _lowest(odd, usual["preload"][0]), usual["preload"][1]
-        odd = _Model(balance, terms, inside, {**others, "preload": lowest}, effort)
+        odd = _Model(balance, terms, inside, {**others, "preload": lowest})
         likelier = weighed.log_evidence - odd.log_evidence + spared
-        both = _weighed(usual, balance, states, terms, inside)
+        both = _weighed(usual, balance, states, terms, inside) if spared else weighed
         if both.log_evidence > weighed.log_evidence + spared:
-            alone = weighed if len(plain) < len(terms) else None
-            weighed, likelier = both, both.log_evidence - odd.log_evidence
+            alone, weighed, likelier = weighed, both, both.log_evidence - odd.log_evidence
         likelier += CLASS_WIDTH + EVIDENCE_LEAST
     largest = {"largest": float(np.hypot(*weighed.mean[-2:]))}
     if likelier <= 0 or not effect(WEIGHT).possible(states, largest):
         return None
     probability = float(1 / (1 + np.exp(-likelier)))
-    first = None if alone is None else Pull(alone.mean[-2:], alone.covariance[-2:, -2:], probability)
-    return Pull(weighed.mean[-2:], weighed.covariance[-2:, -2:], probability, first)
+    return Pull.of(weighed, probability, None if alone is None else Pull.of(alone, probability))
 
 
 def _weighed(
@@ -170,9 +175,12 @@ def _weighed(
 ) -> _Model:
     """The terms and a weight as `states` have it, preload and spring as usual, of the samples `inside`."""
     posed = {s.trial: s for s in states}
-    weights = balance.gather(lambda s: _weight(posed[s.trial]))
-    effort = float(np.std(balance.effort[balance.train]))
-    return _Model(balance, terms, inside, usual, effort, weights)
+    return _Model(balance, terms, inside, usual, balance.gather(lambda s: _weight(posed[s.trial])))
+
+
+def _size(balance: Balance) -> float:
+    """Standard deviation of the effort of training recordings."""
+    return float(np.std(balance.effort[balance.train]))
 
 
 def _impossible(odd: _Model, usual: float, doubt: float) -> bool:
@@ -192,7 +200,7 @@ class _Model:
     """Declared columns and terms of a balance, and further columns (n, k), as a linear model with normal priors, of the
     samples `inside`.
 
-    priors: coefficient -> mean and standard deviation; of the others nothing is known, the terms have some `effort`, and
+    priors: coefficient -> mean and standard deviation; of the others nothing is known, the terms are of the effort's size, and
     the further ones, of a weight, no more than the drive can lift in any pose, however little of it this one shows.
     mean, covariance: of the coefficients (m,), (m, m); possible: their mode (m,) within what physics allows.
     """
@@ -203,7 +211,6 @@ class _Model:
         terms: tuple[Term, ...],
         inside: NDArray[np.bool_],
         priors: Mapping[str, tuple[float, float]],
-        effort: float,
         further: Array | None = None,
     ) -> None:
         matrix, low, high = balance.design(terms)
@@ -214,7 +221,7 @@ class _Model:
             low, high = np.r_[low, -unbounded], np.r_[high, unbounded]
         self.names = balance.names
         size = np.maximum(np.sqrt(np.mean(matrix**2, axis=0)), 1e-12)
-        mean, deviation = np.zeros(len(size)), effort / size
+        mean, deviation = np.zeros(len(size)), _size(balance) / size
         deviation[: len(balance.names)] *= FLAT
         if further is not None:
             deviation[-further.shape[1] :] = 0.5 * np.max(np.abs(balance.effort[balance.train]))
@@ -261,8 +268,7 @@ def _beside_usual(station: Station, usual: Usual) -> Station:
         return station
     rest = (*fit.terms[:at], *fit.terms[at + 1 :])
     columns, weights = balance.design(rest)[0], balance.gather(_weight)
-    effort = float(np.std(balance.effort[balance.train]))
-    model = _Model(balance, rest, balance.unclipped(rest), usual, effort, weights)
+    model = _Model(balance, rest, balance.unclipped(rest), usual, weights)
     sweep, values = _sweep(balance.states[0]), iter(model.possible.tolist())
     declared = {name: next(values) for name in balance.names}
     amplitudes = [{name: next(values) for name in a} for i, a in enumerate(fit.amplitudes) if i != at]

@@ -27,7 +27,7 @@ class GravityLoad(Effect):
 
     def among(self, states: tuple[DriveState, ...]) -> GravityLoad:
         """With a pose for each of these recordings that shows none."""
-        return GravityLoad(max((1 + int(s.extra["pose_unseen"][0]) for s in states if _unseen(s)), default=1))
+        return GravityLoad(max((1 + n for s in states if (n := _unseen(s)) is not None), default=1))
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """Angle swept over the range of positions, [rad], between those of the first joint and of all as the markers
@@ -53,12 +53,13 @@ class GravityLoad(Effect):
         """Torque of a unit weight on the finger's line and across it, in parts of 9.81 m/s^2, and cosine and sine of
         the angle where the pose was not recorded, (n, 2 + 2 unseen); none where no recording has a pose."""
         out = np.zeros((len(state.time_s), 2 + 2 * self.unseen))
-        if not shape or not ("gravity_along" in state.extra or _unseen(state)):
+        unseen = _unseen(state)
+        if not shape or unseen is None and "gravity_along" not in state.extra:
             return out
         angle = shape["sweep"] * state.position / 100.0
         cosine, sine = np.cos(angle), np.sin(angle)
-        if _unseen(state):
-            own = 2 + 2 * int(state.extra["pose_unseen"][0]) if shape.get("form") == OWN_POSES else 2
+        if unseen is not None:
+            own = 2 + 2 * unseen if shape.get("form") == OWN_POSES else 2
             out[:, own], out[:, own + 1] = cosine, sine
             return out
         along, across = state.extra["gravity_along"] / 9.81, state.extra["gravity_across"] / 9.81
@@ -108,8 +109,10 @@ class GravityLoad(Effect):
         return load
 
 
-def _unseen(state: DriveState) -> bool:
-    return "pose_unseen" in state.extra
+def _unseen(state: DriveState) -> int | None:
+    """The number of a recording among those that show no pose; None of one that shows its own, or is not asked."""
+    number = state.extra.get("pose_unseen")
+    return None if number is None else int(number.max(initial=0))
 
 
 EFFECT = GravityLoad()
