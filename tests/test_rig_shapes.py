@@ -108,6 +108,16 @@ def test_a_rival_is_held_to_the_others_at_its_best_place_not_at_that_of_a_grid(t
     assert (best.term.shape["centre"], best.term.shape["width"]) == pytest.approx((0.13, 0.09), rel=0.1)
 
 
+def test_a_detent_narrower_than_any_of_its_grid_is_as_narrow_and_as_high_as_it_is(tmp_path: Path) -> None:
+    """A fiftieth of the range: it lies between places that are looked at, and no start is as narrow."""
+    rig, fit = with_load(tmp_path / "s", lambda q: 0.3 * np.exp(-0.5 * ((q - 0.137) / 0.03) ** 2))
+    detent = next(c for c in candidates(rig, fit, "hinge") if c.effect == "detent_load")
+    assert min(g["width"] for g in detent.grid) > 0.031
+    problem = pose(fit, "hinge")
+    shape = refit(problem, compete(problem, [detent], most=1)[0])[0].shape
+    assert shape["form"] == 0.0 and (shape["centre"], shape["width"]) == pytest.approx((0.137, 0.03), rel=0.05)
+
+
 def test_two_effects_of_which_neither_alone_is_worth_a_name(tmp_path: Path) -> None:
     """What is left is the difference of two columns that are nearly one: both are found, in whichever order; one of
     them alone is not."""

@@ -188,10 +188,6 @@ class Effect:
             points = [{**point, shape.name: value} for point in points for value in shape.starts]
         return [p for p in points if all(s.matters(p) or p[s.name] == s.starts[0] for s in shapes)]
 
-    def coarse_grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
-        """Starting shapes of which every so many may be taken for a first look: the same."""
-        return self.grid(states)
-
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """One amplitude of either sign, in effort units."""
         return (("amplitude", "effort", -np.inf, np.inf),)

@@ -44,10 +44,6 @@ class DetentLoad(Effect):
         low, high = position_range(states)
         return [{"form": form, **spot} for form, apart in APART.items() for spot in spots(low, high, EDGE, apart)]
 
-    def coarse_grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
-        """As many of each width."""
-        return super().grid(states)
-
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Load at the centre, either sign."""
         return (("load", "effort", -np.inf, np.inf),)

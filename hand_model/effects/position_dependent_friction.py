@@ -37,10 +37,6 @@ class PositionDependentFriction(Effect):
         """Side by side over the range."""
         return spots(*position_range(states), EDGE, APART)
 
-    def coarse_grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
-        """As many of each width."""
-        return super().grid(states)
-
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Extra friction at the centre, never negative."""
         return (("extra_friction", "effort", 0.0, np.inf),)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -29,7 +29,6 @@ NOT_FOR_RIGS = frozenset(
         "elastoplastic_hysteresis",
     }
 )
-PERIODIC = frozenset({"torque_ripple"})  # between two periods of a grid there is nothing to descend from
 SMOOTH = ("nonlinear_spring",)  # its knee belongs to fingers with a return spring; a joint has stops and detents
 LONGEST_DELAY_S = 0.03
 # Samples. A drive that holds its torque from one control step to the next acts half a step late: less than a sample of
@@ -49,7 +48,8 @@ Bound = tuple[str, str, float, float]
 @dataclass(frozen=True)
 class Candidate:
     """One effect at one joint. columns(row, shape) -> (n, j) at full rate; grid: starting shapes; warp: shape -> delay
-    [s] by which every column comes later (None: no delay); needs: says in words what variant this is."""
+    [s] by which every column comes later (None: no delay); variant says in words which one this is; bounds: of shapes
+    that may leave their grid."""
 
     effect: str
     variant: str
@@ -58,6 +58,7 @@ class Candidate:
     grid: tuple[dict[str, float], ...]
     columns: Callable[[Rows, Mapping[str, float]], Array]
     delays: bool = False
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def repeats(self) -> bool:
@@ -133,17 +134,15 @@ def _usable(found: Any) -> bool:
 def _from_catalogue(
     found: Any, joint: str, train: tuple[DriveState, ...], states: Mapping[str, DriveState]
 ) -> Candidate:
-    grid = ({},) if found.name in SMOOTH else tuple(found.coarse_grid(train))
-    if len(grid) > 16 and found.name not in PERIODIC:  # a coarse look first; the winner's shape is refined
-        grid = grid[:: int(np.ceil(len(grid) / 16))]
     return Candidate(
         found.name,
         "",
         joint,
         tuple(found.amplitudes()),
-        grid,
+        ({},) if found.name in SMOOTH else tuple(found.grid(train)),
         lambda row, shape: np.asarray(found.columns(states[row.trial], shape), float),
         bool(found.warps),
+        {s.name: (s.low, s.high) for s in found.shapes(train)},
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...diagnose.name.term import DISCRETE
+from .candidates import Candidate
 from .problem import Problem, Term, extended, normal, training_error
 
 Array = NDArray[np.float64]
@@ -23,7 +24,7 @@ def refined(problem: Problem, terms: Sequence[Term], term: Term, parts: tuple) -
     for shape in term.candidate.grid:
         forms.setdefault(_form(shape), []).append(shape)
     starts = [dict(term.shape), *(min(grid, key=train) for form, grid in forms.items() if form != _form(term.shape))]
-    ends = [_descended(train, term.candidate.grid, shape) for shape in starts]
+    ends = [_descended(train, term.candidate, shape) for shape in starts]
     return Term(term.candidate, min(ends, key=train))
 
 
@@ -69,22 +70,23 @@ def _error_beside(
 
 
 def _descended(
-    train: Callable[[Mapping[str, float]], float], shapes: Sequence[Mapping[str, float]], start: Mapping[str, float]
+    train: Callable[[Mapping[str, float]], float], candidate: Candidate, start: Mapping[str, float]
 ) -> Mapping[str, float]:
-    """The shape of least training error near one of a grid of shapes and within their bounds (Nelder & Mead 1965)."""
+    """The shape of least training error near one of a candidate's grid, within its bounds or else those of the grid
+    (Nelder & Mead 1965)."""
     from scipy.optimize import minimize
 
-    grid = _continuous(shapes)
+    grid = _continuous(candidate.grid)
     names = [n for n in start if n in grid]
     if not names:
         return start
-    low, high = (np.array([grid[n][k] for n in names]) for k in (0, -1))
+    low, high = np.array([candidate.bounds.get(n, grid[n][[0, -1]]) for n in names]).T
     at = np.array([start[n] for n in names])
 
     def shape(x: Array) -> dict[str, float]:
         return {**start, **dict(zip(names, (float(v) for v in np.clip(x, low, high)), strict=True))}
 
-    near = np.array([grid[n][np.argsort(np.abs(grid[n] - x))[1]] for n, x in zip(names, at, strict=True)])
+    near = _next(candidate.grid, start, {n: grid[n] for n in names})
     corners = at + np.concatenate([np.zeros((1, len(names))), np.diag(0.5 * (near - at))])
     begin = train(start)
     found = minimize(
@@ -94,3 +96,18 @@ def _descended(
         options={"initial_simplex": corners, "maxfev": 15 + 20 * len(names), "xatol": 0, "fatol": 1e-4 * begin},
     )
     return shape(found.x) if found.fun < begin else start
+
+
+def _next(shapes: Sequence[Mapping[str, float]], start: Mapping[str, float], values: Mapping[str, Array]) -> Array:
+    """The next value of each continuous shape along the line of the grid that passes nearest to a start, or of all its
+    values where that line has no other."""
+    at = np.array([start[n] for n in values])
+    points = np.array([[s[n] for n in values] for s in shapes if _form(s) == _form(start)])
+    size = np.array([np.ptp(v) for v in values.values()])
+    nearest = points[np.argmin(np.sum(((points - at) / size) ** 2, 1))]
+    out = at.copy()
+    for k, every in enumerate(values.values()):
+        line = np.unique(points[np.all(np.delete(points == nearest, k, 1), 1), k])
+        line = line if len(line) > 1 else every
+        out[k] = line[np.argsort(np.abs(line - at[k]))[1]]
+    return out
