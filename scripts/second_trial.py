@@ -1,8 +1,8 @@
-"""A blind trial on sessions of a second recorder, a third, a fourth, a fifth or a sixth, that share no code with each
-other, the twin or the diagnosis (`second_recorder/`, `third_recorder/`, `fourth_recorder/`, `fifth_recorder/`,
-`sixth_recorder/`).
+"""A blind trial on sessions of a second recorder, a third, a fourth, a fifth, a sixth or a seventh, that share no code
+with each other, the twin or the diagnosis (`second_recorder/`, `third_recorder/`, `fourth_recorder/`, `fifth_recorder/`,
+`sixth_recorder/`, `seventh_recorder/`).
 
-    python scripts/second_trial.py FOLDER [--recorder {second,third,fourth,fifth,sixth}] [--seed 1] [--single 36]
+    python scripts/second_trial.py FOLDER [--recorder {second,third,fourth,fifth,sixth,seventh}] [--seed 1] [--single 36]
     [--none 4] [--pair 10] [--weak 10] [--messy 10] [--outside 10] [--anywhere]
 
 FOLDER must be new. It gets sessions, answers.json (its SHA-256 is printed before any diagnosis starts), findings; the
@@ -27,6 +27,8 @@ from fourth_recorder.motor import CompilerError as FourthCompilerError
 from fourth_recorder.readings import truth as truth_of_fourth
 from second_recorder.compose import make_set as make_second
 from second_recorder.hand import COUNTS as RANGES
+from seventh_recorder.compose import CompilerError as SeventhCompilerError
+from seventh_recorder.compose import make_set as make_seventh
 from sixth_recorder.compose import make_set as make_sixth
 from sixth_recorder.plant import CompilerError as SixthCompilerError
 from third_recorder.compose import make_set as make_third
@@ -66,8 +68,8 @@ READINGS: dict[str, Callable[[dict[str, Any], dict[str, float]], dict[str, float
     "drive_backlash": lambda s, m: {"segment_gap": float(np.rad2deg(2 * s["drive_play"]))},
 }  # fmt: skip
 # recorders written after the second, and what each raises without a C compiler
-MAKERS = {"third": make_third, "fourth": make_fourth, "fifth": make_fifth, "sixth": make_sixth}
-COMPILER_ERRORS = ThirdCompilerError, FourthCompilerError, FifthCompilerError, SixthCompilerError
+MAKERS = {"third": make_third, "fourth": make_fourth, "fifth": make_fifth, "sixth": make_sixth, "seventh": make_seventh}
+COMPILER_ERRORS = ThirdCompilerError, FourthCompilerError, FifthCompilerError, SixthCompilerError, SeventhCompilerError
 COUNTS = {"single": 36, "none": 4, "pair": 10, "weak": 10, "messy": 10, "outside": 10}
 
 
