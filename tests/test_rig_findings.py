@@ -52,10 +52,10 @@ def test_a_rigs_findings_say_names_and_units_as_the_format_has_them() -> None:
         "form": {"value": 0.0, "unit": "1"},
         "ratio": {"value": 2.0, "unit": "1"},
     }
-    said = statement(
-        "quadratic_damping", "", "slide", values, {"metric": "effort_rmse", "before": 2.0, "after": 1.0, "unit": "N"}
-    )
-    assert said == "slide: quadratic damping: drag 0.5 N s^2/m^2, ratio 2; held-out effort rmse falls from 2 to 1 N."
+    proof = {"metric": "effort_rmse", "before": 2.0, "after": 1.0, "unit": "N"}
+    for held_out, metric in ((["log/b.csv"], "held-out effort rmse"), ([], "effort rmse on what was fitted")):
+        said = statement("quadratic_damping", "", "slide", values, {**proof, "held_out": held_out})
+        assert said == f"slide: quadratic damping: drag 0.5 N s^2/m^2, ratio 2; {metric} falls from 2 to 1 N."
 
 
 @pytest.mark.parametrize(("effect", "told"), [("command_delay", 0.02), ("current_channel_delay", -0.02)])

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from rig_bench import ARM, HEAD, Motion, recorded
+from rig_bench import ARM, HEAD, Motion, recorded, written
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, filtfilt
 
@@ -15,7 +16,9 @@ from hand_model.errors import SessionError
 from hand_model.rig import diagnose_rig, fit_declared, load_rig, replay_rig
 from hand_model.rig.channels import check_channels, sinusoids_left
 from hand_model.rig.diagnose import trusted_fit
+from hand_model.rig.model import RigTrial
 from hand_model.rig.name.candidates import candidates
+from hand_model.rig.replay import LOST
 from hand_model.rig.states import later, low_pass, noise_std
 from hand_model.session import read_session
 
@@ -111,7 +114,7 @@ def test_inertia_is_fitted_where_nothing_is_driven(tmp_path: Path) -> None:
 def test_a_file_that_diverges_is_said_to_and_leaves_nothing_behind(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Beyond what a simulation can step there is no position error, and MuJoCo writes no log into the user's folder."""
+    """Beyond what a simulation can step it is lost, as far off as counts, and MuJoCo writes no log into the user's folder."""
     stiff = (
         ARM.replace('damping="0.02"', 'damping="0.02" stiffness="1e9"')
         .replace('timestep="0.001"', 'timestep="0.01"')
@@ -120,7 +123,10 @@ def test_a_file_that_diverges_is_said_to_and_leaves_nothing_behind(
     session = read_session(recorded(tmp_path / "s", stiff, 1, balance, 0.0))
     (tmp_path / "empty").mkdir()
     monkeypatch.chdir(tmp_path / "empty")
-    assert np.isnan(replay_rig(session, efforts=False).joints[0].position_rmse)
+    told = replay_rig(session, efforts=False).joints[0]
+    assert (
+        told.diverged and 0.0 < told.position_rmse <= LOST * np.ptp(session.trials[0].log().column("position")) + 1e-9
+    )
     assert list((tmp_path / "empty").iterdir()) == []
 
 
@@ -151,6 +157,56 @@ def test_one_sinusoid_among_other_torques_is_no_command(tmp_path: Path) -> None:
             table[:, 2] = 0.4 * np.sin(2 * np.pi * 0.7 * table[:, 0])
             np.savetxt(log, table, delimiter=",", header="time,position,torque", comments="", fmt="%.8g")
         assert any("sinusoid" in i.reason for i in check_channels(load_rig(read_session(tmp_path / "s")))) is refused
+
+
+def test_a_torque_by_position_alone_is_a_command_after_its_controller_has_begun(tmp_path: Path) -> None:
+    """Pushed by hand, mostly to one side, against a controller that holds the weight and begins after a while; one with
+    friction in it is measured."""
+    t = np.arange(0, 12, 0.004)
+    q = 2.0 - 0.25 * t + 0.25 * np.sin(2 * np.pi * 0.4 * t)
+    v = -0.25 + 0.2 * np.pi * np.cos(2 * np.pi * 0.4 * t)
+    for name, friction, refused in (("command", 0.0, True), ("measured", 0.05, False)):
+        torque = np.where(t > 0.2, 0.981 * np.sin(q) + friction * np.sign(v), 0.0)
+        folder = written(tmp_path / name, ARM, HEAD, "torque", [np.stack([t, q, torque], 1)])
+        reasons = [i.reason for i in check_channels(load_rig(read_session(folder)))]
+        assert any("static function of the position" in r for r in reasons) is refused
+
+
+def test_a_torque_that_never_changes_is_dead_and_a_short_recording_shows_no_drive_warm_up(tmp_path: Path) -> None:
+    """Said so without a percentage; warming takes longer than a few seconds."""
+    t = np.arange(0, 6, 0.004)
+    table = np.stack([t, 0.5 * np.sin(3 * t), np.zeros_like(t)], 1)
+    rig = load_rig(read_session(written(tmp_path / "dead", ARM, HEAD, "torque", [table])))
+    assert [i.reason for i in check_channels(rig)] == ["torque never changes: dead"]
+    for seconds, offered in ((6.0, False), (12.0, True)):
+        rig = load_rig(read_session(recorded(tmp_path / f"{seconds}", ARM, 1, balance, 0.01)))
+        short = replace(rig, trials=tuple(cut(trial, seconds) for trial in rig.trials))
+        known = {c.effect for c in candidates(short, fit_declared(short), "hinge")}
+        assert ("thermal_friction_drift" in known) is offered
+
+
+def cut(trial: RigTrial, seconds: float) -> RigTrial:
+    """The first seconds of a trial."""
+    keep = trial.time_s <= seconds
+    return replace(
+        trial,
+        time_s=trial.time_s[keep],
+        position={j: q[keep] for j, q in trial.position.items()},
+        effort={j: e[keep] for j, e in trial.effort.items()},
+    )
+
+
+def test_without_recordings_held_out_errors_are_said_to_be_of_those_fitted(tmp_path: Path) -> None:
+    """No trial validates: the proof names none, the sentence and a note say so."""
+
+    def dragged(motion: Motion) -> np.ndarray:
+        return balance(motion) + 0.05 * motion[2] * np.abs(motion[2])
+
+    found = diagnose_rig(read_session(recorded(tmp_path / "s", ARM, 4, dragged, 0.005)))
+    assert [f.effect for f in found.findings] == ["quadratic_damping"]
+    assert found.findings[0].fit["held_out"] == [] and len(found.findings[0].where["trials"]) == 4
+    assert "on what was fitted falls from" in found.findings[0].statement
+    assert any("no trial has purpose" in note for note in found.notes)
 
 
 def test_uneven_stamps_are_no_noise() -> None:

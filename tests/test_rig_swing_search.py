@@ -65,7 +65,10 @@ def test_an_effect_whose_size_cannot_be_told_leaves_its_place_to_the_next() -> N
     def ends(link):
         return {"a": (0.5, 1.5), "b": (-1.0, 1.0), "c": (0.1, 0.2)}
 
-    kept, _, _, rejected = _searched(search, chain, ends, lambda sets: [])
+    def links(sets):
+        return [SimpleNamespace(error=1.0 / (len(some) + 1)) for some in sets]
+
+    kept, _, _, rejected = _searched(search, chain, ends, links)
     assert [v.key for v, _ in kept] == ["a", "c"] and [r["effect"] for r in rejected] == ["b"]
     assert asked == [([], set()), (["a"], {"b"})]
 
@@ -90,6 +93,30 @@ def test_what_stood_before_a_later_round_comes_back_where_that_holds_no_better()
         kept, link, _, _ = _searched(lambda kept, without: found, chain, lambda _, ends=ends: ends, links)
         assert [v.key for v, _ in kept] == stands
         assert _figures(kept, link, links)[:2] == [1.0, 0.4]
+
+
+def test_a_form_that_predicts_worse_than_the_declared_model_leaves_its_place_to_another() -> None:
+    """What the training recordings prefer may predict nothing of those held out: then that form is not asked again, and
+    another of the effect may stand."""
+    first, second = (SimpleNamespace(key=f"a/{k}", effect="a", start={k: 0.0}) for k in "xy")
+
+    def search(kept: list, without: frozenset[str]) -> list:
+        asked.append(set(without))
+        form = second if first.key in without else first
+        return [(form, SimpleNamespace(taken=(form,)))]
+
+    def links(sets: list) -> list[SimpleNamespace]:
+        return [SimpleNamespace(error=table["".join(v.key for v, _ in some)]) for some in sets]
+
+    for error, stands in ((0.5, ["a/y"]), (1.2, [])):
+        asked, table = [], {"": 1.0, "a/x": 1.07, "a/y": error}
+        ends = {"x": (0.5, 1.5), "y": (0.5, 1.5)}
+        kept, chain, _, rejected = _searched(
+            search, lambda some: links([some[:k] for k in range(len(some) + 1)]), lambda _, ends=ends: ends, links
+        )
+        assert [v.key for v, _ in kept] == stands and asked == [set(), {"a/x"}]
+        assert chain[-1].error == min(1.0, error)
+        assert {r["effect"] for r in rejected} == {"a/x", "a/y"} - set(stands)
 
 
 def test_a_fit_with_a_variant_that_was_exchanged_starts_from_both_sides() -> None:

@@ -53,9 +53,10 @@ def rig_findings_page(session: Session, findings: RigFindings) -> bytes:
             _rest(findings),
         )
     )
+    measured_on = "the others" if rig.select(True) else "the same: none was held out"
     lead = (
         f"{session.path.name}: the declared model, fitted, against {count(len(rig.trials), 'trial')}; "
-        "what is named below was chosen on the training trials and measured on the others, "
+        f"what is named below was chosen on the training trials and measured on {measured_on}, "
         "by MuJoCo on the written files."
     )
     return page(session.hand or session.path.name, lead, _tiles(findings), sections)
@@ -63,9 +64,10 @@ def rig_findings_page(session: Session, findings: RigFindings) -> bytes:
 
 def _tiles(findings: RigFindings) -> list[tuple[str, str]]:
     lack, tiles = findings.lack_of_fit, [(findings.verdict, "verdict")]
+    error = "held-out error" if findings.protocol["held_out"] else "error on what was fitted"
     if lack.get("before"):
         tiles += [
-            (f"{lack['after'] / lack['before']:.2f}", "held-out error, all effects over declared"),
+            (f"{lack['after'] / lack['before']:.2f}", f"{error}, all effects over declared"),
             (f"{lack['one_effect'] / lack['before']:.2f}", "with the first effect alone"),
         ]
     return tiles
@@ -96,7 +98,7 @@ def _findings(findings: RigFindings) -> list[Element]:
                 f.fit.get("unit") or "",
             ]
         )
-    head = ("joint", "effect", "not told from", "probability", "held-out error before", "after", "unit")
+    head = ("joint", "effect", "not told from", "probability", "error before", "after", "unit")
     parts = (
         [table(head, rows, "By share of the mismatch; each was measured beside those found before it", text_columns=3)]
         if rows

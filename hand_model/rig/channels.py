@@ -23,8 +23,11 @@ Array = NDArray[np.float64]
 SAME = 0.01  # a measured channel differs from its command by more than this share: drives, sensors and CAN buses do
 STRANGE = 0.7  # share of an effort that may stay unexplained before it is said to explain nothing
 UNSIGNED = "has no sign: it follows the size of the expected effort"
+DEAD = "never changes: dead"
 SINUSOID = "is a sinusoid of time"
+BOTH_WAYS = 0.1  # of the way that a joint goes to one side: as much to the other shows its friction twice
 LEAST_PERIODS = 2.0
+UNBEGUN = 0.02  # of a recording, at its begin, in which its controller need not run yet
 LEAST_TURNS = 4  # changes of sign that must be seen before a channel is said to have none
 CLIPPED = 0.05  # share of samples on one and the same extreme value
 
@@ -69,7 +72,7 @@ def _check_effort(rig: RigModel, joint: str, channel: str) -> list[ChannelIssue]
         values = fill_gaps(trial.time_s, raw)
         if np.ptp(values) <= 1e-9 * (np.abs(values).max() + 1e-12):
             if np.ptp(trial.position[joint]) > 0:
-                found.setdefault(("command_as_measurement", "dead"), []).append((trial.name, 0.0, "is constant"))
+                found.setdefault(("command_as_measurement", DEAD), []).append((trial.name, 0.0, DEAD))
             continue
         measured = joint in trial.effort
         for kind, share, reason in _looks(trial, joint, values, measured):
@@ -104,7 +107,7 @@ def _looks(trial: RigTrial, joint: str, values: Array, measured: bool) -> list[t
 def _reverses(trial: RigTrial, joint: str) -> bool:
     step = np.diff(fill_gaps(trial.time_s, trial.position[joint]))
     up, down = step[step > 0].sum(), -step[step < 0].sum()
-    return min(up, down) > 0.2 * max(up, down)
+    return min(up, down) > BOTH_WAYS * max(up, down)
 
 
 def _gather(rig: RigModel, joint: str, channel: str, found: dict, usable: int) -> list[ChannelIssue]:
@@ -121,9 +124,8 @@ def _gather(rig: RigModel, joint: str, channel: str, found: dict, usable: int) -
             trials = tuple(t.name for t in rig.trials)
         share = float(np.median([s for _, s, _ in hits]))
         refuse = kind == "command_as_measurement"
-        out.append(
-            ChannelIssue(kind, channel, joint, trials, f"{channel} {reason} (to {100 * share:.2g} %)", refuse, share)
-        )
+        closely = "" if reason == DEAD else f" (to {100 * share:.2g} %)"
+        out.append(ChannelIssue(kind, channel, joint, trials, f"{channel} {reason}{closely}", refuse, share))
     return out
 
 
@@ -169,7 +171,7 @@ def _sinusoids(time_s: Array, values: Array, most: int) -> tuple[tuple[float, ..
 def _begun(time_s: Array, values: Array) -> tuple[Array, Array]:
     """Even times (n,) [s] and values, without the first instants, before the generator runs."""
     grid = uniform_time(time_s)
-    trim = slice(int(0.02 * len(grid)), None)
+    trim = slice(int(UNBEGUN * len(grid)), None)
     return grid[trim], np.interp(grid, time_s, values)[trim]
 
 
@@ -195,17 +197,19 @@ def _solve(columns: list[Array], y: Array) -> Array:
 
 
 def static_left(trial: RigTrial, joint: str, values: Array) -> float:
-    """Share that sine, cosine and cubic of the position leave, over samples where the joint goes both ways at speed.
+    """Share (as `_share`) that sine, cosine and cubic of the position leave, where the joint goes both ways: a function
+    of it is one at most samples, and need not be in the first instants, before its controller runs.
 
     Friction alone keeps a true torque from being a function of the position: it changes sign with the motion.
     """
     q = fill_gaps(trial.time_s, trial.position[joint])
+    q, values = (v[int(UNBEGUN * len(q)) :] for v in (q, values))
     if not _reverses(trial, joint) or np.ptp(q) == 0:
         return 1.0
     x = np.stack([np.ones_like(q), q, q**2, q**3, np.sin(q), np.cos(q)], 1)
     scale = np.abs(x).max(0) + 1e-300
     left = values - (x / scale) @ np.linalg.lstsq(x / scale, values, rcond=1e-10)[0]
-    return _rms(left) / max(float(np.std(values)), 1e-300)
+    return _share(left, values)
 
 
 def copy_left(values: Array, other: Array) -> float:
@@ -356,9 +360,5 @@ def _check_position(rig: RigModel, joint: str, channel: str) -> list[ChannelIssu
             )
         )
     if dead and len(dead) == len(rig.trials):
-        out.append(
-            ChannelIssue(
-                "command_as_measurement", channel, joint, tuple(dead), f"{channel} never moves: dead", True, 1.0
-            )
-        )
+        out.append(ChannelIssue("command_as_measurement", channel, joint, tuple(dead), f"{channel} {DEAD}", True, 1.0))
     return out

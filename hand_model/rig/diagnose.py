@@ -18,7 +18,7 @@ from ..session import Session
 from .channels import ChannelIssue, check_balance, check_channels
 from .couplings import coupling_terms, with_couplings
 from .declared import DeclaredFit, fit_declared
-from .findings import NOT_TAKEN, CouplingResidual, Finding, RigFindings, whereabouts
+from .findings import NOT_TAKEN, CouplingResidual, Finding, RigFindings, measured, whereabouts
 from .horizon import open_loop
 from .model import RigModel, load_rig
 from .name.beside import Score, score
@@ -120,7 +120,7 @@ def diagnose_rig(
         xml=xml,
         declared_xml=declared_xml,
         couplings=tuple(angles),
-        notes=(*rig.notes, *_silence(rig, fit, found)),
+        notes=(*rig.notes, *_silence(rig, fit, found), *_unproved(rig), *_lost(lack)),
     )
     if output is not None:
         findings.write(output, model)
@@ -128,10 +128,28 @@ def diagnose_rig(
 
 
 def _silence(rig: RigModel, fit: DeclaredFit, found: Sequence[Finding]) -> tuple[str, ...]:
-    """Why nothing of the rig could be balanced, where nothing could."""
-    if fit.rows or found or can_swing(rig):
+    """Why no effort of the rig could be balanced, where none could."""
+    if fit.rows or can_swing(rig):
         return ()
+    if found:
+        return (f"efforts were not analysed: {rig.untold()}",) if rig.drives and rig.untold() else ()
     return (f"nothing could be analysed: {rig.untold() or 'no joint moves long enough'}",)
+
+
+def _unproved(rig: RigModel) -> tuple[str, ...]:
+    """That errors are not held out, where no recording is."""
+    return () if rig.select(True) else ('no trial has purpose = "validate": errors are those of the recordings fitted',)
+
+
+def _lost(lack: Mapping[str, Any]) -> tuple[str, ...]:
+    """Which recordings the simulation left, with the declared model and with effects."""
+    sides = {"the declared model": "before", "the effects named": "after"}
+    return tuple(
+        f"with {model} the motion simulated in open loop leaves {', '.join(trials)}: it counts as off by twice the "
+        "recorded range from there on"
+        for model, side in sides.items()
+        if (trials := lack.get("diverged", {}).get(side))
+    )
 
 
 def _rank(finding: Finding) -> tuple[int, int]:
@@ -285,11 +303,12 @@ def _off_axis(bench: Bench, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple[
         if c.kind == "inertial" and c.value == 0
     }
     where = whereabouts(
-        best, None, "effort", proofs[best]["held_out"], proofs[best]["before"] ** 2 - proofs[best]["after"] ** 2
+        best, None, "effort", measured(rig, proofs[best]), proofs[best]["before"] ** 2 - proofs[best]["after"] ** 2
     )
     words = (
         "Centres of mass lie off the axes on which they are declared: "
-        f"held-out effort error falls to {100 * ratio:.0f} % over all joints (most at {best}: "
+        f"{'held-out effort error' if proofs[best]['held_out'] else 'effort error on what was fitted'} falls to "
+        f"{100 * ratio:.0f} % over all joints (most at {best}: "
         f"{proofs[best]['before']:.4g} to {proofs[best]['after']:.4g})."
     )
     return freed, Finding(

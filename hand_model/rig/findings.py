@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..diagnose.findings import FILES, Finding, Findings
 from ..output import new_file
-from .model import Drive
+from .model import Drive, RigModel
 
 __all__ = ["CouplingResidual", "Finding", "Findings", "RigFindings"]
 Array = NDArray[np.float64]
@@ -36,6 +36,11 @@ def whereabouts(
         "region": None,
         "share_of_mismatch": share,
     }
+
+
+def measured(rig: RigModel, proof: Mapping[str, Any]) -> list[str]:
+    """Names of the recordings that a proof was measured on: those held out, where there are any."""
+    return list(proof["held_out"]) or [t.name for t in rig.select(False)]
 
 
 @dataclass(frozen=True)

@@ -74,7 +74,7 @@ def open_loop(
                 "engine": "mujoco",
                 "ratio": float(np.sqrt(np.mean((new / np.maximum(old, 1e-300)) ** 2))),
                 "joints": joints,
-                "held_out": [t.name for t in trials],
+                "held_out": [t.name for t in trials if t.validate],
             }
     return {"not_run": f"a simulation leaves the recordings within {HORIZONS_S[-1]:g} s"}
 

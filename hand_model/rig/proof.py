@@ -98,7 +98,7 @@ class Bench:
             "after": float(whole[1]),
             "noise_floor": self._floor(before[0], joint),
             "ci95_reduction": [float(fall[0]), float(fall[1])],
-            "held_out": [t for t, _ in a],
+            "held_out": [t for t, _ in a if t in {v.name for v in self.rig.select(True)}],
             "engine": self.engine,
         }
 

@@ -22,6 +22,7 @@ from .supply import supply_deviation
 
 Array = NDArray[np.float64]
 States = tuple[Array, Array, Array]  # times [s], positions, velocities
+LOST = 2.0  # of the recorded range: a simulation that is as far off has left its recording
 STEPS = 4  # of Gauss and Newton, towards a start: the motion is smooth in it
 
 
@@ -29,8 +30,9 @@ STEPS = 4  # of Gauss and Newton, towards a start: the motion is smooth in it
 class JointResidual:
     """What differs at one joint in one trial.
 
-    position_rmse [rad or m]: simulated in open loop over the whole trial minus recorded (nan where that was not run or
-    left the recorded range by more than its width: diverged). effort_rmse [N m or N]: recorded effort minus inverse
+    position_rmse [rad or m]: simulated in open loop over the whole trial minus recorded (nan where that was not run).
+    diverged: the simulation was off by `LOST` times the recorded range or more somewhere, or broke down; no sample counts
+    as farther off than that, since by then how far it is says nothing. effort_rmse [N m or N]: recorded effort minus inverse
     dynamics at the recorded motion, moving samples only (nan where no effort is known).
     """
 
@@ -44,6 +46,7 @@ class JointResidual:
     time_s: Array = field(repr=False, default_factory=lambda: np.zeros(0))
     simulated: Array = field(repr=False, default_factory=lambda: np.zeros(0))
     effort_samples: int = 0
+    diverged: bool = False
 
 
 @dataclass(frozen=True)
@@ -322,11 +325,11 @@ def _residual(
     trial: RigTrial, joint: str, time_s: Array, simulated: Array | None, effort_error: Array | None
 ) -> JointResidual:
     recorded = fill_gaps(trial.time_s, trial.position[joint])
-    rmse = mae = float("nan")
+    rmse, mae, diverged = float("nan"), float("nan"), False
     if simulated is not None:
-        error = simulated - recorded
-        if np.isfinite(error).all() and np.abs(error).max() < 2 * np.ptp(recorded) + 1e-9:
-            rmse, mae = float(np.sqrt(np.mean(error**2))), float(np.mean(np.abs(error)))
+        lost = LOST * np.ptp(recorded) + 1e-9
+        error = np.minimum(np.nan_to_num(np.abs(simulated - recorded), nan=lost), lost)
+        rmse, mae, diverged = float(np.sqrt(np.mean(error**2))), float(np.mean(error)), bool(np.any(error == lost))
     effort, count = float("nan"), 0
     if effort_error is not None and len(effort_error):
         effort, count = float(np.sqrt(np.mean(effort_error**2))), len(effort_error)
@@ -341,4 +344,5 @@ def _residual(
         time_s,
         np.zeros(0) if simulated is None else simulated,
         count,
+        diverged,
     )

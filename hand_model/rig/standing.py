@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .declared import DeclaredFit
-from .findings import NOT_BORNE_OUT, Finding, whereabouts
+from .findings import NOT_BORNE_OUT, Finding, measured, whereabouts
 from .horizon import NO_LAW, open_loop
 from .model import RigModel
 from .name.compete import LEAST_SHARE, Step
@@ -169,7 +169,7 @@ def _joint_finding(
         for k, v in term.shape.items()
     }
     fall = max(proof["before"] ** 2 - proof["after"] ** 2, 0.0)
-    where = whereabouts(c.joint, rig.drive(c.joint), "effort", proof["held_out"], fall)
+    where = whereabouts(c.joint, rig.drive(c.joint), "effort", measured(rig, proof), fall)
     return Finding(
         c.effect,
         (c.effect, *(e for e in step.equals if e != c.effect)),

@@ -82,7 +82,6 @@ def statement(
         if k not in DISCRETE
     }
     listed = ", ".join(f"{k.replace('_', ' ')}{': ' if k[-1].isdigit() else ' '}{v}" for k, v in figures.items())
-    return (
-        f"{joint}: {effect.replace('_', ' ')}{f' ({variant})' if variant else ''}: {listed}; held-out "
-        f"{proof['metric'].replace('_', ' ')} falls from {proof['before']:.4g} to {proof['after']:.4g} {proof['unit']}."
-    )
+    metric = proof["metric"].replace("_", " ")
+    metric = f"held-out {metric}" if proof["held_out"] else f"{metric} on what was fitted"
+    return f"{joint}: {effect.replace('_', ' ')}{f' ({variant})' if variant else ''}: {listed}; {metric} falls from {proof['before']:.4g} to {proof['after']:.4g} {proof['unit']}."

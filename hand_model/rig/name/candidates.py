@@ -30,6 +30,7 @@ NOT_FOR_RIGS = frozenset(
     }
 )
 SMOOTH = ("nonlinear_spring",)  # its knee belongs to fingers with a return spring; a joint has stops and detents
+LEAST_WARMING_S = 10.0  # a drive that warms up takes 5 s or more, and what is shorter than that twice over shows a line
 LONGEST_DELAY_S = 0.03
 # Samples. A drive that holds its torque from one control step to the next acts half a step late: less than a sample of
 # a log.
@@ -117,7 +118,12 @@ def candidates(rig: RigModel, fit: DeclaredFit, joint: str, every: bool = False)
         return ()
     states = {r.trial: drive_state(rig, r, fit.theta) for r in fit.rows if r.joint == joint}
     train = tuple(states[r.trial] for r in rows)
-    found = [_from_catalogue(e, joint, train, states) for e in catalogue("drive") if _usable(e)]
+    long = max(float(s.elapsed_s[-1]) for s in train) >= LEAST_WARMING_S
+    found = [
+        _from_catalogue(e, joint, train, states)
+        for e in catalogue("drive")
+        if _usable(e) and (long or e.name != "thermal_friction_drift")
+    ]
     bends = [c for c in found if c.effect in SMOOTH]
     if every:
         found += [_with_line(c) for c in bends]
@@ -138,7 +144,7 @@ def _from_catalogue(
         found.name,
         "",
         joint,
-        tuple(found.amplitudes()),
+        tuple((name, "1" if name == "per_load" else unit, *ends) for name, unit, *ends in found.amplitudes()),
         ({},) if found.name in SMOOTH else tuple(found.grid(train)),
         lambda row, shape: np.asarray(found.columns(states[row.trial], shape), float),
         bool(found.warps),

@@ -103,7 +103,7 @@ def compete_swing(
     the error is above what the recordings can tell (floor [rad or m]); returns the variants and their rounds, each with
     the fit of all taken so far. whole: the recordings uncut; those left out whole are predicted so, as the ones that
     validate are. begin: what stands already (current has it);
-    without: effects that are not asked."""
+    without: effects, or forms of one by their key, that are not asked."""
     train = tuple(int(i) for i in stages[-1].train())
     test, folds = _folds(stages[-1], train, whole)
     if swings_free(stages[-1]):
@@ -162,7 +162,7 @@ def _round(stages: Sequence[Swing], taken: tuple[Variant, ...], current: Fitted,
     added."""
     swing, train = stages[-1], tuple(int(i) for i in stages[-1].train())
     free = asked(swing, taken)
-    others = [v for v in variants(swing) if not set(v.start) <= set(free) and v.effect not in without]
+    others = [v for v in variants(swing) if not set(v.start) <= set(free) and not {v.effect, v.key} & without]
     tasks = [Task(asked(swing, (*taken, v)), begun(current.theta, v), (), True) for v in others]
     fits = fit_stages(stages, tasks, 8)
     order = _shortlist(others, fits)
@@ -182,10 +182,11 @@ def _otherwise(stages: Sequence[Swing], first: Variant, current: Fitted, test: S
     swing = stages[-1]
     size, every = len(swing.train()), variants(swing)
     plain = np.where(np.isin(PARAMETERS, list(first.start)), vector({}), current.theta)
-    forms = [v for v in every if v.effect == first.effect and v.key != first.key and len(v.start) <= len(first.start)]
+    forms = [v for v in every if v.effect == first.effect and len(v.start) <= len(first.start)]
+    forms = [v for v in forms if v.key not in {first.key, *without}]
     alone = fit_stages(stages, [Task(asked(swing, (v,)), begun(plain, v), (), True) for v in forms], 8)
     near = sorted(range(len(forms)), key=lambda k: _bic(alone[k], size))[:ALIKE]
-    pairs = [(k, v) for k in near for v in every if v.effect != first.effect and v.effect not in without]
+    pairs = [(k, v) for k in near for v in every if v.effect != first.effect and not {v.effect, v.key} & without]
     tasks = [Task(asked(swing, (forms[k], v)), begun(alone[k].theta, v), (), True) for k, v in pairs]
     if not tasks:
         return []
@@ -222,7 +223,9 @@ def _pairs(stages: Sequence[Swing], rivals: Sequence[_Rival], current: Fitted, t
     swing = stages[-1]
     near = sorted(rivals, key=lambda r: float(r.error.sum()))
     found = [(a, b.variant) for k, a in enumerate(near) for b in near[k + 1 :]]
-    found += [(near[0], v) for v in variants(swing) if v.effect not in without and v not in [r.variant for r in near]]
+    found += [
+        (near[0], v) for v in variants(swing) if not {v.effect, v.key} & without and v not in [r.variant for r in near]
+    ]
     apart = [(a, v) for a, v in found if v.effect != a.variant.effect and not set(v.start) & set(a.variant.start)]
     tasks = [Task(asked(swing, (a.variant, v)), begun(a.fit.theta, v), (), True) for a, v in apart]
     together = [Variant(f"{a.variant.effect} and {v.effect}", f"{a.variant.key} and {v.key}", {**a.variant.start, **v.start})

@@ -13,7 +13,7 @@ import numpy as np
 from ...background import Background
 from ...session import Session
 from ..declared import DeclaredFit
-from ..findings import NOT_BORNE_OUT, NOT_TOLD, Finding, whereabouts
+from ..findings import NOT_BORNE_OUT, NOT_TOLD, Finding, measured, whereabouts
 from ..model import RigModel, load_rig
 from ..replay import RigResiduals, replay_rig
 from ..states import fill_gaps, noise_std
@@ -84,13 +84,14 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
         before, after = _sides(kept, chain, k, chain_of)
         proof = {"metric": "position_rmse", "unit": rig.unit(rig.joints[0]), "before": before.error, "after": after.error,
                  "noise_floor": floor, "ci95_reduction": _fall(before.replay, after.replay, held),
-                 "held_out": [t.name for t in rig.select(held)], "engine": "mujoco"}  # fmt: skip
+                 "held_out": [t.name for t in rig.select(True)], "engine": "mujoco"}  # fmt: skip
         found.append(_swing_finding(rig, variant, round_, ends, chain[-1], proof))
     means = [c.replay.figure("position_mae", held) for c in (chain[0], chain[-1])]
     lack = {"metric": "position_rmse", "unit": rig.unit(rig.joints[0]), "before": figures[0], "after": figures[-1],
             "one_effect": figures[min(1, len(figures) - 1)],
             "two_effects": figures[min(2, len(figures) - 1)], "engine": "mujoco", "mae_before": means[0], "mae_after": means[1],
-            "noise_floor": floor,
+            "noise_floor": floor, "diverged": {side: [r.trial for r in c.replay.joints if r.diverged]
+                                               for side, c in (("before", chain[0]), ("after", chain[-1]))},
             "declared": {n: float(chain[0].fit.theta[INDEX[n]]) for n in free}}  # fmt: skip
     return shares(found, {rig.joints[0]: lack}), rejected, lack, chain[-1].xml, chain[0].xml
 
@@ -111,22 +112,23 @@ def _searched(search: Callable[[list[Taken], frozenset[str]], list[Taken]], chai
               ends_of: Callable[[Link], Ends], links_of: Callable[[Sequence[Sequence[Taken]]], list[Link]],
               ) -> tuple[list[Taken], list[Link], Ends, list[dict[str, Any]]]:  # fmt: skip
     """What `_told` leaves of a search; an effect that came last and whose size cannot be told leaves its place to what
-    came next to it. Where all that a search found predicts no better than what stood after one of its rounds, that
-    stands."""
+    came next to it, and so do forms of which none predicts what was held out. Where all that a search found predicts no
+    better than what stood before one of its rounds, that stands."""
     kept: list[Taken] = []
     vague: frozenset[str] = frozenset()
     rejected: list[dict[str, Any]] = []
     for _ in range(MOST_SEARCHES):
         taken = search(kept, vague)
         kept, chain, ends, more = _told(taken, chain_of, ends_of)
-        earlier = _states(taken)[:-1]
+        earlier = [[], *_states(taken)[:-1]]
         errors = [link.error for link in links_of(earlier)]
-        if errors and not chain[-1].error < (1.0 - LEAST_GAIN) * min(errors):
+        if not chain[-1].error < (1.0 - LEAST_GAIN) * min(errors):
             gone = [v for v, _ in kept]
             kept, chain, ends, _ = _told(earlier[int(np.argmin(errors))], chain_of, ends_of)
             more += [{"effect": v.key, "reason": NOT_BORNE_OUT} for v in gone]
         rejected += [r for r in more if r not in rejected]
         told = vague | {v.effect for v, _ in taken if {"effect": v.key, "reason": NOT_TOLD} in more}
+        told |= set() if kept else {v.key for v, _ in taken}  # in another form it may predict what this one does not
         if told == vague or kept != taken[: len(kept)]:
             break
         vague = told
@@ -292,7 +294,7 @@ def _swing_finding(rig: RigModel, variant: Variant, round_: Round, ends: Ends, l
     parameters = {n: {"value": float(link.fit.theta[INDEX[n]]), "unit": units.get(n, "1"), "ci95": list(ends[n])}
                   for n in variant.start}  # fmt: skip
     fall = max(proof["before"] ** 2 - proof["after"] ** 2, 0.0)
-    where = whereabouts(joint, rig.drive(joint), "position", proof["held_out"], fall)
+    where = whereabouts(joint, rig.drive(joint), "position", measured(rig, proof), fall)
     native = set(variant.start) <= {"drag"}
     return Finding(
         variant.effect, (variant.effect, *(e for e in round_.equals if e != variant.effect)), round_.probability,
