@@ -14,6 +14,7 @@ from ..session import Session, Trial
 from ..session.check import check_interval
 from .complete import completed
 from .states import LEAST_SAMPLES
+from .winding import with_windings
 
 Array = NDArray[np.float64]
 SLOWEST_S = 0.5  # between rows: a thousand a second, stamped in milliseconds, lie farther apart
@@ -22,8 +23,9 @@ QUANTITIES = {"joint": ("position", "velocity"), "actuator": ("force", "ctrl", "
 
 @dataclass(frozen=True)
 class Drive:
-    """An actuator on one joint. kind: "force" (torque or force is the control), "voltage" (dcmotor), "position"
-    (servo on position), "velocity" (servo on velocity).
+    """An actuator on one joint. kind: "force" (torque or force is the control), "voltage" (dcmotor, and a servo on
+    velocity of which the control is recorded, which is the same), "position" (servo on position), "velocity" (servo on
+    velocity).
 
     gear: control to joint transmission. gain: joint effort per unit of ctrl. offset: declares a constant (affine bias).
     """
@@ -155,6 +157,11 @@ def load_rig(session: Session, xml: bytes | None = None) -> RigModel:
     joints = tuple(model.joint(j).name for j in range(model.njnt))
     drives = _drives(model, mujoco)
     quantity = {c: _parse(session, c, q, joints, tuple(d.name for d in drives)) for c, q in session.rig.signals.items()}
+    told, given = ({n for _, n, attribute in quantity.values() if attribute == a} for a in ("ctrl", "force"))
+    if slower := [d.name for d in drives if d.kind == "velocity" and d.name in told - given]:
+        xml = with_windings(xml, model, slower)
+        model = mujoco.MjModel.from_xml_string(xml.decode())
+        drives = _drives(model, mujoco)
     if all(attribute != "position" for _, _, attribute in quantity.values()):
         raise SessionError(
             f'{session.path}: [signals] names no position; a log column with "joint:NAME:position" is needed'
