@@ -333,6 +333,26 @@ def test_a_finger_goes_slack_within_a_corner_and_leads_nowhere(corner: float) ->
     assert values["below"] == pytest.approx(20.0, abs=1.5 * max(corner, 1.0))
 
 
+@pytest.mark.parametrize("lag_s", [0.03, 0.15])
+def test_a_finger_that_opens_later_than_its_motor_is_told_by_how_much(lag_s: float) -> None:
+    """Closing it is pushed; a clock or a delay would move it both ways, and a play would not grow with speed."""
+
+    def late(t, x, v):
+        left, out = 0.0, []
+        for way, step in zip(np.diff(x, prepend=x[0]), np.diff(t, prepend=t[0]), strict=True):
+            left = max(left * np.exp(-step / lag_s) - way, 0.0)
+            out.append(left)
+        return 0.8 * np.array(out)
+
+    found = named(joint(5, add=late), "encoder")
+    assert list(found) == ["spring_decoupling"] and found["spring_decoupling"]["form"] == 3.0
+    # how late it is, is how far it stays behind at a speed: of a short time the two that make it up are hardly told
+    late_s = found["spring_decoupling"]["lag"] * found["spring_decoupling"]["lead"]
+    assert late_s == pytest.approx(lag_s, rel=0.3)
+    region = effect("spring_decoupling").region((), {"form": 3.0, "lag": lag_s})
+    assert region is None
+
+
 def test_a_reading_at_the_wrong_time_lifts_no_finger() -> None:
     def late(t, x, v):
         return 4.0 * ((t > 8.13) & (t < 8.22))
@@ -510,6 +530,30 @@ def test_a_drive_is_judged_from_a_little_beyond_where_its_finger_stays_behind() 
     (left,) = while_driven([state()], 20.0)
     kept = left.position[np.isfinite(left.effort)]
     assert 22.0 < kept.min() < 26.0
+
+
+def test_a_drive_has_an_unknown_share_of_its_spring_while_its_finger_comes_open_late() -> None:
+    """That share is no friction that grows with load: along a stroke the two are the same, and it stands already. Where
+    the current shows none, there is nothing that a friction could make up for."""
+    from drive_motion import state
+
+    from hand_model.diagnose.locate.decoupled import RELEASED, while_returning
+
+    moved = state()
+    plain = replace(moved, extra={**moved.extra, "load": 9.0 + 0.2 * moved.position})
+    behind = moved.velocity < -2.0
+    assert while_returning([plain], 0.05) == (plain,)
+    off = replace(plain, effort=plain.effort - 0.1 * np.where(behind, moved.position, 0.0))
+    (left,) = while_returning([off], 0.05)
+    assert left.declared_names == (*plain.declared_names, RELEASED)
+    column = left.declared[:, -1]
+    np.testing.assert_array_equal(left.declared[:, :-1], plain.declared)
+    np.testing.assert_array_equal(column[(moved.velocity > 5.0) & (moved.position > 60.0)], 0.0)
+    assert np.mean(column[behind] == moved.position[behind]) > 0.85
+    for known, told in ((off, True), (left, False)):
+        known = replace(known, effort=plain.effort - 0.1 * column)
+        names = [f.term.effect.name for f in name_effects((known,), catalogue("drive")).found]
+        assert ("load_dependent_friction" in names) is told
 
 
 @pytest.mark.parametrize("met", [True, False])

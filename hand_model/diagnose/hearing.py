@@ -10,7 +10,7 @@ import numpy as np
 from ..background import Background
 from ..effects import catalogue, outsiders
 from ..effects.base import DriveState
-from ..effects.spring_decoupling import tips_over
+from ..effects.spring_decoupling import comes_late, tips_over
 from ..errors import SessionError
 from ..session import Log, Session, check_session, moves
 from .findings import Finding
@@ -18,7 +18,7 @@ from .finger import FingerReading, finger_calls
 from .locate.angles import FingerAngles
 from .locate.command import CommandFacts, command_facts, command_findings, delays, refused, sags_beneath
 from .locate.course import FingerCourses
-from .locate.decoupled import TRIFLE, pulls, while_driven, without_excursions
+from .locate.decoupled import TRIFLE, pulls, while_driven, while_returning, without_excursions
 from .locate.drive import drive_states, drive_trials, frozen_share, opposes, stand_still, too_short
 from .locate.encoder_error import encoder_corrections
 from .locate.gravity import with_gravity
@@ -102,6 +102,8 @@ class Heard:
             named, states = station.standing("spring_decoupling"), drives[station.actuator]
             if named is not None and named.term.shape["form"] < 0.5:
                 states = without_excursions(states, station.naming.balance.states, self.fingers[station.finger])
+            elif named is not None and comes_late(named.term.shape):
+                states = while_returning(states, named.term.shape["lag"])
             elif named is not None and not tips_over(named.term.shape) and pulls(station, TRIFLE):
                 states = while_driven(states, named.term.shape["below"])
             drives[station.actuator] = states

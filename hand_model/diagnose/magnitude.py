@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..effects.base import DriveState, position_range, speed_range
 from ..effects.compliance import at_driver
-from ..effects.spring_decoupling import tips_over
+from ..effects.spring_decoupling import comes_late, tips_over
 
 SLIGHT = 0.25  # of the size at which an effect is plain
 LEAST, MOST = 1e-3, 3.0  # beyond, a figure says nothing more about its kind
@@ -160,6 +160,8 @@ def _by_load(p: Mapping[str, float], c: Channel) -> float:
 
 
 def _apart(p: Mapping[str, float], c: Channel) -> float:
+    if comes_late(p):
+        return p["lead"] * p["lag"] * c.fastest / (0.3 * c.span)
     if tips_over(p):
         return p["lead"] / (0.3 * c.effort)
     return (p["lead"] * (p["below"] - c.low) if p["form"] > 0.5 else c.ahead) / (0.3 * c.effort)

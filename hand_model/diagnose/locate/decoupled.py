@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...effects.base import DriveState, position_range
-from ...effects.spring_decoupling import spans
+from ...effects.spring_decoupling import behind, spans
 from ...errors import IdentificationError
 from ...identify.clock import align
 from ..magnitude import SLIGHT, channel_figures, magnitude
+from ..name.balance import Balance
+from ..name.evidence import gain, parameter_price, scale_of
 from ..name.station import Station, told
 from .angles import FingerAngles
 
@@ -22,6 +24,7 @@ BESIDE, MOST_S = 0.4, 1.0  # of an excursion's length, at most, on either side: 
 # of the size at which a finger's lead is plain: less leaves nearly all of the spring on its drive, and most of the range
 # is worth more
 TRIFLE = 0.12
+LOOSE, RELEASED = 0.3, "released_spring"  # [%] that a finger is behind when its spring is off its drive
 CORNER = 0.2  # of the way on which the finger stays behind, beyond its end
 
 
@@ -39,6 +42,23 @@ def while_driven(states: Sequence[DriveState], below: float) -> tuple[DriveState
     low, _ = position_range(tuple(states))
     driven_from = below + CORNER * max(below - low, 0.0)
     return tuple(replace(s, effort=np.where(s.position < driven_from, np.nan, s.effort)) for s in states)
+
+
+def while_returning(states: Sequence[DriveState], lag_s: float) -> tuple[DriveState, ...]:
+    """A drive's states where its finger comes open later than it: some of the spring may be off it while the finger is
+    behind, and whatever share that is, is no property of the drive's friction. As they are where their current shows no
+    such share."""
+    loose = tuple(_loosened(s, lag_s) for s in states)
+    kept, let = Balance(tuple(states)), Balance(loose)
+    (fit, other), price = (kept.fit(), let.fit()), 0.5 * parameter_price(kept) / kept.inflation
+    return loose if gain(kept, other, fit, scale_of(let, other)) > price else tuple(states)
+
+
+def _loosened(state: DriveState, lag_s: float) -> DriveState:
+    """With a column for the share of the spring [%] that a finger that is behind takes off its drive."""
+    loose = np.clip(behind(state, lag_s) / LOOSE, 0.0, 1.0) * state.position
+    declared = np.column_stack([state.declared, loose])
+    return replace(state, declared=declared, declared_names=(*state.declared_names, RELEASED))
 
 
 def beside_excursions(states: Sequence[DriveState], ahead: Sequence[DriveState]) -> tuple[DriveState, ...]:
