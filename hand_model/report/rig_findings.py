@@ -124,6 +124,7 @@ def _rest(findings: RigFindings) -> tuple[Element, ...]:
         if r["reason"] != NOT_TAKEN
     ]
     tried = sorted({_tried(r) for r in findings.rejected if r["reason"] == NOT_TAKEN})
+    said += [f"{n[:1].upper()}{n[1:]}." for n in findings.notes]
     parts = [listing(said)] if said else []
     if withdrawn:
         parts += [note("Chosen on the training recordings, then withdrawn:"), listing(withdrawn)]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..rig.findings import RigFindings
 from ..rig.model import RigModel
-from ..rig.replay import simulate_trial
+from ..rig.replay import position_error, simulate_trial
 from .page import Section, figures, key, note, table
 from .pictures import POINTS
 from .residual_pictures import PICTURES, error_by_state, full_colour, rms
@@ -25,9 +25,9 @@ def motion_sections(rig: RigModel, findings: RigFindings) -> list[Section]:
     for trial in rig.select(True) or rig.trials:
         recorded = trial.position[joint]
         sides = [simulate_trial(replace(rig, xml=x), trial)[1][:, 0] for x in (findings.declared_xml, findings.xml)]
-        errors = [rms((s - recorded)[np.isfinite(recorded)]) for s in sides]
-        rows.append([trial.name, *(f"{e:.4g}" for e in errors), f"{errors[1] / max(errors[0], 1e-300):.2f}"])
         good = np.isfinite(recorded)
+        errors = [rms(position_error(s[good], recorded[good])[0]) for s in sides]
+        rows.append([trial.name, *(f"{e:.4g}" for e in errors), f"{errors[1] / max(errors[0], 1e-300):.2f}"])
         speed = np.gradient(recorded[good], trial.time_s[good])
         states.append(np.stack([recorded[good], speed, *((recorded - s)[good] for s in sides)]))
         keep = slice(None, None, max(1, len(recorded) // POINTS))

@@ -321,15 +321,22 @@ def replay_rig(
     return RigResiduals(tuple(out))
 
 
+def position_error(simulated: Array, recorded: Array) -> tuple[Array, bool]:
+    """How far (n,) a simulation is off a recorded position [rad or m], at most `LOST` times the recorded range, and
+    whether it was as far off anywhere, or broke down."""
+    lost = LOST * np.ptp(recorded) + 1e-9
+    error = np.minimum(np.nan_to_num(np.abs(simulated - recorded), nan=lost), lost)
+    return error, bool(np.any(error == lost))
+
+
 def _residual(
     trial: RigTrial, joint: str, time_s: Array, simulated: Array | None, effort_error: Array | None
 ) -> JointResidual:
     recorded = fill_gaps(trial.time_s, trial.position[joint])
     rmse, mae, diverged = float("nan"), float("nan"), False
     if simulated is not None:
-        lost = LOST * np.ptp(recorded) + 1e-9
-        error = np.minimum(np.nan_to_num(np.abs(simulated - recorded), nan=lost), lost)
-        rmse, mae, diverged = float(np.sqrt(np.mean(error**2))), float(np.mean(error)), bool(np.any(error == lost))
+        error, diverged = position_error(simulated, recorded)
+        rmse, mae = float(np.sqrt(np.mean(error**2))), float(np.mean(error))
     effort, count = float("nan"), 0
     if effort_error is not None and len(effort_error):
         effort, count = float(np.sqrt(np.mean(effort_error**2))), len(effort_error)
