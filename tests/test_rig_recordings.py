@@ -114,7 +114,8 @@ def test_inertia_is_fitted_where_nothing_is_driven(tmp_path: Path) -> None:
 def test_a_file_that_diverges_is_said_to_and_leaves_nothing_behind(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Beyond what a simulation can step it is lost, as far off as counts, and MuJoCo writes no log into the user's folder."""
+    """Beyond what a simulation can step it is lost, as far off as counts, and MuJoCo writes no log into the user's
+    folder."""
     stiff = (
         ARM.replace('damping="0.02"', 'damping="0.02" stiffness="1e9"')
         .replace('timestep="0.001"', 'timestep="0.01"')

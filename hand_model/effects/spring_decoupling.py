@@ -11,6 +11,7 @@ from .base import Amplitude, Array, DriveState, Effect, Shape, figure, position_
 from .path import runs
 
 WHILES, OPEN, TIPS, SLOW = 0.0, 1.0, 2.0, 3.0
+UNITS = {OPEN: "effort/position", TIPS: "effort"}  # of the lead, where it is no share
 
 
 class SpringDecoupling(Effect):
@@ -47,11 +48,7 @@ class SpringDecoupling(Effect):
 
     def units(self, shape: Mapping[str, float]) -> Mapping[str, str]:
         """Of how far it stays behind for each unit of position, or runs ahead."""
-        return (
-            {}
-            if shape["form"] == WHILES or comes_late(shape)
-            else {"lead": "effort" if tips_over(shape) else "effort/position"}
-        )
+        return {"lead": UNITS[shape["form"]]} if shape["form"] in UNITS else {}
 
     def parameters(
         self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]

@@ -13,6 +13,7 @@ from .base import Amplitude, Array, DriveState, Effect, Shape, figure
 from .law import Law, Moment
 
 ELAPSED, WORKED, LOGGED = 0.0, 1.0, 2.0  # forms
+SOONEST_S = 5.0  # what is recorded for less than this twice over shows no more than a line
 MOVING = 1.0  # %/s: below, a drive is at rest
 
 
@@ -27,7 +28,7 @@ class ThermalFrictionDrift(Effect):
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """Warm-up time between 5 s and four times the session, cooling time at rest, form."""
-        total = max(max(float(s.elapsed_s[-1]) for s in states), 10.0)
+        total = max(_elapsed(states), 2 * SOONEST_S)
         forms = (ELAPSED, WORKED) if all("moving" in s.extra for s in states) else (ELAPSED,)
         forms += (LOGGED,) if _warming(states) else ()
         return (
@@ -35,17 +36,18 @@ class ThermalFrictionDrift(Effect):
             Shape(
                 "warm_up_time",
                 "s",
-                5.0,
+                SOONEST_S,
                 4 * total,
-                tuple(np.geomspace(max(5.0, 0.04 * total), 2 * total, 7)),
+                tuple(np.geomspace(max(SOONEST_S, 0.04 * total), 2 * total, 7)),
                 forms=(ELAPSED, WORKED),
             ),
             Shape("cooling_time", "s", 2.0, 40 * total, (5.0, 25.0, 60.0, 120.0, 400.0), forms=(WORKED,)),
         )
 
     def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
-        """The range of temperatures goes with each point."""
-        return [{**p, **_warming(states)} for p in super().grid(states)]
+        """The range of temperatures goes with each point; none where it is all over too soon."""
+        seen = _elapsed(states) >= 2 * SOONEST_S
+        return [{**p, **_warming(states)} for p in super().grid(states)] if seen else []
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """Friction above the final value when cold; lubricants thin out, yet either sign is allowed."""
@@ -104,6 +106,11 @@ class ThermalFrictionDrift(Effect):
             return parameters["cold_excess"] * now.direction * cold[0]
 
         return load
+
+
+def _elapsed(states: tuple[DriveState, ...]) -> float:
+    """Time [s] from the session's first sample to its last."""
+    return max(float(s.elapsed_s[-1]) for s in states)
 
 
 def _warming(states: tuple[DriveState, ...]) -> dict[str, float]:

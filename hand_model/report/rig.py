@@ -35,7 +35,7 @@ def write_rig_report(session: Session, residuals: RigResiduals, folder: str | Pa
                 "trial": r.trial,
                 "joint": r.joint,
                 "held_out": r.validate,
-                "position_rmse": None if r.diverged else _known(r.position_rmse),
+                "position_rmse": r.position_rmse if r.followed else None,
                 "diverged": r.diverged,
                 "effort_rmse": _known(r.effort_rmse),
                 "samples": r.samples,
@@ -50,11 +50,7 @@ def write_rig_report(session: Session, residuals: RigResiduals, folder: str | Pa
 def rig_page(session: Session, residuals: RigResiduals) -> bytes:
     """The page as bytes."""
     body = [table(HEAD, rows(session, residuals), "Position in rad or m, effort in N m or N", text_columns=3)]
-    drawn = [
-        (f"{r.trial}, {r.joint}", _simulation(r, session))
-        for r in residuals.joints
-        if np.isfinite(r.position_rmse) and not r.diverged
-    ]
+    drawn = [(f"{r.trial}, {r.joint}", _simulation(r, session)) for r in residuals.joints if r.followed]
     if drawn:
         body += [key(("c1", "recorded"), ("ink", "simulated in open loop")), figures(*drawn[:PICTURES])]
     lead = (
@@ -73,7 +69,7 @@ def rig_words(session: Session, residuals: RigResiduals) -> str:
     """One sentence: errors on validation trials, on all where none validates."""
     held = any(r.validate for r in residuals.joints)
     chosen = [r for r in residuals.joints if r.validate or not held]
-    ran = [r for r in chosen if np.isfinite(r.position_rmse) and not r.diverged]
+    ran = [r for r in chosen if r.followed]
     words = f"On {count(len({r.trial for r in chosen}), 'validation trial' if held else 'trial')}"
     if ran:
         share = [100 * _share(session, r) for r in ran if np.isfinite(_share(session, r))]
@@ -101,8 +97,8 @@ def rows(session: Session, residuals: RigResiduals) -> Sequence[Sequence[str | C
             r.trial,
             r.joint,
             "validation" if r.validate else "",
-            "diverged" if r.diverged else f"{r.position_rmse:.4g}" if np.isfinite(r.position_rmse) else "–",
-            "–" if r.diverged else number(100 * _share(session, r), 1),
+            f"{r.position_rmse:.4g}" if r.followed else "diverged" if r.diverged else "–",
+            number(100 * _share(session, r), 1) if r.followed else "–",
             f"{r.effort_rmse:.4g}" if np.isfinite(r.effort_rmse) else "–",
             str(r.samples),
         ]

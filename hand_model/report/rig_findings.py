@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..output import new_file
 from ..rig.findings import NOT_TAKEN, RigFindings
 from ..rig.model import load_rig
+from ..rig.words import told_on
 from ..session import Session
 from .page import Cell, Element, Section, listing, note, page, table
 from .rig_couplings import couplings_section
@@ -64,7 +65,7 @@ def rig_findings_page(session: Session, findings: RigFindings) -> bytes:
 
 def _tiles(findings: RigFindings) -> list[tuple[str, str]]:
     lack, tiles = findings.lack_of_fit, [(findings.verdict, "verdict")]
-    error = "held-out error" if findings.protocol["held_out"] else "error on what was fitted"
+    error = told_on("error", findings.protocol["held_out"])
     if lack.get("before"):
         tiles += [
             (f"{lack['after'] / lack['before']:.2f}", f"{error}, all effects over declared"),

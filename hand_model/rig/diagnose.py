@@ -34,7 +34,7 @@ from .standing import FITS, first_of, proved, solved
 from .swing.build import can_swing
 from .swing.diagnose import diagnose_swing
 from .transmission import angle_residual
-from .words import rejection, shares
+from .words import rejection, shares, told_on
 
 Array = NDArray[np.float64]
 PROBABILITY = (
@@ -131,9 +131,10 @@ def _silence(rig: RigModel, fit: DeclaredFit, found: Sequence[Finding]) -> tuple
     """Why no effort of the rig could be balanced, where none could."""
     if fit.rows or can_swing(rig):
         return ()
+    untold = rig.untold()
     if found:
-        return (f"efforts were not analysed: {rig.untold()}",) if rig.drives and rig.untold() else ()
-    return (f"nothing could be analysed: {rig.untold() or 'no joint moves long enough'}",)
+        return (f"efforts were not analysed: {untold}",) if rig.drives and untold else ()
+    return (f"nothing could be analysed: {untold or 'no joint moves long enough'}",)
 
 
 def _unproved(rig: RigModel) -> tuple[str, ...]:
@@ -307,8 +308,8 @@ def _off_axis(bench: Bench, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple[
     )
     words = (
         "Centres of mass lie off the axes on which they are declared: "
-        f"{'held-out effort error' if proofs[best]['held_out'] else 'effort error on what was fitted'} falls to "
-        f"{100 * ratio:.0f} % over all joints (most at {best}: "
+        f"{told_on('effort error', proofs[best]['held_out'])} falls to {100 * ratio:.0f} % over all joints (most at "
+        f"{best}: "
         f"{proofs[best]['before']:.4g} to {proofs[best]['after']:.4g})."
     )
     return freed, Finding(

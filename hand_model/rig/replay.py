@@ -48,6 +48,11 @@ class JointResidual:
     effort_samples: int = 0
     diverged: bool = False
 
+    @property
+    def followed(self) -> bool:
+        """Whether a simulation was run and stayed with its recording."""
+        return bool(np.isfinite(self.position_rmse)) and not self.diverged
+
 
 @dataclass(frozen=True)
 class RigResiduals:

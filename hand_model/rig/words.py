@@ -71,6 +71,11 @@ def shares(found: Sequence[Finding], declared: Mapping[str, Mapping[str, Any]]) 
     ]
 
 
+def told_on(metric: str, held_out: Sequence[str]) -> str:
+    """A metric with what it was measured on: recordings held out, or, where there are none, those that were fitted."""
+    return f"held-out {metric}" if held_out else f"{metric} on what was fitted"
+
+
 def statement(
     effect: str, variant: str, joint: str, parameters: Mapping[str, Mapping[str, Any]], proof: Mapping[str, Any]
 ) -> str:
@@ -82,6 +87,8 @@ def statement(
         if k not in DISCRETE
     }
     listed = ", ".join(f"{k.replace('_', ' ')}{': ' if k[-1].isdigit() else ' '}{v}" for k, v in figures.items())
-    metric = proof["metric"].replace("_", " ")
-    metric = f"held-out {metric}" if proof["held_out"] else f"{metric} on what was fitted"
-    return f"{joint}: {effect.replace('_', ' ')}{f' ({variant})' if variant else ''}: {listed}; {metric} falls from {proof['before']:.4g} to {proof['after']:.4g} {proof['unit']}."
+    metric = told_on(proof["metric"].replace("_", " "), proof["held_out"])
+    return (
+        f"{joint}: {effect.replace('_', ' ')}{f' ({variant})' if variant else ''}: {listed}; {metric} falls from "
+        f"{proof['before']:.4g} to {proof['after']:.4g} {proof['unit']}."
+    )

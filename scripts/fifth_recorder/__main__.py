@@ -1,23 +1,8 @@
 """Command line: python -m fifth_recorder OUT --seed S --single N --none N --outside N --pair N --weak N --messy N."""
 
-import argparse
-from pathlib import Path
+from make_set_command import main
 
 from fifth_recorder.compose import KINDS, make_set
 
-
-def main() -> None:
-    """Make one set."""
-    parser = argparse.ArgumentParser(
-        prog="fifth_recorder", description="Simulated recordings with something hidden in them."
-    )
-    parser.add_argument("out", type=Path)
-    parser.add_argument("--seed", type=int, default=0)
-    for kind in KINDS:
-        parser.add_argument(f"--{kind}", type=int, default=0, metavar="N")
-    args = parser.parse_args()
-    make_set(args.out, args.seed, {kind: getattr(args, kind) for kind in KINDS})
-
-
 if __name__ == "__main__":
-    main()
+    main("fifth_recorder", KINDS, make_set)

@@ -11,4 +11,3 @@ VOCABULARY: tuple[Effect, ...] = (
     + effects_slips.EFFECTS
 )
 OUTSIDE: tuple[Effect, ...] = outside.EFFECTS
-BY_NAME: dict[str, Effect] = {effect.name: effect for effect in VOCABULARY + OUTSIDE}

@@ -15,7 +15,7 @@ from .catalogue import OUTSIDE, VOCABULARY
 from .effect import Effect
 from .hand import FULL_ANGLES, draw_hand
 from .mocap import Room
-from .plan import Plan
+from .plan import NOISE, Plan
 from .session import record
 from .stepper import CompilerError
 
@@ -70,8 +70,7 @@ def _cases(counts: dict[str, int], rng: np.random.Generator) -> list[Case]:
 def _noise(kind: str, rng: np.random.Generator) -> dict[str, float]:
     """Noise of counts, raw current and markers (mm), spread round what was measured."""
     more = 1.5 if kind == "weak" else 1.0
-    measured = {"counts": 4.0, "current": 4.9, "marker_mm": 0.15}
-    return {name: more * value * float(np.exp(rng.uniform(-0.15, 0.2))) for name, value in measured.items()}
+    return {name: more * value * float(np.exp(rng.uniform(-0.15, 0.2))) for name, value in NOISE.items()}
 
 
 def _make(folder: Path, case: Case, rng: np.random.Generator) -> dict[str, object]:

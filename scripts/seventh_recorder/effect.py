@@ -7,6 +7,7 @@ import numpy as np
 
 from .plan import Plan
 
+JOINTS = ("proximal", "distal")
 Settings = dict[str, object]
 Law = Callable[[Plan, float, np.random.Generator], Settings]
 
@@ -35,6 +36,23 @@ def spread(rng: np.random.Generator, low: float, high: float) -> float:
 def either(rng: np.random.Generator) -> float:
     """A random sign."""
     return float(rng.choice([-1.0, 1.0]))
+
+
+def arrow(rng: np.random.Generator, strength: float, low: float, high: float, unit: float = 1.0) -> np.ndarray:
+    """A vector (3,) of any direction, its length drawn log-uniformly in that unit."""
+    vector = rng.normal(0, 1, 3)
+    return vector * (strength * (spread(rng, low, high) * unit) / np.linalg.norm(vector))
+
+
+def scaled(scalar: str, low: float, high: float, told: str | None = None, signed: bool = False) -> Law:
+    """The law that adds to one scalar of the drive; told: its name in the settings."""
+
+    def law(plan: Plan, strength: float, rng: np.random.Generator) -> Settings:
+        size = strength * (either(rng) if signed else 1.0) * spread(rng, low, high)
+        plan.add(scalar, size)
+        return {told or scalar: size}
+
+    return law
 
 
 def bump(centre: float, width: float) -> Callable[[np.ndarray], np.ndarray]:

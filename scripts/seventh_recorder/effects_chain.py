@@ -3,13 +3,12 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .effect import Effect, Law, Settings, spread
+from .effect import JOINTS, Effect, Law, Settings, spread
 from .kinematics import play
 from .plan import Plan
 from .stepper import Run
 
 Rng = np.random.Generator
-JOINTS = ("proximal", "distal")
 
 
 def _drive_play(give: float) -> Law:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .effect import Effect, Law, Settings, bump, either, spread
+from .effect import Effect, Law, Settings, bump, scaled, spread
 from .plan import Plan
 
 Rng = np.random.Generator
@@ -18,34 +18,10 @@ def _stribeck(power: float) -> Law:
     return law
 
 
-def _viscous_both(plan: Plan, s: float, rng: Rng) -> Settings:
-    size = s * either(rng) * spread(rng, 0.5, 0.95)
-    plan.add("b_asymmetry", size)
-    return {"b_asymmetry": size}
-
-
 def _viscous_back(plan: Plan, s: float, rng: Rng) -> Settings:
     size = s * spread(rng, 0.8, 2.2) * plan.scalar("b")
     plan.add("b_back", size)
     return {"b_back": size}
-
-
-def _coulomb_sides(plan: Plan, s: float, rng: Rng) -> Settings:
-    size = s * either(rng) * spread(rng, 0.12, 0.35)
-    plan.add("Fc_asymmetry", size)
-    return {"Fc_asymmetry": size}
-
-
-def _by_spring(plan: Plan, s: float, rng: Rng) -> Settings:
-    size = s * spread(rng, 0.5, 1.2)
-    plan.add("mu_load", size)
-    return {"mu_load": size}
-
-
-def _by_drive(plan: Plan, s: float, rng: Rng) -> Settings:
-    size = s * spread(rng, 0.25, 0.5)
-    plan.add("mu_drive", size)
-    return {"mu_drive": size}
 
 
 def _tight_bell(plan: Plan, s: float, rng: Rng) -> Settings:
@@ -58,18 +34,6 @@ def _tight_flat(plan: Plan, s: float, rng: Rng) -> Settings:
     size, centre, half = s * spread(rng, 8, 25), rng.uniform(25, 75), rng.uniform(7, 14)
     plan.add_friction(lambda q: size * 0.5 * (1 - np.tanh((np.abs(q - centre) - half) / 1.5)))
     return {"raw": size, "centre": centre, "half_width": half}
-
-
-def _quadratic(plan: Plan, s: float, rng: Rng) -> Settings:
-    size = s * spread(rng, 0.0025, 0.006)
-    plan.add("quadratic", size)
-    return {"quadratic": size}
-
-
-def _cubic(plan: Plan, s: float, rng: Rng) -> Settings:
-    size = s * spread(rng, 1.5e-5, 4e-5)
-    plan.add("cubic", size)
-    return {"cubic": size}
 
 
 def _hysteresis_exponential(plan: Plan, s: float, rng: Rng) -> Settings:
@@ -114,6 +78,12 @@ def _warms_each_time(plan: Plan, s: float, rng: Rng) -> Settings:
     return {"warm": size, "tau": tau, "cools_between": True}
 
 
+_viscous_both = scaled("b_asymmetry", 0.5, 0.95, signed=True)
+_coulomb_sides = scaled("Fc_asymmetry", 0.12, 0.35, signed=True)
+_by_spring = scaled("mu_load", 0.5, 1.2)
+_by_drive = scaled("mu_drive", 0.25, 0.5)
+_quadratic = scaled("quadratic", 0.0025, 0.006)
+_cubic = scaled("cubic", 1.5e-5, 4e-5)
 EFFECTS = (
     Effect("stribeck_friction", "current", None, (_stribeck(2.0), _stribeck(1.0))),
     Effect("asymmetric_viscous_friction", "current", None, (_viscous_both, _viscous_back)),

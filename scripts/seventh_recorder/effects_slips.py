@@ -3,11 +3,10 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .effect import Effect, Law, Settings, spread
+from .effect import JOINTS, Effect, Law, Settings, arrow, spread
 from .plan import Plan
 
 Rng = np.random.Generator
-JOINTS = ("proximal", "distal")
 
 
 def _after(times: np.ndarray, part: float, over: float) -> np.ndarray:
@@ -18,8 +17,7 @@ def _after(times: np.ndarray, part: float, over: float) -> np.ndarray:
 def _one_marker(frame: str, over: float) -> Law:
     def law(plan: Plan, s: float, rng: Rng) -> Settings:
         marker, part = int(rng.integers(6)), rng.uniform(0.25, 0.7)
-        vector = rng.normal(0, 1, 3)
-        vector *= s * spread(rng, 0.7, 2.0) / np.linalg.norm(vector)
+        vector = arrow(rng, s, 0.7, 2.0)
 
         def step(points: np.ndarray, times: np.ndarray, _: np.ndarray) -> np.ndarray:
             moved, first = points.copy(), 3 * (marker // 3)
@@ -48,8 +46,7 @@ def _triad(points: np.ndarray) -> np.ndarray:
 
 def _support(about: str) -> Law:
     def law(plan: Plan, s: float, rng: Rng) -> Settings:
-        segment, part, vector = int(rng.integers(2)), rng.uniform(0.25, 0.7), rng.normal(0, 1, 3)
-        vector *= s * np.deg2rad(spread(rng, 1.5, 5.0)) / np.linalg.norm(vector)
+        segment, part, vector = int(rng.integers(2)), rng.uniform(0.25, 0.7), arrow(rng, s, 1.5, 5.0, np.pi / 180)
 
         def step(points: np.ndarray, times: np.ndarray, _: np.ndarray) -> np.ndarray:
             own = slice(3 * segment, 3 * segment + 3)
@@ -72,8 +69,7 @@ def _support(about: str) -> Law:
 
 def _palm_marker(over: float) -> Law:
     def law(plan: Plan, s: float, rng: Rng) -> Settings:
-        marker, part, vector = int(rng.integers(3)), rng.uniform(0.25, 0.7), rng.normal(0, 1, 3)
-        vector *= s * spread(rng, 0.6, 1.8) / np.linalg.norm(vector)
+        marker, part, vector = int(rng.integers(3)), rng.uniform(0.25, 0.7), arrow(rng, s, 0.6, 1.8)
 
         def step(points: np.ndarray, times: np.ndarray, _: np.ndarray) -> np.ndarray:
             moved = points.copy()

@@ -3,8 +3,7 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-
-from .published import AXES, CENTRES
+from published_hand import AXES, CENTRES
 
 FULL_ANGLES = {"index": (1.35, 1.2), "middle": (1.4, 1.25), "ring": (1.38, 1.22), "little": (1.3, 1.15)}
 RANGES = {"index": (12100, 17900), "middle": (12050, 18050), "ring": (12200, 17800), "little": (12150, 17600)}

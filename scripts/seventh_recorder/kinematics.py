@@ -15,19 +15,22 @@ def play(x: np.ndarray, width: float, give: float = 0.0) -> np.ndarray:
     return out if give <= 0 else out + (x - out) * np.tanh(np.abs(x - out) / give) * 0.3
 
 
+def curve(first: float, second: float, x: np.ndarray) -> np.ndarray:
+    """A joint's share of its full angle at the share x of what drives it: a cubic through both ends."""
+    return first * x + second * x**2 + (1 - first - second) * x**3
+
+
 def angles(plan: Plan, run: Run) -> tuple[np.ndarray, np.ndarray]:
     """Proximal and distal angle in rad at every instant of a run."""
     finger, position = plan.finger, run.finger.copy()
     for step in plan.finger_steps:
         position = step(position, run)
     a, b, c, d = finger.coef
-    x = position / 100
-    proximal = finger.angle_full[0] * (a * x + b * x**2 + (1 - a - b) * x**3)
+    proximal = finger.angle_full[0] * curve(a, b, position / 100)
     driving = proximal.copy()
     for step in plan.proximal_steps:
         driving = step(driving, run)
-    r = driving / finger.angle_full[0]
-    distal = finger.angle_full[1] * (c * r + d * r**2 + (1 - c - d) * r**3)
+    distal = finger.angle_full[1] * curve(c, d, driving / finger.angle_full[0])
     for step in plan.distal_steps:
         distal = step(distal, run)
     return proximal, distal

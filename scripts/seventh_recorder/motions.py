@@ -20,6 +20,9 @@ class Pace:
     full_speed: float
 
 
+PACE = Pace(1.2, 0.35, 900.0, FULL_SPEED)
+
+
 @dataclass(frozen=True)
 class Move:
     """One move to a target in % at a fraction of the full speed."""

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.signal import lfilter
 
-from .effect import Effect, Settings, either, spread
+from .effect import Effect, Settings, arrow, either, scaled, spread
 from .plan import LogTable, Plan
 
 Rng = np.random.Generator
@@ -27,26 +27,13 @@ def _restamped(plan: Plan, s: float, rng: Rng) -> Settings:
     return {"batch": batch}
 
 
-def _acceleration_friction(plan: Plan, s: float, rng: Rng) -> Settings:
-    size = s * spread(rng, 0.015, 0.04)
-    plan.add("accel_friction", size)
-    return {"raw_per_acceleration": size}
-
-
-def _ageing(plan: Plan, s: float, rng: Rng) -> Settings:
-    size = s * spread(rng, 10, 24)
-    plan.add("ageing", size)
-    return {"raw_per_log_dwell": size}
-
-
 def _random_load(plan: Plan, s: float, rng: Rng) -> Settings:
     plan.random_load = s * spread(rng, 5, 12)
     return {"raw": plan.random_load}
 
 
 def _soft_tissue(plan: Plan, s: float, rng: Rng) -> Settings:
-    first, vector = 3 * int(rng.integers(2)), rng.normal(0, 1, 3)
-    vector *= s * spread(rng, 0.8, 2.4) / np.linalg.norm(vector)
+    first, vector = 3 * int(rng.integers(2)), arrow(rng, s, 0.8, 2.4)
 
     def step(points: np.ndarray, _: np.ndarray, speed: np.ndarray) -> np.ndarray:
         moved = points.copy()
@@ -58,8 +45,7 @@ def _soft_tissue(plan: Plan, s: float, rng: Rng) -> Settings:
 
 
 def _ringing_support(plan: Plan, s: float, rng: Rng) -> Settings:
-    first, hertz, vector = 3 * int(rng.integers(2)), rng.uniform(3, 9), rng.normal(0, 1, 3)
-    vector *= s * spread(rng, 0.6, 1.6) / np.linalg.norm(vector)
+    first, hertz, vector = 3 * int(rng.integers(2)), rng.uniform(3, 9), arrow(rng, s, 0.6, 1.6)
 
     def step(points: np.ndarray, _: np.ndarray, speed: np.ndarray) -> np.ndarray:
         turn, damping = 2 * np.pi * hertz / 100, 0.06
@@ -144,6 +130,8 @@ def _mocap_scale(plan: Plan, s: float, rng: Rng) -> Settings:
     return {"scale_change": size}
 
 
+_acceleration_friction = scaled("accel_friction", 0.015, 0.04, "raw_per_acceleration")
+_ageing = scaled("ageing", 10, 24, "raw_per_log_dwell")
 EFFECTS = (
     Effect("outside_current_gain_by_trial", "current", None, (_gain_by_trial,), False),
     Effect("outside_restamped_log", "log", None, (_restamped,), False),

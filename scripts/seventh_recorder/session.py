@@ -10,7 +10,7 @@ from .kinematics import markers_in_palm
 from .log_channel import write_log
 from .manifest import manifest
 from .mocap import RATE, Room, write_c3d
-from .motions import FLEXION_SPEEDS, FULL_SPEED, Pace, Programme, excitation_moves, flexion_moves, programme
+from .motions import FLEXION_SPEEDS, PACE, Pace, Programme, excitation_moves, flexion_moves, programme
 from .plan import Plan
 from .stepper import STEP_S, Run, run_drive
 
@@ -93,7 +93,7 @@ def record(folder: Path, hand: Hand, plans: list[Plan], room: Room, short: bool,
     """Write one session folder."""
     (folder / "log").mkdir(parents=True)
     (folder / "mocap").mkdir()
-    pace = Pace(1.2, 0.35, 900.0 * rng.normal(1, 0.02), FULL_SPEED * rng.normal(1, 0.02))
+    pace = Pace(PACE.rest, PACE.pause, *(x * rng.normal(1, 0.02) for x in (PACE.acceleration, PACE.full_speed)))
     entries = _probe_trials(folder, hand, room, rng)
     for plan in plans:
         name, base = plan.finger.name, 1000.0 + rng.normal(0, 1.5)

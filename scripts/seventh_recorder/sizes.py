@@ -4,21 +4,20 @@ cd scripts; python -m seventh_recorder.sizes [draws]
 """
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 
 from .catalogue import OUTSIDE, VOCABULARY
 from .effect import Effect
 from .hand import Finger, draw_hand
-from .kinematics import markers_in_palm
+from .kinematics import curve, markers_in_palm
 from .log_channel import clean_log
-from .motions import Pace
-from .plan import Plan
+from .motions import PACE
+from .plan import NOISE, Plan
 from .session import drive_trial, finger_trials
 from .stepper import Run
 
-NOISE = {"counts": 4.0, "current": 4.9, "marker_mm": 0.15}
-PACE = Pace(1.2, 0.35, 900.0, 115.0)
 CENTRE_STEP, AXIS_STEP = 0.01, 1e-5
 
 
@@ -49,21 +48,17 @@ def _declared(finger: Finger, position: np.ndarray, change: np.ndarray) -> np.nd
     """Markers of the declared model; change: 4 axis tilts, 4 centre moves, 4 + 5 polynomial terms, 18 marker moves."""
     a, b, c, d = finger.coef
     x = position / 100
-    first = finger.angle_full[0] * (a * x + b * x**2 + (1 - a - b) * x**3) + np.polyval(change[8:12], x)
+    first = finger.angle_full[0] * curve(a, b, x) + np.polyval(change[8:12], x)
     r = first / finger.angle_full[0]
-    second = finger.angle_full[1] * (c * r + d * r**2 + (1 - c - d) * r**3) + np.polyval(change[12:17], x)
+    second = finger.angle_full[1] * curve(c, d, r) + np.polyval(change[12:17], x)
     axes, centres = finger.axes.copy(), finger.centres.copy()
     axes[:, [0, 2]] += change[:4].reshape(2, 2)
     centres[:, [0, 2]] += change[4:8].reshape(2, 2)
-    shifted = Finger(
-        finger.name,
-        axes / np.linalg.norm(axes, axis=1, keepdims=True),
-        centres,
-        finger.angle_full,
-        finger.coef,
-        finger.markers + change[17:].reshape(2, 3, 3),
-        finger.counts,
-        finger.motor,
+    shifted = replace(
+        finger,
+        axes=axes / np.linalg.norm(axes, axis=1, keepdims=True),
+        centres=centres,
+        markers=finger.markers + change[17:].reshape(2, 3, 3),
     )
     plan = Plan(shifted, NOISE, np.array([0.0, 0.0, 1.0]))
     blank = Run(np.arange(len(position)) * 1e-3, position, position * 0, position * 0, position * 0, position)
@@ -72,17 +67,7 @@ def _declared(finger: Finger, position: np.ndarray, change: np.ndarray) -> np.nd
 
 def _posed(plan: Plan, run: Run, first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Markers with both angles given."""
-    finger = plan.finger
-    unit = Finger(
-        finger.name,
-        finger.axes,
-        finger.centres,
-        (1.0, 1.0),
-        np.array([1.0, 0.0, 1.0, 0.0]),
-        finger.markers,
-        finger.counts,
-        finger.motor,
-    )
+    unit = replace(plan.finger, angle_full=(1.0, 1.0), coef=np.array([1.0, 0.0, 1.0, 0.0]))
     posed = Plan(unit, NOISE, plan.up_palm)
     posed.finger_steps.append(lambda _p, _r: 100 * first)
     posed.distal_steps.append(lambda _a, _r: second)

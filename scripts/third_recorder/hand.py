@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from published_hand import AXES, CENTRES
 
 from .controllers import draw_motor
 from .geometry import Array, log_uniform, rotation, unit
@@ -12,7 +13,6 @@ from .hidden import FingerFaults, SessionFaults
 from .kinematics import Linkage
 from .laboratory import Laboratory, draw_laboratory
 from .motor import Motor
-from .published import AXES, CENTRES
 
 SEGMENTS = ("proximal", "distal")
 FINGERS = ["index", "middle", "ring", "little", "thumb_0", "thumb_1"]

@@ -48,10 +48,10 @@ def while_returning(states: Sequence[DriveState], lag_s: float) -> tuple[DriveSt
     """A drive's states where its finger comes open later than it: some of the spring may be off it while the finger is
     behind, and whatever share that is, is no property of the drive's friction. As they are where their current shows no
     such share."""
-    loose = tuple(_loosened(s, lag_s) for s in states)
-    kept, let = Balance(tuple(states)), Balance(loose)
-    (fit, other), price = (kept.fit(), let.fit()), 0.5 * parameter_price(kept) / kept.inflation
-    return loose if gain(kept, other, fit, scale_of(let, other)) > price else tuple(states)
+    held, loose = tuple(states), tuple(_loosened(s, lag_s) for s in states)
+    balance, loosened = Balance(held), Balance(loose)
+    fit, price = loosened.fit(), 0.5 * parameter_price(balance) / balance.inflation
+    return loose if gain(balance, fit, balance.fit(), scale_of(loosened, fit)) > price else held
 
 
 def _loosened(state: DriveState, lag_s: float) -> DriveState:

@@ -27,10 +27,10 @@ NOT_FOR_RIGS = frozenset(
         "command_delay",
         "current_channel_delay",
         "elastoplastic_hysteresis",
+        "load_dependent_friction",
     }
 )
 SMOOTH = ("nonlinear_spring",)  # its knee belongs to fingers with a return spring; a joint has stops and detents
-LEAST_WARMING_S = 10.0  # a drive that warms up takes 5 s or more, and what is shorter than that twice over shows a line
 LONGEST_DELAY_S = 0.03
 # Samples. A drive that holds its torque from one control step to the next acts half a step late: less than a sample of
 # a log.
@@ -118,12 +118,7 @@ def candidates(rig: RigModel, fit: DeclaredFit, joint: str, every: bool = False)
         return ()
     states = {r.trial: drive_state(rig, r, fit.theta) for r in fit.rows if r.joint == joint}
     train = tuple(states[r.trial] for r in rows)
-    long = max(float(s.elapsed_s[-1]) for s in train) >= LEAST_WARMING_S
-    found = [
-        _from_catalogue(e, joint, train, states)
-        for e in catalogue("drive")
-        if _usable(e) and (long or e.name != "thermal_friction_drift")
-    ]
+    found = [_from_catalogue(e, joint, train, states) for e in catalogue("drive") if _usable(e)]
     bends = [c for c in found if c.effect in SMOOTH]
     if every:
         found += [_with_line(c) for c in bends]
@@ -144,7 +139,7 @@ def _from_catalogue(
         found.name,
         "",
         joint,
-        tuple((name, "1" if name == "per_load" else unit, *ends) for name, unit, *ends in found.amplitudes()),
+        tuple(found.amplitudes()),
         ({},) if found.name in SMOOTH else tuple(found.grid(train)),
         lambda row, shape: np.asarray(found.columns(states[row.trial], shape), float),
         bool(found.warps),
@@ -271,6 +266,7 @@ def _by_load(fit: DeclaredFit, joint: str, rows: list[Rows], driven: bool) -> li
         )
 
     found = [
+        friction("", "per_load", load),
         at_low_speed(LOW, load),
         more(MORE, load),
         Candidate(
