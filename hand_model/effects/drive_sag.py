@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, figure
-from .law import Law
+from .law import Law, Moment
+from .path import lowpass
 
 ASKED = 100.0  # [raw]
+LATE = 2.0  # form
+LAG_S = 0.03, 5.0
 LEAST_RISE = 0.1  # effort delivered per further current, however much is asked for already
 ROUNDS = 12
 
@@ -18,7 +22,8 @@ ROUNDS = 12
 class DriveSag(Effect):
     """Of a drive that follows its command in speed: steady speed = commanded speed (1 - sag * load), the load being the
     current in the direction of motion. Of one whose current is what its controller asks for: effort = current (1 -
-    share lost), which grows with the current (form 0) or its square.
+    share lost), which grows with the current (form 0), with its square (form 1), or, where a supply gives way by and by,
+    with what was asked for over the last `lag` (form 2: first order).
     """
 
     name = "drive_sag"
@@ -29,12 +34,17 @@ class DriveSag(Effect):
         return (("torque_loss", "1", 0.0, np.inf),)
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """form 0: the share that is lost grows with the current; form 1: with its square."""
-        return (Shape("form", "1", 0.0, 1.0, (0.0, 1.0)),)
+        """form 0: the share that is lost grows with the current; 1: with its square; 2: with its low pass."""
+        return (
+            Shape("form", "1", 0.0, LATE, (0.0, 1.0, LATE)),
+            Shape("lag", "s", *LAG_S, (0.1, 0.3, 1.0), forms=(LATE,)),
+        )
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
         """The effort that gets lost, (n, 1); what is asked for is "required" in `extra`."""
         asked = state.extra["required"]
+        if shape["form"] == LATE:
+            return (asked * lowpass(state.time_s, np.abs(asked), shape["lag"]) / ASKED)[:, None]
         return (asked * (np.abs(asked) / ASKED) ** (1 + shape["form"]))[:, None]
 
     def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
@@ -51,7 +61,8 @@ class DriveSag(Effect):
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """Speed, or effort, lost per load."""
         if "torque_loss" in parameters:
-            square = " (with its square)" if parameters.get("form") else ""
+            late = f" (by and by, within {figure(parameters.get('lag', 0.0))} s)"
+            square = {0: "", 1: " (with its square)", LATE: late}[parameters.get("form", 0)]
             return (
                 f"the motor delivers less per current as it is loaded{square}: "
                 f"{figure(100 * parameters['torque_loss'])} % are lost at 100 raw"
@@ -65,17 +76,46 @@ class DriveSag(Effect):
         """What is lost of the effort; a loss of speed is no force: the command must be slowed by whoever gives it."""
         if "torque_loss" not in parameters:
             return None
-        return lambda now: now.load * _lost(abs(now.load), parameters)
+        return _late(parameters) if _is_late(parameters) else lambda now: now.load * _lost(abs(now.load), parameters)
 
     def reading(self, effort: Array, time_s: Array, parameters: Mapping[str, float]) -> Array:
         """The current that is asked for where this effort is needed."""
         if "torque_loss" not in parameters:
             return effort
+        if _is_late(parameters):
+            return _asked_late(effort, time_s, parameters)
         asked = np.abs(effort)
         for _ in range(ROUNDS):  # Newton on a concave rise: from the left, and never beyond
             lost = asked * _lost(asked, parameters)
             asked = asked + (np.abs(effort) - asked + lost) / _rise(asked, parameters)
         return np.sign(effort) * asked
+
+
+def _is_late(parameters: Mapping[str, float]) -> bool:
+    return parameters.get("form") == LATE
+
+
+def _late(parameters: Mapping[str, float]) -> Law:
+    """What is lost step by step where the supply gives way by and by."""
+    last: list[float] = []  # low pass of what is asked for
+
+    def lost(now: Moment) -> float:
+        if not last:
+            last[:] = [abs(now.load)]
+        last[0] = abs(now.load) + (last[0] - abs(now.load)) * math.exp(-now.step_s / parameters["lag"])
+        return now.load * min(parameters["torque_loss"] * last[0] / ASKED, 1 - LEAST_RISE)
+
+    return lost
+
+
+def _asked_late(effort: Array, time_s: Array, parameters: Mapping[str, float]) -> Array:
+    """The current (n,) asked for where this effort is needed and the supply gives way by and by: the share lost is that
+    of the low pass, which is found from what is asked for in turn."""
+    asked = effort
+    for _ in range(ROUNDS):
+        share = parameters["torque_loss"] * lowpass(time_s, np.abs(asked), parameters["lag"]) / ASKED
+        asked = effort / (1 - np.minimum(share, 1 - LEAST_RISE))
+    return asked
 
 
 def _bend(parameters: Mapping[str, float]) -> float:
