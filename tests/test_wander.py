@@ -217,6 +217,27 @@ def test_a_current_that_the_way_to_the_target_tells_is_asked_for_and_not_measure
     assert not is_measured(tuple(asked(s) for s in states))
 
 
+def test_a_current_that_speed_alone_tells_is_a_command_and_one_that_rubs_is_none():
+    def told(state, coulomb):
+        noise = np.random.default_rng(4).normal(0, 4.0, len(state.velocity))
+        current = (1.3 * state.velocity / 8).round() * 8 + coulomb * state.direction + noise
+        return replace(state, effort=np.where(np.isfinite(state.effort), current, np.nan))
+
+    states = drive(12)
+    speed = float(np.std(np.concatenate([s.velocity for s in states])))
+    assert not is_measured(tuple(told(s, 0.0) for s in states))
+    assert is_measured(tuple(told(s, 0.3 * speed) for s in states))
+
+
+def test_a_reading_that_is_mostly_clipped_is_still_one():
+    """What stands at its end has no noise; what lies below it has."""
+    states = drive(12)
+    effort = np.concatenate([s.effort[np.isfinite(s.effort)] for s in states])
+    low, high = np.quantile(effort, [0.3, 0.65])
+    clipped = tuple(replace(s, effort=np.clip(s.effort, low, high)) for s in states)
+    assert is_measured(clipped)
+
+
 def test_a_ripple_is_not_read_from_starts_and_stops():
     state = drive(5)[0]
     steady = (np.arange(len(state.time_s)) % 7 > 2).astype(float)

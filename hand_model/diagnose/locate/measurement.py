@@ -22,14 +22,17 @@ PLACES, SPEEDS = 20, 8  # bins of position and of speed, each way
 # of neighbours alike, at most, where a reading that stands still means anything; of such runs by chance; of the largest
 # reading, from which it may have reached its end
 OFTEN, BY_CHANCE, AT_END = 0.5, 1e-4, 0.9
+ALONE, RUBS = 0.2, 0.1  # of a current's standard deviation: left by speed alone, and what friction it has at most
+CLIPPED = 0.05  # of a current's range: what is nearer to its ends may be clipped
 COMMANDED = 0.67  # of what state leaves of a current: less left by the way to the target, and it is asked for
 
 
 def is_measured(states: tuple[DriveState, ...]) -> bool:
     """False where the current channel is dead or stays the same all along a stroke (the load of a spring or a polynomial
     of position does not, nor does noise), where the motion explains nothing of it (friction alone turns over with every
-    reversal), where the way to the target tells it better than where and how fast the drive moves, or where it is so
-    free of noise beside a motion that it does not explain that it can only be a command."""
+    reversal), where speed alone tells it and nothing rubs, where the way to the target tells it better than where and
+    how fast the drive moves, or where it is so free of noise beside a motion that it does not explain that it can only
+    be a command."""
     current = np.concatenate([s.effort[np.isfinite(s.effort)] for s in states])
     if len(current) < 50:
         return True
@@ -37,9 +40,24 @@ def is_measured(states: tuple[DriveState, ...]) -> bool:
     if len(np.unique(current)) <= 3 or spread == 0 or _level(states) or _asked_for(states):
         return False
     declared = np.concatenate([s.declared[np.isfinite(s.effort)] for s in states])
-    left = float(np.std(current - declared @ coefficients(declared, current)))
-    jitter = float(np.median(np.abs(np.diff(current, 2)))) / 0.6745 / np.sqrt(6)
-    return left < UNMOVED * spread and not (jitter < 0.03 * spread and left > 10 * max(jitter, 0.02 * spread))
+    rest = current - declared @ coefficients(declared, current)
+    if float(np.std(rest)) >= UNMOVED * spread or _of_speed(declared, current):
+        return False
+    span = np.ptp(current)  # a clipped reading has no noise at its ends
+    free = (current < np.max(current) - CLIPPED * span) & (current > np.min(current) + CLIPPED * span)
+    free = free if np.sum(free) >= 50 else np.ones(len(current), bool)
+    left = float(np.std(rest[free]))
+    jitter = float(np.median(np.abs(np.diff(current, 2)[free[1:-1]]))) / 0.6745 / np.sqrt(6)
+    return not (jitter < 0.03 * spread and left > 10 * max(jitter, 0.02 * spread))
+
+
+def _of_speed(declared: Array, current: Array) -> bool:
+    """Whether a current (n,) is in proportion to speed and has next to none of a friction that turns over: no motor's is
+    (declared: columns, viscous and Coulomb friction second and third)."""
+    speed = declared[:, 1:2]
+    rubs = coefficients(declared, current)[2]
+    alone = current - speed @ coefficients(speed, current)
+    return float(np.std(alone)) < ALONE * np.std(current) and abs(rubs) < RUBS * np.std(current)
 
 
 def frozen(current: Array, moving: NDArray[np.bool_]) -> NDArray[np.bool_]:
