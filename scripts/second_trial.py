@@ -1,8 +1,8 @@
-"""A blind trial on sessions of a second recorder, a third, a fourth, a fifth, a sixth or a seventh, that share no code
-with each other, the twin or the diagnosis (`second_recorder/`, `third_recorder/`, `fourth_recorder/`, `fifth_recorder/`,
-`sixth_recorder/`, `seventh_recorder/`).
+"""A blind trial on sessions of a second recorder, a third, a fourth, a fifth, a sixth, a seventh or an eighth, that share
+no code with each other, the twin or the diagnosis (`second_recorder/`, `third_recorder/`, `fourth_recorder/`,
+`fifth_recorder/`, `sixth_recorder/`, `seventh_recorder/`, `eighth_recorder/`).
 
-    python scripts/second_trial.py FOLDER [--recorder {second,third,fourth,fifth,sixth,seventh}] [--seed 1] [--single 36]
+    python scripts/second_trial.py FOLDER [--recorder {second,third,fourth,fifth,sixth,seventh,eighth}] [--seed 1] [--single 36]
     [--none 4] [--pair 10] [--weak 10] [--messy 10] [--outside 10] [--anywhere]
 
 FOLDER must be new. It gets sessions, answers.json (its SHA-256 is printed before any diagnosis starts), findings; the
@@ -20,6 +20,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from eighth_recorder.compose import make_set as make_eighth
+from eighth_recorder.simulate import CompilerError as EighthCompilerError
 from fifth_recorder.compose import make_set as make_fifth
 from fifth_recorder.stepper import CompilerError as FifthCompilerError
 from fourth_recorder.compose import make_set as make_fourth
@@ -68,8 +70,22 @@ READINGS: dict[str, Callable[[dict[str, Any], dict[str, float]], dict[str, float
     "drive_backlash": lambda s, m: {"segment_gap": float(np.rad2deg(2 * s["drive_play"]))},
 }  # fmt: skip
 # recorders written after the second, and what each raises without a C compiler
-MAKERS = {"third": make_third, "fourth": make_fourth, "fifth": make_fifth, "sixth": make_sixth, "seventh": make_seventh}
-COMPILER_ERRORS = ThirdCompilerError, FourthCompilerError, FifthCompilerError, SixthCompilerError, SeventhCompilerError
+MAKERS = {
+    "third": make_third,
+    "fourth": make_fourth,
+    "fifth": make_fifth,
+    "sixth": make_sixth,
+    "seventh": make_seventh,
+    "eighth": make_eighth,
+}
+COMPILER_ERRORS = (
+    ThirdCompilerError,
+    FourthCompilerError,
+    FifthCompilerError,
+    SixthCompilerError,
+    SeventhCompilerError,
+    EighthCompilerError,
+)
 COUNTS = {"single": 36, "none": 4, "pair": 10, "weak": 10, "messy": 10, "outside": 10}
 
 

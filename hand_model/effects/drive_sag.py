@@ -53,10 +53,11 @@ class DriveSag(Effect):
 
     def possible(self, states: tuple[DriveState, ...], parameters: Mapping[str, float]) -> bool:
         """Whether the drive still had more to give where most was asked of it: no controller holds a speed beyond. What
-        was asked goes without the readings' noise where it is known."""
+        was asked goes without the readings' noise where it is known. A supply that gives way by and by bears any peak
+        that is short enough."""
         asked = [np.abs(s.extra.get("required", s.effort)[np.isfinite(s.effort)]) for s in states]
         most = max((float(np.nanquantile(a, 0.99)) for a in asked if len(a)), default=0.0)
-        return bool(_rise(most, parameters) > LEAST_RISE)
+        return bool(_is_late(parameters) or _rise(most, parameters) > LEAST_RISE)
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """Speed, or effort, lost per load."""

@@ -34,6 +34,7 @@ SHARES = (0.1, 0.25, 0.5)  # of a current's rise, by which a late one is told fr
 SLOWER = 3.0  # times as slow as another drive's, at most, is the rise of a healthy one
 BIN_S, RISEN_S = 0.005, 0.35  # in which samples after all changes are averaged, and after which the rise is over
 SHIFTED = 0.5  # of what a drive's answers are late, at least, is a shift of its rise and no slowness
+VARIOUS, AS_FAST = 1.5, 1.5  # times another drive's scatter of answers and length of rise
 RISEN_T = 6.0  # standard errors by which a current must have risen before the changes come
 EARLY_S = 0.2  # by which a current's time stamps may run ahead
 
@@ -43,13 +44,15 @@ class Answers:
     """current_s, motion_s: (e,) from each change of the setpoint to its answer. step_s: sample interval. rise_s: (s,)
     time from the changes until the current, mean over them all, has risen to SHARES (s) of its most; nan where
     that is not told. lead_s: (s,) the same counted from before the changes, where it has risen for sure before they
-    come; else nan."""
+    come; else nan. own_s: (s,) time from where the current answers each of them, so that answers that are variously late
+    do not smear it."""
 
     current_s: Array
     motion_s: Array
     step_s: float
     rise_s: Array = field(default_factory=lambda: np.full(len(SHARES), np.nan))
     lead_s: Array = field(default_factory=lambda: np.full(len(SHARES), np.nan))
+    own_s: Array = field(default_factory=lambda: np.full(len(SHARES), np.nan))
 
 
 @dataclass(frozen=True)
@@ -68,7 +71,8 @@ def answers_of(states: Sequence[DriveState], currents: Sequence[Array]) -> Answe
     motion = [x for s in states for x in _answered(s, s.position)]
     step = sample_interval(states)
     rises = _rise(states, currents, step)
-    return Answers(_usual(np.array(current), step), _usual(np.array(motion), step), step, *rises)
+    own = _rise_from_answers(states, currents)
+    return Answers(_usual(np.array(current), step), _usual(np.array(motion), step), step, *rises, own)
 
 
 def lateness(answers: Mapping[str, Answers], in_time: Collection[str] = ()) -> dict[str, Lateness]:
@@ -95,6 +99,7 @@ def lateness(answers: Mapping[str, Answers], in_time: Collection[str] = ()) -> d
         )
         shift = _onset(x.rise_s) if alone else _shift(x.rise_s, [y.rise_s for a, y in told.items() if a != actuator])
         slow = total > 0 and shift <= SHIFTED * total and not _moves_first(x, total - behind)
+        slow = slow and not _variously_late(x, [y for a, y in told.items() if a != actuator])
         known = actuator in in_time
         drive = known or not slow and (plain or (not alone and _both_late(x, total, behind)))
         if known:
@@ -127,6 +132,18 @@ def _moves_first(x: Answers, apart_s: float) -> bool:
     if len(x.motion_s) < LEAST_ANSWERS:
         return False
     return bool(min(float(np.mean(x.current_s) - np.mean(x.motion_s)), apart_s) > UNLIKE * x.step_s)
+
+
+def _variously_late(x: Answers, others: Sequence[Answers]) -> bool:
+    """Whether a drive answers some changes later than others and then as fast as another drive does: a rise that is only
+    slow is so after its answers, too."""
+    told = [y for y in others if np.isfinite(x.own_s + y.own_s).all()]
+    scatter = float(np.std(x.current_s))
+    return any(
+        scatter > VARIOUS * max(float(np.std(y.current_s)), x.step_s)
+        and np.ptp(x.own_s) < AS_FAST * max(float(np.ptp(y.own_s)), x.step_s)
+        for y in told
+    )
 
 
 def _shift(rise_s: Array, others: Sequence[Array]) -> float:
@@ -189,6 +206,26 @@ def _rise(states: Sequence[DriveState], currents: Sequence[Array], step_s: float
     return own, _reached(middle, mean, count) if _risen_before(since, risen, step_s) else unknown
 
 
+def _rise_from_answers(states: Sequence[DriveState], currents: Sequence[Array]) -> Array:
+    """Times (len(SHARES),) [s] at which a drive's current has risen to SHARES of its most, counted from its answer to
+    each change of the setpoint before which it stood, mean over all; nan where too few are seen."""
+    since, risen = [np.zeros(0)], [np.zeros(0)]
+    for state, current in zip(states, currents, strict=True):
+        setpoint, t = state.extra.get("setpoint", np.zeros(len(state.time_s))), state.time_s
+        for k in np.flatnonzero(np.diff(setpoint)) + 1:
+            before, answer = (t > t[k] - EARLY_S) & (t < t[k]), _latency(t, setpoint, current, k)
+            if answer is not None and before.sum() >= 5 and np.ptp(state.position[before]) < STOOD:
+                after = (t > t[k]) & (t < t[k] + answer + RISEN_S)
+                since.append(t[after] - t[k] - answer)
+                risen.append(np.sign(setpoint[k] - setpoint[k - 1]) * (current[after] - np.median(current[before])))
+    cells, at, count = np.unique(
+        np.floor(np.concatenate(since) / BIN_S).astype(int), return_inverse=True, return_counts=True
+    )
+    if len(since) <= LEAST_ANSWERS or len(cells) < 2:
+        return np.full(len(SHARES), np.nan)
+    return _reached(BIN_S * (cells + 0.5), np.bincount(at, np.concatenate(risen)) / count, count)
+
+
 def _risen_before(since: Sequence[Array], risen: Sequence[Array], step_s: float) -> bool:
     """Whether what a current has risen by in the last sample before the changes is more than chance, and than a course
     that it was on."""
@@ -249,15 +286,17 @@ def latencies(time_s: Array, setpoint: Array, channel: Array, early_s: float = 0
     early_s: by how much a channel may answer before it is told; it does where that much before the change it stood, and
     no longer does at the change.
     """
-    out = []
-    for k in np.flatnonzero(np.diff(setpoint)) + 1:
-        way, ahead = np.sign(setpoint[k] - setpoint[k - 1]), int(np.searchsorted(time_s, time_s[k] - early_s))
-        hit, away = _departure(time_s, way * channel, ahead, k + 60) if ahead < k else (None, None)
-        if hit is None or hit >= k - 1 or not away[hit - ahead : k - ahead].all():
-            hit, _ = _departure(time_s, way * channel, k, k + 60)
-        if hit is not None:
-            out.append(float(time_s[hit] - time_s[k]))
-    return out
+    found = (_latency(time_s, setpoint, channel, k, early_s) for k in np.flatnonzero(np.diff(setpoint)) + 1)
+    return [x for x in found if x is not None]
+
+
+def _latency(time_s: Array, setpoint: Array, channel: Array, k: int, early_s: float = 0.0) -> float | None:
+    """The same of the change at sample k; None where it is not answered."""
+    way, ahead = np.sign(setpoint[k] - setpoint[k - 1]), int(np.searchsorted(time_s, time_s[k] - early_s))
+    hit, away = _departure(time_s, way * channel, ahead, k + 60) if ahead < k else (None, None)
+    if hit is None or hit >= k - 1 or not away[hit - ahead : k - ahead].all():
+        hit, _ = _departure(time_s, way * channel, k, k + 60)
+    return None if hit is None else float(time_s[hit] - time_s[k])
 
 
 def _departure(t: Array, channel: Array, begin: int, end: int) -> tuple[int | None, NDArray[np.bool_]]:

@@ -1,0 +1,1 @@
+"""A recorder of simulated prosthetic hands with something hidden in each session."""
