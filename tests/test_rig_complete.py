@@ -145,14 +145,14 @@ def test_a_linear_machine_that_is_moved_in_a_sine_takes_one(tmp_path: Path) -> N
             ("</body></worldbody>", '<body><joint name="wrist"/><geom size="0.01"/></body></body></worldbody>'),
             '"wrist"',
         ),
-        (('<motor name="motor" joint="hinge"/>', '<position name="motor" joint="hinge" kp="2"/>'), '"motor" gives'),
+        (('<motor name="motor" joint="hinge"/>', '<velocity name="motor" joint="hinge" kv="2"/>'), '"motor" gives'),
     ],
 )
 def test_why_nothing_can_be_analysed_is_said(tmp_path: Path, change: tuple[str, str], said: str) -> None:
     folder = planted(tmp_path / "s")
     (folder / "rig.xml").write_text(PENDULUM.replace(*change))
     manifest = (folder / "session.toml").read_text()
-    (folder / "session.toml").write_text(manifest.replace("actuator:motor:force", "actuator:motor:ctrl"))
+    (folder / "session.toml").write_text(manifest.replace("actuator:motor:force", "actuator:motor:setpoint"))
     findings = diagnose_rig(read_session(folder), tmp_path / "out")
     assert findings.verdict == "unexplained" and said in findings.notes[0]
 

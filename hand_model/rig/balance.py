@@ -338,11 +338,12 @@ def _joint_effort(rig: RigModel, trial: RigTrial, grid: Array) -> dict[str, Arra
         elif joint in trial.effort:
             out[joint] = np.interp(grid, trial.time_s, fill_gaps(trial.time_s, trial.effort[joint]))
         elif joint in trial.voltage:
-            out[joint] = drive.gain * np.interp(grid, trial.time_s, fill_gaps(trial.time_s, trial.voltage[joint]))
+            volts = np.interp(grid, trial.time_s, fill_gaps(trial.time_s, trial.voltage[joint]))
+            out[joint] = trial.drives[joint].gain * volts
         elif drive.kind == "position" and joint in trial.setpoint:
             target = np.interp(grid, trial.time_s, fill_gaps(trial.time_s, trial.setpoint[joint]))
             position = np.interp(grid, trial.time_s, fill_gaps(trial.time_s, trial.position[joint]))
-            out[joint] = drive.gain * (target - position)
+            out[joint] = trial.drives[joint].answer(target, position, np.gradient(position, grid))
         else:
             out[joint] = None
     return out
@@ -361,8 +362,11 @@ def _column_values(
             out[:, :, p] = _tendon_column(model, c.name, q)
         elif c.kind in ("offset", "back_emf"):
             drive = next(d for d in rig.drives if d.name == c.name)
-            j = rig.joints.index(drive.joint)
-            out[:, j, p] = (-drive.gear if c.kind == "offset" else v[:, j]) * (drive.joint in trial.live)
+            j, i = rig.joints.index(drive.joint), model.actuator(drive.name).id
+            # as this recording's drive is set: its gear and resistance may not be the declared ones
+            brake = _back_emf(model, c.name) / c.value if c.value else 1.0
+            own = -model.actuator_gear[i, 0] if c.kind == "offset" else brake * v[:, j]
+            out[:, j, p] = own * (drive.joint in trial.live)
         else:
             j = rig.joints.index(c.name)
             if c.kind == "frictionloss":

@@ -8,7 +8,7 @@ drives is unsigned.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 SAME = 0.01  # a measured channel differs from its command by more than this share: drives, sensors and CAN buses do
 STRANGE = 0.7  # share of an effort that may stay unexplained before it is said to explain nothing
 UNSIGNED = "has no sign: it follows the size of the expected effort"
+REPEATS = "repeats the channel"
 DEAD = "never changes: dead"
 SINUSOID = "is a sinusoid of time"
 BOTH_WAYS = 0.1  # of the way that a joint goes to one side: as much to the other shows its friction twice
@@ -30,6 +31,8 @@ LEAST_PERIODS = 2.0
 UNBEGUN = 0.02  # of a recording, at its begin, in which its controller need not run yet
 LEAST_TURNS = 4  # changes of sign that must be seen before a channel is said to have none
 CLIPPED = 0.05  # share of samples on one and the same extreme value
+PILED = 10  # times as often as any other value comes, stands a reading on a limit
+APART = 0.1  # of SAME: a copy in few recordings among others that are none is plainly one
 
 
 @dataclass(frozen=True)
@@ -84,13 +87,11 @@ def _looks(trial: RigTrial, joint: str, values: Array, measured: bool) -> list[t
     out: list[tuple[str, float, str]] = []
     if not measured:  # a control that stands on its limits is what was put in
         return out
-    limits = [np.mean(values == e) for e in (values.min(), values.max())]
-    if (
-        min(limits) > CLIPPED
-        and abs(values.max() + values.min()) < 0.02 * np.ptp(values)
-        and len(np.unique(values)) > 20
-    ):
-        out.append(("current_saturation", float(sum(limits)), "stands on its limits, the same both ways"))
+    low, high = limits(trial, joint)
+    if np.isfinite([low, high]).any():
+        both = np.isfinite([low, high]).all()
+        reason = "stands on its limits, the same both ways" if both else "stands on a limit, one way alone"
+        out.append(("current_saturation", float(np.mean((values == low) | (values == high))), reason))
     share = sinusoids_left(trial.time_s, values)
     if share < SAME and not _linear(trial, joint, values):
         out.append(("command_as_measurement", share, SINUSOID))
@@ -100,8 +101,49 @@ def _looks(trial: RigTrial, joint: str, values: Array, measured: bool) -> list[t
     for name, other in trial.extra.items():
         share = copy_left(values, fill_gaps(trial.time_s, other))
         if share < SAME:
-            out.append(("command_as_measurement", share, f'repeats the channel "{name}"'))
+            out.append(("command_as_measurement", share, f'{REPEATS} "{name}"'))
     return out
+
+
+def limits(trial: RigTrial, joint: str) -> tuple[float, float]:
+    """Least and greatest reading of an effort, each where the channel stands on it and the machine would not: the same
+    both ways; or on one side alone, in many samples while the joint moves, beside which no other value comes as often.
+    Infinite where there is none."""
+    values = fill_gaps(trial.time_s, trial.effort[joint])
+    found, often = np.unique(values, return_counts=True)
+    low, high = float(found[0]), float(found[-1])
+    none = (-np.inf, np.inf)
+    if len(found) <= 20:
+        return none
+    if min(often[0], often[-1]) > CLIPPED * len(values) and abs(high + low) < 0.02 * (high - low):
+        return low, high
+    speed = np.abs(np.gradient(fill_gaps(trial.time_s, trial.position[joint]), trial.time_s))
+    moving = speed > 0.1 * np.quantile(speed, 0.9)
+
+    def stands(end: float, count: int) -> bool:
+        here = (values == end) & moving
+        return end != 0 and np.sum(here) > CLIPPED * len(values) and count > PILED * np.max(often[1:-1])
+
+    return (
+        low if stands(low, int(often[0])) else none[0],
+        high if stands(high, int(often[-1])) else none[1],
+    )
+
+
+def unclipped(rig: RigModel) -> RigModel:
+    """The rig without the samples of efforts that stand on a limit of their reading: they say only that it is at least
+    that."""
+
+    def without(trial: RigTrial) -> RigTrial:
+        effort = dict(trial.effort)
+        for joint in (j for j in effort if j in trial.live and j in trial.position):
+            low, high = limits(trial, joint)
+            at_end = (effort[joint] == low) | (effort[joint] == high)
+            if at_end.any():
+                effort[joint] = np.where(at_end, np.nan, effort[joint])
+        return replace(trial, effort=effort)
+
+    return replace(rig, trials=tuple(without(t) for t in rig.trials))
 
 
 def _reverses(trial: RigTrial, joint: str) -> bool:
@@ -119,6 +161,8 @@ def _gather(rig: RigModel, joint: str, channel: str, found: dict, usable: int) -
     for (kind, reason), hits in found.items():
         if reason == SINUSOID and not whole:
             continue
+        if reason.startswith(REPEATS) and not whole and max(s for _, s, _ in hits) > APART * SAME:
+            continue  # in most recordings it differs from its command, and in these not by much less
         trials = tuple(dict.fromkeys(n for n, _, _ in hits))
         if kind == "command_as_measurement" and whole:
             trials = tuple(t.name for t in rig.trials)
@@ -238,6 +282,8 @@ def check_balance(rig: RigModel, fit: DeclaredFit) -> tuple[ChannelIssue, ...]:
         )
         if name is None or row.moving.sum() < 30:
             continue
+        if not {row.joint} & {*trials[row.trial].effort, *trials[row.trial].voltage}:
+            continue  # a servo's effort, reckoned from its target, is no channel
         y, x = row.effort[row.moving], row.columns[row.moving]
         if (share := _unsigned(trials[row.trial], row, start)) is not None:
             looks.append((name, row, UNSIGNED, share))

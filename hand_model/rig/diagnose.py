@@ -15,7 +15,7 @@ from ..background import single_threaded
 from ..errors import HandModelError, SessionError
 from ..output import refuse_file
 from ..session import Session
-from .channels import ChannelIssue, check_balance, check_channels
+from .channels import ChannelIssue, check_balance, check_channels, unclipped
 from .couplings import coupling_terms, with_couplings
 from .declared import DeclaredFit, fit_declared
 from .findings import NOT_TAKEN, CouplingResidual, Finding, RigFindings, measured, whereabouts
@@ -72,10 +72,11 @@ def diagnose_rig(
                 f"{output}: is the session itself, whose model would be written over; name another folder"
             )
     say = progress or (lambda _: None)
-    rig = with_couplings(load_rig(session))
+    recorded = with_couplings(load_rig(session))
+    rig, told = unclipped(recorded), check_channels(recorded)
     if not rig.select(validate=False):
         raise SessionError(f'{session.path}: every trial has purpose = "validate"; at least one must be left to fit to')
-    fit, issues = trusted_fit(rig)
+    fit, issues = trusted_fit(rig, told)
     found = [_channel_finding(i) for i in issues]
     refused = {(t, i.joint) for i in issues if i.refuse for t in i.trials}
     say(f"{rig.name}: declared model fitted, {len(issues)} channel issues")
@@ -160,9 +161,12 @@ def _rank(finding: Finding) -> tuple[int, int]:
     return place, -round(float(finding.where.get("share_of_mismatch") or 0.0) / LEAST_SHARE)
 
 
-def trusted_fit(rig: RigModel) -> tuple[DeclaredFit, tuple[ChannelIssue, ...]]:
-    """The declared fit to the channels that can be trusted, and what is wrong with the others."""
-    issues = list(check_channels(rig))
+def trusted_fit(
+    rig: RigModel, told: tuple[ChannelIssue, ...] | None = None
+) -> tuple[DeclaredFit, tuple[ChannelIssue, ...]]:
+    """The declared fit to the channels that can be trusted, and what is wrong with the others; told: what is known of
+    that before any fit."""
+    issues = list(check_channels(rig) if told is None else told)
     while True:
         refused = {(t, i.joint) for i in issues if i.refuse for t in i.trials}
         fit = fit_declared(rig, refused)

@@ -100,10 +100,10 @@ def joint_efforts(rig: RigModel, trial: RigTrial, row: Rows) -> Array:
         if drive.joint in trial.live:
             i, j = model.actuator(drive.name).id, rig.joints.index(drive.joint)
             if drive.offset:
-                out[:, j] -= drive.gear * model.actuator_biasprm[i, 0]
+                out[:, j] -= model.actuator_gear[i, 0] * model.actuator_biasprm[i, 0]
             if drive.kind == "voltage" and drive.joint not in trial.effort:
                 resistance, constant = model.actuator_gainprm[i, :2]
-                out[:, j] += constant**2 / resistance * drive.gear**2 * v[:, j]
+                out[:, j] += constant**2 / resistance * model.actuator_gear[i, 0] ** 2 * v[:, j]
     return out
 
 

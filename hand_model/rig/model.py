@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,6 +14,7 @@ from ..errors import DescriptionError, SessionError, did_you_mean
 from ..session import Session, Trial
 from ..session.check import check_interval
 from .complete import completed
+from .overrides import apply_overrides
 from .states import LEAST_SAMPLES
 from .winding import with_windings
 
@@ -28,6 +30,8 @@ class Drive:
     velocity).
 
     gear: control to joint transmission. gain: joint effort per unit of ctrl. offset: declares a constant (affine bias).
+    bias: (3,) joint effort that it adds by itself, constant, per joint position and per joint velocity. limits: of the
+    joint effort; targets: of what it is told.
     """
 
     name: str
@@ -36,6 +40,15 @@ class Drive:
     gear: float
     gain: float
     offset: bool = False
+    bias: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    limits: tuple[float, float] = (-np.inf, np.inf)
+    targets: tuple[float, float] = (-np.inf, np.inf)
+
+    def answer(self, target: Array, position: Array, velocity: Array) -> Array:
+        """Joint effort (n,) that it gives when it is told a target (n,), at a joint's position and velocity (n,)."""
+        constant, by_position, by_velocity = self.bias
+        effort = self.gain * np.clip(target, *self.targets) + constant + by_position * position + by_velocity * velocity
+        return np.clip(effort, *self.limits)
 
 
 @dataclass(frozen=True)
@@ -56,7 +69,8 @@ class RigTrial:
     time_s: (n,) [s] from zero. position, velocity, effort: joint -> (n,), SI, nan where a cell was empty; effort is
     what the drive is recorded to put on the joint (absent where only a voltage or nothing is recorded). voltage,
     setpoint:
-    joint -> (n,). extra: columns that no signal names. live: joints whose drive is connected (gear not zero).
+    joint -> (n,). extra: columns that no signal names. live: joints whose drive is connected (gear not zero). drives:
+    joint -> its drive as this recording has it, the declared one where it is not connected.
     """
 
     name: str
@@ -70,6 +84,7 @@ class RigTrial:
     extra: Mapping[str, Array]
     set: Mapping[str, Any]
     live: tuple[str, ...]
+    drives: Mapping[str, Drive] = field(default_factory=dict)
 
     def tells(self, drive: Drive) -> bool:
         """Whether what a drive puts in is recorded, or what it is told, or it is not connected."""
@@ -207,8 +222,34 @@ def _drives(model: Any, mujoco: Any) -> tuple[Drive, ...]:
             kind = "position" if by_position != 0 else "velocity" if by_velocity != 0 else "force"
             offset = kind == "force"
         joint = model.joint(int(model.actuator_trnid[a, 0])).name
-        drives.append(Drive(model.actuator(a).name, joint, kind, gear, gain * gear, offset))
+        drives.append(
+            Drive(
+                model.actuator(a).name,
+                joint,
+                kind,
+                gear,
+                gain * gear,
+                offset,
+                tuple(float(x) for x in model.actuator_biasprm[a, :3] * gear ** np.array([1, 2, 2])),
+                _within(model.actuator_forcelimited[a], model.actuator_forcerange[a] * gear),
+                _within(model.actuator_ctrllimited[a], model.actuator_ctrlrange[a]),
+            )
+        )
     return tuple(drives)
+
+
+def _within(limited: int, ends: Array) -> tuple[float, float]:
+    """Least and greatest of two ends, none where nothing is limited."""
+    return (float(np.min(ends)), float(np.max(ends))) if limited else (-np.inf, np.inf)
+
+
+def _set_drives(model: Any, trial: Trial) -> tuple[Drive, ...]:
+    """The drives as a trial's overrides set them."""
+    import mujoco
+
+    own = copy(model)
+    apply_overrides(own, {k: v for k, v in trial.set.items() if k.startswith("actuator:")})
+    return _drives(own, mujoco)
 
 
 def _couplings(model: Any, mujoco: Any) -> tuple[Coupling, ...]:
@@ -265,14 +306,16 @@ def _map_trial(trial: Trial, quantity: Mapping[str, tuple], drives: tuple[Drive,
             "together, their sum)"
         )
     effort, voltage = {}, {}
-    for drive in drives:
-        joint = drive.joint
+    acting = {d.joint: d if d.gear else declared for d, declared in zip(_set_drives(model, trial), drives, strict=True)}
+    for joint, drive in acting.items():
         if joint in maps["force"]:
             effort[joint] = maps["force"][joint] * drive.gear
         elif joint in maps["ctrl"] and drive.kind == "force":
             effort[joint] = maps["ctrl"][joint] * drive.gain
         elif joint in maps["ctrl"] and drive.kind == "voltage":
             voltage[joint] = maps["ctrl"][joint]
+        elif joint in maps["ctrl"] and drive.kind == "position":
+            maps["setpoint"].setdefault(joint, maps["ctrl"][joint])
     extra = {c: v[keep] for c, v in log.columns.items() if c not in quantity and np.isfinite(v).any()}
     return RigTrial(
         trial.name,
@@ -286,4 +329,5 @@ def _map_trial(trial: Trial, quantity: Mapping[str, tuple], drives: tuple[Drive,
         extra,
         dict(trial.set),
         live,
+        acting,
     )

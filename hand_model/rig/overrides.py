@@ -7,15 +7,17 @@ since (the arm's own mass) stays: a patched file keeps the bodies as they were d
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import SessionError
 from .dynamics import inertial_parameters
 from .mjcf import read_effects
-from .model import RigModel, RigTrial
 from .physical import physical
+
+if TYPE_CHECKING:
+    from .model import RigModel, RigTrial
 
 BODY = ("mass", "inertia", "ipos", "iquat")
 VIEW = {("body", "diaginertia"): "inertia", ("joint", "ref"): "qpos0", ("joint", "springref"): "qpos_spring"}

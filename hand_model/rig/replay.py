@@ -290,10 +290,10 @@ def _controls(rig: RigModel, trial: RigTrial, model: Any, effects: EffectStepper
             )
         elif drive.kind == "position" and drive.joint in trial.setpoint:
             out[:, a] = np.interp(at, trial.time_s, fill_gaps(trial.time_s, trial.setpoint[drive.joint]))
-        elif drive.joint in trial.effort and drive.gain:
+        elif drive.joint in trial.effort and (gain := trial.drives[drive.joint].gain):
             effort = np.interp(at, trial.time_s, fill_gaps(trial.time_s, trial.effort[drive.joint]))
             if drive.kind == "force":
-                out[:, a] = effort / drive.gain
+                out[:, a] = effort / gain
             else:
                 model.actuator_gear[a] = 0.0
                 applied[:, rig.joints.index(drive.joint)] = effort
