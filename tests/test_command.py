@@ -391,6 +391,34 @@ def test_a_drive_that_moves_before_its_current_rises_has_a_late_current_and_no_s
     assert lateness(answers)["index"].channel_s == pytest.approx(late_s, abs=1e-3)
 
 
+@pytest.mark.parametrize(("scatter_s", "late"), [(0.005, True), (0.03, False)])
+def test_who_may_move_before_its_current_rises_by_chance_is_slow_and_not_late(scatter_s: float, late: bool) -> None:
+    scatter = scatter_s * np.tile([-1.0, 1.0], 17)
+
+    def answers_of(current_s: float, motion_s: float, spread: np.ndarray, *rise_s: float) -> Answers:
+        return Answers(current_s + spread, motion_s + spread, 0.018, np.array(rise_s))
+
+    answers = {
+        "index": answers_of(0.058, 0.046, scatter, 0.014, 0.030, 0.060),
+        "ring": answers_of(0.020, 0.024, 0.2 * scatter, 0.0025, 0.008, 0.026),
+    }
+    assert bool(len(lateness(answers)["index"].drive_s)) == late
+
+
+def test_answers_that_are_variously_late_are_the_drives_and_no_slow_rise() -> None:
+    """Each change is answered at its own time, and as fast as another drive answers: together they seem to rise slowly."""
+    delays = np.tile([0.02, 0.06, 0.10, 0.14], 15)
+    own = np.array([-0.01, -0.002, 0.015])
+    prompt = Answers(np.full(60, 0.01), np.full(60, 0.013), 0.018, np.array([0.0025, 0.009, 0.022]), own_s=own)
+
+    def late(own_s: np.ndarray) -> bool:
+        answers = Answers(delays + 0.01, delays + 0.013, 0.018, np.array([0.035, 0.073, 0.133]), own_s=own_s)
+        return bool(len(lateness({"index": answers, "ring": prompt})["index"].drive_s))
+
+    assert late(own)
+    assert not late(np.array([-0.02, 0.03, 0.09]))  # a slow one rises slowly from its own answers on, too
+
+
 def test_answers_too_few_say_nothing() -> None:
     assert not lateness({"index": Answers(np.full(4, 0.09), np.full(4, 0.09), STEP_S)})
 

@@ -276,6 +276,11 @@ def _near_gap(rig: RigModel, trial: RigTrial, grid: Array, reach_s: float) -> ND
         lost = rows_lost(time_s) & (interval > GAP * reach_s)
         for begin, end in zip(time_s[:-1][lost], time_s[1:][lost], strict=True):
             near |= (grid > begin - reach_s) & (grid < end + reach_s)
+    for clipped in trial.clipped.values():
+        if clipped.any():
+            at = trial.time_s[clipped]
+            after = np.clip(np.searchsorted(at, grid), 1, len(at) - 1) if len(at) > 1 else np.zeros(len(grid), int)
+            near |= np.minimum(np.abs(grid - at[after]), np.abs(grid - at[np.maximum(after - 1, 0)])) < reach_s
     return near
 
 

@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 SAME = 0.01  # a measured channel differs from its command by more than this share: drives, sensors and CAN buses do
 STRANGE = 0.7  # share of an effort that may stay unexplained before it is said to explain nothing
 UNSIGNED = "has no sign: it follows the size of the expected effort"
+BOTH_LIMITS, ONE_LIMIT = "stands on its limits, the same both ways", "stands on a limit, one way alone"
 REPEATS = "repeats the channel"
 DEAD = "never changes: dead"
 SINUSOID = "is a sinusoid of time"
@@ -80,6 +81,9 @@ def _check_effort(rig: RigModel, joint: str, channel: str) -> list[ChannelIssue]
         measured = joint in trial.effort
         for kind, share, reason in _looks(trial, joint, values, measured):
             found.setdefault((kind, reason), []).append((trial.name, share, reason))
+    ends = [("current_saturation", reason) for reason in (BOTH_LIMITS, ONE_LIMIT)]
+    if all(e in found for e in ends):  # which of its limits a recording comes to is not the channel's
+        found[ends[0]] += found.pop(ends[1])
     return _gather(rig, joint, channel, found, len(usable))
 
 
@@ -90,8 +94,8 @@ def _looks(trial: RigTrial, joint: str, values: Array, measured: bool) -> list[t
     low, high = limits(trial, joint)
     if np.isfinite([low, high]).any():
         both = np.isfinite([low, high]).all()
-        reason = "stands on its limits, the same both ways" if both else "stands on a limit, one way alone"
-        out.append(("current_saturation", float(np.mean((values == low) | (values == high))), reason))
+        share = float(np.mean((values == low) | (values == high)))
+        out.append(("current_saturation", share, BOTH_LIMITS if both else ONE_LIMIT))
     share = sinusoids_left(trial.time_s, values)
     if share < SAME and not _linear(trial, joint, values):
         out.append(("command_as_measurement", share, SINUSOID))
@@ -134,14 +138,16 @@ def unclipped(rig: RigModel) -> RigModel:
     """The rig without the samples of efforts that stand on a limit of their reading: they say only that it is at least
     that."""
 
+    ends: dict[str, set[float]] = {}
+    for trial in rig.trials:
+        for joint in (j for j in trial.effort if j in trial.live and j in trial.position):
+            ends.setdefault(joint, set()).update(e for e in limits(trial, joint) if np.isfinite(e))
+
     def without(trial: RigTrial) -> RigTrial:
-        effort = dict(trial.effort)
-        for joint in (j for j in effort if j in trial.live and j in trial.position):
-            low, high = limits(trial, joint)
-            at_end = (effort[joint] == low) | (effort[joint] == high)
-            if at_end.any():
-                effort[joint] = np.where(at_end, np.nan, effort[joint])
-        return replace(trial, effort=effort)
+        # a limit is the channel's: it is one in a recording that stands on it for a moment only, too
+        ended = {j: np.isin(e, list(ends[j])) for j, e in trial.effort.items() if ends.get(j)}
+        effort = {j: np.where(at, np.nan, trial.effort[j]) for j, at in ended.items()}
+        return replace(trial, effort={**trial.effort, **effort}, clipped=ended)
 
     return replace(rig, trials=tuple(without(t) for t in rig.trials))
 
@@ -285,7 +291,8 @@ def check_balance(rig: RigModel, fit: DeclaredFit) -> tuple[ChannelIssue, ...]:
         if not {row.joint} & {*trials[row.trial].effort, *trials[row.trial].voltage}:
             continue  # a servo's effort, reckoned from its target, is no channel
         y, x = row.effort[row.moving], row.columns[row.moving]
-        if (share := _unsigned(trials[row.trial], row, start)) is not None:
+        one_sided = np.any(trials[row.trial].clipped.get(row.joint, False))  # of what is left, not of what was measured
+        if not one_sided and (share := _unsigned(trials[row.trial], row, start)) is not None:
             looks.append((name, row, UNSIGNED, share))
         elif drive.name not in force:  # what was put in may be any function, and need not explain anything
             continue

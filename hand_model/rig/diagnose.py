@@ -365,7 +365,7 @@ def _diagnose_coupling(
 
 
 def _verdict(found: Sequence[Finding], lack: Mapping[str, Any]) -> str:
-    if any(f.model is not None for f in found):
+    if any(f.effect != "command_as_measurement" for f in found):
         return "mismatch"
     if lack.get("before") is None:
         return "unexplained"

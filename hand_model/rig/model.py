@@ -70,7 +70,8 @@ class RigTrial:
     what the drive is recorded to put on the joint (absent where only a voltage or nothing is recorded). voltage,
     setpoint:
     joint -> (n,). extra: columns that no signal names. live: joints whose drive is connected (gear not zero). drives:
-    joint -> its drive as this recording has it, the declared one where it is not connected.
+    joint -> its drive as this recording has it, the declared one where it is not connected. clipped:
+    joint -> (n,) samples at which its effort stood on a limit of its reading; they are nan.
     """
 
     name: str
@@ -85,6 +86,7 @@ class RigTrial:
     set: Mapping[str, Any]
     live: tuple[str, ...]
     drives: Mapping[str, Drive] = field(default_factory=dict)
+    clipped: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
 
     def tells(self, drive: Drive) -> bool:
         """Whether what a drive puts in is recorded, or what it is told, or it is not connected."""

@@ -25,6 +25,7 @@ MOSTLY = 0.7  # share of such answers that must be late
 # most)
 BOTH_LATE = 0.8
 CERTAIN = 3.0  # standard errors by which the means of both are late beyond what healthy drives differ by
+SURELY = 2.0  # standard errors by which a drive moves before its current rises
 UNCLEAR = 0.3  # share of the lateness that the motion has too, from which it is no longer clear what is late
 LEAST_ANSWERS = 5
 STOOD = 0.5  # [%] a drive that moves less just before a change stands
@@ -127,11 +128,13 @@ def lateness(answers: Mapping[str, Answers], in_time: Collection[str] = ()) -> d
 
 
 def _moves_first(x: Answers, apart_s: float) -> bool:
-    """Whether a drive is seen to move before its current rises, which a current that is only slow does not let it;
-    apart_s: by how much [s] more than another drive, whose friction may be as little."""
+    """Whether a drive is surely seen to move before its current rises, which a current that is only slow does not let
+    it; apart_s: by how much [s] more than another drive, whose friction may be as little."""
     if len(x.motion_s) < LEAST_ANSWERS:
         return False
-    return bool(min(float(np.mean(x.current_s) - np.mean(x.motion_s)), apart_s) > UNLIKE * x.step_s)
+    doubt_s = float(np.hypot(*(np.std(answers_s) / np.sqrt(len(answers_s)) for answers_s in (x.current_s, x.motion_s))))
+    before_s = min(float(np.mean(x.current_s) - np.mean(x.motion_s)), apart_s)
+    return before_s > UNLIKE * x.step_s + SURELY * doubt_s
 
 
 def _variously_late(x: Answers, others: Sequence[Answers]) -> bool:

@@ -285,19 +285,25 @@ class Give:
 def gives(prepared: Mapping[str, Sequence[DriveState]]) -> tuple[dict[str, Give], float]:
     """Bristles of each drive's declared Coulomb friction, and what any other drive of the session is granted.
 
-    Coulomb friction turns over within a small distance in any drive; the drive that gives least shows how small: bristles
-    may be as long as its own, or as stiff, so that they are as much longer as friction is larger (Canudas de Wit 1995).
+    Coulomb friction turns over within a small distance in any drive; the drive that gives least shows how small (of three
+    and more the next one: the odd one out is no measure for the others): bristles may be as long as its own, or as
+    stiff, so that they are as much longer as friction is larger (Canudas de Wit 1995).
     What a drive gives clearly beyond that is presliding, an effect.
     """
     fits = {a: min((*_misfits(states, x)[0], x) for x in LENGTHS) for a, states in prepared.items()}
     best = {a: (length, max(friction, 0.0)) for a, (_, friction, length) in fits.items()}
-    least = min((length for length, _ in best.values()), default=GIVE_LEAST)
-    softness = min((length / f for length, f in best.values() if f > 0), default=0.0)  # of the stiffest drive [%/raw]
+    least = _least([length for length, _ in best.values()], GIVE_LEAST)
+    softness = _least([length / f for length, f in best.values() if f > 0], 0.0)  # of the stiffest drive [%/raw]
 
     def granted(friction: float) -> float:
         return max(ALIKE * max(least, softness * friction), GIVE_UNSEEN)
 
     return {a: Give(min(x, granted(f)), granted(f)) for a, (x, f) in best.items()}, granted(0.0)
+
+
+def _least(values: Sequence[float], none: float) -> float:
+    """The least of one or two values, the next of more."""
+    return sorted(values)[len(values) > 2] if values else none
 
 
 def _beside_late(states: Sequence[DriveState], late_s: float | None = None) -> float:

@@ -1,0 +1,97 @@
+"""Drives as each recording sets them, and efforts that stand on a limit of their reading."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rig_bench import ARM, Motion, recorded
+
+from hand_model.rig import diagnose_rig, fit_declared, load_rig
+from hand_model.rig.channels import check_channels, limits, unclipped
+from hand_model.session import read_session
+
+pytest.importorskip("mujoco")
+
+MOTOR = '<motor name="motor" joint="hinge"/>'
+KP = 3.0
+
+
+def balance(motion: Motion, mass: float = 0.6) -> np.ndarray:
+    """Torque [N m] of the arm with another mass than declared."""
+    _, q, v, a = motion
+    return (0.002 + mass * 0.04) * a + mass * 0.2 * 9.81 * np.sin(q) + 0.02 * v + 0.05 * np.sign(v)
+
+
+def set_in(folder: Path, values: list[str]) -> Path:
+    """The session with an override of each of its recordings."""
+    head, *trials = (folder / "session.toml").read_text().split("[[trial]]")
+    trials = [f"{text}set = {{ {value} }}\n" for text, value in zip(trials, values, strict=True)]
+    (folder / "session.toml").write_text("[[trial]]".join([head, *trials]))
+    return folder
+
+
+def mass_of(folder: Path) -> float:
+    """First moment that the balance finds over the lever [kg]."""
+    fit = fit_declared(load_rig(read_session(folder)))
+    return next(
+        -float(t) / 0.2 for c, t in zip(fit.columns, fit.theta, strict=True) if (c.kind, c.part) == ("inertial", "hz")
+    )
+
+
+@pytest.mark.parametrize("quantity", ["setpoint", "ctrl"])
+def test_a_servo_on_position_has_the_gain_that_each_recording_sets(tmp_path: Path, quantity: str) -> None:
+    gains, number = [2.0, 4.0, 2.0, 4.0, 3.0], iter(range(5))
+    servo = ARM.replace(MOTOR, '<position name="motor" joint="hinge" kp="1.5" kv="0.1" gear="2"/>')
+
+    def target(motion: Motion) -> np.ndarray:
+        # gear (kp (target - gear q) - kv gear v) is what the arm takes
+        kp = gains[next(number)]
+        return 2 * motion[1] + (balance(motion) / 2 + 0.1 * 2 * motion[2]) / kp
+
+    folder = recorded(tmp_path / "s", servo, 5, target, 1e-4)
+    text = (folder / "session.toml").read_text()
+    (folder / "session.toml").write_text(text.replace("actuator:motor:force", f"actuator:motor:{quantity}"))
+    set_in(folder, [f'"actuator:motor:kp" = {kp}' for kp in gains])
+    assert mass_of(folder) == pytest.approx(0.6, rel=0.01)
+
+
+def test_a_force_acts_through_the_gear_that_its_recording_sets(tmp_path: Path) -> None:
+    gears, number = [1.0, 2.0, 1.0, 2.0, 1.5], iter(range(5))
+    folder = recorded(tmp_path / "s", ARM, 5, lambda m: balance(m) / gears[next(number)], 1e-3)
+    set_in(folder, [f'"actuator:motor:gear" = {gear}' for gear in gears])
+    assert mass_of(folder) == pytest.approx(0.6, rel=0.01)
+
+
+@pytest.mark.parametrize(("low", "high", "said"), [(-np.inf, 0.5, "one way alone"), (-0.6, 0.6, "the same both ways")])
+def test_what_stands_on_a_limit_is_in_no_fit(tmp_path: Path, low: float, high: float, said: str) -> None:
+    def clipped(motion: Motion) -> np.ndarray:
+        noise = 0.01 * np.random.default_rng(1).standard_normal(len(motion[0]))
+        return np.clip(balance(motion) + noise, low, high)
+
+    folder = recorded(tmp_path / "s", ARM, 5, clipped, 0.0)
+    findings = diagnose_rig(read_session(folder))
+    assert [f.effect for f in findings.findings] == ["current_saturation"] and findings.verdict == "mismatch"
+    assert said in findings.findings[0].statement
+    assert -findings.declared["inertial:arm:hz"] / 0.2 == pytest.approx(0.6, rel=0.01)
+    assert findings.declared["frictionloss:hinge"] == pytest.approx(0.05, rel=0.1)
+
+
+def test_an_effort_that_reaches_its_extreme_as_any_other_value_is_not_clipped(tmp_path: Path) -> None:
+    def coarse(motion: Motion) -> np.ndarray:
+        return 0.05 * np.round((balance(motion) + 0.01 * np.sin(50 * motion[0])) / 0.05)
+
+    rig = load_rig(read_session(recorded(tmp_path / "s", ARM, 5, coarse, 0.0)))
+    assert check_channels(rig) == () and not np.isfinite([limits(t, "hinge") for t in rig.trials]).any()
+    assert not any(t.clipped for t in unclipped(rig).trials)
+
+
+def test_a_limit_of_one_recording_is_one_in_all(tmp_path: Path) -> None:
+    rig = load_rig(read_session(recorded(tmp_path / "s", ARM, 5, lambda m: np.minimum(balance(m), 0.5), 0.0)))
+    first, last = rig.trials[0], rig.trials[-1]
+    moment = np.where(np.arange(len(last.time_s)) < 40, 0.5, np.minimum(last.effort["hinge"], 0.45))
+    brief = replace(last, effort={"hinge": moment})
+    left = unclipped(replace(rig, trials=(first, brief)))
+    assert np.flatnonzero(left.trials[1].clipped["hinge"]).tolist() == list(range(40))
