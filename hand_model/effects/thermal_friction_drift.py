@@ -60,19 +60,26 @@ class ThermalFrictionDrift(Effect):
     def parameters(
         self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]
     ) -> dict[str, float]:
-        """Cold excess, also as a ratio to the warm Coulomb friction, and the times."""
-        return {**amplitude, **shape, "ratio": amplitude["cold_excess"] / (declared.get("coulomb") or np.nan)}
+        """Cold excess, also as a ratio to the warm Coulomb friction, and what its form has of times and temperatures."""
+        without = {
+            ELAPSED: ("cooling_time", "coldest", "warmest"),
+            WORKED: ("coldest", "warmest"),
+            LOGGED: ("warm_up_time", "cooling_time"),
+        }[shape["form"]]
+        told = {k: v for k, v in shape.items() if k not in without}
+        return {**amplitude, **told, "ratio": amplitude["cold_excess"] / (declared.get("coulomb") or np.nan)}
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """By how much cold friction differs, and how it fades."""
-        excess, warm_up = parameters["cold_excess"], figure(parameters["warm_up_time"])
+        excess = parameters["cold_excess"]
         cold = f"friction is {figure(abs(excess))} raw {'higher' if excess > 0 else 'lower'} cold than warm and"
-        if parameters["form"] == ELAPSED:
-            return f"{cold} settles with a time constant of {warm_up} s from the session's first sample on"
         if parameters["form"] == LOGGED:
             return (
                 f"{cold} follows the logged temperature from {parameters['coldest']:.1f} to {parameters['warmest']:.1f}"
             )
+        warm_up = figure(parameters["warm_up_time"])
+        if parameters["form"] == ELAPSED:
+            return f"{cold} settles with a time constant of {warm_up} s from the session's first sample on"
         cooling = figure(parameters["cooling_time"])
         return (
             f"{cold} settles with a time constant of {warm_up} s in motion; at rest it returns with one of {cooling} s"

@@ -165,8 +165,8 @@ def _joint_finding(
     # what a late drive leaves comes early in the balance: its command is ahead
     sign = -1.0 if c.effect == "command_delay" else 1.0
     parameters |= {
-        k: {"value": sign * float(v) if k == "delay" else float(v), "unit": shape_unit(k, position), "ci95": None}
-        for k, v in term.shape.items()
+        k: {"value": sign * v if k == "delay" else v, "unit": shape_unit(k, position), "ci95": None}
+        for k, v in c.told(term.shape).items()
     }
     fall = max(proof["before"] ** 2 - proof["after"] ** 2, 0.0)
     where = whereabouts(c.joint, rig.drive(c.joint), "effort", measured(rig, proof), fall)

@@ -35,7 +35,7 @@ SHARES = (0.1, 0.25, 0.5)  # of a current's rise, by which a late one is told fr
 SLOWER = 3.0  # times as slow as another drive's, at most, is the rise of a healthy one
 BIN_S, RISEN_S = 0.005, 0.35  # in which samples after all changes are averaged, and after which the rise is over
 SHIFTED = 0.5  # of what a drive's answers are late, at least, is a shift of its rise and no slowness
-VARIOUS, AS_FAST = 1.5, 1.5  # times another drive's scatter of answers and length of rise
+VARIOUS, AS_FAST = 2.0, 1.5  # times another drive's scatter of answers and length of rise
 RISEN_T = 6.0  # standard errors by which a current must have risen before the changes come
 EARLY_S = 0.2  # by which a current's time stamps may run ahead
 
@@ -72,7 +72,7 @@ def answers_of(states: Sequence[DriveState], currents: Sequence[Array]) -> Answe
     motion = [x for s in states for x in _answered(s, s.position)]
     step = sample_interval(states)
     rises = _rise(states, currents, step)
-    own = _rise_from_answers(states, currents)
+    own = _rise_from_answers(states, currents, step)
     return Answers(_usual(np.array(current), step), _usual(np.array(motion), step), step, *rises, own)
 
 
@@ -209,7 +209,7 @@ def _rise(states: Sequence[DriveState], currents: Sequence[Array], step_s: float
     return own, _reached(middle, mean, count) if _risen_before(since, risen, step_s) else unknown
 
 
-def _rise_from_answers(states: Sequence[DriveState], currents: Sequence[Array]) -> Array:
+def _rise_from_answers(states: Sequence[DriveState], currents: Sequence[Array], step_s: float) -> Array:
     """Times (len(SHARES),) [s] at which a drive's current has risen to SHARES of its most, counted from its answer to
     each change of the setpoint before which it stood, mean over all; nan where too few are seen."""
     since, risen = [np.zeros(0)], [np.zeros(0)]
@@ -218,7 +218,7 @@ def _rise_from_answers(states: Sequence[DriveState], currents: Sequence[Array]) 
         for k in np.flatnonzero(np.diff(setpoint)) + 1:
             before, answer = (t > t[k] - EARLY_S) & (t < t[k]), _latency(t, setpoint, current, k)
             if answer is not None and before.sum() >= 5 and np.ptp(state.position[before]) < STOOD:
-                after = (t > t[k]) & (t < t[k] + answer + RISEN_S)
+                after = (t > t[k] + answer - 2 * step_s) & (t < t[k] + answer + RISEN_S)
                 since.append(t[after] - t[k] - answer)
                 risen.append(np.sign(setpoint[k] - setpoint[k - 1]) * (current[after] - np.median(current[before])))
     cells, at, count = np.unique(

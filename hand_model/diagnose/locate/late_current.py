@@ -67,6 +67,10 @@ def _late(
         earliest, latest = seen_s[actuator]
         told, doubt = late[actuator].tolist()
         beyond_chance = brought[actuator] > BEYOND_CHANCE
+        if _denied(
+            answered.get(actuator), told, doubt
+        ):  # a controller that is another than simulated looks like a delay
+            return beyond_chance and told * x > 0 and abs(x) > bound
         if earliest < latest and beyond_chance and x > bound:
             # behind a filter answers tell little of how late it is: they must not deny it
             return earliest - ALIKE * doubt < told < latest + ALIKE * doubt
@@ -113,6 +117,13 @@ def _told(states: tuple[DriveState, ...]) -> bool:
     """Whether it is known for sure how late a current is."""
     late_s, doubt_s = states[0].extra.get("late", (0.0, 1.0))
     return bool(abs(late_s) > SURE_DELAY * doubt_s)
+
+
+def _denied(answers: Lateness | None, told_s: float, doubt_s: float) -> bool:
+    """Whether answers to commands say a current in time, and surely not as late, or early, as a simulation tells."""
+    if answers is None or abs(answers.channel_s) > answers.doubt_s:
+        return False
+    return abs(told_s - answers.channel_s) > ALIKE * float(np.hypot(answers.doubt_s, doubt_s))
 
 
 def _answers_so(answers: Lateness | None, told_s: float) -> bool:

@@ -50,7 +50,7 @@ Bound = tuple[str, str, float, float]
 class Candidate:
     """One effect at one joint. columns(row, shape) -> (n, j) at full rate; grid: starting shapes; warp: shape -> delay
     [s] by which every column comes later (None: no delay); variant says in words which one this is; bounds: of shapes
-    that may leave their grid."""
+    that may leave their grid; forms: shape -> forms in which it says something, where that is not all."""
 
     effect: str
     variant: str
@@ -60,6 +60,12 @@ class Candidate:
     columns: Callable[[Rows, Mapping[str, float]], Array]
     delays: bool = False
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    forms: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+
+    def told(self, shape: Mapping[str, float]) -> dict[str, float]:
+        """What of a shape says something in its form."""
+        form = shape.get("form", 0.0)
+        return {k: float(v) for k, v in shape.items() if k not in self.forms or form in self.forms[k]}
 
     @property
     def repeats(self) -> bool:
@@ -135,6 +141,7 @@ def _usable(found: Any) -> bool:
 def _from_catalogue(
     found: Any, joint: str, train: tuple[DriveState, ...], states: Mapping[str, DriveState]
 ) -> Candidate:
+    shapes = found.shapes(train)
     return Candidate(
         found.name,
         "",
@@ -143,7 +150,8 @@ def _from_catalogue(
         ({},) if found.name in SMOOTH else tuple(found.grid(train)),
         lambda row, shape: np.asarray(found.columns(states[row.trial], shape), float),
         bool(found.warps),
-        {s.name: (s.low, s.high) for s in found.shapes(train)},
+        {s.name: (s.low, s.high) for s in shapes},
+        {s.name: s.forms for s in shapes if s.forms},
     )
 
 
