@@ -39,6 +39,7 @@ DRIVE = [
     ("quadratic_damping", {}, {"drag": 0.002}, 0.01),
     ("stribeck_friction", {"stribeck_speed": 18.0}, {"static_excess": 25.0}, 0.06),
     ("thermal_friction_drift", {"form": 0.0, "warm_up_time": 30.0, "cooling_time": 90.0}, {"cold_excess": 12.0}, 0.02),
+    ("thermal_friction_drift", {"form": 3.0, "warm_up_time": 8.0, "cooling_time": 90.0}, {"cold_excess": 12.0}, 0.02),
     ("torque_ripple", {"period": 9.0}, {"sine": 4.0, "cosine": 3.0}, 0.01),
     ("viscoelastic_spring", {"relaxation_time": 1.2}, {"stiffness": 0.3}, 0.01),
 ]

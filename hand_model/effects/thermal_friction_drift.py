@@ -12,15 +12,15 @@ import numpy as np
 from .base import Amplitude, Array, DriveState, Effect, Shape, figure
 from .law import Law, Moment
 
-ELAPSED, WORKED, LOGGED = 0.0, 1.0, 2.0  # forms
+ELAPSED, WORKED, LOGGED, EACH = 0.0, 1.0, 2.0, 3.0  # forms
 SOONEST_S = 5.0  # what is recorded for less than this twice over shows no more than a line
 MOVING = 1.0  # %/s: below, a drive is at rest
 
 
 class ThermalFrictionDrift(Effect):
     """F = sign(v) A (1 - h): the change still to come. h rises to 1 with the time since the session began (form 0), or
-    with the time in motion, and falls back at rest between recordings (form 1), or with the logged temperature, whose
-    sensor need not sit where the friction is (form 2).
+    with the time in motion, and falls back at rest between recordings (form 1), with the logged temperature, whose
+    sensor need not sit where the friction is (form 2), or with the time since each recording began, cold (form 3).
     """
 
     name = "thermal_friction_drift"
@@ -31,15 +31,16 @@ class ThermalFrictionDrift(Effect):
         total = max(_elapsed(states), 2 * SOONEST_S)
         forms = (ELAPSED, WORKED) if all("moving" in s.extra for s in states) else (ELAPSED,)
         forms += (LOGGED,) if _warming(states) else ()
+        forms += (EACH,) if len(states) > 1 and _longest(states) >= 2 * SOONEST_S else ()
         return (
-            Shape("form", "1", ELAPSED, LOGGED, forms),
+            Shape("form", "1", ELAPSED, EACH, forms),
             Shape(
                 "warm_up_time",
                 "s",
                 SOONEST_S,
                 4 * total,
                 tuple(np.geomspace(max(SOONEST_S, 0.04 * total), 2 * total, 7)),
-                forms=(ELAPSED, WORKED),
+                forms=(ELAPSED, WORKED, EACH),
             ),
             Shape("cooling_time", "s", 2.0, 40 * total, (5.0, 25.0, 60.0, 120.0, 400.0), forms=(WORKED,)),
         )
@@ -65,6 +66,7 @@ class ThermalFrictionDrift(Effect):
             ELAPSED: ("cooling_time", "coldest", "warmest"),
             WORKED: ("coldest", "warmest"),
             LOGGED: ("warm_up_time", "cooling_time"),
+            EACH: ("cooling_time", "coldest", "warmest"),
         }[shape["form"]]
         told = {k: v for k, v in shape.items() if k not in without}
         return {**amplitude, **told, "ratio": amplitude["cold_excess"] / (declared.get("coulomb") or np.nan)}
@@ -80,6 +82,8 @@ class ThermalFrictionDrift(Effect):
         warm_up = figure(parameters["warm_up_time"])
         if parameters["form"] == ELAPSED:
             return f"{cold} settles with a time constant of {warm_up} s from the session's first sample on"
+        if parameters["form"] == EACH:
+            return f"{cold} settles with a time constant of {warm_up} s from the begin of each recording on"
         cooling = figure(parameters["cooling_time"])
         return (
             f"{cold} settles with a time constant of {warm_up} s in motion; at rest it returns with one of {cooling} s"
@@ -89,6 +93,8 @@ class ThermalFrictionDrift(Effect):
         """Share of the excess that is left when a recording begins."""
         if parameters.get("form", ELAPSED) == ELAPSED:
             return {"cold": math.exp(-float(state.elapsed_s[0]) / parameters["warm_up_time"])}
+        if parameters["form"] == EACH:
+            return {"cold": 1.0}
         if parameters["form"] == LOGGED:
             return {"cold": float(np.mean(_share(state, parameters)))}
         return {"cold": _before(state, parameters["warm_up_time"], parameters["cooling_time"])}
@@ -99,14 +105,14 @@ class ThermalFrictionDrift(Effect):
         return -2.0 * max(0.0, min(ratio, 6.0) - 1.0) ** 2
 
     def law(self, parameters: Mapping[str, float]) -> Law:
-        """Friction that fades while time passes (form 0) or while the drive moves (form 1), cold to begin with; of a
+        """Friction that fades while time passes (forms 0 and 3) or while the drive moves (form 1), cold to begin with; of a
         logged temperature (form 2) it stays as a recording's was."""
         cold = [parameters.get("cold", 1.0)]
 
         def load(now: Moment) -> float:
             if parameters.get("form") == LOGGED:
                 pass
-            elif parameters.get("form", ELAPSED) < 0.5 or abs(now.velocity) > MOVING:
+            elif parameters.get("form", ELAPSED) in (ELAPSED, EACH) or abs(now.velocity) > MOVING:
                 cold[0] *= math.exp(-now.step_s / parameters["warm_up_time"])
             else:
                 cold[0] = _rested(cold[0], now.step_s, parameters["cooling_time"])
@@ -118,6 +124,11 @@ class ThermalFrictionDrift(Effect):
 def _elapsed(states: tuple[DriveState, ...]) -> float:
     """Time [s] from the session's first sample to its last."""
     return max(float(s.elapsed_s[-1]) for s in states)
+
+
+def _longest(states: tuple[DriveState, ...]) -> float:
+    """Length [s] of the longest recording."""
+    return max(float(np.ptp(s.time_s)) for s in states)
 
 
 def _warming(states: tuple[DriveState, ...]) -> dict[str, float]:
@@ -135,7 +146,8 @@ def _share(state: DriveState, shape: Mapping[str, float]) -> Array:
         return (shape["warmest"] - state.extra["temperature"]) / (shape["warmest"] - shape["coldest"])
     if shape["form"] == WORKED:
         return _cold(state, shape["warm_up_time"], shape["cooling_time"])
-    return np.exp(-state.elapsed_s / shape["warm_up_time"])
+    since = state.time_s - state.time_s[0] if shape["form"] == EACH else state.elapsed_s
+    return np.exp(-since / shape["warm_up_time"])
 
 
 def _rested(cold: float, rest_s: float, cooling_time_s: float) -> float:

@@ -31,6 +31,8 @@ NOT_FOR_RIGS = frozenset(
     }
 )
 SMOOTH = ("nonlinear_spring",)  # its knee belongs to fingers with a return spring; a joint has stops and detents
+# what it damps at one end of a range is hardly told there from friction that differs by speed and way
+UNDAMPED = ("end_stop_contact",)
 LONGEST_DELAY_S = 0.03
 # Samples. A drive that holds its torque from one control step to the next acts half a step late: less than a sample of
 # a log.
@@ -142,12 +144,13 @@ def _from_catalogue(
     found: Any, joint: str, train: tuple[DriveState, ...], states: Mapping[str, DriveState]
 ) -> Candidate:
     shapes = found.shapes(train)
+    grid = [p for p in found.grid(train) if found.name not in UNDAMPED or not p["form"]]
     return Candidate(
         found.name,
         "",
         joint,
         tuple(found.amplitudes()),
-        ({},) if found.name in SMOOTH else tuple(found.grid(train)),
+        ({},) if found.name in SMOOTH else tuple(grid),
         lambda row, shape: np.asarray(found.columns(states[row.trial], shape), float),
         bool(found.warps),
         {s.name: (s.low, s.high) for s in shapes},
