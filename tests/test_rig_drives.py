@@ -11,6 +11,7 @@ from rig_bench import ARM, Motion, recorded
 
 from hand_model.rig import diagnose_rig, fit_declared, load_rig
 from hand_model.rig.channels import check_channels, limits, unclipped
+from hand_model.rig.glitches import glitches
 from hand_model.session import read_session
 
 pytest.importorskip("mujoco")
@@ -95,3 +96,28 @@ def test_a_limit_of_one_recording_is_one_in_all(tmp_path: Path) -> None:
     brief = replace(last, effort={"hinge": moment})
     left = unclipped(replace(rig, trials=(first, brief)))
     assert np.flatnonzero(left.trials[1].clipped["hinge"]).tolist() == list(range(40))
+
+
+def test_single_readings_far_outside_all_others_are_left_out(tmp_path: Path) -> None:
+    wild = {3: 888.0, 700: -650.0, 701: -650.0}
+
+    def told(motion: Motion) -> np.ndarray:
+        torque = balance(motion)
+        torque[list(wild)] = list(wild.values())
+        return torque
+
+    findings = diagnose_rig(read_session(recorded(tmp_path / "s", ARM, 5, told, 0.01)))
+    assert findings.verdict == "consistent" and '"torque": 15 single readings' in findings.notes[0]
+    assert -findings.declared["inertial:arm:hz"] / 0.2 == pytest.approx(0.6, rel=0.01)
+
+
+def test_bursts_and_what_comes_often_are_no_glitches() -> None:
+    random = np.random.default_rng(0)
+    burst = random.standard_normal(2000)
+    burst[500:520] += 60.0
+    often = random.standard_normal(2000)
+    often[::50] += 60.0
+    assert not glitches(burst).any() and not glitches(often).any() and not glitches(np.zeros(50)).any()
+    gap = np.where(np.arange(2000) == 7, np.nan, random.standard_normal(2000))
+    gap[900] = 99.0
+    assert np.flatnonzero(glitches(gap)).tolist() == [900]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 from typing import Any
@@ -14,6 +14,7 @@ from ..errors import DescriptionError, SessionError, did_you_mean
 from ..session import Session, Trial
 from ..session.check import check_interval
 from .complete import completed
+from .glitches import glitches
 from .overrides import apply_overrides
 from .states import LEAST_SAMPLES
 from .winding import with_windings
@@ -71,7 +72,8 @@ class RigTrial:
     setpoint:
     joint -> (n,). extra: columns that no signal names. live: joints whose drive is connected (gear not zero). drives:
     joint -> its drive as this recording has it, the declared one where it is not connected. clipped:
-    joint -> (n,) samples at which its effort stood on a limit of its reading; they are nan.
+    joint -> (n,) samples at which its effort stood on a limit of its reading; they are nan. dropped: column -> how many
+    of its readings no machine gave; they are nan.
     """
 
     name: str
@@ -87,6 +89,7 @@ class RigTrial:
     live: tuple[str, ...]
     drives: Mapping[str, Drive] = field(default_factory=dict)
     clipped: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+    dropped: Mapping[str, int] = field(default_factory=dict)
 
     def tells(self, drive: Drive) -> bool:
         """Whether what a drive puts in is recorded, or what it is told, or it is not connected."""
@@ -202,11 +205,24 @@ def load_rig(session: Session, xml: bytes | None = None) -> RigModel:
         couplings=_couplings(model, mujoco),
         trials=tuple(t for t in trials if t not in short),
         quantity=quantity,
-        notes=tuple(
-            f"{t.name}: {len(t.time_s)} samples are too few, and are left out; {LEAST_SAMPLES} or more are needed"
-            for t in short
+        notes=(
+            *(
+                f"{t.name}: {len(t.time_s)} samples are too few, and are left out; {LEAST_SAMPLES} or more are needed"
+                for t in short
+            ),
+            *_glitches_told([t for t in trials if t not in short]),
         ),
     )
+
+
+def _glitches_told(trials: Sequence[RigTrial]) -> list[str]:
+    """What is to be said of readings that are left out."""
+    columns = dict.fromkeys(c for t in trials for c in t.dropped)
+    return [
+        f'"{c}": {sum(t.dropped.get(c, 0) for t in trials)} single readings stand far outside all others and are left '
+        f"out (first in {next(t.name for t in trials if c in t.dropped)})"
+        for c in columns
+    ]
 
 
 def _drives(model: Any, mujoco: Any) -> tuple[Drive, ...]:
@@ -289,12 +305,15 @@ def _map_trial(trial: Trial, quantity: Mapping[str, tuple], drives: tuple[Drive,
     time_s = log.time_s[keep] - log.time_s[0]
     maps: dict[str, dict[str, Array]] = {k: {} for k in ("position", "velocity", "force", "ctrl", "setpoint")}
     by_drive = {d.name: d for d in drives}
+    columns = {c: v[keep] for c, v in log.columns.items()}
+    wild = {c: at for c, v in columns.items() if (at := glitches(v)).any()}
+    columns |= {c: np.where(at, np.nan, columns[c]) for c, at in wild.items()}
     for column, (kind, name, attribute) in quantity.items():
         if column not in log.columns:
             if attribute == "position":
                 raise SessionError(f'{log.path}: no column "{column}"; {did_you_mean(column, log.columns)}')
             continue
-        values = log.columns[column][keep]
+        values = columns[column]
         if np.isfinite(values).any():
             maps[attribute][name if kind == "joint" else by_drive[name].joint] = values
     if not maps["position"]:
@@ -318,7 +337,7 @@ def _map_trial(trial: Trial, quantity: Mapping[str, tuple], drives: tuple[Drive,
             voltage[joint] = maps["ctrl"][joint]
         elif joint in maps["ctrl"] and drive.kind == "position":
             maps["setpoint"].setdefault(joint, maps["ctrl"][joint])
-    extra = {c: v[keep] for c, v in log.columns.items() if c not in quantity and np.isfinite(v).any()}
+    extra = {c: v for c, v in columns.items() if c not in quantity and np.isfinite(v).any()}
     return RigTrial(
         trial.name,
         trial.validate,
@@ -332,4 +351,5 @@ def _map_trial(trial: Trial, quantity: Mapping[str, tuple], drives: tuple[Drive,
         dict(trial.set),
         live,
         acting,
+        dropped={c: int(at.sum()) for c, at in wild.items()},
     )
