@@ -121,3 +121,14 @@ def test_bursts_and_what_comes_often_are_no_glitches() -> None:
     gap = np.where(np.arange(2000) == 7, np.nan, random.standard_normal(2000))
     gap[900] = 99.0
     assert np.flatnonzero(glitches(gap)).tolist() == [900]
+
+
+def test_a_position_that_jumps_by_a_turn_and_back_is_a_glitch_and_one_that_stays_is_none() -> None:
+    t = np.arange(0, 20, 0.01)
+    swing = 2.0 * np.sin(3 * t)
+    jumps = swing.copy()
+    jumps[[100, 400, 401]] += 2 * np.pi * np.array([1, -1, -1])
+    assert np.flatnonzero(glitches(jumps, smooth=True)).tolist() == [100, 400, 401]
+    assert not glitches(np.where(t > 10, swing + 2 * np.pi, swing), smooth=True).any()
+    rests = np.where((t > 10) & (t < 10.5), 0.3 * (t - 10), np.where(t <= 10, 0.0, 0.15))
+    assert not glitches(np.round(rests, 3), smooth=True).any()

@@ -306,7 +306,8 @@ def _map_trial(trial: Trial, quantity: Mapping[str, tuple], drives: tuple[Drive,
     maps: dict[str, dict[str, Array]] = {k: {} for k in ("position", "velocity", "force", "ctrl", "setpoint")}
     by_drive = {d.name: d for d in drives}
     columns = {c: v[keep] for c, v in log.columns.items()}
-    wild = {c: at for c, v in columns.items() if (at := glitches(v)).any()}
+    moved = {c for c, (_, _, attribute) in quantity.items() if attribute == "position"}
+    wild = {c: at for c, v in columns.items() if (at := glitches(v, c in moved)).any()}
     columns |= {c: np.where(at, np.nan, columns[c]) for c, at in wild.items()}
     for column, (kind, name, attribute) in quantity.items():
         if column not in log.columns:
