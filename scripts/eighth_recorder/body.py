@@ -40,7 +40,7 @@ def palm_path(rng, pose, time):
 
 def segment_poses(finger, proximal, distal, tilt, shift):
     """Rotation and centre of both segments in the palm frame."""
-    turn, centre = [], []
+    _turn, _centre = [], []
     first = rotation(finger.axes[0], proximal)
     for axis, angle in tilt[0]:
         first = rotation(axis, angle) @ first
