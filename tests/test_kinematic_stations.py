@@ -603,3 +603,17 @@ def test_a_finger_that_stays_bent_takes_its_spring_off_the_drive_unless_it_is_a_
     station = judged("encoder", "index", "index", "proximal", joint(4, add=stays, noise=0.2), catalogue("encoder"))
     assert [f.term.effect.name for f in station.kept] == ["spring_decoupling"]
     assert pulls(station, TRIFLE) is pulled
+
+
+@pytest.mark.parametrize(("p", "share", "stands"), [(1.0, 0.4, False), (1.0, 0.6, True), (1e-4, 0.4, True)])
+def test_what_holds_less_than_something_no_table_names_stands_only_where_a_test_sees_it(
+    p: float, share: float, stands: bool
+) -> None:
+    def of(held: float, **kind: object) -> SimpleNamespace:
+        kind = {"listed": True, "name": "series_elasticity", "drifting": False, "covers": (), **kind}
+        return SimpleNamespace(term=SimpleNamespace(effect=SimpleNamespace(**kind)), size=1.0, share=held)
+
+    give, strange = of(share), of(1 - share, listed=False, name="clock_wander")
+    naming = SimpleNamespace(before=SimpleNamespace(p=p))
+    station = SimpleNamespace(_unlisted=(strange,), _beside=(give, strange), naming=naming, wander=0.0)
+    assert (give in Station.kept.fget(station)) is stands

@@ -214,8 +214,11 @@ class Station:
     @property
     def kept(self) -> tuple[Named, ...]:
         """The effects that stand beside each other: one of a small share may be no more than the form of the large one
-        being another, and is left to the unexplained part; so is what is smaller than something that no table names."""
+        being another, and is left to the unexplained part; so is what is smaller than something that no table names, or,
+        where no test sees anything, holds less of it."""
         strange = max((f.size for f in self._unlisted), default=0.0)
+        unseen = self.naming.before.p >= ALPHA
+        held = max((f.share for f in self._unlisted), default=0.0) if unseen else 0.0
         covered = {name for f in self._unlisted for name in f.term.effect.covers}
         restless = self.wander if self.wander > UNREST else 0.0
         return tuple(
@@ -223,6 +226,7 @@ class Station:
             for f in self._beside
             if f.term.effect.listed
             and f.size >= strange
+            and f.share >= held
             and f.term.effect.name not in covered
             and (f.size >= restless or not f.term.effect.drifting)
         )
