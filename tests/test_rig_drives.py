@@ -10,7 +10,8 @@ import pytest
 from rig_bench import ARM, Motion, recorded
 
 from hand_model.rig import diagnose_rig, fit_declared, load_rig
-from hand_model.rig.channels import check_channels, limits, unclipped
+from hand_model.rig.channels import check_channels
+from hand_model.rig.clipping import limits, unclipped
 from hand_model.rig.glitches import glitches
 from hand_model.session import read_session
 

@@ -8,13 +8,14 @@ drives is unsigned.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .balance import Rows
+from .clipping import limits
 from .declared import DeclaredFit
 from .model import RigModel, RigTrial
 from .states import fill_gaps, uniform_time
@@ -31,8 +32,6 @@ BOTH_WAYS = 0.1  # of the way that a joint goes to one side: as much to the othe
 LEAST_PERIODS = 2.0
 UNBEGUN = 0.02  # of a recording, at its begin, in which its controller need not run yet
 LEAST_TURNS = 4  # changes of sign that must be seen before a channel is said to have none
-CLIPPED = 0.05  # share of samples on one and the same extreme value
-PILED = 10  # times as often as any other value comes, stands a reading on a limit
 APART = 0.1  # of SAME: a copy in few recordings among others that are none is plainly one
 
 
@@ -107,49 +106,6 @@ def _looks(trial: RigTrial, joint: str, values: Array, measured: bool) -> list[t
         if share < SAME:
             out.append(("command_as_measurement", share, f'{REPEATS} "{name}"'))
     return out
-
-
-def limits(trial: RigTrial, joint: str) -> tuple[float, float]:
-    """Least and greatest reading of an effort, each where the channel stands on it and the machine would not: the same
-    both ways; or on one side alone, in many samples while the joint moves, beside which no other value comes as often.
-    Infinite where there is none."""
-    values = fill_gaps(trial.time_s, trial.effort[joint])
-    found, often = np.unique(values, return_counts=True)
-    low, high = float(found[0]), float(found[-1])
-    none = (-np.inf, np.inf)
-    if len(found) <= 20:
-        return none
-    if min(often[0], often[-1]) > CLIPPED * len(values) and abs(high + low) < 0.02 * (high - low):
-        return low, high
-    speed = np.abs(np.gradient(fill_gaps(trial.time_s, trial.position[joint]), trial.time_s))
-    moving = speed > 0.1 * np.quantile(speed, 0.9)
-
-    def stands(end: float, count: int) -> bool:
-        here = (values == end) & moving
-        return end != 0 and np.sum(here) > CLIPPED * len(values) and count > PILED * np.max(often[1:-1])
-
-    return (
-        low if stands(low, int(often[0])) else none[0],
-        high if stands(high, int(often[-1])) else none[1],
-    )
-
-
-def unclipped(rig: RigModel) -> RigModel:
-    """The rig without the samples of efforts that stand on a limit of their reading: they say only that it is at least
-    that."""
-
-    ends: dict[str, set[float]] = {}
-    for trial in rig.trials:
-        for joint in (j for j in trial.effort if j in trial.live and j in trial.position):
-            ends.setdefault(joint, set()).update(e for e in limits(trial, joint) if np.isfinite(e))
-
-    def without(trial: RigTrial) -> RigTrial:
-        # a limit is the channel's: it is one in a recording that stands on it for a moment only, too
-        ended = {j: np.isin(e, list(ends[j])) for j, e in trial.effort.items() if ends.get(j)}
-        effort = {j: np.where(at, np.nan, trial.effort[j]) for j, at in ended.items()}
-        return replace(trial, effort={**trial.effort, **effort}, clipped=ended)
-
-    return replace(rig, trials=tuple(without(t) for t in rig.trials))
 
 
 def _reverses(trial: RigTrial, joint: str) -> bool:

@@ -15,7 +15,8 @@ from ..background import single_threaded
 from ..errors import HandModelError, SessionError
 from ..output import refuse_file
 from ..session import Session
-from .channels import ChannelIssue, check_balance, check_channels, unclipped
+from .channels import ChannelIssue, check_balance, check_channels
+from .clipping import unclipped
 from .couplings import coupling_terms, with_couplings
 from .declared import DeclaredFit, fit_declared
 from .findings import NOT_TAKEN, CouplingResidual, Finding, RigFindings, measured, whereabouts
