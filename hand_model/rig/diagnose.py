@@ -25,7 +25,7 @@ from .model import RigModel, load_rig
 from .name.beside import Score, score
 from .name.candidates import Candidate, candidates
 from .name.compete import LEAST_SHARE, Step, judge
-from .name.joint_search import as_term, offsets_first, search_joints
+from .name.joint_search import as_term, offsets_first, offsets_of_chain, search_joints
 from .name.problem import Term, held_out, normal, pose, solution
 from .noise import effort_noise
 from .proof import Bench
@@ -243,6 +243,9 @@ def _searched(rig: RigModel, fit: DeclaredFit, say: Callable[[str], None]) -> _S
     offsets = [(w.step, as_term(rig, fit, w)) for w in first.values() if w is not None]
     off_axis = _off_axis(Bench(rig, floor=floor), fit, [t for _, t in offsets])
     fit, finding = (fit, None) if off_axis is None else off_axis
+    if off_axis is not None:  # beside weights where they are declared, offsets stood for what these do elsewhere
+        first, offsets = offsets_of_chain(rig, fit, joints), []
+        stories += [(w.step, as_term(rig, fit, w)) for w in first.values() if w is not None]
     for joint, (won, left) in zip(joints, search_joints(rig, fit, first), strict=True):
         stories += [(w.step, as_term(rig, fit, w)) for w in won]
         rejected += left

@@ -31,6 +31,19 @@ def offsets_first(rig: RigModel, fit: DeclaredFit, joints: Sequence[str]) -> dic
     return dict(zip(joints, _each(_offset_first, [(rig, _own(fit, j), j) for j in joints]), strict=True))
 
 
+def offsets_of_chain(rig: RigModel, fit: DeclaredFit, joints: Sequence[str]) -> dict[str, Won | None]:
+    """Of every joint, a constant offset of its effort where it wins a round among those of all joints, all declared
+    parameters of the chain free beside them: a weight off its axis is shared by joints, and what it does at one posture
+    an offset does, too."""
+    offsets = [c for j in joints for c in candidates(rig, fit, j) if c.effect == "asymmetric_friction"]
+    taken, steps, _ = compete(pose(fit), offsets, most=len(joints))
+    won = {
+        t.candidate.joint: Won(s, t.candidate.joint, t.candidate.key, t.shape)
+        for t, s in zip(taken, steps, strict=True)
+    }
+    return {joint: won.get(joint) for joint in joints}
+
+
 def search_joints(
     rig: RigModel, fit: DeclaredFit, begin: Mapping[str, Won | None]
 ) -> Iterator[tuple[list[Won], list[str]]]:
