@@ -131,3 +131,31 @@ def test_answers_are_late_with_the_drive_where_its_current_is_in_time() -> None:
     for in_time, drive_s, channel_s in (((), 0, 0.1), (("index",), 20, 0.0)):
         told = lateness({"index": sooner, "ring": slow}, in_time)["index"]
         assert len(told.drive_s) == drive_s and told.channel_s == pytest.approx(channel_s)
+
+
+@pytest.mark.parametrize(
+    ("told_s", "answered_s", "may_be"),
+    [(0.02, 0.0, False), (0.02, 0.016, True), (0.05, 0.05, True), (-0.02, 0.0, False)],
+)
+def test_a_lateness_that_a_simulation_tells_stands_where_answers_do_not_deny_it(
+    told_s: float, answered_s: float, may_be: bool
+) -> None:
+    """A controller that is not as taken for looks like a late current, and answers like one that is in time."""
+    drives = {"index": drive(3), "ring": drive(4)}
+    timed = answering(drives, {"index": (told_s, 0.0015), "ring": (0.0, 0.0015)})
+    answered = {"index": Lateness(np.zeros(0), answered_s, 0.007)}
+    assert _late(drives, timed, answered) == {"index": may_be, "ring": False}
+
+
+def test_what_simulation_and_answers_surely_say_stands_beside_a_balance_that_takes_it_for_a_short_filter() -> None:
+    read = {"form": 1.0, "delay": 0.015}
+
+    def behind(state: DriveState) -> DriveState:
+        seen = np.isfinite(state.effort)
+        whole = np.interp(state.time_s, state.time_s[seen], state.effort[seen])
+        return replace(state, effort=np.where(seen, EFFECT.reading(whole, state.time_s, read), np.nan))
+
+    drives = {"index": tuple(behind(s) for s in drive(3)), "ring": drive(4)}
+    timed = answering(drives, {"index": (0.06, 0.0015), "ring": (0.0, 0.0015)})
+    assert not _late(drives, timed, {})["index"]
+    assert _late(drives, timed, {"index": Lateness(np.zeros(0), 0.06, 0.007)})["index"]

@@ -21,6 +21,7 @@ from .simulated import SimulatedDrive
 DELAY_TOLD = 2.0
 SEEN = 0.5  # the same of a shift that is told otherwise (one standard deviation)
 ALIKE = 2.0  # standard deviations of answers within which they and what else is told say the same
+SURELY = 3.0  # standard deviations
 ANSWERED = 1.5  # standard deviations by which answers bear a simulated lateness out
 
 
@@ -71,6 +72,8 @@ def _late(
             answered.get(actuator), told, doubt
         ):  # a controller that is another than simulated looks like a delay
             return beyond_chance and told * x > 0 and abs(x) > bound
+        if _surely_late(answered.get(actuator), told, doubt, bound):
+            return True
         if earliest < latest and beyond_chance and x > bound:
             # behind a filter answers tell little of how late it is: they must not deny it
             return earliest - ALIKE * doubt < told < latest + ALIKE * doubt
@@ -124,6 +127,15 @@ def _denied(answers: Lateness | None, told_s: float, doubt_s: float) -> bool:
     if answers is None or abs(answers.channel_s) > answers.doubt_s:
         return False
     return abs(told_s - answers.channel_s) > ALIKE * float(np.hypot(answers.doubt_s, doubt_s))
+
+
+def _surely_late(answers: Lateness | None, told_s: float, doubt_s: float, bound_s: float) -> bool:
+    """Whether a simulation and answers to commands each surely say a current late by more than a bound, whatever a
+    balance makes of it."""
+    if answers is None:
+        return False
+    least_s = min(told_s - SURELY * doubt_s, answers.channel_s - SURELY * answers.doubt_s)
+    return least_s > bound_s
 
 
 def _answers_so(answers: Lateness | None, told_s: float) -> bool:
