@@ -291,9 +291,9 @@ def test_what_no_finger_can_do_is_said_where_nothing_else_explains_the_markers(m
     found = markers._named
     tried: list[int] = []
 
-    def beyond(search, before):
+    def beyond(search, before, begin=()):
         tried.append(len(search.candidates))
-        naming = found(search, before)
+        naming = found(search, before, begin)
         if len(tried) > 1:
             return naming
         return replace(naming, found=tuple(replace(e, effect=NO_HINGE) for e in naming.found))
@@ -303,6 +303,29 @@ def test_what_no_finger_can_do_is_said_where_nothing_else_explains_the_markers(m
     assert len(tried) == 2 and tried[1] < tried[0]
     tried.clear()
     assert places(seen(tilting(lambda share, way: 0.01 * np.sin(2 * np.pi * share)), body=2)) == {(NO_HINGE, None)}
+
+
+def test_what_slips_leave_is_told_beside_them_where_a_way_that_no_finger_can_go_was_found_first(monkeypatch) -> None:
+    """A tilting joint whose marker slips is taken for no hinge at first, slips alone do not do: both together do."""
+    found = markers._named
+    begun: list[set[str]] = []
+
+    def beyond(search, before, begin=()):
+        begun.append({e.effect for e in begin})
+        naming = found(search, before, begin)
+        if len(begun) > 1:
+            return naming
+        ways = [e for e in naming.found if e.effect == "joint_wobble"]
+        return replace(naming, found=tuple(replace(e, effect=NO_HINGE) for e in ways))
+
+    def shift(share, turn, arm):
+        tilt = tilting(lambda share, way: 0.01 * np.sin(2 * np.pi * share))
+        return tilt(share, turn, arm) + slipping(0.4)(share, turn, arm)
+
+    monkeypatch.setattr(markers, "_named", beyond)
+    told = places(seen(shift, body=2))
+    assert begun[0] == begun[1] == set() and "marker_slip" in begun[2]
+    assert ("joint_wobble", None) in told and ("marker_slip", "M8") in told and (NO_HINGE, None) not in told
 
 
 @pytest.mark.parametrize(("rate_hz", "frames"), [(50.0, 8), (120.0, 8), (240.0, 16), (960.0, 64)])

@@ -26,7 +26,7 @@ LEAST_ROWS = 50  # of a recording: fewer, and no motion is read from it
 GIVE_LEAST, GIVE_MOST = 0.02, 1.2  # [%] of the declared Coulomb friction's bristles; beyond, give is presliding
 LENGTHS = np.geomspace(GIVE_LEAST, GIVE_MOST, 12).tolist()
 ALIKE = 1.6  # times the bristles of the drive that gives least, at most, another healthy one's are
-GIVE_UNSEEN = 0.12  # [%] differences of bristles below this are within what starts tell
+GIVE_USUAL = 0.65  # [%] any drive's friction may take to turn over (measured in healthy ones of a hand: 0.5 to 0.6)
 SETTLE_SAMPLES = (14, 13)  # after a start and before a stop: where acceleration is smeared by the kernel
 
 UNFOLLOWED = 0.25  # of the range: commands that end farther than this from where the motion does are not its own
@@ -296,7 +296,7 @@ def gives(prepared: Mapping[str, Sequence[DriveState]]) -> tuple[dict[str, Give]
     softness = _least([length / f for length, f in best.values() if f > 0], 0.0)  # of the stiffest drive [%/raw]
 
     def granted(friction: float) -> float:
-        return max(ALIKE * max(least, softness * friction), GIVE_UNSEEN)
+        return max(ALIKE * max(least, softness * friction), GIVE_USUAL)
 
     return {a: Give(min(x, granted(f)), granted(f)) for a, (x, f) in best.items()}, granted(0.0)
 

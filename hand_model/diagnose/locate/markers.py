@@ -67,7 +67,7 @@ def name_markers(angles: FingerAngles) -> MarkerNaming:
 
 def named_in(blocks: Blocks) -> MarkerNaming:
     """The same of its blocks of frames. A way of a joint that no finger can go is what stays where nothing else
-    explains the markers."""
+    explains the markers, or, what other things leave told beside them, explains them better."""
     y = project(blocks, blocks.residual.reshape(len(blocks.residual), -1, 1))
     shared = project(blocks, blocks.chain_columns)
     sigma = _noise(y, blocks)
@@ -76,21 +76,27 @@ def named_in(blocks: Blocks) -> MarkerNaming:
     if p_before > SKIP_P:
         return MarkerNaming(blocks, (), sigma, p_before, p_before, excess_before, excess_before)
     candidates, before = candidates_of(blocks), (p_before, excess_before)
-    naming = _named(Stepwise(blocks, candidates, y, shared, sigma, lasting), before)
+    search = Stepwise(blocks, candidates, y, shared, sigma, lasting)
+    naming = _named(search, before)
     beyond = {e.body for e in naming.found if e.effect == NO_HINGE}
     if not beyond:
         return naming
     candidates = [c for c in candidates if c.effect not in UNHINGED or c.body not in beyond]
     other = _named(Stepwise(blocks, candidates, y, shared, sigma, lasting), before)
-    explained = bool(other.found) and other.p_after >= ALPHA
-    return other if explained and all(e.effect != NO_HINGE for e in other.found) else naming
+    if other.found and other.p_after >= ALPHA and all(e.effect != NO_HINGE for e in other.found):
+        return other
+    known = [e for e in other.found if e.effect not in UNHINGED]
+    if not known:
+        return naming
+    again = _named(search, before, known)
+    return again if search.score(again.found) > search.score(naming.found) + UNLIKELY else naming
 
 
-def _named(search: Stepwise, before: tuple[float, float]) -> MarkerNaming:
+def _named(search: Stepwise, before: tuple[float, float], begin: Sequence[MarkerEffect] = ()) -> MarkerNaming:
     """The naming among the candidates of a search; slips of one place are a creep where an even motion says as much.
-    before: lack of fit and excess without any."""
+    before: lack of fit and excess without any. begin: effects from which it sets out."""
     blocks, candidates, y, shared, sigma = search.blocks, search.candidates, search.y, search.shared, search.sigma
-    found, refused = _selected(search)
+    found, refused = _selected(search, begin)
     for place in dict.fromkeys((e.body, e.label) for e in found if e.begin is not None):
         others = [e for e in found if e.begin is None or (e.body, e.label) != place]
         slips = [c for c in candidates if c.step and c.lasting and (c.body, c.label) == place]
@@ -121,9 +127,9 @@ def _possible(blocks: Blocks, effect: MarkerEffect) -> bool:
     return possible(blocks, effect.body, (effect.columns @ effect.coefficients).reshape(len(blocks.residual), -1, 3))
 
 
-def _selected(search: Stepwise) -> tuple[list[MarkerEffect], MarkerEffect | None]:
-    """What stepwise selection finds, and the likeliest further effect, that did not bring enough."""
-    found: list[MarkerEffect] = []
+def _selected(search: Stepwise, begin: Sequence[MarkerEffect] = ()) -> tuple[list[MarkerEffect], MarkerEffect | None]:
+    """What stepwise selection finds from `begin` on, and the likeliest further effect, that did not bring enough."""
+    found = list(begin)
     while len(found) < MOST:
         best = search.next(found)
         # what stays correlated beside the best candidate weighs all of them down
