@@ -29,7 +29,7 @@ def states(departure: float = 0.0, samples: int | None = None) -> tuple[DriveSta
             "steady": (moving & (after > 4.0)).astype(float),
             "smoothed": 0 * n,
             "granted": GRANTED * n,
-            "give": 0.5 * n,
+            "give": GRANTED / 1.6 * n,
             "position_noise": 0.02 * n,
         }
         cut = {k: v[keep] for k, v in {**state.extra, **known}.items()}
