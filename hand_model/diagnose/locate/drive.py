@@ -26,7 +26,10 @@ LEAST_ROWS = 50  # of a recording: fewer, and no motion is read from it
 GIVE_LEAST, GIVE_MOST = 0.02, 1.2  # [%] of the declared Coulomb friction's bristles; beyond, give is presliding
 LENGTHS = np.geomspace(GIVE_LEAST, GIVE_MOST, 12).tolist()
 ALIKE = 1.6  # times the bristles of the drive that gives least, at most, another healthy one's are
-GIVE_USUAL = 0.65  # [%] any drive's friction may take to turn over (measured in healthy ones of a hand: 0.5 to 0.6)
+GIVE_UNSEEN = 0.12  # [%] differences of bristles below this are within what starts tell
+# [%] any drive's friction may take to turn over where one of the session's takes more than the other (healthy ones of
+# a hand, as measured: 0.5 to 0.6)
+GIVE_USUAL, GIVE_SOFT = 0.65, 0.3
 SETTLE_SAMPLES = (14, 13)  # after a start and before a stop: where acceleration is smeared by the kernel
 
 UNFOLLOWED = 0.25  # of the range: commands that end farther than this from where the motion does are not its own
@@ -293,10 +296,12 @@ def gives(prepared: Mapping[str, Sequence[DriveState]]) -> tuple[dict[str, Give]
     fits = {a: min((*_misfits(states, x)[0], x) for x in LENGTHS) for a, states in prepared.items()}
     best = {a: (length, max(friction, 0.0)) for a, (_, friction, length) in fits.items()}
     least = _least([length for length, _ in best.values()], GIVE_LEAST)
+    soft = max((length for length, _ in best.values()), default=0.0) > GIVE_SOFT
+    usual = GIVE_USUAL if soft else GIVE_UNSEEN
     softness = _least([length / f for length, f in best.values() if f > 0], 0.0)  # of the stiffest drive [%/raw]
 
     def granted(friction: float) -> float:
-        return max(ALIKE * max(least, softness * friction), GIVE_USUAL)
+        return max(ALIKE * max(least, softness * friction), usual)
 
     return {a: Give(min(x, granted(f)), granted(f)) for a, (x, f) in best.items()}, granted(0.0)
 
