@@ -100,7 +100,8 @@ def lateness(answers: Mapping[str, Answers], in_time: Collection[str] = ()) -> d
         )
         shift = _onset(x.rise_s) if alone else _shift(x.rise_s, [y.rise_s for a, y in told.items() if a != actuator])
         slow = total > 0 and shift <= SHIFTED * total and not _moves_first(x, total - behind)
-        slow = slow and not _variously_late(x, [y for a, y in told.items() if a != actuator])
+        if behind > 0.5 * total:  # the motion is, too
+            slow = slow and not _variously_late(x, [y for a, y in told.items() if a != actuator])
         known = actuator in in_time
         drive = known or not slow and (plain or (not alone and _both_late(x, total, behind)))
         if known:
