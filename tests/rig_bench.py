@@ -24,6 +24,12 @@ torque = "actuator:motor:force"
 Motion = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # time [s], angle [rad], velocity, acceleration
 
 
+def balance(motion: Motion, mass: float = 0.5) -> np.ndarray:
+    """Torque [N m] of the arm, as declared or with another mass [kg]."""
+    _, q, v, a = motion
+    return (0.002 + mass * 0.04) * a + mass * 0.2 * 9.81 * np.sin(q) + 0.02 * v + 0.05 * np.sign(v)
+
+
 def recorded(
     folder: Path, arm: str, count: int, torque: Callable[[Motion], np.ndarray], noise: float, last: float = 1.0
 ) -> Path:

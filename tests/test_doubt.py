@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from test_diagnose import drive
 
-from hand_model.diagnose.locate.doubt import with_doubt
+from hand_model.diagnose.locate.doubt import LONGER, with_doubt
 from hand_model.effects.base import DriveState
 from hand_model.effects.path import from_rest
 
@@ -29,7 +29,7 @@ def states(departure: float = 0.0, samples: int | None = None) -> tuple[DriveSta
             "steady": (moving & (after > 4.0)).astype(float),
             "smoothed": 0 * n,
             "granted": GRANTED * n,
-            "give": GRANTED / 1.6 * n,
+            "give": GRANTED / LONGER * n,
             "position_noise": 0.02 * n,
         }
         cut = {k: v[keep] for k, v in {**state.extra, **known}.items()}

@@ -29,6 +29,18 @@ def shifted(states: tuple[DriveState, ...], delay_s: float) -> tuple[DriveState,
     return tuple(one(s) for s in states)
 
 
+def filtered(states: tuple[DriveState, ...], delay_s: float) -> tuple[DriveState, ...]:
+    """The states with the current behind a filter of `delay_s`."""
+    read = {"form": 1.0, "delay": delay_s}
+
+    def one(state: DriveState) -> DriveState:
+        seen = np.isfinite(state.effort)
+        whole = np.interp(state.time_s, state.time_s[seen], state.effort[seen])
+        return replace(state, effort=np.where(seen, EFFECT.reading(whole, state.time_s, read), np.nan))
+
+    return tuple(one(s) for s in states)
+
+
 def answering(
     drives: dict[str, tuple[DriveState, ...]], told: dict[str, tuple[float, float]]
 ) -> dict[str, tuple[DriveState, ...]]:
@@ -72,14 +84,7 @@ def test_answers_that_may_be_early_by_chance_are_so_where_the_balance_says_the_s
 )
 def test_answers_that_a_filter_leaves_vague_do_not_deny_it(told_s: float, doubt_s: float, may_be: bool) -> None:
     """Of a current behind a filter of 60 ms a sudden rise is noticed anywhere from its start to then."""
-    read = {"form": 1.0, "delay": 0.06}
-
-    def behind(state: DriveState) -> DriveState:
-        seen = np.isfinite(state.effort)
-        whole = np.interp(state.time_s, state.time_s[seen], state.effort[seen])
-        return replace(state, effort=np.where(seen, EFFECT.reading(whole, state.time_s, read), np.nan))
-
-    drives = {"index": tuple(behind(s) for s in drive(3)), "ring": drive(4)}
+    drives = {"index": filtered(drive(3), 0.06), "ring": drive(4)}
     told = {"index": (told_s, doubt_s), "ring": (0.0, 0.005)}
     timed = answering(drives, told)
     assert _late(drives, timed, {}) == {"index": may_be, "ring": False}
@@ -148,14 +153,7 @@ def test_a_lateness_that_a_simulation_tells_stands_where_answers_do_not_deny_it(
 
 
 def test_what_simulation_and_answers_surely_say_stands_beside_a_balance_that_takes_it_for_a_short_filter() -> None:
-    read = {"form": 1.0, "delay": 0.015}
-
-    def behind(state: DriveState) -> DriveState:
-        seen = np.isfinite(state.effort)
-        whole = np.interp(state.time_s, state.time_s[seen], state.effort[seen])
-        return replace(state, effort=np.where(seen, EFFECT.reading(whole, state.time_s, read), np.nan))
-
-    drives = {"index": tuple(behind(s) for s in drive(3)), "ring": drive(4)}
+    drives = {"index": filtered(drive(3), 0.015), "ring": drive(4)}
     timed = answering(drives, {"index": (0.06, 0.0015), "ring": (0.0, 0.0015)})
     assert not _late(drives, timed, {})["index"]
     assert _late(drives, timed, {"index": Lateness(np.zeros(0), 0.06, 0.007)})["index"]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rig_bench import ARM, Motion, recorded
+from rig_bench import ARM, Motion, balance, recorded
 
 from hand_model.rig import diagnose_rig, fit_declared, load_rig
 from hand_model.rig.channels import check_channels
@@ -18,13 +18,11 @@ from hand_model.session import read_session
 pytest.importorskip("mujoco")
 
 MOTOR = '<motor name="motor" joint="hinge"/>'
-KP = 3.0
 
 
-def balance(motion: Motion, mass: float = 0.6) -> np.ndarray:
+def heavier(motion: Motion) -> np.ndarray:
     """Torque [N m] of the arm with another mass than declared."""
-    _, q, v, a = motion
-    return (0.002 + mass * 0.04) * a + mass * 0.2 * 9.81 * np.sin(q) + 0.02 * v + 0.05 * np.sign(v)
+    return balance(motion, 0.6)
 
 
 def set_in(folder: Path, values: list[str]) -> Path:
@@ -51,7 +49,7 @@ def test_a_servo_on_position_has_the_gain_that_each_recording_sets(tmp_path: Pat
     def target(motion: Motion) -> np.ndarray:
         # gear (kp (target - gear q) - kv gear v) is what the arm takes
         kp = gains[next(number)]
-        return 2 * motion[1] + (balance(motion) / 2 + 0.1 * 2 * motion[2]) / kp
+        return 2 * motion[1] + (heavier(motion) / 2 + 0.1 * 2 * motion[2]) / kp
 
     folder = recorded(tmp_path / "s", servo, 5, target, 1e-4)
     text = (folder / "session.toml").read_text()
@@ -62,7 +60,7 @@ def test_a_servo_on_position_has_the_gain_that_each_recording_sets(tmp_path: Pat
 
 def test_a_force_acts_through_the_gear_that_its_recording_sets(tmp_path: Path) -> None:
     gears, number = [1.0, 2.0, 1.0, 2.0, 1.5], iter(range(5))
-    folder = recorded(tmp_path / "s", ARM, 5, lambda m: balance(m) / gears[next(number)], 1e-3)
+    folder = recorded(tmp_path / "s", ARM, 5, lambda m: heavier(m) / gears[next(number)], 1e-3)
     set_in(folder, [f'"actuator:motor:gear" = {gear}' for gear in gears])
     assert mass_of(folder) == pytest.approx(0.6, rel=0.01)
 
@@ -71,7 +69,7 @@ def test_a_force_acts_through_the_gear_that_its_recording_sets(tmp_path: Path) -
 def test_what_stands_on_a_limit_is_in_no_fit(tmp_path: Path, low: float, high: float, said: str) -> None:
     def clipped(motion: Motion) -> np.ndarray:
         noise = 0.01 * np.random.default_rng(1).standard_normal(len(motion[0]))
-        return np.clip(balance(motion) + noise, low, high)
+        return np.clip(heavier(motion) + noise, low, high)
 
     folder = recorded(tmp_path / "s", ARM, 5, clipped, 0.0)
     findings = diagnose_rig(read_session(folder))
@@ -83,7 +81,7 @@ def test_what_stands_on_a_limit_is_in_no_fit(tmp_path: Path, low: float, high: f
 
 def test_an_effort_that_reaches_its_extreme_as_any_other_value_is_not_clipped(tmp_path: Path) -> None:
     def coarse(motion: Motion) -> np.ndarray:
-        return 0.05 * np.round((balance(motion) + 0.01 * np.sin(50 * motion[0])) / 0.05)
+        return 0.05 * np.round((heavier(motion) + 0.01 * np.sin(50 * motion[0])) / 0.05)
 
     rig = load_rig(read_session(recorded(tmp_path / "s", ARM, 5, coarse, 0.0)))
     assert check_channels(rig) == () and not np.isfinite([limits(t, "hinge") for t in rig.trials]).any()
@@ -91,7 +89,7 @@ def test_an_effort_that_reaches_its_extreme_as_any_other_value_is_not_clipped(tm
 
 
 def test_a_limit_of_one_recording_is_one_in_all(tmp_path: Path) -> None:
-    rig = load_rig(read_session(recorded(tmp_path / "s", ARM, 5, lambda m: np.minimum(balance(m), 0.5), 0.0)))
+    rig = load_rig(read_session(recorded(tmp_path / "s", ARM, 5, lambda m: np.minimum(heavier(m), 0.5), 0.0)))
     first, last = rig.trials[0], rig.trials[-1]
     moment = np.where(np.arange(len(last.time_s)) < 40, 0.5, np.minimum(last.effort["hinge"], 0.45))
     brief = replace(last, effort={"hinge": moment})
@@ -103,7 +101,7 @@ def test_single_readings_far_outside_all_others_are_left_out(tmp_path: Path) -> 
     wild = {3: 888.0, 700: -650.0, 701: -650.0}
 
     def told(motion: Motion) -> np.ndarray:
-        torque = balance(motion)
+        torque = heavier(motion)
         torque[list(wild)] = list(wild.values())
         return torque
 

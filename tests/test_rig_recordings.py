@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rig_bench import ARM, HEAD, Motion, recorded, written
+from rig_bench import ARM, HEAD, Motion, balance, recorded, written
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, filtfilt
 
@@ -27,12 +27,6 @@ VOLTAGE = ARM.replace(
     '<dcmotor name="motor" joint="hinge" motorconst="0.35 0.35" resistance="3.4"/>',
 )
 OPEN = 'set = { "actuator:motor:gear" = [0, 0, 0, 0, 0, 0] }\n'
-
-
-def balance(motion: tuple[np.ndarray, ...]) -> np.ndarray:
-    """Torque [N m] of the declared arm."""
-    _, q, v, a = motion
-    return 0.022 * a + 0.5 * 0.2 * 9.81 * np.sin(q) + 0.02 * v + 0.05 * np.sign(v)
 
 
 def voltage_bench(folder: Path, size: bool) -> Path:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .base import LOST_MOTION, Amplitude, Array, DriveState, Effect, Shape, figure
-from .law import Law, Moment
+from .law import Followed, Law, Moment
 from .path import lowpass
 
 DRIVER, FOLLOWER = 0, 1  # even forms give at the driver's end, odd ones at the follower's
@@ -121,7 +121,7 @@ class Compliance(Effect):
     def law(self, parameters: Mapping[str, float]) -> Law:
         """Minus compliance times load, through the map's slope where the give is at the driver's end."""
         compliance, there = parameters["compliance"], at_driver({"form": FOLLOWER, **parameters})
-        followed = _Followed(parameters["lag"]) if damped(parameters) else None
+        followed = Followed(parameters["lag"]) if damped(parameters) else None
         other = (parameters["drag_compliance"] - compliance) * parameters["drag"] if dragged(parameters) else 0.0
         stiff = parameters["stiff"] if stiffens(parameters) else math.inf
 
@@ -132,21 +132,6 @@ class Compliance(Effect):
             return -give * (now.slope if there else math.radians(1.0))
 
         return departure
-
-
-class _Followed:
-    """A give behind a first-order low pass, step by step."""
-
-    def __init__(self, lag_s: float) -> None:
-        self.lag_s, self.state = lag_s, math.nan
-
-    def __call__(self, give: float, step_s: float) -> float:
-        """As much of it as there is by this moment."""
-        if math.isnan(self.state) and step_s == 0:  # nothing has been simulated yet, and no load computed
-            return give
-        before = give if math.isnan(self.state) else self.state
-        self.state = give + (before - give) * math.exp(-step_s / self.lag_s)
-        return self.state
 
 
 def damped(parameters: Mapping[str, float]) -> bool:

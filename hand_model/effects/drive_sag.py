@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, figure
-from .law import Law, Moment
+from .law import Followed, Law, Moment
 from .path import lowpass
 
 ASKED = 100.0  # [raw]
@@ -98,13 +97,11 @@ def _is_late(parameters: Mapping[str, float]) -> bool:
 
 def _late(parameters: Mapping[str, float]) -> Law:
     """What is lost step by step where the supply gives way by and by."""
-    last: list[float] = []  # low pass of what is asked for
+    followed = Followed(parameters["lag"])
 
     def lost(now: Moment) -> float:
-        if not last:
-            last[:] = [abs(now.load)]
-        last[0] = abs(now.load) + (last[0] - abs(now.load)) * math.exp(-now.step_s / parameters["lag"])
-        return now.load * min(parameters["torque_loss"] * last[0] / ASKED, 1 - LEAST_RISE)
+        asked = followed(abs(now.load), now.step_s)
+        return now.load * min(parameters["torque_loss"] * asked / ASKED, 1 - LEAST_RISE)
 
     return lost
 

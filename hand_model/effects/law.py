@@ -48,3 +48,18 @@ class Bristle:
             way = math.copysign(1.0, moved)
             self.state = way + (self.state - way) * math.exp(-abs(moved) / self.length)
         return self.state
+
+
+class Followed:
+    """What follows a value behind a first-order low pass, step by step."""
+
+    def __init__(self, lag_s: float) -> None:
+        self.lag_s, self.state = lag_s, math.nan
+
+    def __call__(self, value: float, step_s: float) -> float:
+        """As much of it as there is by this moment."""
+        if math.isnan(self.state) and step_s == 0:  # nothing has been simulated yet, and no load computed
+            return value
+        before = value if math.isnan(self.state) else self.state
+        self.state = value + (before - value) * math.exp(-step_s / self.lag_s)
+        return self.state

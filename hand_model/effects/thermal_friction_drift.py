@@ -13,6 +13,8 @@ from .base import Amplitude, Array, DriveState, Effect, Shape, figure
 from .law import Law, Moment
 
 ELAPSED, WORKED, LOGGED, EACH = 0.0, 1.0, 2.0, 3.0  # forms
+WARM_UP, COOLING, TEMPERATURES = ("warm_up_time",), ("cooling_time",), ("coldest", "warmest")
+TOLD = {ELAPSED: WARM_UP, WORKED: WARM_UP + COOLING, LOGGED: TEMPERATURES, EACH: WARM_UP}  # what each form has
 SOONEST_S = 5.0  # what is recorded for less than this twice over shows no more than a line
 MOVING = 1.0  # %/s: below, a drive is at rest
 
@@ -62,13 +64,7 @@ class ThermalFrictionDrift(Effect):
         self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]
     ) -> dict[str, float]:
         """Cold excess, also as a ratio to the warm Coulomb friction, and what its form has of times and temperatures."""
-        without = {
-            ELAPSED: ("cooling_time", "coldest", "warmest"),
-            WORKED: ("coldest", "warmest"),
-            LOGGED: ("warm_up_time", "cooling_time"),
-            EACH: ("cooling_time", "coldest", "warmest"),
-        }[shape["form"]]
-        told = {k: v for k, v in shape.items() if k not in without}
+        told = {k: v for k, v in shape.items() if k in ("form", *TOLD[shape["form"]])}
         return {**amplitude, **told, "ratio": amplitude["cold_excess"] / (declared.get("coulomb") or np.nan)}
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..effects.path import runs
 from ..session.log import rows_lost
 from .dynamics import INERTIAL, inertial_columns, inertial_parameters
 from .model import RigModel, RigTrial
@@ -152,7 +153,7 @@ def declared_columns(rig: RigModel, off_axis: bool = False) -> tuple[Column, ...
             columns.append(Column("offset", drive.name, "", 0.0))
         # Back-EMF: damping while the leads are connected, unless what the drive gives after it is recorded.
         if drive.kind == "voltage" and not any(drive.joint in t.effort for t in rig.trials):
-            columns.append(Column("back_emf", drive.name, "", _back_emf(model, drive.name)))
+            columns.append(Column("back_emf", drive.name, "", back_emf(model, drive.name)))
     columns += [
         Column("spring", model.tendon(t).name, "", float(model.tendon_stiffness[t]))
         for t in range(model.ntendon)
@@ -161,7 +162,8 @@ def declared_columns(rig: RigModel, off_axis: bool = False) -> tuple[Column, ...
     return tuple(columns)
 
 
-def _back_emf(model: Any, name: str) -> float:
+def back_emf(model: Any, name: str) -> float:
+    """Damping [N m s or N s/m] at its joint of a drive by voltage whose leads are connected."""
     a = model.actuator(name).id
     resistance, constant = model.actuator_gainprm[a, :2]
     return float(constant**2 / resistance * model.actuator_gear[a, 0] ** 2)
@@ -276,11 +278,8 @@ def _near_gap(rig: RigModel, trial: RigTrial, grid: Array, reach_s: float) -> ND
         lost = rows_lost(time_s) & (interval > GAP * reach_s)
         for begin, end in zip(time_s[:-1][lost], time_s[1:][lost], strict=True):
             near |= (grid > begin - reach_s) & (grid < end + reach_s)
-    for clipped in trial.clipped.values():
-        if clipped.any():
-            at = trial.time_s[clipped]
-            after = np.clip(np.searchsorted(at, grid), 1, len(at) - 1) if len(at) > 1 else np.zeros(len(grid), int)
-            near |= np.minimum(np.abs(grid - at[after]), np.abs(grid - at[np.maximum(after - 1, 0)])) < reach_s
+    for begin, end in (run for clipped in trial.clipped.values() for run in runs(clipped)):
+        near |= (grid > trial.time_s[begin] - reach_s) & (grid < trial.time_s[end - 1] + reach_s)
     return near
 
 
@@ -367,10 +366,10 @@ def _column_values(
             out[:, :, p] = _tendon_column(model, c.name, q)
         elif c.kind in ("offset", "back_emf"):
             drive = next(d for d in rig.drives if d.name == c.name)
-            j, i = rig.joints.index(drive.joint), model.actuator(drive.name).id
+            j = rig.joints.index(drive.joint)
             # as this recording's drive is set: its gear and resistance may not be the declared ones
-            brake = _back_emf(model, c.name) / c.value if c.value else 1.0
-            own = -model.actuator_gear[i, 0] if c.kind == "offset" else brake * v[:, j]
+            brake = back_emf(model, c.name) / c.value if c.value else 1.0
+            own = -model.actuator(c.name).gear[0] if c.kind == "offset" else brake * v[:, j]
             out[:, j, p] = own * (drive.joint in trial.live)
         else:
             j = rig.joints.index(c.name)

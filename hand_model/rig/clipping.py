@@ -43,7 +43,6 @@ def limits(trial: RigTrial, joint: str) -> tuple[float, float]:
 def unclipped(rig: RigModel) -> RigModel:
     """The rig without the samples of efforts that stand on a limit of their reading: they say only that it is at least
     that."""
-
     ends: dict[str, set[float]] = {}
     for trial in rig.trials:
         for joint in (j for j in trial.effort if j in trial.live and j in trial.position):

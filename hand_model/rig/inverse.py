@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DescriptionError
-from .balance import Column, Rows, declared_columns, trial_rows
+from .balance import Column, Rows, back_emf, declared_columns, trial_rows
 from .declared import DeclaredFit
 from .mjcf import read_effects
 from .model import RigModel, RigTrial
@@ -102,8 +102,7 @@ def joint_efforts(rig: RigModel, trial: RigTrial, row: Rows) -> Array:
             if drive.offset:
                 out[:, j] -= model.actuator_gear[i, 0] * model.actuator_biasprm[i, 0]
             if drive.kind == "voltage" and drive.joint not in trial.effort:
-                resistance, constant = model.actuator_gainprm[i, :2]
-                out[:, j] += constant**2 / resistance * model.actuator_gear[i, 0] ** 2 * v[:, j]
+                out[:, j] += back_emf(model, drive.name) * v[:, j]
     return out
 
 

@@ -261,12 +261,15 @@ def _within(limited: int, ends: Array) -> tuple[float, float]:
     return (float(np.min(ends)), float(np.max(ends))) if limited else (-np.inf, np.inf)
 
 
-def _set_drives(model: Any, trial: Trial) -> tuple[Drive, ...]:
+def _set_drives(drives: tuple[Drive, ...], model: Any, trial: Trial) -> tuple[Drive, ...]:
     """The drives as a trial's overrides set them."""
     import mujoco
 
+    changes = {k: v for k, v in trial.set.items() if k.startswith("actuator:")}
+    if not changes:
+        return drives
     own = copy(model)
-    apply_overrides(own, {k: v for k, v in trial.set.items() if k.startswith("actuator:")})
+    apply_overrides(own, changes)
     return _drives(own, mujoco)
 
 
@@ -320,15 +323,15 @@ def _map_trial(trial: Trial, quantity: Mapping[str, tuple], drives: tuple[Drive,
     if not maps["position"]:
         named = ", ".join(f'"{c}"' for c, (_, _, attribute) in quantity.items() if attribute == "position")
         raise SessionError(f"{log.path}: no sample of a position in {named}; a log with one is needed")
-    gears = {k.split(":")[1]: np.atleast_1d(v)[0] for k, v in trial.set.items() if k.endswith(":gear")}
-    live = tuple(d.joint for d in drives if gears.get(d.name, d.gear) != 0)
+    own = _set_drives(drives, model, trial)
+    live = tuple(d.joint for d in own if d.gear != 0)
     for joint in {j for j in live if live.count(j) > 1}:
         raise DescriptionError(
             f'{log.path}: {live.count(joint)} actuators drive the joint "{joint}"; one is needed (of those that pull '
             "together, their sum)"
         )
     effort, voltage = {}, {}
-    acting = {d.joint: d if d.gear else declared for d, declared in zip(_set_drives(model, trial), drives, strict=True)}
+    acting = {d.joint: d if d.gear else declared for d, declared in zip(own, drives, strict=True)}
     for joint, drive in acting.items():
         if joint in maps["force"]:
             effort[joint] = maps["force"][joint] * drive.gear

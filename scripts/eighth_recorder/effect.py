@@ -1,5 +1,7 @@
 """One hidden effect: a name, its draw, and the stages of a recording into which it may reach."""
 
+JOINTS = ("proximal", "distal")
+
 
 class Effect:
     """Subclasses override `draw` and the stages they need; p is what `draw` returned."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from eighth_recorder.effect import Effect, law_of
+from eighth_recorder.effect import JOINTS, Effect, law_of
 
 
 class JointWobble(Effect):
@@ -16,7 +16,7 @@ class JointWobble(Effect):
         side = np.cross(side, finger.axes[joint]) * np.cos(a := rng.uniform(0, np.pi)) + side * np.sin(a)
         return {
             "law": law,
-            "joint": ("proximal", "distal")[joint],
+            "joint": JOINTS[joint],
             "axis": side.tolist(),
             "amplitude_rad": strength * rng.uniform(0.018, 0.04),
             "waves": rng.uniform(0.6, 1.4),
@@ -24,7 +24,7 @@ class JointWobble(Effect):
         }
 
     def angles(self, p, run):
-        joint = ("proximal", "distal").index(p["joint"])
+        joint = JOINTS.index(p["joint"])
         share = (run.proximal, run.distal)[joint] / run.finger.full[joint]
         if p["law"] == "proportional":
             angle = p["amplitude_rad"] * share * (1 if p["phase"] < np.pi else -1)
@@ -43,13 +43,13 @@ class MovingCentre(Effect):
         away = np.cross(finger.axes[joint], rng.normal(0, 1, 3))
         return {
             "law": law,
-            "joint": ("proximal", "distal")[joint],
+            "joint": JOINTS[joint],
             "direction": (away / np.linalg.norm(away)).tolist(),
             "travel_mm": strength * rng.uniform(1.3, 2.8),
         }
 
     def angles(self, p, run):
-        joint = ("proximal", "distal").index(p["joint"])
+        joint = JOINTS.index(p["joint"])
         share = (run.proximal, run.distal)[joint] / run.finger.full[joint]
         path = share if p["law"] == "rolling" else np.sin(np.pi * share)
         run.shift[joint] = run.shift[joint] + p["travel_mm"] * path[:, None] * np.array(p["direction"])

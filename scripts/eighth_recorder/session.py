@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from eighth_recorder import body
+from eighth_recorder.effect import JOINTS
 from eighth_recorder.files import write_log, write_markers
 from eighth_recorder.run import Run
 from eighth_recorder.simulate import State
@@ -82,7 +83,7 @@ def record(hand, folder: Path, rng) -> None:
     for name, place in zip(("origin", "medial", "lateral"), hand.landmarks, strict=True):
         touch(f"landmark_{name}", place, 1.5, kind="landmark", name=name)
     for finger in hand.fingers:
-        for j, joint in enumerate(("proximal", "distal")):
+        for j, joint in enumerate(JOINTS):
             half = rng.uniform(6.7, 7.6)
             for side, way in (("medial", half), ("lateral", -half)):
                 tip = finger.centres[j] + way * finger.axes[j]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from eighth_recorder.body import rotation
-from eighth_recorder.effect import Effect, law_of
+from eighth_recorder.effect import JOINTS, Effect, law_of
 
 
 def _direction(rng):
@@ -30,7 +30,7 @@ class MarkerSlip(Effect):
         segment, marker = int(rng.integers(2)), int(rng.integers(3))
         return {
             "law": _laws(rng),
-            "joint": ("proximal", "distal")[segment],
+            "joint": JOINTS[segment],
             "marker": finger.labels[3 * segment + marker],
             "at": rng.uniform(0.3, 0.7),
             "move_mm": (strength * rng.uniform(1.2, 2.2) * _direction(rng)).tolist(),
@@ -49,7 +49,7 @@ class SupportSlip(Effect):
         segment = int(rng.integers(2))
         return {
             "law": _laws(rng),
-            "joint": ("proximal", "distal")[segment],
+            "joint": JOINTS[segment],
             "at": rng.uniform(0.3, 0.7),
             "axis": _direction(rng).tolist(),
             "turn_rad": strength * rng.uniform(0.03, 0.065),
@@ -57,7 +57,7 @@ class SupportSlip(Effect):
         }
 
     def local(self, p, run):
-        part = run.local[1 + ("proximal", "distal").index(p["joint"])]
+        part = run.local[1 + JOINTS.index(p["joint"])]
         late = after(p, run)
         foot = part[0].mean(axis=0) - [0, 0, 10.0]
         turn = rotation(np.array(p["axis"]), p["turn_rad"])[0]
@@ -98,7 +98,7 @@ class MarkerSwap(Effect):
         ]
         return {
             "law": law,
-            "joint": ("proximal", "distal")[segment],
+            "joint": JOINTS[segment],
             "markers": [finger.labels[j] for j in pair],
             "marker": finger.labels[pair[0]],
             "windows": windows,

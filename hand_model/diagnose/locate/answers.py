@@ -8,7 +8,7 @@ once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -100,8 +100,8 @@ def lateness(answers: Mapping[str, Answers], in_time: Collection[str] = ()) -> d
         )
         shift = _onset(x.rise_s) if alone else _shift(x.rise_s, [y.rise_s for a, y in told.items() if a != actuator])
         slow = total > 0 and shift <= SHIFTED * total and not _moves_first(x, total - behind)
-        if behind > 0.5 * total:  # the motion is, too
-            slow = slow and not _variously_late(x, [y for a, y in told.items() if a != actuator])
+        if slow and behind > 0.5 * total:  # the motion is late, too
+            slow = not _variously_late(x, [y for a, y in told.items() if a != actuator])
         known = actuator in in_time
         drive = known or not slow and (plain or (not alone and _both_late(x, total, behind)))
         if known:
@@ -190,20 +190,16 @@ def _rise(states: Sequence[DriveState], currents: Sequence[Array], step_s: float
     setpoint before which it stood: their moments lie anywhere between samples, so that the mean tells much less than
     one. And the same counted from before the changes, nan where it has not risen for sure when they come."""
     since, risen = [np.zeros(0)], [np.zeros(0)]
-    for state, current in zip(states, currents, strict=True):
-        setpoint, t = state.extra.get("setpoint", np.zeros(len(state.time_s))), state.time_s
-        for k in np.flatnonzero(np.diff(setpoint)) + 1:
-            before, after = (t > t[k] - EARLY_S) & (t < t[k]), (t > t[k] - EARLY_S) & (t < t[k] + RISEN_S)
-            if before.sum() >= 5 and np.ptp(state.position[before]) < STOOD:
-                since.append(t[after] - t[k])
-                risen.append(np.sign(setpoint[k] - setpoint[k - 1]) * (current[after] - np.median(current[before])))
-    since_s, rise = np.concatenate(since), np.concatenate(risen)
-    cells, at, count = np.unique(np.floor(since_s / BIN_S).astype(int), return_inverse=True, return_counts=True)
+    for t, rise, k, _ in _changes(states, currents):
+        after = (t > t[k] - EARLY_S) & (t < t[k] + RISEN_S)
+        since.append(t[after] - t[k])
+        risen.append(rise[after])
+    cells, mean, count = _binned(since, risen)
     told = cells >= 0
     unknown = np.full(len(SHARES), np.nan)
     if len(since) <= LEAST_ANSWERS or told.sum() < 2:
         return unknown, unknown
-    middle, mean = BIN_S * (cells + 0.5), np.bincount(at, rise) / count
+    middle = BIN_S * (cells + 0.5)
     half_s = _reached(middle[told], mean[told], count[told])[-1]
     settling = _course(*(x[middle <= half_s] for x in (middle, mean, count)))
     own = _reached(middle[told], (mean - settling(middle))[told], count[told])
@@ -214,20 +210,37 @@ def _rise_from_answers(states: Sequence[DriveState], currents: Sequence[Array], 
     """Times (len(SHARES),) [s] at which a drive's current has risen to SHARES of its most, counted from its answer to
     each change of the setpoint before which it stood, mean over all; nan where too few are seen."""
     since, risen = [np.zeros(0)], [np.zeros(0)]
+    for t, rise, k, answer in _changes(states, currents):
+        if answer is not None:
+            after = (t > t[k] + answer - 2 * step_s) & (t < t[k] + answer + RISEN_S)
+            since.append(t[after] - t[k] - answer)
+            risen.append(rise[after])
+    cells, mean, count = _binned(since, risen)
+    if len(since) <= LEAST_ANSWERS or len(cells) < 2:
+        return np.full(len(SHARES), np.nan)
+    return _reached(BIN_S * (cells + 0.5), mean, count)
+
+
+def _changes(
+    states: Sequence[DriveState], currents: Sequence[Array]
+) -> Iterator[tuple[Array, Array, int, float | None]]:
+    """Of every change of the setpoint before which a drive stood: the recording's times (n,) [s], how far its current is
+    by then beyond what it was before, towards the new setpoint (n,), the sample of the change and the time [s] from it to
+    the current's answer, None where there is none."""
     for state, current in zip(states, currents, strict=True):
         setpoint, t = state.extra.get("setpoint", np.zeros(len(state.time_s))), state.time_s
         for k in np.flatnonzero(np.diff(setpoint)) + 1:
-            before, answer = (t > t[k] - EARLY_S) & (t < t[k]), _latency(t, setpoint, current, k)
-            if answer is not None and before.sum() >= 5 and np.ptp(state.position[before]) < STOOD:
-                after = (t > t[k] + answer - 2 * step_s) & (t < t[k] + answer + RISEN_S)
-                since.append(t[after] - t[k] - answer)
-                risen.append(np.sign(setpoint[k] - setpoint[k - 1]) * (current[after] - np.median(current[before])))
-    cells, at, count = np.unique(
-        np.floor(np.concatenate(since) / BIN_S).astype(int), return_inverse=True, return_counts=True
-    )
-    if len(since) <= LEAST_ANSWERS or len(cells) < 2:
-        return np.full(len(SHARES), np.nan)
-    return _reached(BIN_S * (cells + 0.5), np.bincount(at, np.concatenate(risen)) / count, count)
+            before = (t > t[k] - EARLY_S) & (t < t[k])
+            if before.sum() >= 5 and np.ptp(state.position[before]) < STOOD:
+                rise = np.sign(setpoint[k] - setpoint[k - 1]) * (current - np.median(current[before]))
+                yield t, rise, k, _latency(t, setpoint, current, k)
+
+
+def _binned(since: Sequence[Array], risen: Sequence[Array]) -> tuple[Array, Array, Array]:
+    """Cells of BIN_S that hold readings at times `since` [s], in order (c,), their means and how many they hold."""
+    label = np.floor(np.concatenate(since) / BIN_S).astype(int)
+    cells, at, count = np.unique(label, return_inverse=True, return_counts=True)
+    return cells, np.bincount(at, np.concatenate(risen)) / count, count
 
 
 def _risen_before(since: Sequence[Array], risen: Sequence[Array], step_s: float) -> bool:

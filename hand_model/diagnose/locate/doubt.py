@@ -22,8 +22,8 @@ START_DOUBT = 0.1  # of the Coulomb friction: what the give of other bristles th
 TOLD_S = 2e-3  # to which the instants of a simulated motion are known
 FEWEST = 20  # samples of a drive in motion, of which anything can be said
 REACH, BLURRED = 2.0, 6.0  # bristle lengths, and times the noise of the position, within which friction turns over
-# times a drive's own bristles, and at least that long [%], may be what its friction takes to turn over
-LONGER, LEAST_GIVE = 1.6, 0.12
+LONGER = 1.6  # times the bristles of one healthy drive, at most, another's are
+LEAST_GIVE = 0.12  # [%] differences of bristles below this are within what starts tell
 PARTS = (0.0, 0.125, 0.25, 0.5, 1.0)  # of that reach, within which departures are alike
 FEW, SURE = 8, 2.0  # samples of a part, and standard errors by which its departures may be larger
 ALIKE = 2.0  # times what departures are: at one start they all err together, which independent ones do not

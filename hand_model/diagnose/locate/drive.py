@@ -14,7 +14,7 @@ from ...effects.current_channel_delay import EFFECT as DELAY
 from ...effects.path import from_rest, runs
 from ...session import Log, Session, Trial
 from ..name.bristles import bristled
-from .doubt import with_doubt
+from .doubt import LEAST_GIVE, LONGER, with_doubt
 from .measurement import coefficients, extremes, frozen, is_measured
 from .motion import Motion, estimate_motion, sure_acceleration
 from .simulated import SimulatedDrive, with_simulated
@@ -25,8 +25,6 @@ KINDS = ("flexion", "excitation")
 LEAST_ROWS = 50  # of a recording: fewer, and no motion is read from it
 GIVE_LEAST, GIVE_MOST = 0.02, 1.2  # [%] of the declared Coulomb friction's bristles; beyond, give is presliding
 LENGTHS = np.geomspace(GIVE_LEAST, GIVE_MOST, 12).tolist()
-ALIKE = 1.6  # times the bristles of the drive that gives least, at most, another healthy one's are
-GIVE_UNSEEN = 0.12  # [%] differences of bristles below this are within what starts tell
 # [%] any drive's friction may take to turn over where one of the session's takes more than the other (healthy ones of
 # a hand, as measured: 0.5 to 0.6)
 GIVE_USUAL, GIVE_SOFT = 0.65, 0.3
@@ -297,11 +295,11 @@ def gives(prepared: Mapping[str, Sequence[DriveState]]) -> tuple[dict[str, Give]
     best = {a: (length, max(friction, 0.0)) for a, (_, friction, length) in fits.items()}
     least = _least([length for length, _ in best.values()], GIVE_LEAST)
     soft = max((length for length, _ in best.values()), default=0.0) > GIVE_SOFT
-    usual = GIVE_USUAL if soft else GIVE_UNSEEN
+    usual = GIVE_USUAL if soft else LEAST_GIVE
     softness = _least([length / f for length, f in best.values() if f > 0], 0.0)  # of the stiffest drive [%/raw]
 
     def granted(friction: float) -> float:
-        return max(ALIKE * max(least, softness * friction), usual)
+        return max(LONGER * max(least, softness * friction), usual)
 
     return {a: Give(min(x, granted(f)), granted(f)) for a, (x, f) in best.items()}, granted(0.0)
 

@@ -21,7 +21,7 @@ from .simulated import SimulatedDrive
 DELAY_TOLD = 2.0
 SEEN = 0.5  # the same of a shift that is told otherwise (one standard deviation)
 ALIKE = 2.0  # standard deviations of answers within which they and what else is told say the same
-SURELY = 3.0  # standard deviations
+SURELY = 3.0  # standard deviations by which a simulation and answers each say a current late, and it is
 ANSWERED = 1.5  # standard deviations by which answers bear a simulated lateness out
 
 
@@ -68,9 +68,8 @@ def _late(
         earliest, latest = seen_s[actuator]
         told, doubt = late[actuator].tolist()
         beyond_chance = brought[actuator] > BEYOND_CHANCE
-        if _denied(
-            answered.get(actuator), told, doubt
-        ):  # a controller that is another than simulated looks like a delay
+        # a controller that is another than simulated looks like a delay
+        if _denied(answered.get(actuator), told, doubt):
             return beyond_chance and told * x > 0 and abs(x) > bound
         if _surely_late(answered.get(actuator), told, doubt, bound):
             return True

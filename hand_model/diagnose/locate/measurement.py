@@ -40,8 +40,9 @@ def is_measured(states: tuple[DriveState, ...]) -> bool:
     if len(np.unique(current)) <= 3 or spread == 0 or _level(states) or _asked_for(states):
         return False
     declared = np.concatenate([s.declared[np.isfinite(s.effort)] for s in states])
-    rest = current - declared @ coefficients(declared, current)
-    if float(np.std(rest)) >= UNMOVED * spread or _of_speed(declared, current):
+    beta = coefficients(declared, current)
+    rest = current - declared @ beta
+    if float(np.std(rest)) >= UNMOVED * spread or _of_speed(current, declared[:, 1:2], beta[2]):
         return False
     span = np.ptp(current)  # a clipped reading has no noise at its ends
     free = (current < np.max(current) - CLIPPED * span) & (current > np.min(current) + CLIPPED * span)
@@ -51,11 +52,9 @@ def is_measured(states: tuple[DriveState, ...]) -> bool:
     return not (jitter < 0.03 * spread and left > 10 * max(jitter, 0.02 * spread))
 
 
-def _of_speed(declared: Array, current: Array) -> bool:
-    """Whether a current (n,) is in proportion to speed and has next to none of a friction that turns over: no motor's is
-    (declared: columns, viscous and Coulomb friction second and third)."""
-    speed = declared[:, 1:2]
-    rubs = coefficients(declared, current)[2]
+def _of_speed(current: Array, speed: Array, rubs: float) -> bool:
+    """Whether a current (n,) is in proportion to a speed (n, 1) and has next to none of a Coulomb friction `rubs` [raw]:
+    no motor's is."""
     alone = current - speed @ coefficients(speed, current)
     return float(np.std(alone)) < ALONE * np.std(current) and abs(rubs) < RUBS * np.std(current)
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...effects import DriveState, catalogue, effect
+from ...effects.base import Shape
 from ..balance import Rows
 from ..declared import DeclaredFit
 from ..laws import GEAR, GEAR_LOW, GEAR_MORE, LINE, LOW, MORE, MOTOR, MOTOR_LOW, MOTOR_MORE, TURNING
@@ -51,8 +52,8 @@ Bound = tuple[str, str, float, float]
 @dataclass(frozen=True)
 class Candidate:
     """One effect at one joint. columns(row, shape) -> (n, j) at full rate; grid: starting shapes; warp: shape -> delay
-    [s] by which every column comes later (None: no delay); variant says in words which one this is; bounds: of shapes
-    that may leave their grid; forms: shape -> forms in which it says something, where that is not all."""
+    [s] by which every column comes later (None: no delay); variant says in words which one this is; shapes: by
+    name, those of the catalogue's effect, which may leave their grid within their bounds."""
 
     effect: str
     variant: str
@@ -61,13 +62,11 @@ class Candidate:
     grid: tuple[dict[str, float], ...]
     columns: Callable[[Rows, Mapping[str, float]], Array]
     delays: bool = False
-    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    forms: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    shapes: Mapping[str, Shape] = field(default_factory=dict)
 
     def told(self, shape: Mapping[str, float]) -> dict[str, float]:
         """What of a shape says something in its form."""
-        form = shape.get("form", 0.0)
-        return {k: float(v) for k, v in shape.items() if k not in self.forms or form in self.forms[k]}
+        return {k: float(v) for k, v in shape.items() if k not in self.shapes or self.shapes[k].matters(shape)}
 
     @property
     def repeats(self) -> bool:
@@ -143,7 +142,6 @@ def _usable(found: Any) -> bool:
 def _from_catalogue(
     found: Any, joint: str, train: tuple[DriveState, ...], states: Mapping[str, DriveState]
 ) -> Candidate:
-    shapes = found.shapes(train)
     grid = [p for p in found.grid(train) if found.name not in UNDAMPED or not p["form"]]
     return Candidate(
         found.name,
@@ -153,8 +151,7 @@ def _from_catalogue(
         ({},) if found.name in SMOOTH else tuple(grid),
         lambda row, shape: np.asarray(found.columns(states[row.trial], shape), float),
         bool(found.warps),
-        {s.name: (s.low, s.high) for s in shapes},
-        {s.name: s.forms for s in shapes if s.forms},
+        {s.name: s for s in found.shapes(train)},
     )
 
 

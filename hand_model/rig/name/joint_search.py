@@ -37,10 +37,7 @@ def offsets_of_chain(rig: RigModel, fit: DeclaredFit, joints: Sequence[str]) -> 
     an offset does, too."""
     offsets = [c for j in joints for c in candidates(rig, fit, j) if c.effect == "asymmetric_friction"]
     taken, steps, _ = compete(pose(fit), offsets, most=len(joints))
-    won = {
-        t.candidate.joint: Won(s, t.candidate.joint, t.candidate.key, t.shape)
-        for t, s in zip(taken, steps, strict=True)
-    }
+    won = {t.candidate.joint: _won(s, t) for t, s in zip(taken, steps, strict=True)}
     return {joint: won.get(joint) for joint in joints}
 
 
@@ -54,6 +51,10 @@ def search_joints(
 def as_term(rig: RigModel, fit: DeclaredFit, won: Won) -> Term:
     """The winner of a round as a term of the balance."""
     return Term(next(c for c in candidates(rig, fit, won.joint) if c.key == won.key), won.shape)
+
+
+def _won(step: Step, term: Term) -> Won:
+    return Won(step, term.candidate.joint, term.candidate.key, term.shape)
 
 
 def _each(function: Callable[..., Any], calls: Sequence[tuple[Any, ...]]) -> Iterator[Any]:
@@ -73,7 +74,7 @@ def _offset_first(rig: RigModel, fit: DeclaredFit, joint: str) -> Won | None:
         return None
     taken, steps, _ = compete(problem, everything, most=1)
     if taken and taken[0].candidate.effect == "asymmetric_friction":
-        return Won(steps[0], joint, taken[0].candidate.key, taken[0].shape)
+        return _won(steps[0], taken[0])
     return None
 
 
@@ -85,6 +86,6 @@ def _search(rig: RigModel, fit: DeclaredFit, joint: str, begin: Won | None) -> t
         return tuple(same), candidates(rig, at, joint)
 
     taken, steps, scores = compete(pose(fit, joint), candidates(rig, fit, joint), stands, settle=settle)
-    won = [Won(s, joint, t.candidate.key, t.shape) for s, t in zip(steps, taken[len(stands) :], strict=True)]
+    won = [_won(s, t) for s, t in zip(steps, taken[len(stands) :], strict=True)]
     stand = {t.candidate.key for t in taken}
     return won, [s.term.candidate.key for s in scores if s.term.candidate.key not in stand]

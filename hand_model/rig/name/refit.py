@@ -80,7 +80,9 @@ def _descended(
     names = [n for n in start if n in grid]
     if not names:
         return start
-    low, high = np.array([candidate.bounds.get(n, grid[n][[0, -1]]) for n in names]).T
+    shapes = candidate.shapes
+    ends = [(shapes[n].low, shapes[n].high) if n in shapes else grid[n][[0, -1]] for n in names]
+    low, high = np.array(ends).T
     at = np.array([start[n] for n in names])
 
     def shape(x: Array) -> dict[str, float]:
