@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 from hand_model.diagnose.locate.decoupled import TRIFLE, pulls
 from hand_model.diagnose.locate.excursions import with_excursions
-from hand_model.diagnose.locate.slips import _swaps
+from hand_model.diagnose.locate.swaps import swaps as swaps_found
 from hand_model.diagnose.name.balance import Balance
 from hand_model.diagnose.name.evidence import gain
 from hand_model.diagnose.name.judgement import judged
@@ -23,8 +24,9 @@ from hand_model.effects.base import DriveState
 from hand_model.effects.driven import driven, play, soft_play
 from hand_model.effects.law import Moment
 from hand_model.effects.path import dahl, lowpass
-from hand_model.identify.chain import ChainData
+from hand_model.identify.chain import Chain, ChainData, Pose
 from hand_model.identify.repair import Swap, repair_labels
+from hand_model.session import Mocap
 
 MAP = np.array([0.0, 62.0, 30.0, -12.0])  # deg over the share of the driver's range
 
@@ -405,40 +407,57 @@ def test_exchanged_labels_of_a_symmetrical_cluster_are_put_right() -> None:
 
 
 def exchanging(*swaps_of_recordings: tuple[Swap, ...]) -> SimpleNamespace:
-    """A finger of three markers, all of which are seen, in recordings of 5 s with these exchanges."""
+    """A finger of three markers at rest, 20 mm apart, all of which are seen, in recordings of 5 s with these
+    exchanges."""
+    place = np.array([[0.0, 0.0, 0.0], [0.02, 0.0, 0.0], [0.02, 0.02, 0.0]])
+    chain = Chain(place, np.array([[0.0, 0.0, 1.0]]), np.zeros((1, 3)))
+    labels = ("a", "b", "c")
 
     def record(number: int, swaps: tuple[Swap, ...]) -> SimpleNamespace:
-        data = SimpleNamespace(labels=("a", "b", "c"), position_world=np.zeros((500, 3, 3)))
+        right = np.tile(place, (500, 1, 1)) + np.random.default_rng(number).normal(0, 1e-4, (500, 3, 3))
+        recorded = right.copy()
+        for swap in swaps:
+            span, (i, j) = slice(swap.start, swap.stop + 1), (labels.index(name) for name in swap.labels)
+            recorded[span, [i, j]] = right[span, [j, i]]
         return SimpleNamespace(
-            mocap=SimpleNamespace(time_s=np.arange(500) / 100),
+            mocap=Mocap(labels, np.arange(500) / 100, recorded, 100.0, Path("t.c3d")),
             swaps=swaps,
             trial=SimpleNamespace(name=f"t{number}"),
-            data=data,
+            data=ChainData(right, np.ones(3, int), labels),
+            angle_rad=np.zeros((500, 1)),
+            pose=Pose(np.tile(np.eye(3), (500, 1, 1)), np.zeros((500, 3)), np.zeros((500, 1))),
         )
 
     segment = SimpleNamespace(name="distal", markers=("a", "b", "c"))
     records = tuple(record(i, swaps) for i, swaps in enumerate(swaps_of_recordings))
-    return SimpleNamespace(records=records, finger=SimpleNamespace(name="index", segments=(segment,)), noise_m=1e-4)
+    finger = SimpleNamespace(name="index", segments=(segment,))
+    return SimpleNamespace(records=records, finger=finger, chain=chain, noise_m=1e-4)
 
 
 def test_labels_that_flicker_are_no_exchange() -> None:
     lasting = Swap(("a", "b"), 100, 140)
     flicker = tuple(Swap(("a", "b"), f, f + 1) for f in range(200, 300, 5))
     for swaps, count in (((lasting,), 1), ((lasting, *flicker), 0)):
-        assert len(_swaps(exchanging(swaps))) == count
+        assert len(swaps_found(exchanging(swaps))) == count
 
 
 def test_an_exchange_is_told_by_its_own_recording_and_while() -> None:
     angles = exchanging((Swap(("a", "b"), 40, 60),), (Swap(("a", "b"), 300, 420), Swap(("a", "b"), 460, 480)))
-    ((_, finding),) = _swaps(angles)
+    ((_, finding),) = swaps_found(angles)
     read = {name: entry["value"] for name, entry in finding.parameters.items()}
     assert read == pytest.approx({"begin": 3.0, "end": 4.2, "lasting": 0.2 + 1.2 + 0.2})
     assert finding.where["trials"] == ["t0", "t1"] and all(
         text in finding.statement for text in ("0.4 to 0.6 s of t0", "3.0 to 4.2 s of t1", "4.6 to 4.8 s of t1")
     )
     angles.records[1].data.position_world[421:460, 0] = np.nan  # between the two a marker is lost: one while
-    ((_, finding),) = _swaps(angles)
+    ((_, finding),) = swaps_found(angles)
     assert finding.parameters["end"]["value"] == pytest.approx(4.8)
+
+
+def test_putting_labels_right_takes_their_error_away() -> None:
+    ((_, finding),) = swaps_found(exchanging((Swap(("a", "b"), 100, 199),)))  # a fifth of the time, 20 mm apart along x
+    assert finding.fit["before"] == pytest.approx(0.02 * np.sqrt(0.2 / 3), rel=0.01)
+    assert finding.fit["after"] == pytest.approx(1e-4, rel=0.1)
 
 
 def test_the_current_of_whiles_in_which_the_finger_has_left_its_drive_is_not_judged() -> None:

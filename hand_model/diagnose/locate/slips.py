@@ -1,4 +1,4 @@
-"""Marker station -> findings: what slipped, turned or was exchanged, and which joint is no hinge."""
+"""Marker station -> findings: what slipped or turned, and which joint is no hinge."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...identify.chain import propagate
-from ...identify.likelihood import OUTLIER_LIMIT
 from ...rotation import kabsch
 from ..findings import UNWRITTEN, Finding, weighed
 from .angles import FingerAngles, Step
@@ -19,6 +18,7 @@ from .course_amount import course_amount
 from .displacement import NO_HINGE, NOT_RIGID, UNNAMED, WITH_FINGER, YIELDING, MarkerEffect
 from .markers import ALPHA, SMALL, UNHINGED, MarkerNaming
 from .stepwise import HINGE
+from .swaps import swaps
 from .wobble import side_to_side
 
 Array = NDArray[np.float64]
@@ -27,17 +27,15 @@ CORRECTION = {
     "marker_slip": "the marker's displacement is taken out from the moment of the slip",
     "palm_marker_slip": "the palm marker's displacement is taken out from the moment of the slip",
     "support_slip": "the support's turn is taken out from the moment of the slip",
-    "marker_swap": "the labels are put right while they were exchanged",
 }
 IN_STEP = "the markers leave the hinge's motion in step with the angle"
 DRAWS = 60  # of coefficients, for an interval
 BENDS = 0.1  # of the gain of all that is found: the share of palm markers from which the palm is known to bend
-SWAP_FRAMES = 5  # shorter exchanges are ghosts
 
 
 def marker_findings(angles: FingerAngles, naming: MarkerNaming) -> list[tuple[float, Finding]]:
     """Findings of one finger's markers, one per marker, support or joint, with their weight."""
-    out = _swaps(angles)
+    out = swaps(angles)
     if not naming.believed:
         return out
     groups: dict[tuple[str, int, str | None], list[MarkerEffect]] = {}
@@ -258,91 +256,6 @@ def _proof(naming: MarkerNaming) -> dict[str, Any]:
         float(naming.sigma_m * np.sqrt(1 + e / count)) for e in (naming.excess_before, naming.excess_after)
     )
     return {"before": before, "after": after, "ci95_reduction": None}
-
-
-def _swaps(angles: FingerAngles) -> list[tuple[float, Finding]]:
-    whiles = {
-        labels: found
-        for labels in {frozenset(s.labels) for r in angles.records for s in r.swaps}
-        if (found := _exchanged(angles, labels))
-    }
-    if not whiles:
-        return []
-    lasting = {labels: sum(end - begin for _, begin, end in found) for labels, found in whiles.items()}
-    order = sorted(whiles, key=lambda names: (-lasting[names], sorted(names)))
-    labels = order[0]
-    joint = next((s.name for s in angles.finger.segments if labels & set(s.markers)), None)
-    _, begin, end = max(whiles[labels], key=lambda w: w[2] - w[1])
-    names, trials = sorted(labels), sorted({trial for trial, _, _ in whiles[labels]})
-    where = {
-        "finger": angles.finger.name,
-        "joint": joint,
-        "actuator": None,
-        "signal": "markers",
-        "marker": names[0],
-        "markers": names,
-        "trials": trials,
-        "region": {"time": [begin, end], "unit": "s"},
-        "share_of_mismatch": 1.0,
-    }
-    parameters = {
-        name: {"value": value, "unit": "s"}
-        for name, value in (("begin", begin), ("end", end), ("lasting", sum(lasting.values())))
-    }
-    fit = {
-        "metric": "marker_rmse",
-        "unit": "m",
-        "before": None,
-        "after": None,
-        "noise_floor": angles.noise_m,
-        "ci95_reduction": None,
-        "held_out": [],
-        "engine": "chain fitted to the markers, in-sample",
-    }
-    text = "; ".join(f"{' and '.join(sorted(pair))} are exchanged {_spans(whiles[pair])}" for pair in order) + "."
-    weight = _displaced(angles, names, sum(lasting.values()))
-    return [
-        (
-            weight,
-            Finding(
-                "marker_swap", ("marker_swap",), 1.0, (), where, text, parameters, fit, None, CORRECTION["marker_swap"]
-            ),
-        )
-    ]
-
-
-def _exchanged(angles: FingerAngles, labels: frozenset[str]) -> list[tuple[str, float, float]]:
-    """Recording, begin and end [s, of that recording] of each while in which `labels` are exchanged; pieces of one
-    while, between which they are hardly seen, are one. None where labels come and go all the time: that is a marker's
-    noise that reaches its neighbour."""
-    out, flickers = [], 0
-    for record in angles.records:
-        seen = np.isfinite(
-            record.data.position_world[:, [record.data.labels.index(name) for name in sorted(labels)], 0]
-        ).all(1)
-        pieces = [s for s in record.swaps if frozenset(s.labels) == labels]
-        lasting = [s for s in pieces if s.stop - s.start + 1 >= SWAP_FRAMES]
-        flickers += len(pieces) - len(lasting)
-        joined: list[tuple[int, int]] = []
-        for piece in lasting:
-            apart = not joined or seen[joined[-1][1] + 1 : piece.start].sum() >= SWAP_FRAMES
-            joined = [*joined, (piece.start, piece.stop)] if apart else [*joined[:-1], (joined[-1][0], piece.stop)]
-        out += [(record.trial.name, float(record.mocap.time_s[a]), float(record.mocap.time_s[b])) for a, b in joined]
-    return out if len(out) > flickers else []
-
-
-def _spans(whiles: Sequence[tuple[str, float, float]], most: int = 3) -> str:
-    spans = [f"from {begin:.1f} to {end:.1f} s of {trial}" for trial, begin, end in whiles[:most]]
-    return ", ".join(spans) + (f" and {len(whiles) - most} times more" if len(whiles) > most else "")
-
-
-def _displaced(angles: FingerAngles, labels: list[str], lasting_s: float) -> float:
-    """Weight of an exchange of labels, as a robust likelihood sees it: a wrong label is no more than an outlier,
-    however far away the right one is, and tells nothing."""
-    share = min(lasting_s / sum(float(np.ptp(r.mocap.time_s)) for r in angles.records), 1.0)
-    lost = share * len(labels) / len(angles.records[0].data.labels)  # of all readings
-    size = OUTLIER_LIMIT * np.sqrt(lost / 3)
-    return weighed(float(size), float(size / max(lost, 1e-9)))
 
 
 def steps(naming: MarkerNaming) -> list[Step]:
