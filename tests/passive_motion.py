@@ -110,6 +110,7 @@ KINEMATIC = [
     ("linkage_compliance", {"form": 6.0, "stiff": 40.0}, {"compliance": 0.03, "drag_compliance": 0.0}),
     ("linkage_compliance", {"form": 9.0, "lag": 0.1}, {"compliance": 0.03, "drag_compliance": 0.06}),
     ("coupling_deadband", {"until": 15.0, "corner": 0.1}, {}),
+    ("coupling_deadband", {"until": 8.0, "corner": 2.5}, {}),
     ("distal_stop", {"from": 50.0, "passing": 0.0}, {}),
     ("distal_stop", {"from": 50.0, "passing": 0.2}, {}),
 ]

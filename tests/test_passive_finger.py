@@ -9,7 +9,7 @@ import pytest
 from passive_motion import DECLARED, DRIVE, ENCODER, FINGER, KINEMATIC, LINKAGE, MOTOR_NAMES, state
 
 from hand_model.effects import catalogue, effect
-from hand_model.effects.base import DriveState
+from hand_model.effects.base import DriveState, rounded
 from hand_model.effects.driven import segment_gap, soft_play
 from hand_model.hand import Effect, EncoderMap, Estimate, Finger, Hand, Joint, Motor
 
@@ -218,6 +218,21 @@ def test_a_play_behind_the_map_is_replayed_behind_a_bound(tmp_path) -> None:
     driven = np.maximum(now.position, 10.0)
     wanted = soft_play(on_the_map(now, driven), segment_gap((now,), {"value": 1.5})["value"], 0.0)
     assert off(wanted, moved, driven) < 0.1
+
+
+def test_a_play_is_replayed_behind_a_round_bound_and_a_map_that_grows_steep(tmp_path, monkeypatch) -> None:
+    """What rubs in the play stretches the bound's spring the more the steeper the map between them is."""
+    monkeypatch.setitem(globals(), "LINKAGE", np.array([0.02, 0.3, 0.4, 0.0, 0.0]))
+    monkeypatch.setitem(globals(), "FINGER", FINGER.replace("0.02 0.7 0.15 0 0", "0.02 0.3 0.4 0 0"))
+    bound, play = (
+        ("coupling_deadband", {"until": 4.0, "corner": 1.8}, {}),
+        ("linkage_backlash", {"gap": 0.4, "form": 2.0}, {}),
+    )
+    now = kinematic_state("linkage")
+    moved = replayed(tmp_path, now, "linkage", bound, play)
+    driven = 4.0 + rounded(now.position - 4.0, 1.8)
+    wanted = soft_play(on_the_map(now, driven), segment_gap((now,), {"value": 0.4})["value"], 0.0)
+    assert off(wanted, moved, driven) < 0.1  # of 0.3 deg
 
 
 def test_plays_are_compiled_behind_bounds() -> None:

@@ -48,9 +48,13 @@ class CouplingDeadband(Effect):
         return f"the {segment} segment does not move until the joint before it has come to {until:.1f} deg"
 
     def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
-        """An input joint behind the driver that does not go below where the motion begins."""
+        """An input joint behind the driver that does not go below where the motion begins, and springs that round its
+        corner off."""
         equality = map_of(root, where, self.station)
-        return None if equality is None else write_bound(root, equality, -1, math.radians(parameters["until"]))
+        if equality is None:
+            return None
+        until, corner = (math.radians(parameters.get(name, 0.0)) for name in ("until", "corner"))
+        return write_bound(root, equality, -1, until, corner=corner)
 
 
 EFFECT = CouplingDeadband()

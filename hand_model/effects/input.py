@@ -24,6 +24,8 @@ FIRM_RATE = 400.0
 STRETCHED = 1e-3  # rad: by what rubs in a play, a spring that holds an input may be stretched
 HARD = {"solreflimit": (0.002, 1.0), "solimplimit": (0.9999, 0.9999, 0.001, 0.5, 2.0)}
 FRICTION = {"solreffriction": "0.004 1", "solimpfriction": "0.9999 0.9999 0.001 0.5 2"}
+SHARP = np.deg2rad(0.1)  # a corner of a bound no wider is none
+ROUNDING = (0.03, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)  # of a corner, above its bound: where springs begin to round it off
 SUFFIX = "_input"
 MAPPED = "_mapped"  # of a joint that a map moves, behind which something is lost
 
@@ -146,19 +148,34 @@ def write_play(root: Any, equality: Any, gap: float, behind: bool = False) -> st
     return _limit(root, f"{name}_gap", {driver: 1.0, name: -1.0}, -0.5 * gap, 0.5 * gap)
 
 
-def write_bound(root: Any, equality: Any, side: int, at: float, passing: float = 0.0) -> str:
+def write_bound(root: Any, equality: Any, side: int, at: float, passing: float = 0.0, corner: float = 0.0) -> str:
     """The input follows the driver up to `at` (side 1) or down to it (side -1), and a share `passing` of the motion
     beyond;
-    a spring holds it on the driver elsewhere. `at` in the driver's unit. Path of the tendon that bounds it."""
+    a spring holds it on the driver elsewhere. corner: over which a lower bound is rounded (`CouplingDeadband`). `at` and
+    `corner` in the driver's unit. Path of the tendon that bounds it."""
     driver, name = _put_between(root, equality)
     inertia = _inertia(root, equality)
     next(j for j in root.find("worldbody").iter("joint") if j.get("name") == name).set("armature", repr(inertia))
     spring = {"stiffness": inertia * YIELD_RATE**2, "damping": 2 * inertia * YIELD_RATE, "springlength": 0.0}
     ends = (0.0, 1e6) if side > 0 else (-1e6, 0.0)  # driver - input: the input is never beyond the driver
     _limit(root, f"{name}_follow", {driver: 1.0, name: -1.0}, *ends, **spring)
+    if corner > SHARP:
+        at = _round_off(root, name, at, corner, spring["stiffness"])
     bound = (1 - passing) * at
     ends = (-1e6, bound) if side > 0 else (bound, 1e6)
     return _limit(root, f"{name}_stop", {driver: -passing, name: 1.0}, *ends)
+
+
+def _round_off(root: Any, name: str, at: float, corner: float, stiffness: float) -> float:
+    """Springs that push an input, which one of that stiffness holds on its driver, off a lower bound `at` one after the
+    other, so that it follows the driver by s ln(1 + exp((q - at) / s)), s the corner: pieces of its inverse, straight
+    between `ROUNDING`. Where the hard bound is then."""
+    input_ = np.array(ROUNDING)
+    slope = np.r_[np.diff(np.log(np.expm1(input_))) / np.diff(input_), 1.0]  # of the driver over the input
+    for until, firmer in zip(input_[1:], slope[:-1] - slope[1:], strict=True):
+        spring = {"stiffness": stiffness * firmer, "springlength": (at + corner * until, 1e6)}
+        fixed_tendon(root, free_name(root, f"{name}_round"), {name: 1.0}, **spring)
+    return float(at + corner * input_[0])
 
 
 def _limit(root: Any, name: str, coefficients: Mapping[str, float], low: float, high: float, **more: Any) -> str:

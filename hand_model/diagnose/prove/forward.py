@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ...effects import effect
 from ...effects.base import DriveState
-from ...effects.input import FIRM_RATE, MAPPED, SUFFIX
+from ...effects.input import MAPPED, STRETCHED, SUFFIX
 from ...engines.mujoco import HOLD, divergence, on_linkages
 from ...hand import load_hand
 from ...passive import effects_on
@@ -121,6 +121,7 @@ def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, pat
         model,
         driver,
         float(model.dof_M0[model.jnt_dofadr[follower]]),
+        path,
         float(np.abs(np.gradient(path, state.time_s)).max()) / slower,
     )
     held = {driver}
@@ -191,10 +192,11 @@ def _parts(model: Any, tendon: int) -> slice:
     return slice(model.tendon_adr[tendon], model.tendon_adr[tendon] + model.tendon_num[tendon])
 
 
-def _rub(model: Any, driver: int, inertia: float, fastest: float) -> None:
+def _rub(model: Any, driver: int, inertia: float, path: Array, fastest: float) -> None:
     """Let inputs that lie loose in a play behind a driver stand within `COASTING_S`, as friction, which the gap's ends
-    push without lag; springs that hold inputs ahead of them, which would have to bear it, as firm as `FIRM_RATE`.
-    inertia: of the joint that is moved [kg m^2]; fastest: of the driver, its unit per second."""
+    push without lag; springs that hold inputs ahead of them, which have to bear it, so stiff that it hardly stretches
+    them, with inputs so heavy that they are no faster. inertia: of the joint that is moved [kg m^2]; path (n,) [its unit]
+    and fastest [per second]: of the driver."""
     import mujoco
 
     for row in np.flatnonzero(model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)):
@@ -202,25 +204,33 @@ def _rub(model: Any, driver: int, inertia: float, fastest: float) -> None:
         if _source(model, last) == driver:
             inputs = list(_inputs(model, last))
             loose = [model.jnt_dofadr[joint] for joint, tendon in inputs if not model.tendon_stiffness[tendon]]
-            for tendon in _ties_ahead(model, last):
-                rate = 2 * model.tendon_stiffness[tendon] / model.tendon_damping[tendon]
-                firmer = max(FIRM_RATE / rate, 1.0)
-                model.tendon_stiffness[tendon] *= firmer**2
-                model.tendon_damping[tendon] *= firmer
             ahead = _behind_inputs(model, last)
-            speed = fastest if ahead == driver else fastest * abs(model.eq_data[_map_to(model, ahead), 1])
-            model.dof_frictionloss[loose] = inertia * model.eq_data[row, 1] ** 2 * speed / COASTING_S
+            slope = 1.0 if ahead == driver else _steepest(model, _map_to(model, ahead), path)
+            friction = inertia * model.eq_data[row, 1] ** 2 * fastest * slope / COASTING_S
+            for joint, tendon in _ties_ahead(model, last):
+                heavier = max(friction * slope / STRETCHED / model.tendon_stiffness[tendon], 1.0)
+                mine = [t for t in range(model.ntendon) if joint in model.wrap_objid[_parts(model, t)]]
+                model.tendon_stiffness[mine] *= heavier
+                model.tendon_damping[mine] *= heavier
+                model.dof_armature[model.jnt_dofadr[joint]] *= heavier
+            model.dof_frictionloss[loose] = friction
 
 
-def _ties_ahead(model: Any, joint: int, loose: bool = False) -> list[int]:
-    """The springs that hold inputs on what they follow, towards the driver from the first that lies loose in a play on,
-    or from the joint on."""
+def _steepest(model: Any, row: int | None, path: Array) -> float:
+    """The largest slope of an equality's map along a driver's path (n,)."""
+    polynomial = np.polynomial.Polynomial(model.eq_data[row, :5])
+    return float(np.abs(polynomial.deriv()(np.linspace(path.min(), path.max(), 50))).max())
+
+
+def _ties_ahead(model: Any, joint: int, loose: bool = False) -> list[tuple[int, int]]:
+    """The inputs that springs hold on what they follow, with these, towards the driver from the first that lies loose in
+    a play on, or from the joint on."""
     ties = []
-    for _, tendon in _inputs(model, joint):
+    for held, tendon in _inputs(model, joint):
         if not model.tendon_stiffness[tendon]:
             loose = True
         elif loose:
-            ties.append(tendon)
+            ties.append((held, tendon))
     row = _map_ahead(model, _behind_inputs(model, joint))
     return ties if row is None else [*ties, *_ties_ahead(model, int(model.eq_obj2id[row]), loose)]
 
