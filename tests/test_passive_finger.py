@@ -235,6 +235,16 @@ def test_a_play_is_replayed_behind_a_round_bound_and_a_map_that_grows_steep(tmp_
     assert off(wanted, moved, driven) < 0.1  # of 0.3 deg
 
 
+def test_a_bound_holds_its_input_firmly_where_the_map_begins_flat(tmp_path, monkeypatch) -> None:
+    monkeypatch.setitem(globals(), "LINKAGE", np.array([0.02, 0.01, 0.5, 0.0, 0.0]))
+    finger = FINGER.replace("0.02 0.7 0.15 0 0", "0.02 0.01 0.5 0 0")
+    finger = finger.replace('name="index_proximal" type', 'name="index_proximal" range="0 1.3" type')
+    monkeypatch.setitem(globals(), "FINGER", finger)
+    now = kinematic_state("linkage")
+    moved = replayed(tmp_path, now, "linkage", ("coupling_deadband", {"until": 15.0, "corner": 0.1}, {}))
+    assert off_the_map(now, moved, np.maximum(now.position, 15.0)) < 0.1
+
+
 def test_plays_are_compiled_behind_bounds() -> None:
     """The spring that holds an input on its driver would pull a play ahead of it shut."""
     from hand_model.compile.mjcf import in_order

@@ -24,6 +24,7 @@ FIRM_RATE = 400.0
 STRETCHED = 1e-3  # rad: by what rubs in a play, a spring that holds an input may be stretched
 HARD = {"solreflimit": (0.002, 1.0), "solimplimit": (0.9999, 0.9999, 0.001, 0.5, 2.0)}
 FRICTION = {"solreffriction": "0.004 1", "solimpfriction": "0.9999 0.9999 0.001 0.5 2"}
+LEAST_SLOPE = 1e-3  # of a map, in its units
 SHARP = np.deg2rad(0.1)  # a corner of a bound no wider is none
 ROUNDING = (0.03, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)  # of a corner, above its bound: where springs begin to round it off
 SUFFIX = "_input"
@@ -138,7 +139,7 @@ def write_play(root: Any, equality: Any, gap: float, behind: bool = False) -> st
     tie = _tie(root, ahead).get("stiffness") if SUFFIX in ahead else None
     hold = HOLD if tie is None else min(HOLD, STRETCHED * float(tie))
     if behind:
-        hold /= _slope(equality)  # the same at the driver
+        hold /= _slope(root, equality)  # the same at the driver
         _map_ahead(root, equality)
     driver, name = _put_between(root, equality)
     joint = next(j for j in root.find("worldbody").iter("joint") if j.get("name") == name)
@@ -153,8 +154,8 @@ def write_bound(root: Any, equality: Any, side: int, at: float, passing: float =
     beyond;
     a spring holds it on the driver elsewhere. corner: over which a lower bound is rounded (`CouplingDeadband`). `at` and
     `corner` in the driver's unit. Path of the tendon that bounds it."""
-    driver, name = _put_between(root, equality)
     inertia = _inertia(root, equality)
+    driver, name = _put_between(root, equality)
     next(j for j in root.find("worldbody").iter("joint") if j.get("name") == name).set("armature", repr(inertia))
     spring = {"stiffness": inertia * YIELD_RATE**2, "damping": 2 * inertia * YIELD_RATE, "springlength": 0.0}
     ends = (0.0, 1e6) if side > 0 else (-1e6, 0.0)  # driver - input: the input is never beyond the driver
@@ -189,12 +190,16 @@ def _inertia(root: Any, equality: Any) -> float:
     joint = next(j for j in root.find("worldbody").iter("joint") if j.get("name") == equality.get("joint1"))
     inertial = joint.getparent().find("inertial")
     position = np.array([float(x) for x in inertial.get("pos").split()])
-    return (float(inertial.get("mass")) * float(position @ position) + 1e-6) * _slope(equality) ** 2
+    return (float(inertial.get("mass")) * float(position @ position) + 1e-6) * _slope(root, equality) ** 2
 
 
-def _slope(equality: Any) -> float:
-    """How fast an equality's follower goes with its driver where both begin."""
-    return max(abs(float(equality.get("polycoef").split()[1])), 1e-3)
+def _slope(root: Any, equality: Any) -> float:
+    """How fast an equality's follower goes with its driver at most, over the range of what is ahead of it."""
+    driver = _behind_inputs(root, equality.get("joint2"))
+    joint = next(j for j in root.find("worldbody").iter("joint") if j.get("name") == driver)
+    low, high = (float(x) for x in joint.get("range", "0 0").split())
+    polynomial = np.polynomial.Polynomial([float(x) for x in equality.get("polycoef").split()])
+    return max(float(np.abs(polynomial.deriv()(np.linspace(low, high, 50))).max()), LEAST_SLOPE)
 
 
 def settle(root: Any, pose: dict[str, float]) -> None:
