@@ -46,7 +46,8 @@ class Answers:
     time from the changes until the current, mean over them all, has risen to SHARES (s) of its most; nan where
     that is not told. lead_s: (s,) the same counted from before the changes, where it has risen for sure before they
     come; else nan. own_s: (s,) time from where the current answers each of them, so that answers that are variously late
-    do not smear it."""
+    do not smear it. kept_out: (e,) which answers of the current are of recordings kept out; empty where none is known
+    to be."""
 
     current_s: Array
     motion_s: Array
@@ -54,6 +55,7 @@ class Answers:
     rise_s: Array = field(default_factory=lambda: np.full(len(SHARES), np.nan))
     lead_s: Array = field(default_factory=lambda: np.full(len(SHARES), np.nan))
     own_s: Array = field(default_factory=lambda: np.full(len(SHARES), np.nan))
+    kept_out: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, bool))
 
 
 @dataclass(frozen=True)
@@ -68,12 +70,15 @@ class Lateness:
 
 def answers_of(states: Sequence[DriveState], currents: Sequence[Array]) -> Answers:
     """Answers of one drive. currents: raw current (n,) of each state (its `effort` is masked at rest)."""
-    current = [x for s, c in zip(states, currents, strict=True) for x in _answered(s, c, EARLY_S)]
-    motion = [x for s in states for x in _answered(s, s.position)]
+    of_each = [_answered(s, c, EARLY_S) for s, c in zip(states, currents, strict=True)]
+    current = np.array([x for found in of_each for x in found])
+    kept_out = np.repeat([s.validate for s in states], [len(found) for found in of_each])
+    motion = np.array([x for s in states for x in _answered(s, s.position)])
     step = sample_interval(states)
     rises = _rise(states, currents, step)
     own = _rise_from_answers(states, currents, step)
-    return Answers(_usual(np.array(current), step), _usual(np.array(motion), step), step, *rises, own)
+    usual = _usual(current, step)
+    return Answers(current[usual], motion[_usual(motion, step)], step, *rises, own, kept_out[usual])
 
 
 def lateness(answers: Mapping[str, Answers], in_time: Collection[str] = ()) -> dict[str, Lateness]:
@@ -327,9 +332,9 @@ def _departure(t: Array, channel: Array, begin: int, end: int) -> tuple[int | No
     return (begin + int(hit[0]) if len(hit) else None), away
 
 
-def _usual(latency_s: Array, step_s: float) -> Array:
-    """The latencies (k,) without those that noise answered early or that a drive already in motion hid."""
+def _usual(latency_s: Array, step_s: float) -> NDArray[np.bool_]:
+    """Which latencies (k,) are none that noise answered early or that a drive already in motion hid."""
     if not len(latency_s):
-        return latency_s
+        return np.zeros(0, bool)
     apart = np.abs(latency_s - np.median(latency_s))
-    return latency_s[apart <= 3 * max(1.4826 * float(np.median(apart)), 0.5 * step_s)]
+    return apart <= 3 * max(1.4826 * float(np.median(apart)), 0.5 * step_s)

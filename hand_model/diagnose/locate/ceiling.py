@@ -9,11 +9,13 @@ behind, something limits it.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, fields, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ..reduction import reduction
 
 if TYPE_CHECKING:
     from ...identify.motor import MotorFit
@@ -42,20 +44,23 @@ SURE = 1.92  # of log likelihood: what 95 % of chance does not bring (Wilks 1938
 @dataclass(frozen=True)
 class Ceiling:
     """limit [raw]; share: of the samples in motion for which more is asked; lost: of what is
-    asked, over the noise (root mean square); likelier: log likelihood that it brings."""
+    asked, over the noise (root mean square); likelier: log likelihood that it brings. proof: error of the current
+    `before` and `after`, and what else a finding's `fit` says of it."""
 
     limit: float
     share: float
     lost: float
     likelier: float
+    proof: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Run:
-    """One recording simulated along its moves. first_s: of its log [s]. simulated, slow: (3, n) position [%] and its
-    derivatives as simulated, and what is slow of the recorded less these."""
+    """One recording simulated along its moves. kept_out: whether it is for validation. first_s: of its log [s].
+    simulated, slow: (3, n) position [%] and its derivatives as simulated, and what is slow of the recorded less these."""
 
     trial: MotorTrial
+    kept_out: bool
     first_s: float
     data: tuple[MoveData, ...]
     own: Array
@@ -67,7 +72,8 @@ class Run:
 class Asked:
     """Samples in motion of all recordings. sensed, asked: (n,) [raw]; columns (n, k): what parameters of the controller
     change of `asked`; speed (n,): what a move's own does; doubt (n,) [raw]: what an instant that is known to a tick
-    means for it while the reference's speed changes; move (n,): numbers."""
+    means for it while the reference's speed changes; move (n,): numbers; kept_out (n,): of recordings for
+    validation, empty where there are none."""
 
     sensed: Array
     asked: Array
@@ -75,6 +81,11 @@ class Asked:
     speed: Array
     doubt: Array
     move: NDArray[np.int64]
+    kept_out: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, bool))
+
+    def only(self, rows: NDArray[np.bool_]) -> Asked:
+        """Some of the samples."""
+        return Asked(*(getattr(self, f.name)[rows] for f in fields(self)[:-1]))
 
 
 def ceiling_of(fit: MotorFit, runs: Sequence[Run], noise: float) -> Ceiling | None:
@@ -84,21 +95,21 @@ def ceiling_of(fit: MotorFit, runs: Sequence[Run], noise: float) -> Ceiling | No
     noise: of the current and of what is asked together [raw], white. Parameters of the controller are fitted to the
     current, and of each move its instant and its speed.
     """
-    asked = _stacked([_behind_reference(fit, run) for run in runs])
-    return None if asked is None else limit_of(asked, noise)
+    asked = _stacked([_behind_reference(fit, run) for run in runs], [run.kept_out for run in runs])
+    found = None if asked is None else limit_of(asked, noise)
+    if asked is None or found is None or found.likelier <= SURE:
+        return found
+    held = [run.trial.name for run in runs if run.kept_out]
+    return replace(found, proof=foretold(asked, noise, held))
 
 
 def limit_of(asked: Asked, noise: float) -> Ceiling | None:
     """The likeliest limit between what is asked and what flows; None where these differ by more than that and noise
     [raw], or samples are too few."""
-    if len(asked.sensed) < FEWEST:
+    sigma, unlimited = np.hypot(noise, asked.doubt), _unlimited(asked, noise)
+    if unlimited is None:
         return None
-    sigma, sound = np.hypot(noise, asked.doubt), np.ones(len(asked.sensed), bool)
-    for _ in range(ROUNDS):
-        free = _corrected(asked, sound)
-        sound = np.abs(asked.sensed - free) < WRONG * sigma
-        if sound.sum() < FEWEST:
-            return None
+    free, sound = unlimited
     size = np.abs(free)
     levels = np.linspace(np.quantile(size, LEAST_QUANTILE), np.max(size), LEVELS + 1)[:-1]
 
@@ -125,6 +136,42 @@ def limit_of(asked: Asked, noise: float) -> Ceiling | None:
     if likelier > SURE and min(fitted(passing)[0][0] for passing in PASSING) < error + 2 * SURE:
         return None
     return Ceiling(float(limit), share, lost, likelier)
+
+
+def foretold(asked: Asked, noise: float, held_out: Sequence[str]) -> dict[str, Any]:
+    """What a limit is worth on recordings kept out (of these names): error of the current [raw] as asked for, and within
+    the limit that the others tell; there the controller's figures are learned where that is not reached. On all, where
+    either are too few. noise: of the current and of what is asked together [raw], white."""
+    for held in (asked.kept_out, np.ones(len(asked.sensed), bool)):
+        if held.size < len(asked.sensed) or not held.any():
+            continue
+        learned = limit_of(asked if held.all() else asked.only(~held), noise)
+        told = asked.only(held)
+        unlimited = _unlimited(told, noise)
+        if learned is None or unlimited is None:
+            continue
+        inside = _within(told, *unlimited, learned.limit)
+        if len(inside):
+            left = told.sensed - np.clip(inside, -learned.limit, learned.limit)
+            moves = np.unique(told.move, return_inverse=True)[1]
+            floor = float(np.sqrt(np.mean(noise**2 + told.doubt**2)))
+            fall = reduction([told.sensed - unlimited[0]], [left], [moves])
+            return {**fall, "noise_floor": floor, "held_out": [] if held.all() else list(held_out)}
+    return {}
+
+
+def _unlimited(asked: Asked, noise: float) -> tuple[Array, NDArray[np.bool_]] | None:
+    """What is asked for (n,) by a controller learned from all rows but those that go wrong, and which do not; None
+    where these are too few."""
+    sigma, sound = np.hypot(noise, asked.doubt), np.ones(len(asked.sensed), bool)
+    if len(sound) < FEWEST:
+        return None
+    for _ in range(ROUNDS):
+        free = _corrected(asked, sound)
+        sound = np.abs(asked.sensed - free) < WRONG * sigma
+        if sound.sum() < FEWEST:
+            return None
+    return free, sound
 
 
 def _told_by_limit(asked: Asked, free: Array, within: Array, limit: float, sigma: Array) -> tuple[float, float]:
@@ -201,7 +248,7 @@ def _of_each(rest: Array, column: Array, move: NDArray[np.int64], use: NDArray[n
     return (np.bincount(move, rest * column * use) / size)[move] * column
 
 
-def _stacked(parts: Sequence[tuple[Mapping[str, Array], Array]]) -> Asked | None:
+def _stacked(parts: Sequence[tuple[Mapping[str, Array], Array]], kept_out: Sequence[bool]) -> Asked | None:
     """All recordings' samples in motion of which everything is known; a speed that was told is a column of its own. None where they
     are too few."""
     joined = {name: np.concatenate([p[name] for p, _ in parts]) for name in parts[0][0]}
@@ -221,6 +268,7 @@ def _stacked(parts: Sequence[tuple[Mapping[str, Array], Array]]) -> Asked | None
         joined["speed"][use],
         joined["doubt"][use],
         move.ravel(),
+        np.array(kept_out)[record[use]],
     )
 
 

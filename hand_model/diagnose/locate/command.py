@@ -14,8 +14,9 @@ from ...effects.base import DriveState, figure
 from ..findings import UNWRITTEN, Finding, weighed
 from .answers import Answers, answers_of, lateness
 from .ceiling import Ceiling
+from .foretold import ceiling_foretold, delay_foretold, sag_foretold
 from .simulated import SimulatedDrive
-from .strokes import STROKES, Loss, Stroke, beneath, ceiling, later, sag, strokes_of
+from .strokes import Loss, Stroke, beneath, ceiling, later, sag, strokes_of
 
 Array = NDArray[np.float64]
 
@@ -38,7 +39,8 @@ UNLIKE = 0.1  # of a delay by which answers may miss it: controllers of other ga
 class CommandFacts:
     """answers: to commands. loss: of speed under load; later: the same in the later half of strokes. ceiling: current
     [raw] at which the drive is at its limit, or nan; cut: the weight of what it takes away; share_cut: of the time at
-    steady speed in which more would be needed. strokes: that tell the loss. trials: names of the recordings."""
+    steady speed in which more would be needed. strokes: that tell the loss. trials, kept_out: names of the
+    recordings, and of those for validation."""
 
     answers: Answers
     loss: Loss
@@ -48,6 +50,7 @@ class CommandFacts:
     share_cut: float = 0.0
     strokes: tuple[Stroke, ...] = ()
     trials: tuple[str, ...] = ()
+    kept_out: tuple[str, ...] = ()
 
 
 def command_facts(states: tuple[DriveState, ...], currents: tuple[Array, ...]) -> CommandFacts:
@@ -60,6 +63,7 @@ def command_facts(states: tuple[DriveState, ...], currents: tuple[Array, ...]) -
         *ceiling(strokes),
         tuple(strokes),
         tuple(s.trial for s in states),
+        tuple(s.trial for s in states if s.validate),
     )
 
 
@@ -183,7 +187,7 @@ def _ceiling_finding(actuator: str, finger: str | None, fact: CommandFacts) -> t
         "as the load rises."
     )
     parameters = {"limit": {"value": fact.ceiling, "unit": "raw"}, "share_cut": {"value": fact.share_cut, "unit": "1"}}
-    return fact.cut, _saturation(actuator, finger, fact, text, parameters, "speed_loss", STROKES)
+    return fact.cut, _saturation(actuator, finger, fact, text, parameters, ceiling_foretold(fact.strokes))
 
 
 def _limit_finding(actuator: str, finger: str | None, fact: CommandFacts, ceiling: Ceiling) -> tuple[float, Finding]:
@@ -192,8 +196,8 @@ def _limit_finding(actuator: str, finger: str | None, fact: CommandFacts, ceilin
         "limit": {"value": ceiling.limit, "unit": "raw"},
         "share_cut": {"value": ceiling.share, "unit": "1"},
     }
-    finding = _saturation(actuator, finger, fact, text, parameters, "current_rmse", "controller of the motor")
-    return ceiling.lost, finding
+    fit = {**_unfitted("current_rmse", "raw", "controller of the motor"), **ceiling.proof}
+    return ceiling.lost, _saturation(actuator, finger, fact, text, parameters, fit)
 
 
 def _saturation(
@@ -202,10 +206,8 @@ def _saturation(
     fact: CommandFacts,
     text: str,
     parameters: Mapping[str, Mapping[str, Any]],
-    metric: str,
-    engine: str,
+    fit: Mapping[str, Any],
 ) -> Finding:
-    fit = _unfitted(metric, "1" if metric == "speed_loss" else "raw", engine)
     where = {**_where(actuator, finger), "signal": "current", "trials": list(fact.trials)}
     return Finding(
         "current_saturation", ("current_saturation",), 0.999, (), where, text, parameters, fit, dict(UNWRITTEN)
@@ -260,16 +262,7 @@ def _delay(actuator: str, finger: str | None, fact: CommandFacts, late_s: Array)
     """Finding of a drive that answers `late_s` (k,) [s] later than a healthy one."""
     value, step_s = float(np.mean(late_s)), fact.answers.step_s
     error = 1.96 * float(np.std(late_s)) / np.sqrt(len(late_s))
-    fit = {
-        "metric": "command_latency",
-        "unit": "s",
-        "before": value,
-        "after": float(np.std(late_s)),
-        "noise_floor": step_s,
-        "ci95_reduction": None,
-        "held_out": [],
-        "engine": "events",
-    }
+    fit = delay_foretold(late_s, fact.answers.kept_out, fact.kept_out)
     half = 0.5 * step_s  # the event itself is known to a sample only
     parameters = {"delay": {"value": value, "unit": "s", "ci95": [value - error - half, value + error + half]}}
     text = f"The {actuator} motor answers its commands {1e3 * value:.0f} ms late."
@@ -284,16 +277,7 @@ def _sag_finding(actuator: str, finger: str | None, fact: CommandFacts) -> tuple
     parameters = {
         "sag": {"value": fact.loss.sag, "unit": "1/raw", "ci95": [fact.loss.sag - doubt, fact.loss.sag + doubt]}
     }
-    fit = {
-        "metric": "speed_loss",
-        "unit": "1",
-        "before": loss,
-        "after": 0.0,
-        "noise_floor": fact.loss.share_se,
-        "ci95_reduction": None,
-        "held_out": [],
-        "engine": STROKES,
-    }
+    fit = sag_foretold(fact.strokes)
     text = f"The {actuator} motor loses {100 * loss:.1f} % of its speed over the recorded loads."
     per_stroke = fact.loss.sag / fact.loss.sag_se / np.sqrt(len(fact.strokes))
     where, weight = _where(actuator, finger), weighed(per_stroke, per_stroke / max(loss, 1e-9))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ...effects.path import runs
 from ...errors import HandModelError
-from ...session import Log, Session
+from ...session import Log, Session, Trial
 from .ceiling import Ceiling, Run, ceiling_of
 from .motion import Motion, local_quadratic, since_rest
 
@@ -63,8 +63,9 @@ def simulated_drive(session: Session, actuator: str) -> SimulatedDrive | None:
         if fit.output_error is None:
             return None
         delay_s, doubt_s = channel_delay(fit.output_error, BOUNDS) if fit.predictive else (0.0, np.inf)
-        logs = {t.name: t.log() for t in drive_trials(session)[actuator]}
-        runs_ = {name: _along(fit, name, log) for name, log in logs.items()}
+        trials = drive_trials(session)[actuator]
+        logs = {t.name: t.log() for t in trials}
+        runs_ = {t.name: _along(fit, t, logs[t.name]) for t in trials}
         motions = {name: None if run is None else _motion(run) for name, run in runs_.items()}
         in_time = abs(delay_s) <= IN_TIME * doubt_s + DIFFERENCE_S and not any(log.uneven for log in logs.values())
         ceiling = _ceiling(fit, [run for run in runs_.values() if run is not None]) if in_time else None
@@ -75,13 +76,13 @@ def simulated_drive(session: Session, actuator: str) -> SimulatedDrive | None:
     return SimulatedDrive(actuator, delay_s, doubt_s, told if len(told) == len(motions) else {}, ceiling)
 
 
-def _along(fit: MotorFit, name: str, log: Log) -> Run | None:
-    """A log's moves simulated; None where none starts from rest."""
+def _along(fit: MotorFit, recorded: Trial, log: Log) -> Run | None:
+    """A recording's moves simulated; None where none starts from rest."""
     from ...identify.motor.predict import aligned_moves
     from ...identify.motor.recording import motor_trial
     from ...identify.motor.residuals import simulate_states
 
-    trial, found = motor_trial(name, log, fit.scale), fit.output_error
+    trial, found = motor_trial(recorded.name, log, fit.scale), fit.output_error
     data, own = aligned_moves(fit, trial)
     if not data or found is None:
         return None
@@ -91,7 +92,9 @@ def _along(fit: MotorFit, name: str, log: Log) -> Run | None:
     first = log.time_s[
         np.isfinite(log.time_s) & np.isfinite(log.columns["position"]) & np.isfinite(log.columns["current"])
     ][0]
-    return Run(trial, float(first), tuple(data), own, state, _slow(trial.time_s, trial.position - state[0]))
+    return Run(
+        trial, recorded.validate, float(first), tuple(data), own, state, _slow(trial.time_s, trial.position - state[0])
+    )
 
 
 def _motion(run: Run) -> tuple[Array, Array, Array, Array] | None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -12,6 +12,7 @@ from scipy.optimize import lsq_linear
 
 from ...effects.base import DriveState
 from ..findings import weighed
+from ..name.naming import EXPLAINED_LEAST
 
 Array = NDArray[np.float64]
 
@@ -28,6 +29,9 @@ AT_SPEED = 0.9  # of that, from which a drive does what it is told
 # of the current beyond its limit that a drive takes from its speed: one, but for noise in the limit
 CEILING_SHARE = 0.6
 CEILING_LEFT, CEILING_T = 0.1, 6.0
+# of the fastest strokes, at most, that are beyond a limit; limits tried, and by how much two readings of one may differ
+# (standard errors, and of its size)
+MOSTLY, LIMITS, SURE, SAME_LIMIT = 0.95, 200, 3.0, 0.03
 # of the current beyond a limit over what is needed, from which it is none: a drive that slows down needs less
 FLAT, SLOPES_T = 0.3, 3.0
 BEYOND_T = 2.0  # standard deviations of the current, of what is beyond a limit
@@ -39,7 +43,8 @@ ROUNDS = 3  # of telling where a limit is and what is beyond
 @dataclass(frozen=True)
 class Stroke:
     """A stroke at one commanded speed, away from its start and stop. way: 1 flexing, -1 extending. time_s (since it
-    began), position [%], velocity [%/s], current [raw]: (n,)."""
+    began), position [%], velocity [%/s], current [raw]: (n,). trial: name of its recording; kept_out: whether that is
+    for validation."""
 
     way: float
     commanded: float
@@ -47,6 +52,8 @@ class Stroke:
     position: Array
     velocity: Array
     current: Array
+    trial: str = ""
+    kept_out: bool = False
 
 
 @dataclass(frozen=True)
@@ -93,6 +100,8 @@ def strokes_of(states: tuple[DriveState, ...], currents: tuple[Array, ...]) -> l
                         state.position[keep],
                         state.velocity[keep],
                         current[keep],
+                        state.trial,
+                        state.validate,
                     )
                 )
     return out
@@ -103,7 +112,7 @@ def beneath(strokes: Sequence[Stroke], limit: float) -> list[Stroke]:
     return [s for s in strokes if np.quantile(np.abs(s.current), NEARLY_MOST) < NEAR * limit]
 
 
-def _load_rise(strokes: Sequence[Stroke]) -> dict[float, np.poly1d]:
+def load_rise(strokes: Sequence[Stroke]) -> dict[float, np.poly1d]:
     """Rise of the load over position [raw/%] flexing and extending, as polynomials of position: current = cubic in
     position + viscous velocity, each of its own for the two ways."""
     scale = 100.0 ** -np.arange(4)
@@ -121,22 +130,36 @@ def sag(strokes: Sequence[Stroke]) -> Loss:
     what either way it does while the speed changes, is no sag."""
     if len(strokes) < 12 or {s.way for s in strokes} != {1.0, -1.0}:
         return Loss()
-    rise = _load_rise(strokes)
-    y = np.log([max(s.way * float(np.mean(s.velocity)), 1e-9) for s in strokes])
-    load = np.array([s.way * float(np.mean(s.current)) for s in strokes])
-    levels = np.array(
-        [[float(s.commanded == level) for level in sorted({s.commanded for s in strokes})] for s in strokes]
-    )
-    rises = np.array([[float(np.mean(rise[s.way](s.position))), *_changes(s)] for s in strokes])
-    design = np.concatenate([levels, rises, load[:, None]], axis=1)
-    most = np.full(design.shape[1], np.inf)
-    at = levels.shape[1] + np.arange(RISES_OF_LOAD)
-    most[at] = 0.0
-    beta = lsq_linear(design, y, (-np.inf, most), method="bvls").x
+    commanded, y = sorted({s.commanded for s in strokes}), log_speeds(strokes)
+    design = speed_design(strokes, load_rise(strokes), commanded)
+    beta = speed_coefficients(design, y, len(commanded))
     spread = np.median(np.abs(y - design @ beta)) / 0.6745
+    at, load = len(commanded) + np.arange(RISES_OF_LOAD), design[:, -1]
     design = np.delete(design, at[beta[at] > -TAKEN], axis=1)
     covariance = np.linalg.pinv(design.T @ design) * spread**2
     return Loss(-float(beta[-1]), float(np.sqrt(covariance[-1, -1])), float(np.ptp(load)))
+
+
+def log_speeds(strokes: Sequence[Stroke]) -> Array:
+    """Logarithms (s,) of the strokes' mean speeds [%/s]."""
+    return np.log([max(s.way * float(np.mean(s.velocity)), 1e-9) for s in strokes])
+
+
+def speed_design(strokes: Sequence[Stroke], rise: Mapping[float, np.poly1d], commanded: Sequence[float]) -> Array:
+    """Columns (s, k) of log speed: one of each commanded speed, what the load's and the speed's rises take, and the load
+    [raw]. rise: of the load over position (`load_rise`)."""
+    levels = np.array([[float(s.commanded == level) for level in commanded] for s in strokes])
+    rises = np.array([[float(np.mean(rise[s.way](s.position))), *_changes(s)] for s in strokes])
+    load = np.array([s.way * float(np.mean(s.current)) for s in strokes])
+    return np.concatenate([levels, rises, load[:, None]], axis=1)
+
+
+def speed_coefficients(design: Array, y: Array, commanded: int) -> Array:
+    """Coefficients of log speed (s,) on such columns, the first `commanded` of which are levels; a rise of the load only
+    slows."""
+    most = np.full(design.shape[1], np.inf)
+    most[commanded + np.arange(RISES_OF_LOAD)] = 0.0
+    return lsq_linear(design, y, (-np.inf, most), method="bvls").x
 
 
 def _changes(stroke: Stroke) -> tuple[float, float]:
@@ -151,53 +174,104 @@ def later(strokes: Sequence[Stroke]) -> list[Stroke]:
     """The later half of each: what a slow controller still settles fades, and a loss of speed stays."""
     halves = ((s, s.time_s >= 0.5 * (s.time_s[0] + s.time_s[-1])) for s in strokes)
     return [
-        Stroke(s.way, s.commanded, s.time_s[k], s.position[k], s.velocity[k], s.current[k])
+        replace(s, time_s=s.time_s[k], position=s.position[k], velocity=s.velocity[k], current=s.current[k])
         for s, k in halves
         if k.sum() >= LEAST_LATER
     ]
+
+
+@dataclass(frozen=True)
+class Pushed:
+    """A drive in its fastest flexing strokes, as its slower ones foretell it. beta (5,): of the current on
+    `_load_design`; full: the speed [%/s] that the fastest strokes reach; limit [raw]: the current where more is needed
+    than the drive gives, infinite where nowhere is; noise [raw]: of the current."""
+
+    beta: Array
+    full: float
+    limit: float
+    noise: float
+
+    @property
+    def viscous(self) -> float:
+        """Current per speed [raw s/%]."""
+        return float(self.beta[-1])
+
+    def lost(self, strokes: Sequence[Stroke], mine: Sequence[Stroke]) -> tuple[Array, Array]:
+        """Speed [%/s] that the fast strokes `mine` have lost, and current [raw] that full speed would need there, (n,)
+        both. strokes: all, that tell what settles or brakes."""
+        lost = np.minimum(self.full, _unloaded(strokes, mine)) - _joined(mine, "velocity")
+        return lost, _load_design(mine) @ self.beta + self.viscous * lost
+
+
+def fastest(strokes: Sequence[Stroke]) -> list[Stroke]:
+    """The flexing strokes of the highest commanded speed."""
+    fast = max((s.commanded for s in strokes), default=0.0)
+    return [s for s in strokes if s.way > 0 and s.commanded == fast]
+
+
+def pushed(strokes: Sequence[Stroke]) -> tuple[Pushed, NDArray[np.bool_]] | None:
+    """What slower strokes foretell of the fastest, and in which samples (n,) of these the current is at its limit; None
+    where there are too few of either, or nothing is viscous."""
+    mine = fastest(strokes)
+    slower = [s for s in strokes if s.way > 0 and s.commanded < mine[0].commanded] if mine else []
+    if len(mine) < 3 or not slower:
+        return None
+    design, drawn, at_speed = _load_design(slower), _joined(slower, "current"), _at_speed(slower)
+    beta = np.linalg.lstsq(design[at_speed], drawn[at_speed], rcond=None)[0]
+    if beta[-1] <= 0:
+        return None
+    noise = max(float(np.std((drawn - design @ beta)[at_speed])), 1e-9)
+    found = Pushed(beta, _full_speed(_joined(mine, "velocity")), np.inf, noise)
+    current, (_, needed) = _joined(mine, "current"), found.lost(strokes, mine)
+    seen = _joined(mine, "position") <= np.max(_joined(slower, "position")[at_speed])
+    over = needed > np.quantile(needed, 0.75)
+    for _ in range(ROUNDS):  # the current stays at the limit wherever more is needed
+        found = replace(found, limit=float(np.mean(current[over])) if over.any() else np.inf)
+        over = (needed > found.limit) & seen
+    return found, over
 
 
 def ceiling(strokes: list[Stroke]) -> tuple[float, float, float]:
     """Current [raw] at which the drive is at its limit, nan where it is at none, the weight of what that cuts and the
     share of time in which it does: in the fastest flexing strokes speed falls by just what keeps the current from
     exceeding it. What current each place would need at full speed is told by the slower strokes."""
-    none = np.nan, 0.0, 0.0
-    fast = max((s.commanded for s in strokes), default=0.0)
-    mine = [s for s in strokes if s.way > 0 and s.commanded == fast]
-    slower = [s for s in strokes if s.way > 0 and s.commanded < fast]
-    if len(mine) < 3 or not slower:
+    none, told_by = (np.nan, 0.0, 0.0), pushed(strokes)
+    if told_by is None or told_by[1].sum() < 10:
         return none
-    design, drawn, at_speed = _load_design(slower), _joined(slower, "current"), _at_speed(slower)
-    beta = np.linalg.lstsq(design[at_speed], drawn[at_speed], rcond=None)[0]
-    viscous = float(beta[-1])
-    if viscous <= 0:
-        return none
-    position, velocity, current = (_joined(mine, name) for name in ("position", "velocity", "current"))
-    full = _full_speed(velocity)
-    lost = np.minimum(full, _unloaded(strokes, mine)) - velocity
-    needed = _load_design(mine) @ beta + viscous * lost
-    seen = position <= np.max(_joined(slower, "position")[at_speed])
-    over = needed > np.quantile(needed, 0.75)
-    for _ in range(ROUNDS):  # the current stays at the limit wherever more is needed
-        limit = float(np.mean(current[over])) if over.any() else np.inf
-        over = (needed > limit) & seen
-    if over.sum() < 10:
-        return none
-    x, y = (needed - limit)[over], viscous * lost[over]
+    found, over = told_by
+    mine = fastest(strokes)
+    lost, needed = (v[over] for v in found.lost(strokes, mine))
+    x, y = needed - found.limit, found.viscous * lost
     share = float(x @ y / max(x @ x, 1e-12))
     rest = y - share * x
     told = share > CEILING_T * float(np.std(rest)) / np.sqrt(max(float(x @ x), 1e-12))
     alone = float(rest @ rest) < CEILING_LEFT * float(y @ y)  # speed changes for no other reason
-    bends = _slope(needed[over], current[over])
+    bends = _slope(needed, _joined(mine, "current")[over])
     slopes = abs(bends[0]) > max(FLAT, SLOPES_T * bends[1])
-    slight = float(np.quantile(lost[over], NEARLY_MOST)) < LEAST_LOSS * full  # a healthy controller loses as much
-    noise = max(float(np.std((drawn - design @ beta)[at_speed])), 1e-9)
-    hidden = float(np.sqrt(x @ x)) < BEYOND_T * noise  # what is needed beyond it is less than the current tells
-    if slight or slopes or hidden or not (told and alone and CEILING_SHARE < share < 1 / CEILING_SHARE):
+    # a healthy controller loses as much
+    slight = float(np.quantile(lost, NEARLY_MOST)) < LEAST_LOSS * found.full
+    hidden = float(np.sqrt(x @ x)) < BEYOND_T * found.noise  # what is needed beyond it is less than the current tells
+    just = alone and CEILING_SHARE < share < 1 / CEILING_SHARE
+    if slight or slopes or hidden or not told or not (just or _agrees(found, strokes)):
         return none
     every = _joined(strokes, "current")
-    weight = weighed(float(np.sqrt(y @ y / len(every))) / noise, float(np.std(every)) / noise)
-    return limit, weight, int(over.sum()) / len(every)
+    weight = weighed(float(np.sqrt(y @ y / len(every))) / found.noise, float(np.std(every)) / found.noise)
+    return found.limit, weight, int(over.sum()) / len(every)
+
+
+def _agrees(found: Pushed, strokes: Sequence[Stroke]) -> bool:
+    """Whether the limit at which the fastest strokes begin to lose speed, likeliest by that loss alone, explains most of
+    what they lose, and is the current that flows from there on."""
+    mine = fastest(strokes)
+    lost, needed = found.lost(strokes, mine)
+    y, current = found.viscous * lost, _joined(mine, "current")
+    limits = np.linspace(np.quantile(needed, 1 - MOSTLY), np.max(needed), LIMITS)[:-1]
+    left = [float(np.sum((y - np.maximum(needed - limit, 0.0)) ** 2)) for limit in limits]
+    limit = float(limits[int(np.argmin(left))])
+    flows = current[needed > limit]
+    doubt = SURE * found.noise / np.sqrt(len(flows)) + SAME_LIMIT * limit
+    explained = 1 - min(left) / max(float(y @ y), 1e-12)
+    return explained > EXPLAINED_LEAST and abs(float(np.mean(flows)) - limit) < doubt
 
 
 def _full_speed(speed: Array) -> float:
@@ -216,7 +290,7 @@ def _slope(x: Array, y: Array) -> tuple[float, float]:
     return slope, float(np.std(y - y.mean() - slope * apart)) / float(np.sqrt(size))
 
 
-def _at_speed(strokes: list[Stroke]) -> NDArray[np.bool_]:
+def _at_speed(strokes: Sequence[Stroke]) -> NDArray[np.bool_]:
     """Samples (n,) in which the drive has not fallen behind the speed that it reaches when told as much: in the others it
     may be at its limit, too."""
     reached = {}
@@ -226,7 +300,7 @@ def _at_speed(strokes: list[Stroke]) -> NDArray[np.bool_]:
     return np.concatenate([s.way * s.velocity > AT_SPEED * reached[s.commanded] for s in strokes])
 
 
-def _unloaded(strokes: list[Stroke], mine: list[Stroke]) -> Array:
+def _unloaded(strokes: Sequence[Stroke], mine: Sequence[Stroke]) -> Array:
     """Speed (n,) [%/s] of extending strokes of the same commanded speed, which a spring helps, at the same time after
     their start and before their end as each sample of `mine`, the lower one: what is settling still, or brakes, is no
     limit. Infinite where there are none."""
@@ -243,12 +317,12 @@ def _unloaded(strokes: list[Stroke], mine: list[Stroke]) -> Array:
     return np.minimum(*out)
 
 
-def _joined(strokes: list[Stroke], name: str) -> Array:
+def _joined(strokes: Sequence[Stroke], name: str) -> Array:
     """One channel (n,) of all strokes, one after the other."""
     return np.concatenate([getattr(s, name) for s in strokes])
 
 
-def _load_design(strokes: list[Stroke]) -> Array:
+def _load_design(strokes: Sequence[Stroke]) -> Array:
     """Columns (n, 5): powers 0 to 3 of position / 100 %, and velocity [%/s]."""
     position, velocity = _joined(strokes, "position"), _joined(strokes, "velocity")
     return np.stack([*((position / 100) ** k for k in range(4)), velocity], axis=-1)

@@ -1,0 +1,110 @@
+"""What is read from answers and strokes, held to recordings that took no part.
+
+No compiled file is replayed for it: a delay and a loss of speed show in events. Their figures are learned from the
+recordings that are not kept for validation, and foretell those that are; where these tell nothing, all tell both, and
+no recording is said to be held out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..reduction import reduction
+from .strokes import (
+    STROKES,
+    Pushed,
+    Stroke,
+    ceiling,
+    fastest,
+    load_rise,
+    log_speeds,
+    pushed,
+    sag,
+    speed_coefficients,
+    speed_design,
+)
+
+Array = NDArray[np.float64]
+
+FEWEST = 3  # answers, or strokes, of recordings kept out
+
+
+def delay_foretold(late_s: Array, kept_out: NDArray[np.bool_], trials: Sequence[str]) -> dict[str, Any]:
+    """`fit` of a delay: by how much answers (e,) are late [s], and late beside the delay of the others. kept_out: (e,),
+    or empty; trials: names of the recordings kept out. The floor is by how much one answer differs from the next."""
+    held = kept_out if kept_out.size == late_s.size else np.zeros(late_s.size, bool)
+    if held.sum() < FEWEST or (~held).sum() < FEWEST:
+        held, trials = np.ones(late_s.size, bool), ()
+    learned = ~held if len(trials) else held
+    left = late_s[held] - np.mean(late_s[learned])
+    return {
+        "metric": "command_latency",
+        "unit": "s",
+        **reduction([late_s[held]], [left], [np.arange(held.sum())]),
+        "noise_floor": float(np.std(late_s[learned], ddof=1)) if learned.sum() > 1 else None,
+        "held_out": list(trials),
+        "engine": "events",
+    }
+
+
+def sag_foretold(strokes: Sequence[Stroke]) -> dict[str, Any]:
+    """`fit` of a loss of speed under load: what the logarithms of the strokes' mean speeds are off by, of a drive that
+    goes as fast as it is told, and of one that loses speed as the other recordings tell it."""
+    learned, told = _apart(strokes, lambda some: np.isfinite(sag(some).sag))
+    commanded, rise = sorted({s.commanded for s in learned}), load_rise(learned)
+    told = [s for s in told if s.commanded in commanded]
+    design, y = speed_design(learned, rise, commanded), log_speeds(learned)
+    ahead, speeds = speed_design(told, rise, commanded), log_speeds(told)
+    loaded = speed_coefficients(design, y, len(commanded))
+    floor = float(np.sum((y - design @ loaded) ** 2)) / max(len(y) - design.shape[1], 1)
+    plain = np.linalg.lstsq(design[:, : len(commanded)], y, rcond=None)[0]
+    errors = [[speeds - ahead[:, : len(beta)] @ beta] for beta in (plain, loaded)]
+    return _of_strokes(reduction(*errors, [np.arange(len(told))]), float(np.sqrt(floor)), learned, told)
+
+
+def ceiling_foretold(strokes: Sequence[Stroke]) -> dict[str, Any]:
+    """`fit` of a limit of the drive: what its fastest strokes lose of their speed, and lose beyond what keeps the
+    current within the limit that the other recordings tell."""
+    learned, told = _apart(strokes, lambda some: np.isfinite(ceiling(list(some))[0]))
+    found = pushed(learned)
+    if found is None or not fastest(told):
+        return _of_strokes(dict.fromkeys(("before", "after", "ci95_reduction")), None, learned, told)
+    model, over = found
+    lost, left = _lost(model, strokes, fastest(told))
+    _, free = _lost(model, strokes, fastest(learned))
+    floor = float(np.sqrt(np.mean(free[~over] ** 2))) if (~over).any() else None
+    blocks = [np.repeat(np.arange(len(fastest(told))), [len(s.time_s) for s in fastest(told)])]
+    return _of_strokes(reduction([lost], [left], blocks), floor, learned, told)
+
+
+def _lost(model: Pushed, strokes: Sequence[Stroke], mine: Sequence[Stroke]) -> tuple[Array, Array]:
+    """Share (n,) of full speed that strokes have lost, and that less what a limit takes."""
+    lost, needed = model.lost(strokes, mine)
+    taken = np.maximum(needed - model.limit, 0.0) / model.viscous
+    return lost / model.full, (lost - taken) / model.full
+
+
+def _apart(strokes: Sequence[Stroke], tells: Callable[[list[Stroke]], bool]) -> tuple[list[Stroke], list[Stroke]]:
+    """Strokes that figures are learned from, and those that they are held to; all of them twice where either are too few
+    to tell."""
+    learned, told = ([s for s in strokes if s.kept_out == held] for held in (False, True))
+    enough = len(told) >= FEWEST and tells(learned)
+    return (learned, told) if enough else (list(strokes), list(strokes))
+
+
+def _of_strokes(
+    fall: dict[str, Any], floor: float | None, learned: Sequence[Stroke], told: Sequence[Stroke]
+) -> dict[str, Any]:
+    held = [] if told and told[0] is learned[0] else list(dict.fromkeys(s.trial for s in told))
+    return {
+        "metric": "speed_loss",
+        "unit": "1",
+        **fall,
+        "noise_floor": floor,
+        "held_out": held,
+        "engine": STROKES,
+    }
