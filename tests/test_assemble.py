@@ -379,3 +379,10 @@ def test_a_finding_ranks_by_its_figures_or_by_what_recordings_kept_out_bear_out_
     ended = replace(found, effect="end_stop_contact", parameters=stop)
     of_stop = magnitude("end_stop_contact", {"begin": 80.0, "stiffness": 0.01})
     assert _sure_sizes(ended, None)[0] == pytest.approx(0.25 * of_stop)
+
+
+def test_the_lack_of_fit_is_that_of_the_markers_where_these_alone_lack_something() -> None:
+    fit = {"metric": "marker_rmse", "unit": "m", "before": 2.4e-4, "after": 1.1e-4, "noise_floor": 1e-4}
+    wobble = replace(finding("joint_wobble", "index", "markers", amplitude=0.02), fit=fit)
+    lack = assemble([], [(0.3, wobble)], []).lack_of_fit
+    assert lack["before"] == pytest.approx(2.4**2) and lack["after"] == pytest.approx(1.1**2)
