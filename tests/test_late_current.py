@@ -157,3 +157,20 @@ def test_what_simulation_and_answers_surely_say_stands_beside_a_balance_that_tak
     timed = answering(drives, {"index": (0.06, 0.0015), "ring": (0.0, 0.0015)})
     assert not _late(drives, timed, {})["index"]
     assert _late(drives, timed, {"index": Lateness(np.zeros(0), 0.06, 0.007)})["index"]
+
+
+@pytest.mark.parametrize(
+    ("brought", "doubt_s", "stands"), [(-0.3, 0.01, True), (-0.3, 0.1, False), (-8.0, 0.01, False), (0.3, 0.1, True)]
+)
+def test_a_lateness_that_answers_surely_tell_stands_where_recordings_kept_out_do_not_deny_it(
+    brought: float, doubt_s: float, stands: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from types import SimpleNamespace
+
+    from hand_model.diagnose.name import station
+
+    monkeypatch.setattr(station, "brought_held_out", lambda naming, which: brought)
+    states = answering({"index": drive(0)}, {"index": (0.1, doubt_s)})["index"]
+    naming = SimpleNamespace(balance=SimpleNamespace(states=states))
+    term = SimpleNamespace(effect=EFFECT, shape={"form": 0.0, "delay": 0.09})
+    assert station._stands(naming, SimpleNamespace(term=term, evidence=20.0), 0, 8.0) == stands

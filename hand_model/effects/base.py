@@ -235,6 +235,10 @@ class Effect:
         state."""
         return {}
 
+    def told_otherwise(self, states: tuple[DriveState, ...], shape: Mapping[str, float]) -> bool:
+        """Whether something else than the balance of `states` says the same for sure."""
+        return False
+
     def possible(self, states: tuple[DriveState, ...], parameters: Mapping[str, float]) -> bool:
         """Whether a machine with these parameters could have moved as it did: any can."""
         return True

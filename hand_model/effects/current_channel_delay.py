@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from .base import Amplitude, Array, DriveState, Effect, Shape, sample_interval
+from .base import SURE_DELAY, Amplitude, Array, DriveState, Effect, Shape, sample_interval
 from .mjcf import delay, motor_sensor
 
+ALIKE = 2.0  # standard deviations within which two delays are the same
 FIRST_SEEN = 0.1  # of a filter's time constant: a rise of ten times what is noticed
 
 
@@ -58,6 +59,13 @@ class CurrentChannelDelay(Effect):
         height over the noise; of a negative delay, on whether the current comes early or the position late."""
         delay_s = shape["delay"]
         return (FIRST_SEEN * delay_s, delay_s) if _filters(shape) else (delay_s, max(delay_s, 0.0))
+
+    def told_otherwise(self, states: tuple[DriveState, ...], shape: Mapping[str, float]) -> bool:
+        """Whether answers to commands, or a simulation, surely say the current as late ("late" in `extra`)."""
+        late_s, doubt_s = states[0].extra.get("late", (0.0, np.inf))
+        earliest_s, latest_s = self.lateness(shape)
+        apart_s = max(earliest_s - late_s, late_s - latest_s, 0.0)
+        return bool(abs(late_s) > SURE_DELAY * doubt_s and apart_s < ALIKE * doubt_s)
 
     def further(
         self, states: tuple[DriveState, ...], parameters: Mapping[str, Mapping[str, Any]]

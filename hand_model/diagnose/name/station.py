@@ -346,10 +346,13 @@ def _outgrows(one: Named, other: Named) -> bool:
 
 
 def _stands(naming: Naming, named: Named, which: int, least: float) -> bool:
-    """Whether recordings that took no part are predicted better with the effect, and all of them together bear it
-    out."""
+    """Whether recordings that took no part are predicted better with the effect, or, of what something else than the
+    balance says for sure, do not deny it, and all of them together bear it out."""
     brought = brought_held_out(naming, which)
-    return named.evidence >= least if brought is None else brought > 0 and named.evidence + brought >= least
+    if brought is None:
+        return named.evidence >= least
+    told = named.term.effect.told_otherwise(naming.balance.states, named.term.shape)
+    return brought > (-EVIDENCE_LEAST if told else 0.0) and named.evidence + brought >= least
 
 
 def _plain_at_ends(naming: Naming, named: Named, which: int, least: float) -> bool:
