@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from test_diagnose import drive
 
-from hand_model.diagnose.locate.drive import gives, with_gives
+from hand_model.diagnose.locate.doubt import LEAST_GIVE
+from hand_model.diagnose.locate.drive import GIVE_USUAL, gives, with_gives
 from hand_model.diagnose.name.balance import Balance
 from hand_model.diagnose.name.bristles import bristled, with_bristles
 from hand_model.diagnose.name.shapes import refit
@@ -131,6 +132,12 @@ def test_bristles_may_be_as_long_as_anothers_or_as_stiff(friction: float, grante
     found, _ = gives({"ring": rubbing(1, friction, 0.83), "index": rubbing(2, 25.0, 0.4)})
     assert found["index"].length == pytest.approx(0.4, rel=0.1)
     assert (found["ring"].granted > 0.83) == granted
+
+
+@pytest.mark.parametrize(("other", "granted"), [(0.2, GIVE_USUAL), (0.03, LEAST_GIVE)])
+def test_where_one_drive_is_sharp_another_is_granted_no_soft_friction(other: float, granted: float) -> None:
+    found, _ = gives({"ring": rubbing(1, 25.0, 0.4), "index": rubbing(2, 25.0, other)})
+    assert found["ring"].granted == pytest.approx(granted)
 
 
 @pytest.mark.parametrize("own", [True, False])

@@ -25,9 +25,9 @@ KINDS = ("flexion", "excitation")
 LEAST_ROWS = 50  # of a recording: fewer, and no motion is read from it
 GIVE_LEAST, GIVE_MOST = 0.02, 1.2  # [%] of the declared Coulomb friction's bristles; beyond, give is presliding
 LENGTHS = np.geomspace(GIVE_LEAST, GIVE_MOST, 12).tolist()
-# [%] any drive's friction may take to turn over where one of the session's takes more than the other (healthy ones of
-# a hand, as measured: 0.5 to 0.6)
-GIVE_USUAL, GIVE_SOFT = 0.65, 0.3
+# [%] any drive's friction may take to turn over where one of the session's takes more than the second and none takes
+# less than the third (healthy ones of a hand, as measured: 0.5 to 0.6)
+GIVE_USUAL, GIVE_SOFT, GIVE_SHARP = 0.65, 0.3, 0.1
 SETTLE_SAMPLES = (14, 13)  # after a start and before a stop: where acceleration is smeared by the kernel
 
 UNFOLLOWED = 0.25  # of the range: commands that end farther than this from where the motion does are not its own
@@ -293,8 +293,9 @@ def gives(prepared: Mapping[str, Sequence[DriveState]]) -> tuple[dict[str, Give]
     """
     fits = {a: min((*_misfits(states, x)[0], x) for x in LENGTHS) for a, states in prepared.items()}
     best = {a: (length, max(friction, 0.0)) for a, (_, friction, length) in fits.items()}
-    least = _least([length for length, _ in best.values()], GIVE_LEAST)
-    soft = max((length for length, _ in best.values()), default=0.0) > GIVE_SOFT
+    lengths = [length for length, _ in best.values()]
+    least = _least(lengths, GIVE_LEAST)
+    soft = max(lengths, default=0.0) > GIVE_SOFT and min(lengths) > GIVE_SHARP
     usual = GIVE_USUAL if soft else LEAST_GIVE
     softness = _least([length / f for length, f in best.values() if f > 0], 0.0)  # of the stiffest drive [%/raw]
 
