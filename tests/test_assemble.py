@@ -23,7 +23,7 @@ from hand_model.diagnose.assemble import (
     _without_shadows,
     assemble,
 )
-from hand_model.diagnose.findings import Finding, weighed
+from hand_model.diagnose.findings import Finding, of_one_whole, weighed
 from hand_model.diagnose.hearing import _without_settled_sags
 from hand_model.diagnose.locate.answers import Answers
 from hand_model.diagnose.locate.command import CommandFacts
@@ -386,3 +386,12 @@ def test_the_lack_of_fit_is_that_of_the_markers_where_these_alone_lack_something
     wobble = replace(finding("joint_wobble", "index", "markers", amplitude=0.02), fit=fit)
     lack = assemble([], [(0.3, wobble)], []).lack_of_fit
     assert lack["before"] == pytest.approx(2.4**2) and lack["after"] == pytest.approx(1.1**2)
+
+
+def test_findings_and_what_is_unexplained_are_parts_of_one_mismatch() -> None:
+    slips = [finding("marker_slip", name, "markers", distance=1e-3) for name in ("index", "ring")]
+    other = {"where": {"finger": "middle"}, "share_of_mismatch": 0.5, "shape": "varies with speed"}
+    shared, left = of_one_whole(slips, [other])
+    assert [f.where["share_of_mismatch"] for f in shared] == pytest.approx([0.4, 0.4])
+    assert left[0]["share_of_mismatch"] == pytest.approx(0.2)
+    assert of_one_whole(slips[:1], []) == ((slips[0],), ())

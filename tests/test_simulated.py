@@ -56,7 +56,8 @@ def test_the_simulated_state_carries_little_noise_and_is_where_the_drive_was(
 
 
 def test_what_the_simulation_lacks_is_not_smoothed_away(session: Session) -> None:
-    fit, log = identify_motor(session, "index"), session.select("flexion")[0].log()
+    fit, trial = identify_motor(session, "index"), session.select("flexion")[0]
+    log = trial.log()
     position = log.column("position")
     swing = 0.003 * np.ptp(position)
     slow, fast = (
@@ -65,7 +66,7 @@ def test_what_the_simulation_lacks_is_not_smoothed_away(session: Session) -> Non
         )
         for hz in (0.15, 6.0)
     )
-    told = [run is not None and _motion(run) is not None for run in (_along(fit, "flexion", x) for x in (slow, fast))]
+    told = [run is not None and _motion(run) is not None for run in (_along(fit, trial, x) for x in (slow, fast))]
     assert told == [True, False]
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from ..effects import catalogue
 from ..effects.base import sample_interval
 from .doubtful import REFUSED, compared, doubted, trifles
-from .findings import Finding, Findings
+from .findings import Finding, Findings, of_one_whole
 from .locate.displacement import NO_HINGE, NOT_RIGID
 from .locate.markers import HINGE, SLIPS
 from .locate.preload import usual_spring
@@ -116,14 +116,15 @@ def assemble(
     ranked, slight = _without(ranked, trifles(ranked, surely))
     rejected += [*unsure, *slight]
     found = _shared(ranked)
-    verdict = "mismatch" if found else "unexplained" if unexplained else "consistent"
+    found, left = of_one_whole(found, unexplained)
+    verdict = "mismatch" if found else "unexplained" if left else "consistent"
     return Findings(
         verdict,
         _lack_of_fit(stations, found),
         _protocol(stations),
         found,
         tuple(rejected),
-        tuple(unexplained),
+        left,
         _next(found),
         tuple(channel_of(s, stands) for s, stands in zip(stations, believed, strict=True)),
         tuple(notes),

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -97,6 +97,21 @@ class Findings:
         with new_file(target) as staging:
             staging.write_text(self.to_json())
         return target
+
+
+def of_one_whole(
+    found: Sequence[Finding], unexplained: Sequence[Mapping[str, Any]]
+) -> tuple[tuple[Finding, ...], tuple[Mapping[str, Any], ...]]:
+    """Findings and what is unexplained with shares of one mismatch, where those of several places together are more:
+    each place counts alike."""
+    whole = sum(f.where["share_of_mismatch"] for f in found) + sum(u["share_of_mismatch"] for u in unexplained)
+    if whole <= 1:
+        return tuple(found), tuple(unexplained)
+
+    def part(place: Mapping[str, Any]) -> dict[str, Any]:
+        return {**place, "share_of_mismatch": place["share_of_mismatch"] / whole}
+
+    return tuple(replace(f, where=part(f.where)) for f in found), tuple(part(u) for u in unexplained)
 
 
 def weighed(size: float, contrast: float) -> float:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..background import single_threaded
+from ..diagnose.findings import of_one_whole
 from ..errors import HandModelError, SessionError
 from ..output import refuse_file
 from ..session import Session
@@ -100,6 +101,7 @@ def diagnose_rig(
     unexplained = _unexplained(lack, found)
     again = repeated_trajectory(rig)
     found = one_load_each(found) if again and len(rig.joints) > 1 else found
+    ranked, unexplained = of_one_whole(sorted(found, key=_rank), unexplained)
     findings = RigFindings(
         session=rig.name,
         verdict=_verdict(found, lack),
@@ -114,7 +116,7 @@ def diagnose_rig(
             "probability": PROBABILITY,
             "not_isolable": [list(f.members) for f in found if len(f.members) > 1],
         },
-        findings=tuple(sorted(found, key=_rank)),
+        findings=ranked,
         rejected=tuple(rejection(r["effect"], r["reason"]) for r in rejected),
         unexplained=unexplained,
         next_experiment=_next(found, issues, again),
@@ -369,7 +371,7 @@ def _diagnose_coupling(
 
 
 def _verdict(found: Sequence[Finding], lack: Mapping[str, Any]) -> str:
-    if any(f.effect != "command_as_measurement" for f in found):
+    if found:
         return "mismatch"
     if lack.get("before") is None:
         return "unexplained"
