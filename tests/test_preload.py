@@ -54,6 +54,9 @@ def test_the_lopsided_one_is_named_in_a_class_with_another_preload(half: float) 
     low, high = finding.parameters["half_difference"]["ci95"]
     assert low < half < high
     assert "the same" in finding.statement
+    value, noise = finding.parameters["half_difference"]["value"], finding.fit["noise_floor"]
+    assert finding.fit["after"] == pytest.approx(noise, rel=0.1)
+    assert finding.fit["before"] == pytest.approx(np.hypot(noise, value), rel=0.1)
 
 
 @pytest.mark.slow

@@ -15,6 +15,7 @@ import numpy as np
 from ...effects import effect
 from ..findings import UNWRITTEN, Finding, weighed
 from ..name.station import Station
+from ..reduction import reduction
 from .decoupled import pulls
 from .known_motors import PRELOAD, kinship, preload_by_chance
 
@@ -195,14 +196,23 @@ def _finding(station: Station, half_difference: float, doubt: float, probability
     fit = {
         "metric": "current_rmse",
         "unit": unit,
-        "before": None,
-        "after": None,
+        **_proof(station, half_difference),
         "noise_floor": station.naming.balance.sigma,
-        "ci95_reduction": None,
-        "held_out": [],
         "engine": COMPARISON,
     }
     sure = max(abs(half_difference) - doubt, SURE_LEAST * abs(half_difference))
     return weighed(sure / station.naming.balance.sigma, station.contrast), Finding(
         CLASS[0], CLASS, probability, (), where, text, parameters, fit, dict(UNWRITTEN)
     )
+
+
+def _proof(station: Station, half_difference: float) -> dict[str, Any]:
+    """What a drive with the preload that the hand's others let expect would leave of its steady current on recordings
+    kept out (all, where there are none), and what this one leaves, as the other recordings teach it."""
+    balance, fit = station.naming.balance, station.naming.fit
+    held = balance.steady & ~balance.train
+    use = held if held.any() else balance.steady
+    left = (balance.effort - fit.prediction)[use]
+    blocks = np.unique(balance.stroke[use], return_inverse=True)[1]
+    names = [s.trial for s in balance.states if s.validate] if held.any() else []
+    return {**reduction([left + half_difference], [left], [blocks]), "held_out": names}
