@@ -18,6 +18,7 @@ from typing import Any, Self
 import numpy as np
 
 from .effects import effect
+from .effects.chain import behind_inputs, map_ahead, map_to
 from .effects.law import Bristle, Law, Moment
 from .errors import DescriptionError
 from .hand import Effect, Hand, load_hand
@@ -28,14 +29,15 @@ LEAST_GIVE = 0.1  # [%]: the bristle of a motor whose file has plain Coulomb fri
 @dataclass(frozen=True)
 class Place:
     """Where one effect acts in a model. actuator: id of the motor, in the unit [effort per raw]. equality: id of the
-    follower's equality, None for a load on the motor joint. address, dof: of the joint whose state the law reads, the
-    motor's or the follower's driver; scale: its coordinate per unit of the law. body: of the palm. give: bristle length
+    follower's equality, None for a load on the motor joint; map: of the one with its polynomial, ahead of what is lost
+    behind it. address, dof: of the joint whose state the law reads, the motor's or the map's driver; scale: its coordinate per unit of the law. body: of the palm. give: bristle length
     [%]. plane: (2, 3) unit vectors in the palm, along the open finger and where flexion takes it."""
 
     effect: Effect
     actuator: int
     unit: float
     equality: int | None
+    map: int | None
     address: int
     dof: int
     scale: float
@@ -155,20 +157,22 @@ def _place(model: Any, hand: Hand, found: Effect) -> Place | None:
             equality = identity(kinds.mjOBJ_EQUALITY, f"{name}_map")
         else:
             follower = identity(kinds.mjOBJ_JOINT, f"{found.where.get('finger')}_{found.where.get('joint')}")
-            rows = np.flatnonzero((model.eq_obj1id == follower) & (model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)))
-            equality = int(rows[0]) if follower >= 0 and len(rows) else -1
-        if equality < 0:
+            equality = map_to(model, follower) if follower >= 0 else None
+        if equality is None or equality < 0:
             return None
     motor = next((m for m in hand.motors if m.actuator == name), None)
     give = 0.0 if motor is None or "presliding" not in motor.parameters else motor.parameters["presliding"].value
     unit = float(model.numeric_data[model.numeric_adr[number]])
-    driver = joint if equality is None else int(model.eq_obj2id[equality])
+    mapped = None if equality is None else map_ahead(model, behind_inputs(model, int(model.eq_obj2id[equality])))
+    mapped = equality if mapped is None else mapped
+    driver = joint if mapped is None else int(model.eq_obj2id[mapped])
     scale = math.pi / 180 if station not in ("drive", "encoder") else 1.0  # radians for degrees, or percent
     return Place(
         found,
         actuator,
         unit,
         equality,
+        mapped,
         int(model.jnt_qposadr[driver]),
         int(model.jnt_dofadr[driver]),
         scale,
@@ -217,7 +221,7 @@ def _moment(model: Any, data: Any, place: Place, step: float, bristle: Callable[
 
 def _follower(model: Any, data: Any, place: Place, step: float) -> Moment:
     position, scale = float(data.qpos[place.address]), place.scale
-    _, c1, c2, c3, c4 = model.eq_data[place.equality, :5].tolist()
+    _, c1, c2, c3, c4 = model.eq_data[place.map, :5].tolist()
     slope = c1 + position * (2 * c2 + position * (3 * c3 + position * 4 * c4))
     return Moment(
         data.time,

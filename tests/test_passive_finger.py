@@ -220,6 +220,23 @@ def test_a_play_behind_the_map_is_replayed_behind_a_bound(tmp_path) -> None:
     assert off(wanted, moved, driven) < 0.1
 
 
+@pytest.mark.parametrize("at", [0.0, 1.0])  # at the driver, and at what follows
+def test_a_give_is_replayed_beside_a_play_behind_the_map(at: float, tmp_path) -> None:
+    """The give reads its drive ahead of the map, in whose unit it is."""
+    give = ("series_elasticity", {"form": at}, {"compliance": 0.02, "drag_compliance": 0.0})
+    play = ("drive_backlash", {"gap": 1.5, "form": 2.0}, {})
+    now = kinematic_state("encoder")
+    alone, beside = (replayed(_new(tmp_path / str(len(e))), now, "encoder", *e) for e in ((play,), (give, play)))
+    wanted = effect(give[0]).columns(now, give[1])[:, 0] * give[2]["compliance"]
+    begun = np.maximum.accumulate(np.abs(now.position - now.position[0]) > 4.0)
+    assert np.quantile(np.abs(beside - alone - wanted)[begun], 0.95) < 0.1 * np.abs(wanted).max() + 0.03
+
+
+def _new(folder):
+    folder.mkdir()
+    return folder
+
+
 def test_a_play_is_replayed_behind_a_round_bound_and_a_map_that_grows_steep(tmp_path, monkeypatch) -> None:
     """What rubs in the play stretches the bound's spring the more the steeper the map between them is."""
     monkeypatch.setitem(globals(), "LINKAGE", np.array([0.02, 0.3, 0.4, 0.0, 0.0]))

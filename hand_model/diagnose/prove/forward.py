@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from ...effects import effect
 from ...effects.base import DriveState
-from ...effects.input import MAPPED, STRETCHED, SUFFIX
+from ...effects.chain import behind_inputs, inputs, map_ahead, map_to, source
+from ...effects.input import STRETCHED, SUFFIX
 from ...engines.mujoco import HOLD, divergence, on_linkages
 from ...hand import load_hand
 from ...passive import effects_on
@@ -64,47 +65,8 @@ def _driver(model: Any, actuator_name: str, follower: int, station: str) -> int 
         joint = int(model.actuator_trnid[actuator, 0]) if actuator >= 0 else -1
         # a nominal actuator acts on the finger itself: such a file has no motor
         return joint if joint >= 0 and joint != follower else None
-    row = _map_to(model, follower)
-    return None if row is None else _source(model, int(model.eq_obj2id[row]))
-
-
-def _map_to(model: Any, follower: int) -> int | None:
-    """The equality that moves a joint; None where none does."""
-    import mujoco
-
-    rows = np.flatnonzero((model.eq_obj1id == follower) & (model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)))
-    return int(rows[0]) if len(rows) else None
-
-
-def _source(model: Any, joint: int) -> int:
-    """The joint behind a chain of inputs and maps."""
-    joint = _behind_inputs(model, joint)
-    row = _map_ahead(model, joint)
-    return joint if row is None else _source(model, int(model.eq_obj2id[row]))
-
-
-def _map_ahead(model: Any, joint: int) -> int | None:
-    """The equality that moves a joint of a map's own, ahead of what lies behind that map; None where it is none."""
-    return _map_to(model, joint) if MAPPED in model.joint(joint).name else None
-
-
-def _behind_inputs(model: Any, joint: int) -> int:
-    """The joint that an input joint follows, over any number of inputs."""
-    for _, tendon in _inputs(model, joint):
-        joint = int(model.wrap_objid[model.tendon_adr[tendon]])
-    return joint
-
-
-def _inputs(model: Any, joint: int) -> Iterator[tuple[int, int]]:
-    """Inputs from a joint on, towards the driver, each with the tendon by which it follows the next."""
-    while SUFFIX in model.joint(joint).name:
-        tendon = next(
-            t
-            for t in range(model.ntendon)
-            if model.wrap_objid[model.tendon_adr[t] + 1] == joint and model.tendon_num[t] == 2
-        )
-        yield joint, tendon
-        joint = int(model.wrap_objid[model.tendon_adr[tendon]])
+    row = map_to(model, follower)
+    return None if row is None else source(model, int(model.eq_obj2id[row]))
 
 
 def _roll(model: Any, hand: Any, state: DriveState, motor: str, driver: int, path: Array, follower: int) -> Array:
@@ -173,8 +135,8 @@ def _let_follow(model: Any, joint: int) -> None:
     """Let what follows a joint do so by its maps alone: what is lost there is not asked, and would pull at it."""
     import mujoco
 
-    lost = {i for i in range(model.njnt) if SUFFIX in model.joint(i).name and _source(model, i) == joint}
-    ahead = {i: _behind_inputs(model, i) for i in lost}
+    lost = {i for i in range(model.njnt) if SUFFIX in model.joint(i).name and source(model, i) == joint}
+    ahead = {i: behind_inputs(model, i) for i in lost}
     for row in np.flatnonzero(model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)):
         model.eq_obj2id[row] = ahead.get(int(model.eq_obj2id[row]), model.eq_obj2id[row])
     for t in range(model.ntendon):
@@ -201,11 +163,11 @@ def _rub(model: Any, driver: int, inertia: float, path: Array, fastest: float) -
 
     for row in np.flatnonzero(model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)):
         last = int(model.eq_obj2id[row])
-        if _source(model, last) == driver:
-            inputs = list(_inputs(model, last))
-            loose = [model.jnt_dofadr[joint] for joint, tendon in inputs if not model.tendon_stiffness[tendon]]
-            ahead = _behind_inputs(model, last)
-            slope = 1.0 if ahead == driver else _steepest(model, _map_to(model, ahead), path)
+        if source(model, last) == driver:
+            between = list(inputs(model, last))
+            loose = [model.jnt_dofadr[joint] for joint, tendon in between if not model.tendon_stiffness[tendon]]
+            ahead = behind_inputs(model, last)
+            slope = 1.0 if ahead == driver else _steepest(model, map_to(model, ahead), path)
             friction = inertia * model.eq_data[row, 1] ** 2 * fastest * slope / COASTING_S
             for joint, tendon in _ties_ahead(model, last):
                 heavier = max(friction * slope / STRETCHED / model.tendon_stiffness[tendon], 1.0)
@@ -226,12 +188,12 @@ def _ties_ahead(model: Any, joint: int, loose: bool = False) -> list[tuple[int, 
     """The inputs that springs hold on what they follow, with these, towards the driver from the first that lies loose in
     a play on, or from the joint on."""
     ties = []
-    for held, tendon in _inputs(model, joint):
+    for held, tendon in inputs(model, joint):
         if not model.tendon_stiffness[tendon]:
             loose = True
         elif loose:
             ties.append((held, tendon))
-    row = _map_ahead(model, _behind_inputs(model, joint))
+    row = map_ahead(model, behind_inputs(model, joint))
     return ties if row is None else [*ties, *_ties_ahead(model, int(model.eq_obj2id[row]), loose)]
 
 
@@ -248,7 +210,7 @@ def _started(model: Any, qpos: Array, driver: int) -> Array:
     maps."""
     out = on_linkages(model, qpos)
     for joint in range(model.njnt):
-        if SUFFIX in model.joint(joint).name and _source(model, joint) == driver:
+        if SUFFIX in model.joint(joint).name and source(model, joint) == driver:
             out[model.jnt_qposadr[joint]] = _within(model, out, joint)
             out = on_linkages(model, out)
     return _pushed(model, out)
@@ -271,7 +233,7 @@ def _within(model: Any, qpos: Array, joint: int) -> float:
         low, high = max(low, ends[0]), min(high, ends[1])
         if np.ptp(model.tendon_range[t]) < 1e5:
             gap = float(np.ptp(ends))
-    return float(np.clip(qpos[model.jnt_qposadr[_behind_inputs(model, joint)]] + 0.5 * gap, low, high))
+    return float(np.clip(qpos[model.jnt_qposadr[behind_inputs(model, joint)]] + 0.5 * gap, low, high))
 
 
 def _pushed(model: Any, qpos: Array) -> Array:
