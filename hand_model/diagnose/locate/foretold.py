@@ -35,17 +35,20 @@ FEWEST = 3  # answers, or strokes, of recordings kept out
 
 def delay_foretold(late_s: Array, kept_out: NDArray[np.bool_], trials: Sequence[str]) -> dict[str, Any]:
     """`fit` of a delay: by how much answers (e,) are late [s], and late beside the delay of the others. kept_out: (e,),
-    or empty; trials: names of the recordings kept out. The floor is by how much one answer differs from the next."""
+    or empty; trials: names of the recordings kept out. The floor is by how much the answers of either differ among
+    themselves."""
     held = kept_out if kept_out.size == late_s.size else np.zeros(late_s.size, bool)
     if held.sum() < FEWEST or (~held).sum() < FEWEST:
         held, trials = np.ones(late_s.size, bool), ()
     learned = ~held if len(trials) else held
     left = late_s[held] - np.mean(late_s[learned])
+    parts = [late_s[learned], late_s[held]] if len(trials) else [late_s]
+    scatter = sum(float(np.sum((x - x.mean()) ** 2)) for x in parts) / max(len(late_s) - len(parts), 1)
     return {
         "metric": "command_latency",
         "unit": "s",
         **reduction([late_s[held]], [left], [np.arange(held.sum())]),
-        "noise_floor": float(np.std(late_s[learned], ddof=1)) if learned.sum() > 1 else None,
+        "noise_floor": float(np.sqrt(scatter)),
         "held_out": list(trials),
         "engine": "events",
     }
@@ -60,10 +63,17 @@ def sag_foretold(strokes: Sequence[Stroke]) -> dict[str, Any]:
     design, y = speed_design(learned, rise, commanded), log_speeds(learned)
     ahead, speeds = speed_design(told, rise, commanded), log_speeds(told)
     loaded = speed_coefficients(design, y, len(commanded))
-    floor = float(np.sum((y - design @ loaded) ** 2)) / max(len(y) - design.shape[1], 1)
     plain = np.linalg.lstsq(design[:, : len(commanded)], y, rcond=None)[0]
     errors = [[speeds - ahead[:, : len(beta)] @ beta] for beta in (plain, loaded)]
-    return _of_strokes(reduction(*errors, [np.arange(len(told))]), float(np.sqrt(floor)), learned, told)
+    return _of_strokes(reduction(*errors, [np.arange(len(told))]), _scatter(strokes), learned, told)
+
+
+def _scatter(strokes: Sequence[Stroke]) -> float:
+    """Standard deviation of log speed that all strokes together leave beside their own loss."""
+    commanded, y = sorted({s.commanded for s in strokes}), log_speeds(strokes)
+    design = speed_design(strokes, load_rise(strokes), commanded)
+    left = y - design @ speed_coefficients(design, y, len(commanded))
+    return float(np.sqrt(np.sum(left**2) / max(len(y) - design.shape[1], 1)))
 
 
 def ceiling_foretold(strokes: Sequence[Stroke]) -> dict[str, Any]:
