@@ -9,6 +9,7 @@ import numpy as np
 
 from .base import LOST_MOTION, Amplitude, Array, DriveState, Effect, Shape, position_range
 from .driven import driven, path_behind, segment_gap, soft_play
+from .law import Bristle, Law
 from .path import dahl
 
 HARD, SOFT, HARD_BEHIND, SOFT_BEHIND, GRADUAL = 0.0, 1.0, 2.0, 3.0, 4.0
@@ -72,6 +73,13 @@ class Backlash(Effect):
         """Most gaps have ends."""
         return -RARE if parameters["form"] == GRADUAL else 0.0
 
+    def law(self, parameters: Mapping[str, float]) -> Law | None:
+        """Of a gap that is crossed gradually, which no play of MJCF is, what follows lags by."""
+        if not crossed_gradually(parameters):
+            return None
+        half, bristle = 0.5 * parameters["gap"], Bristle(parameters["reach"])
+        return lambda now: -half * bristle(now.position) * now.slope
+
     def further(
         self, states: tuple[DriveState, ...], parameters: Mapping[str, Mapping[str, Any]]
     ) -> dict[str, dict[str, Any]]:
@@ -81,9 +89,14 @@ class Backlash(Effect):
 
 def ends(parameters: Mapping[str, float]) -> str:
     """What a sentence says of how a gap ends; nothing of a hard one."""
-    if parameters.get("form", HARD) == GRADUAL:
+    if crossed_gradually(parameters):
         return f", gradually, two thirds of it within {parameters['reach']:.1f}"
     return ", with ends that give" if gives_way(parameters) else ""
+
+
+def crossed_gradually(parameters: Mapping[str, float]) -> bool:
+    """Whether a gap has no ends."""
+    return parameters.get("form", HARD) == GRADUAL
 
 
 def gives_way(parameters: Mapping[str, float]) -> bool:
