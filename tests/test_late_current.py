@@ -160,17 +160,24 @@ def test_what_simulation_and_answers_surely_say_stands_beside_a_balance_that_tak
 
 
 @pytest.mark.parametrize(
-    ("brought", "doubt_s", "stands"), [(-0.3, 0.01, True), (-0.3, 0.1, False), (-8.0, 0.01, False), (0.3, 0.1, True)]
+    ("brought", "late_s", "doubt_s", "stands"),
+    [
+        (-0.3, 0.1, 0.01, True),
+        (-0.3, 0.1, 0.1, False),
+        (-8.0, 0.1, 0.01, False),
+        (0.3, 0.1, 0.1, True),
+        (-0.3, 0.02, 1e-3, False),  # a sample
+    ],
 )
 def test_a_lateness_that_answers_surely_tell_stands_where_recordings_kept_out_do_not_deny_it(
-    brought: float, doubt_s: float, stands: bool, monkeypatch: pytest.MonkeyPatch
+    brought: float, late_s: float, doubt_s: float, stands: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from types import SimpleNamespace
 
     from hand_model.diagnose.name import station
 
     monkeypatch.setattr(station, "brought_held_out", lambda naming, which: brought)
-    states = answering({"index": drive(0)}, {"index": (0.1, doubt_s)})["index"]
+    states = answering({"index": drive(0)}, {"index": (late_s, doubt_s)})["index"]
     naming = SimpleNamespace(balance=SimpleNamespace(states=states))
-    term = SimpleNamespace(effect=EFFECT, shape={"form": 0.0, "delay": 0.09})
+    term = SimpleNamespace(effect=EFFECT, shape={"form": 0.0, "delay": 0.9 * late_s})
     assert station._stands(naming, SimpleNamespace(term=term, evidence=20.0), 0, 8.0) == stands

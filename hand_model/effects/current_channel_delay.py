@@ -11,6 +11,7 @@ from .base import SURE_DELAY, Amplitude, Array, DriveState, Effect, Shape, sampl
 from .mjcf import delay, motor_sensor
 
 ALIKE = 2.0  # standard deviations within which two delays are the same
+SEVERAL = 2.0  # sample intervals: a current so late shows at any start, whatever controller is simulated
 FIRST_SEEN = 0.1  # of a filter's time constant: a rise of ten times what is noticed
 
 
@@ -61,11 +62,13 @@ class CurrentChannelDelay(Effect):
         return (FIRST_SEEN * delay_s, delay_s) if _filters(shape) else (delay_s, max(delay_s, 0.0))
 
     def told_otherwise(self, states: tuple[DriveState, ...], shape: Mapping[str, float]) -> bool:
-        """Whether answers to commands, or a simulation, surely say the current as late ("late" in `extra`)."""
+        """Whether answers to commands, or a simulation, surely say the current as late ("late" in `extra`), by several
+        samples."""
         late_s, doubt_s = states[0].extra.get("late", (0.0, np.inf))
         earliest_s, latest_s = self.lateness(shape)
         apart_s = max(earliest_s - late_s, late_s - latest_s, 0.0)
-        return bool(abs(late_s) > SURE_DELAY * doubt_s and apart_s < ALIKE * doubt_s)
+        least_s = max(SURE_DELAY * doubt_s, SEVERAL * sample_interval(states))
+        return bool(abs(late_s) > least_s and apart_s < ALIKE * doubt_s)
 
     def further(
         self, states: tuple[DriveState, ...], parameters: Mapping[str, Mapping[str, Any]]
