@@ -19,6 +19,7 @@ etree = pytest.importorskip("lxml.etree")
 # Nothing of them is a force of the drive: an obstacle of one recording, a controller's speed, what is read of a
 # command.
 NOT_OF_THE_DRIVE = {"external_contact"}
+GIVE = {"compliance": 0.02, "drag_compliance": 0.0}
 # An encoder's own error and a clock are no motion of the finger; one that runs ahead is pushed by something else.
 NOT_OF_A_MAP = {"encoder_periodic_error", "clock_drift", "spring_decoupling"}
 
@@ -220,21 +221,38 @@ def test_a_play_behind_the_map_is_replayed_behind_a_bound(tmp_path) -> None:
     assert off(wanted, moved, driven) < 0.1
 
 
-@pytest.mark.parametrize("at", [0.0, 1.0])  # at the driver, and at what follows
-def test_a_give_is_replayed_beside_a_play_behind_the_map(at: float, tmp_path) -> None:
-    """The give reads its drive ahead of the map, in whose unit it is."""
-    give = ("series_elasticity", {"form": at}, {"compliance": 0.02, "drag_compliance": 0.0})
-    play = ("drive_backlash", {"gap": 1.5, "form": 2.0}, {})
-    now = kinematic_state("encoder")
-    alone, beside = (replayed(_new(tmp_path / str(len(e))), now, "encoder", *e) for e in ((play,), (give, play)))
-    wanted = effect(give[0]).columns(now, give[1])[:, 0] * give[2]["compliance"]
-    begun = np.maximum.accumulate(np.abs(now.position - now.position[0]) > 4.0)
-    assert np.quantile(np.abs(beside - alone - wanted)[begun], 0.95) < 0.1 * np.abs(wanted).max() + 0.03
-
-
-def _new(folder):
-    folder.mkdir()
-    return folder
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        (("series_elasticity", {"form": 0.0}, GIVE), ("drive_backlash", {"gap": 1.5, "form": 2.0}, {})),
+        (("series_elasticity", {"form": 1.0}, GIVE), ("drive_backlash", {"gap": 1.5, "form": 2.0}, {})),
+        (("series_elasticity", {"form": 0.0}, GIVE), ("drive_backlash", {"gap": 1.5, "form": 4.0, "reach": 3.0}, {})),
+        (
+            ("coupling_deadband", {"until": 15.0, "corner": 0.1}, {}),
+            ("linkage_backlash", {"gap": 2.0, "form": 2.0}, {}),
+        ),
+        (("coupling_deadband", {"until": 8.0, "corner": 2.5}, {}), ("linkage_compliance", {"form": 0.0}, GIVE)),
+        (("distal_stop", {"from": 50.0, "passing": 0.2}, {}), ("linkage_compliance", {"form": 1.0}, GIVE)),
+        (
+            ("distal_stop", {"from": 50.0, "passing": 0.2}, {}),
+            ("linkage_backlash", {"gap": 2.0, "form": 4.0, "reach": 3.0}, {}),
+        ),
+    ],
+    ids=lambda e: f"{e[0]}_{e[1].get('form', '')}",
+)
+def test_two_effects_are_replayed_as_they_predict_together(first, second, tmp_path) -> None:
+    """Changes of the driver follow one another; a give reads its drive ahead of the map, in whose unit it is."""
+    station = effect(first[0]).station
+    now = kinematic_state(station)
+    moved = replayed(tmp_path, now, station, first, second)
+    told = now
+    for name, shape, _ in (first, second):
+        told = replace(told, declared=effect(name).declared(told, shape))
+    wanted = told.declared @ powers(now, station)
+    for name, shape, amplitude in (first, second):
+        if amplitude:
+            wanted += effect(name).columns(now, shape) @ np.array(list(amplitude.values()))
+    assert off(wanted, moved, now.position) < 0.05 * np.abs(wanted - now.effort).max() + 0.05
 
 
 def test_a_play_is_replayed_behind_a_round_bound_and_a_map_that_grows_steep(tmp_path, monkeypatch) -> None:

@@ -60,8 +60,12 @@ class Backlash(Effect):
         softness = SOFTNESS if gives_way(shape) else 0.0
         if shape["form"] < HARD_BEHIND:
             return driven(state, lambda x: soft_play(x, shape["gap"], softness))
-        path, rate = path_behind(state)
-        return driven(state, lambda x: x + (soft_play(path, shape["gap"], softness) - path) / rate)
+
+        def lagging(x: Array) -> Array:
+            path, rate = path_behind(state, x)
+            return x + (soft_play(path, shape["gap"], softness) - path) / rate
+
+        return driven(state, lagging)
 
     def parameters(
         self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]

@@ -62,15 +62,18 @@ def soft_play(path: Array, gap: float, softness: float) -> Array:
     return np.mean([play(path, g) for g in gaps], axis=0)
 
 
-def path_behind(state: DriveState) -> tuple[Array, Array]:
+def path_behind(state: DriveState, driver: Array) -> tuple[Array, Array]:
     """The path of what follows (n,) by its map, scaled to the driver's unit at the map's mean slope, and how fast it
-    goes with the driver (n,), one on the average."""
+    goes with the driver (n,), one on the average. driver (n,): what other changes leave of the state's position."""
     order = np.argsort(state.position, kind="stable")
     slope = np.maximum(state.slope, LEAST_SLOPE * mean_slope((state,))) / mean_slope((state,))
     x, rate = state.position[order], slope[order]
-    path = np.empty(len(x))
-    path[order] = x[0] + np.r_[0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(x))]
-    return path, slope
+    along = x[0] + np.r_[0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(x))]
+    if np.allclose(driver, state.position, rtol=1e-9, atol=1e-9 * max(float(np.ptp(x)), 1e-9)):  # nothing changed it
+        path = np.empty(len(x))
+        path[order] = along
+        return path, slope
+    return np.interp(driver, x, along), np.interp(driver, x, rate)
 
 
 def mean_slope(states: tuple[DriveState, ...]) -> float:
