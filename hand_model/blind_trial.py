@@ -20,6 +20,8 @@ from typing import Any
 
 from .textbook import readings
 
+# times the noise floor, that the error after modelling may be; share of what could be removed that must be gone
+NOISE, REMOVED = 1.05, 0.8
 KIND_SHARE = ("single", "single", "single", "single", "weak", "weak", "none", "pair", "messy", "outside")
 
 
@@ -174,9 +176,24 @@ def score_case(name: str, answer: Mapping[str, Any], findings: Mapping[str, Any]
         "in_three": bool(truth) and truth[0] in named[:3],
         "in_class": bool(truth) and any(truth[0] in c for c in classes.values()),
         "parameter_errors": _parameter_errors(hidden, findings["findings"]),
+        "proofs": _proofs(truth, findings["findings"]),
         "settings": [e.get("parameters", e.get("settings")) for e in hidden][:2],
         "parameters": [f["parameters"] for f in findings["findings"]][:2],
     }
+
+
+def _proofs(truth: Sequence[str], found: Sequence[Mapping[str, Any]]) -> list[dict[str, bool]]:
+    """Of findings of what was hidden, as they say it themselves: whether the error that modelling leaves is within
+    `NOISE` times the noise, and whether `REMOVED` of what could be removed is gone. Of a channel that is refused there
+    is no error."""
+    out = []
+    for fit in (f.get("fit", {}) for f in found if f["effect"] in truth):
+        before, after, floor = (fit.get(name) for name in ("before", "after", "noise_floor"))
+        if None not in (before, after, floor):
+            within = after <= NOISE * floor
+            gone = within if before <= floor else before - after >= REMOVED * (before - floor)
+            out.append({"within": within, "gone": gone})
+    return out
 
 
 def _parameter_errors(
@@ -228,6 +245,9 @@ def _summary(digest: str, rows: Sequence[Mapping[str, Any]]) -> Trial:
         sum(bool(e["covered"]) for e in errors),
         sum(e["covered"] is not None for e in errors),
     )
+    proofs = [p for r in rows if r["kind"] == "single" and r["right"] for p in r["proofs"]]
+    for what, key in (("error after within the noise", "within"), ("removable error gone", "gone")):
+        rates[f"single: {what}"] = (sum(p[key] for p in proofs), len(proofs))
     confusion: Counter[tuple[str, str]] = Counter()
     for row in rows:
         if row["kind"] in ("single", "weak", "none", "outside"):

@@ -36,3 +36,16 @@ def test_another_name_is_wrong_whatever_its_place() -> None:
     """No place makes up for a name."""
     answer = {"case": "single", "effects": [{"effect": "palm_marker_slip", "finger": None}]}
     assert not score_case("case_000", answer, findings(None))["right"]
+
+
+@pytest.mark.parametrize(
+    ("after", "within", "gone"), [(1.0, True, True), (1.04, True, True), (1.15, False, True), (1.3, False, False)]
+)
+def test_what_a_finding_proves_is_counted(after: float, within: bool, gone: bool) -> None:
+    """Of an error of 2 over a noise of 1."""
+    answer = {"case": "single", "effects": [{"effect": "torque_ripple", "finger": "index"}]}
+    fit = {"before": 2.0, "after": after, "noise_floor": 1.0}
+    named = {"effect": "torque_ripple", "where": {"finger": "index"}, "parameters": {}, "fit": fit}
+    row = score_case("case_000", answer, {"verdict": "mismatch", "findings": [named]})
+    assert row["proofs"] == [{"within": within, "gone": gone}]
+    assert score_case("case_000", answer, {"verdict": "mismatch", "findings": [{**named, "fit": {}}]})["proofs"] == []
