@@ -25,7 +25,9 @@ MOSTLY = 0.7  # share of such answers that must be late
 # most)
 BOTH_LATE = 0.8
 CERTAIN = 3.0  # standard errors by which the means of both are late beyond what healthy drives differ by
-SURELY = 2.0  # standard errors by which a drive moves before its current rises
+SURELY = (
+    2.0  # standard errors by which a drive moves before its current rises, and its answers scatter more than another's
+)
 UNCLEAR = 0.3  # share of the lateness that the motion has too, from which it is no longer clear what is late
 LEAST_ANSWERS = 5
 STOOD = 0.5  # [%] a drive that moves less just before a change stands
@@ -144,10 +146,10 @@ def _moves_first(x: Answers, apart_s: float) -> bool:
 
 
 def _variously_late(x: Answers, others: Sequence[Answers]) -> bool:
-    """Whether a drive answers some changes later than others and then as fast as another drive does: a rise that is only
-    slow is so after its answers, too."""
+    """Whether a drive surely answers some changes later than others and then as fast as another drive does: a rise that
+    is only slow is so after its answers, too."""
     told = [y for y in others if np.isfinite(x.own_s + y.own_s).all()]
-    scatter = float(np.std(x.current_s))
+    scatter = float(np.std(x.current_s)) * (1 - SURELY / np.sqrt(2 * max(len(x.current_s), 2)))
     return any(
         scatter > VARIOUS * max(float(np.std(y.current_s)), x.step_s)
         and np.ptp(x.own_s) < AS_FAST * max(float(np.ptp(y.own_s)), x.step_s)
