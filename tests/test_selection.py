@@ -200,3 +200,29 @@ def test_more_than_five_effects_are_looked_for_where_five_explain_most(
     naming = name_effects(drive(4, six, noise=3.0, trials=3), [effect(name) for name in SIX])
     found = {f.term.effect.name for f in naming.found}
     assert len(found) == named and found <= set(SIX)
+
+
+def test_what_recordings_kept_out_would_exchange_is_held_to_all_other_terms(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beside the large terms alone another effect may stand for the small ones as well, and be as likely in training."""
+    large, small = (SimpleNamespace(effect=SimpleNamespace(name=name)) for name in ("ripple", "tight_spot"))
+    fit = SimpleNamespace(terms=(large, small), rss=0.0, amplitudes=({}, {}))
+    without = {("tight_spot",): 100.0, ("ripple",): 1.0, (): 200.0}
+
+    balance = SimpleNamespace(fit=lambda some: SimpleNamespace(rss=without[tuple(t.effect.name for t in some)]))
+
+    def in_place(pair, effects, fit, which, others, tangents):
+        if which == 1:
+            return [Rival("tight_spot", 5.0, fit)]
+        alone, beside_all = [("ripple", 10.0), ("hysteresis", 9.9)], [("ripple", 20.0), ("hysteresis", 1.0)]
+        return [Rival(name, value, fit) for name, value in (beside_all if others else alone)]
+
+    def kept_out(balance, rivals):
+        told = [Rival(r.name, r.evidence - 5.0 * (r.name == "ripple"), r.fit) for r in rivals]
+        return sorted(told, key=lambda r: -r.evidence)
+
+    monkeypatch.setattr(selection, "_in_place", in_place)
+    monkeypatch.setattr(selection, "_with_kept_out", kept_out)
+    monkeypatch.setattr(selection, "_size", lambda *_: 1.0)
+    monkeypatch.setattr(selection, "Tangents", SimpleNamespace(of=lambda *_: None))
+    found = selection._findings(SimpleNamespace(state=balance), None, (), fit)
+    assert found[0].rivals[0].name == "ripple" and found[0].probability > 0.99

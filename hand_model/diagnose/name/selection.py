@@ -264,7 +264,9 @@ def _findings(pair: Pair, every_recording: Balance, effects: tuple[Any, ...], fi
             brought = sum(max(evidence(balance, fit, left[i], i, scale_of(balance, fit)), 0.0) for i in small)
             if own.evidence + brought > rivals[0].evidence:  # they do not stand for it: together they explain more
                 rivals = _in_place(pair, effects, fit, which, every, tangents)
-        rivals = _with_kept_out(every_recording, rivals)
+        likeliest, rivals = rivals[0].name, _with_kept_out(every_recording, rivals)
+        if likeliest == term.effect.name != rivals[0].name and others != every:  # beside all, would they exchange it?
+            rivals = _with_kept_out(every_recording, _in_place(pair, effects, fit, which, every, tangents))
         weights = np.exp(np.array([r.evidence for r in rivals] + [0.0]) - max(rivals[0].evidence, 0.0))
         mine = [r.name for r in rivals].index(term.effect.name)
         share = losses[which] / max(sum(losses), 1e-12)
