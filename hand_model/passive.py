@@ -30,8 +30,9 @@ LEAST_GIVE = 0.1  # [%]: the bristle of a motor whose file has plain Coulomb fri
 class Place:
     """Where one effect acts in a model. actuator: id of the motor, in the unit [effort per raw]. equality: id of the
     follower's equality, None for a load on the motor joint; map: of the one with its polynomial, ahead of what is lost
-    behind it. address, dof: of the joint whose state the law reads, the motor's or the map's driver; scale: its coordinate per unit of the law. body: of the palm. give: bristle length
-    [%]. plane: (2, 3) unit vectors in the palm, along the open finger and where flexion takes it."""
+    behind it. address, dof: of the joint whose state the law reads, the motor's or the map's driver; scale: its
+    coordinate per unit of the law. body: of the palm. give: bristle length [%]. plane: (2, 3) unit vectors in the palm,
+    along the open finger and where flexion takes it."""
 
     effect: Effect
     actuator: int

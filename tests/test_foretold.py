@@ -80,3 +80,10 @@ def test_a_limit_foretells_the_current_that_a_controller_gets() -> None:
     assert proof["held_out"] == ["log/b.csv"]
     assert proof["before"] > 1.1 * proof["noise_floor"] and proof["after"] < 1.1 * proof["noise_floor"]
     assert foretold(limited, NOISE, ())["held_out"] == []
+
+
+def test_strokes_of_speeds_that_no_other_recording_has_foretell_nothing() -> None:
+    strange = [replace(s, commanded=s.commanded + 1.0) if s.kept_out else s for s in strokes(sag=2e-3)]
+    assert sag_foretold(strange)["held_out"] == []
+    limited = [replace(s, commanded=s.commanded + 1.0) if s.kept_out else s for s in strokes(limit=62.0)]
+    assert ceiling_foretold(limited)["held_out"] == []

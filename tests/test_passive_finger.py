@@ -19,9 +19,9 @@ etree = pytest.importorskip("lxml.etree")
 # Nothing of them is a force of the drive: an obstacle of one recording, a controller's speed, what is read of a
 # command.
 NOT_OF_THE_DRIVE = {"external_contact"}
-GIVE = {"compliance": 0.02, "drag_compliance": 0.0}
 # An encoder's own error and a clock are no motion of the finger; one that runs ahead is pushed by something else.
 NOT_OF_A_MAP = {"encoder_periodic_error", "clock_drift", "spring_decoupling"}
+GIVE = {"compliance": 0.02, "drag_compliance": 0.0}
 
 
 def kinematic_state(station: str) -> DriveState:
@@ -268,6 +268,18 @@ def test_a_play_is_replayed_behind_a_round_bound_and_a_map_that_grows_steep(tmp_
     driven = 4.0 + rounded(now.position - 4.0, 1.8)
     wanted = soft_play(on_the_map(now, driven), segment_gap((now,), {"value": 0.4})["value"], 0.0)
     assert off(wanted, moved, driven) < 0.1  # of 0.3 deg
+
+
+def test_a_play_is_replayed_behind_two_bounds(tmp_path) -> None:
+    bounds = (
+        ("coupling_deadband", {"until": 10.0, "corner": 0.1}, {}),
+        ("distal_stop", {"from": 55.0, "passing": 0.0}, {}),
+    )
+    now = kinematic_state("linkage")
+    moved = replayed(tmp_path, now, "linkage", *bounds, ("linkage_backlash", {"gap": 1.5, "form": 2.0}, {}))
+    driven = np.clip(now.position, 10.0, 55.0)
+    wanted = soft_play(on_the_map(now, driven), segment_gap((now,), {"value": 1.5})["value"], 0.0)
+    assert off(wanted, moved, driven) < 0.1
 
 
 def test_a_bound_holds_its_input_firmly_where_the_map_begins_flat(tmp_path, monkeypatch) -> None:

@@ -135,18 +135,22 @@ def _lack_of_fit(stations: Sequence[Station], found: Sequence[Finding]) -> dict[
     """Residual variance over the pure error of where it is largest, before and after, with the limit that chance stays
     below: at a station, on recordings kept out, or of the markers that something moved. None where nothing could be
     compared."""
-    lacks: list[dict[str, float | None]] = [{"before": None, "after": None, "limit": None}]
+    lack: dict[str, float | None] = {"before": None, "after": None, "limit": None}
     worst = max(stations, key=lambda s: variance_ratio(s.naming, s.naming.declared), default=None)
     if worst is not None:
         n = worst.naming.balance
         count = max(int((~n.train & n.steady).sum()) or int(n.steady.sum()), 1)
-        ratios = (variance_ratio(worst.naming, f) for f in (worst.naming.declared, worst.naming.fit))
-        lacks.append(dict(zip(lacks[0], (*ratios, 1 + 2.6 * float(np.sqrt(2 / count))), strict=True)))
+        lack = {
+            "before": variance_ratio(worst.naming, worst.naming.declared),
+            "after": variance_ratio(worst.naming, worst.naming.fit),
+            "limit": 1 + 2.6 * float(np.sqrt(2 / count)),
+        }
     for fit in (f.fit for f in found if f.where["signal"] == "markers"):
         if fit.get("metric") == "marker_rmse" and fit["before"] is not None and fit["noise_floor"]:
             before, after = ((fit[k] / fit["noise_floor"]) ** 2 for k in ("before", "after"))
-            lacks.append({"before": before, "after": after, "limit": lacks[min(1, len(lacks) - 1)]["limit"]})
-    return max(lacks, key=lambda lack: lack["before"] or 0.0)
+            if before > (lack["before"] or 0.0):
+                lack = {**lack, "before": before, "after": after}
+    return lack
 
 
 def _worn(stations: Sequence[Station], of_markers: Sequence[Finding]) -> set[str | None]:

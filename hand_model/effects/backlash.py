@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from .base import LOST_MOTION, Amplitude, Array, DriveState, Effect, Shape, position_range
 from .driven import driven, path_behind, segment_gap, soft_play
+from .input import map_of, write_play
 from .law import Bristle, Law
 from .path import dahl
 
@@ -76,6 +78,15 @@ class Backlash(Effect):
     def log_prior(self, parameters: Mapping[str, float]) -> float:
         """Most gaps have ends."""
         return -RARE if parameters["form"] == GRADUAL else 0.0
+
+    def write_mjcf(self, root: Any, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str | None:
+        """An input joint behind the driver, or behind its map, within the gap; none of one that is crossed gradually."""
+        if crossed_gradually(parameters):
+            return None
+        equality, behind = map_of(root, where, self.station), behind_map(parameters)
+        gap = parameters["segment_gap" if behind else "gap"]
+        turns = behind or self.station == "linkage"  # else the driver is the motor, in percent
+        return None if equality is None else write_play(root, equality, math.radians(gap) if turns else gap, behind)
 
     def law(self, parameters: Mapping[str, float]) -> Law | None:
         """Of a gap that is crossed gradually, which no play of MJCF is, what follows lags by."""

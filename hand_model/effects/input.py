@@ -7,7 +7,7 @@ the palm.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from typing import Any
 
@@ -198,8 +198,13 @@ def _slope(root: Any, equality: Any) -> float:
     driver = _behind_inputs(root, equality.get("joint2"))
     joint = next(j for j in root.find("worldbody").iter("joint") if j.get("name") == driver)
     low, high = (float(x) for x in joint.get("range", "0 0").split())
-    polynomial = np.polynomial.Polynomial([float(x) for x in equality.get("polycoef").split()])
-    return max(float(np.abs(polynomial.deriv()(np.linspace(low, high, 50))).max()), LEAST_SLOPE)
+    return max(steepest([float(x) for x in equality.get("polycoef").split()], low, high), LEAST_SLOPE)
+
+
+def steepest(coefficients: Sequence[float], low: float, high: float) -> float:
+    """The largest slope of a map (its coefficients, constant first) from one place of its driver to another."""
+    slope = np.polynomial.Polynomial(coefficients).deriv()
+    return float(np.abs(slope(np.linspace(low, high, 50))).max())
 
 
 def settle(root: Any, pose: dict[str, float]) -> None:

@@ -25,9 +25,8 @@ MOSTLY = 0.7  # share of such answers that must be late
 # most)
 BOTH_LATE = 0.8
 CERTAIN = 3.0  # standard errors by which the means of both are late beyond what healthy drives differ by
-SURELY = (
-    2.0  # standard errors by which a drive moves before its current rises, and its answers scatter more than another's
-)
+# standard errors by which a drive moves before its current rises, and its answers scatter more than another's
+SURELY = 2.0
 UNCLEAR = 0.3  # share of the lateness that the motion has too, from which it is no longer clear what is late
 LEAST_ANSWERS = 5
 STOOD = 0.5  # [%] a drive that moves less just before a change stands

@@ -153,9 +153,8 @@ def foretold(asked: Asked, noise: float, held_out: Sequence[str]) -> dict[str, A
         inside = _within(told, *unlimited, learned.limit)
         if len(inside):
             left = told.sensed - np.clip(inside, -learned.limit, learned.limit)
-            moves = np.unique(told.move, return_inverse=True)[1]
             floor = float(np.sqrt(np.mean(noise**2 + told.doubt**2)))
-            fall = reduction([told.sensed - unlimited[0]], [left], [moves])
+            fall = reduction([told.sensed - unlimited[0]], [left], [told.move])
             return {**fall, "noise_floor": floor, "held_out": [] if held.all() else list(held_out)}
     return {}
 

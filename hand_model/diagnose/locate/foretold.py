@@ -38,18 +38,16 @@ def delay_foretold(late_s: Array, kept_out: NDArray[np.bool_], trials: Sequence[
     or empty; trials: names of the recordings kept out. The floor is by how much the answers of either differ among
     themselves."""
     held = kept_out if kept_out.size == late_s.size else np.zeros(late_s.size, bool)
-    if held.sum() < FEWEST or (~held).sum() < FEWEST:
-        held, trials = np.ones(late_s.size, bool), ()
-    learned = ~held if len(trials) else held
-    left = late_s[held] - np.mean(late_s[learned])
-    parts = [late_s[learned], late_s[held]] if len(trials) else [late_s]
+    apart = min(held.sum(), (~held).sum()) >= FEWEST
+    learned, told = (late_s[~held], late_s[held]) if apart else (late_s, late_s)
+    parts = [learned, told] if apart else [late_s]
     scatter = sum(float(np.sum((x - x.mean()) ** 2)) for x in parts) / max(len(late_s) - len(parts), 1)
     return {
         "metric": "command_latency",
         "unit": "s",
-        **reduction([late_s[held]], [left], [np.arange(held.sum())]),
+        **reduction([told], [told - np.mean(learned)], [np.arange(len(told))]),
         "noise_floor": float(np.sqrt(scatter)),
-        "held_out": list(trials),
+        "held_out": list(trials) if apart else [],
         "engine": "events",
     }
 
@@ -57,15 +55,14 @@ def delay_foretold(late_s: Array, kept_out: NDArray[np.bool_], trials: Sequence[
 def sag_foretold(strokes: Sequence[Stroke]) -> dict[str, Any]:
     """`fit` of a loss of speed under load: what the logarithms of the strokes' mean speeds are off by, of a drive that
     goes as fast as it is told, and of one that loses speed as the other recordings tell it."""
-    learned, told = _apart(strokes, lambda some: np.isfinite(sag(some).sag))
+    learned, told, names = _apart(strokes, lambda some: np.isfinite(sag(some).sag))
     commanded, rise = sorted({s.commanded for s in learned}), load_rise(learned)
-    told = [s for s in told if s.commanded in commanded]
     design, y = speed_design(learned, rise, commanded), log_speeds(learned)
     ahead, speeds = speed_design(told, rise, commanded), log_speeds(told)
     loaded = speed_coefficients(design, y, len(commanded))
     plain = np.linalg.lstsq(design[:, : len(commanded)], y, rcond=None)[0]
     errors = [[speeds - ahead[:, : len(beta)] @ beta] for beta in (plain, loaded)]
-    return _of_strokes(reduction(*errors, [np.arange(len(told))]), _scatter(strokes), learned, told)
+    return _of_strokes(reduction(*errors, [np.arange(len(told))]), _scatter(strokes), names)
 
 
 def _scatter(strokes: Sequence[Stroke]) -> float:
@@ -79,16 +76,17 @@ def _scatter(strokes: Sequence[Stroke]) -> float:
 def ceiling_foretold(strokes: Sequence[Stroke]) -> dict[str, Any]:
     """`fit` of a limit of the drive: what its fastest strokes lose of their speed, and lose beyond what keeps the
     current within the limit that the other recordings tell."""
-    learned, told = _apart(strokes, lambda some: np.isfinite(ceiling(list(some))[0]))
-    found = pushed(learned)
-    if found is None or not fastest(told):
-        return _of_strokes(dict.fromkeys(("before", "after", "ci95_reduction")), None, learned, told)
-    model, over = found
-    lost, left = _lost(model, strokes, fastest(told))
-    _, free = _lost(model, strokes, fastest(learned))
+    learned, told, names = _apart(strokes, lambda some: np.isfinite(ceiling(some)[0]))
+    found, top = pushed(learned), fastest(learned)
+    mine = [s for s in told if s.way > 0 and s.commanded == top[0].commanded] if top else []
+    if found is None or not mine:
+        return _of_strokes(dict.fromkeys(("before", "after", "ci95_reduction")), None, names)
+    model, *_, over = found
+    lost, left = _lost(model, strokes, mine)
+    _, free = _lost(model, strokes, top)
     floor = float(np.sqrt(np.mean(free[~over] ** 2))) if (~over).any() else None
-    blocks = [np.repeat(np.arange(len(fastest(told))), [len(s.time_s) for s in fastest(told)])]
-    return _of_strokes(reduction([lost], [left], blocks), floor, learned, told)
+    blocks = np.repeat(np.arange(len(mine)), [len(s.time_s) for s in mine])
+    return _of_strokes(reduction([lost], [left], [blocks]), floor, names)
 
 
 def _lost(model: Pushed, strokes: Sequence[Stroke], mine: Sequence[Stroke]) -> tuple[Array, Array]:
@@ -98,23 +96,25 @@ def _lost(model: Pushed, strokes: Sequence[Stroke], mine: Sequence[Stroke]) -> t
     return lost / model.full, (lost - taken) / model.full
 
 
-def _apart(strokes: Sequence[Stroke], tells: Callable[[list[Stroke]], bool]) -> tuple[list[Stroke], list[Stroke]]:
-    """Strokes that figures are learned from, and those that they are held to; all of them twice where either are too few
-    to tell."""
-    learned, told = ([s for s in strokes if s.kept_out == held] for held in (False, True))
-    enough = len(told) >= FEWEST and tells(learned)
-    return (learned, told) if enough else (list(strokes), list(strokes))
+def _apart(
+    strokes: Sequence[Stroke], tells: Callable[[list[Stroke]], bool]
+) -> tuple[list[Stroke], list[Stroke], list[str]]:
+    """Strokes that figures are learned from, those of the same commanded speeds that they are held to, and the names of
+    the recordings kept out; all strokes twice, and no name, where either are too few to tell."""
+    learned = [s for s in strokes if not s.kept_out]
+    known = {s.commanded for s in learned}
+    told = [s for s in strokes if s.kept_out and s.commanded in known]
+    if len(told) >= FEWEST and tells(learned):
+        return learned, told, list(dict.fromkeys(s.trial for s in told))
+    return list(strokes), list(strokes), []
 
 
-def _of_strokes(
-    fall: dict[str, Any], floor: float | None, learned: Sequence[Stroke], told: Sequence[Stroke]
-) -> dict[str, Any]:
-    held = [] if told and told[0] is learned[0] else list(dict.fromkeys(s.trial for s in told))
+def _of_strokes(fall: dict[str, Any], floor: float | None, held_out: Sequence[str]) -> dict[str, Any]:
     return {
         "metric": "speed_loss",
         "unit": "1",
         **fall,
         "noise_floor": floor,
-        "held_out": held,
+        "held_out": list(held_out),
         "engine": STROKES,
     }

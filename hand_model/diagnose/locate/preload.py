@@ -213,6 +213,5 @@ def _proof(station: Station, half_difference: float) -> dict[str, Any]:
     held = balance.steady & ~balance.train
     use = held if held.any() else balance.steady
     left = (balance.effort - fit.prediction)[use]
-    blocks = np.unique(balance.stroke[use], return_inverse=True)[1]
     names = [s.trial for s in balance.states if s.validate] if held.any() else []
-    return {**reduction([left + half_difference], [left], [blocks]), "held_out": names}
+    return {**reduction([left + half_difference], [left], [balance.stroke[use]]), "held_out": names}

@@ -209,9 +209,9 @@ def fastest(strokes: Sequence[Stroke]) -> list[Stroke]:
     return [s for s in strokes if s.way > 0 and s.commanded == fast]
 
 
-def pushed(strokes: Sequence[Stroke]) -> tuple[Pushed, NDArray[np.bool_]] | None:
-    """What slower strokes foretell of the fastest, and in which samples (n,) of these the current is at its limit; None
-    where there are too few of either, or nothing is viscous."""
+def pushed(strokes: Sequence[Stroke]) -> tuple[Pushed, Array, Array, NDArray[np.bool_]] | None:
+    """What slower strokes foretell of the fastest, of these the speed lost and the current needed, as `Pushed.lost`, and
+    in which samples (n,) the current is at its limit; None where there are too few of either, or nothing is viscous."""
     mine = fastest(strokes)
     slower = [s for s in strokes if s.way > 0 and s.commanded < mine[0].commanded] if mine else []
     if len(mine) < 3 or not slower:
@@ -222,13 +222,13 @@ def pushed(strokes: Sequence[Stroke]) -> tuple[Pushed, NDArray[np.bool_]] | None
         return None
     noise = max(float(np.std((drawn - design @ beta)[at_speed])), 1e-9)
     found = Pushed(beta, _full_speed(_joined(mine, "velocity")), np.inf, noise)
-    current, (_, needed) = _joined(mine, "current"), found.lost(strokes, mine)
+    current, (lost, needed) = _joined(mine, "current"), found.lost(strokes, mine)
     seen = _joined(mine, "position") <= np.max(_joined(slower, "position")[at_speed])
     over = needed > np.quantile(needed, 0.75)
     for _ in range(ROUNDS):  # the current stays at the limit wherever more is needed
         found = replace(found, limit=float(np.mean(current[over])) if over.any() else np.inf)
         over = (needed > found.limit) & seen
-    return found, over
+    return found, lost, needed, over
 
 
 def ceiling(strokes: list[Stroke]) -> tuple[float, float, float]:
@@ -236,35 +236,32 @@ def ceiling(strokes: list[Stroke]) -> tuple[float, float, float]:
     share of time in which it does: in the fastest flexing strokes speed falls by just what keeps the current from
     exceeding it. What current each place would need at full speed is told by the slower strokes."""
     none, told_by = (np.nan, 0.0, 0.0), pushed(strokes)
-    if told_by is None or told_by[1].sum() < 10:
+    if told_by is None or told_by[-1].sum() < 10:
         return none
-    found, over = told_by
-    mine = fastest(strokes)
-    lost, needed = (v[over] for v in found.lost(strokes, mine))
-    x, y = needed - found.limit, found.viscous * lost
+    found, lost, needed, over = told_by
+    current = _joined(fastest(strokes), "current")
+    x, y = needed[over] - found.limit, found.viscous * lost[over]
     share = float(x @ y / max(x @ x, 1e-12))
     rest = y - share * x
     told = share > CEILING_T * float(np.std(rest)) / np.sqrt(max(float(x @ x), 1e-12))
     alone = float(rest @ rest) < CEILING_LEFT * float(y @ y)  # speed changes for no other reason
-    bends = _slope(needed, _joined(mine, "current")[over])
+    bends = _slope(needed[over], current[over])
     slopes = abs(bends[0]) > max(FLAT, SLOPES_T * bends[1])
     # a healthy controller loses as much
-    slight = float(np.quantile(lost, NEARLY_MOST)) < LEAST_LOSS * found.full
+    slight = float(np.quantile(lost[over], NEARLY_MOST)) < LEAST_LOSS * found.full
     hidden = float(np.sqrt(x @ x)) < BEYOND_T * found.noise  # what is needed beyond it is less than the current tells
     just = alone and CEILING_SHARE < share < 1 / CEILING_SHARE
-    if slight or slopes or hidden or not told or not (just or _agrees(found, strokes)):
+    if slight or slopes or hidden or not told or not (just or _agrees(found, lost, needed, current)):
         return none
     every = _joined(strokes, "current")
     weight = weighed(float(np.sqrt(y @ y / len(every))) / found.noise, float(np.std(every)) / found.noise)
     return found.limit, weight, int(over.sum()) / len(every)
 
 
-def _agrees(found: Pushed, strokes: Sequence[Stroke]) -> bool:
+def _agrees(found: Pushed, lost: Array, needed: Array, current: Array) -> bool:
     """Whether the limit at which the fastest strokes begin to lose speed, likeliest by that loss alone, explains most of
-    what they lose, and is the current that flows from there on."""
-    mine = fastest(strokes)
-    lost, needed = found.lost(strokes, mine)
-    y, current = found.viscous * lost, _joined(mine, "current")
+    what they lose, and is the current that flows from there on. lost [%/s], needed and current [raw]: (n,) of them."""
+    y = found.viscous * lost
     limits = np.linspace(np.quantile(needed, 1 - MOSTLY), np.max(needed), LIMITS)[:-1]
     left = [float(np.sum((y - np.maximum(needed - limit, 0.0)) ** 2)) for limit in limits]
     limit = float(limits[int(np.argmin(left))])

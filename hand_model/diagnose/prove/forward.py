@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ...effects import effect
 from ...effects.base import DriveState
 from ...effects.chain import behind_inputs, inputs, map_ahead, map_to, source
-from ...effects.input import STRETCHED, SUFFIX
+from ...effects.input import STRETCHED, SUFFIX, steepest
 from ...engines.mujoco import HOLD, divergence, on_linkages
 from ...hand import load_hand
 from ...passive import effects_on
@@ -167,21 +167,18 @@ def _rub(model: Any, driver: int, inertia: float, path: Array, fastest: float) -
             between = list(inputs(model, last))
             loose = [model.jnt_dofadr[joint] for joint, tendon in between if not model.tendon_stiffness[tendon]]
             ahead = behind_inputs(model, last)
-            slope = 1.0 if ahead == driver else _steepest(model, map_to(model, ahead), path)
+            slope = (
+                1.0 if ahead == driver else steepest(model.eq_data[map_to(model, ahead), :5], path.min(), path.max())
+            )
             friction = inertia * model.eq_data[row, 1] ** 2 * fastest * slope / COASTING_S
             for joint, tendon in _ties_ahead(model, last):
                 heavier = max(friction * slope / STRETCHED / model.tendon_stiffness[tendon], 1.0)
-                mine = [t for t in range(model.ntendon) if joint in model.wrap_objid[_parts(model, t)]]
+                # the last joint of a tendon is the one that it holds
+                mine = [t for t in range(model.ntendon) if model.wrap_objid[_parts(model, t)][-1] == joint]
                 model.tendon_stiffness[mine] *= heavier
                 model.tendon_damping[mine] *= heavier
                 model.dof_armature[model.jnt_dofadr[joint]] *= heavier
             model.dof_frictionloss[loose] = friction
-
-
-def _steepest(model: Any, row: int | None, path: Array) -> float:
-    """The largest slope of an equality's map along a driver's path (n,)."""
-    polynomial = np.polynomial.Polynomial(model.eq_data[row, :5])
-    return float(np.abs(polynomial.deriv()(np.linspace(path.min(), path.max(), 50))).max())
 
 
 def _ties_ahead(model: Any, joint: int, loose: bool = False) -> list[tuple[int, int]]:
