@@ -97,6 +97,41 @@ def test_a_limit_of_one_recording_is_one_in_all(tmp_path: Path) -> None:
     assert np.flatnonzero(left.trials[1].clipped["hinge"]).tolist() == list(range(40))
 
 
+def test_a_reading_that_clips_at_its_peaks_alone_stands_on_its_limits(tmp_path: Path) -> None:
+    rig = load_rig(read_session(recorded(tmp_path / "s", ARM, 5, heavier, 0.003)))
+    most = [float(np.quantile(np.abs(t.effort["hinge"]), 0.98)) for t in rig.trials]
+    limit = max(most)  # in most recordings nothing comes near
+    trials = tuple(replace(t, effort={"hinge": np.clip(t.effort["hinge"], -limit, limit)}) for t in rig.trials)
+    cut = unclipped(replace(rig, trials=trials))
+    assert 0 < sum(np.sum(t.clipped["hinge"]) for t in cut.trials) < 0.02 * sum(len(t.time_s) for t in rig.trials)
+    assert [i.kind for i in check_channels(replace(rig, trials=trials))] == ["current_saturation"]
+    assert not any(t.clipped for t in unclipped(rig).trials)
+
+
+def test_a_copy_of_its_command_is_refused_for_that_alone(tmp_path: Path) -> None:
+    rig = load_rig(read_session(recorded(tmp_path / "s", ARM, 5, lambda m: np.clip(heavier(m), -0.5, 0.5), 0.0)))
+    trials = tuple(replace(t, extra={"asked": t.effort["hinge"]}) for t in rig.trials)
+    assert [i.kind for i in check_channels(rig)] == ["current_saturation"]
+    assert {i.kind for i in check_channels(replace(rig, trials=trials))} == {"command_as_measurement"}
+
+
+def test_a_target_that_comes_late_to_a_servo_is_told_from_a_late_servo(tmp_path: Path) -> None:
+    servo = ARM.replace(MOTOR, '<position name="motor" joint="hinge" kp="6" kv="0.1"/>')
+
+    def target(motion: Motion) -> np.ndarray:
+        t, q, v, _ = motion
+        asked = q + (balance(motion) + 0.1 * v) / 6
+        return np.interp(t + 0.04, t, asked)  # sent 40 ms before it acts
+
+    folder = recorded(tmp_path / "s", servo, 5, target, 1e-4)
+    text = (folder / "session.toml").read_text()
+    (folder / "session.toml").write_text(text.replace("actuator:motor:force", "actuator:motor:setpoint"))
+    findings = diagnose_rig(read_session(folder))
+    assert [f.effect for f in findings.findings] == ["command_delay"]
+    assert findings.findings[0].parameters.keys() == {"delay"}
+    assert findings.findings[0].parameters["delay"]["value"] == pytest.approx(0.04, rel=0.1)
+
+
 def test_single_readings_far_outside_all_others_are_left_out(tmp_path: Path) -> None:
     wild = {3: 888.0, 700: -650.0, 701: -650.0}
 

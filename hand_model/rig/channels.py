@@ -121,8 +121,8 @@ def _gather(rig: RigModel, joint: str, channel: str, found: dict, usable: int) -
     flagged = {n for (kind, _), hits in found.items() if kind == "command_as_measurement" for n, _, _ in hits}
     whole = usable > 0 and len(flagged) >= 0.5 * usable
     for (kind, reason), hits in found.items():
-        if reason == SINUSOID and not whole:
-            continue
+        if reason == SINUSOID and not whole or kind == "current_saturation" and whole:
+            continue  # what is asked for may have limits
         if reason.startswith(REPEATS) and not whole and max(s for _, s, _ in hits) > APART * SAME:
             continue  # in most recordings it differs from its command, and in these not by much less
         trials = tuple(dict.fromkeys(n for n, _, _ in hits))

@@ -11,13 +11,14 @@ from .states import fill_gaps
 
 CLIPPED = 0.05  # share of samples on one and the same extreme value
 PILED = 10  # times as often as any other value comes, stands a reading on a limit
-FEWEST = 20  # different readings: fewer are a coarse channel's
+FEWEST = 20  # different readings: fewer are a coarse channel's; and samples on each of two limits, that pile up there
+OUTER = 0.75  # of the greatest reading: beyond, a signal that is not clipped thins out
 SYMMETRIC = 0.02  # of a channel's range, by which two limits of one size may differ
 
 
 def limits(trial: RigTrial, joint: str) -> tuple[float, float]:
     """Least and greatest reading of an effort, each where the channel stands on it and the machine would not: the same
-    both ways; or on one side alone, in many samples while the joint moves, beside which no other value comes as often.
+    both ways, in many samples or where no reading a little below comes nearly as often; or on one side alone, in many samples while the joint moves, beside which no other value comes as often.
     Infinite where there is none."""
     values = fill_gaps(trial.time_s, trial.effort[joint])
     found, often = np.unique(values, return_counts=True)
@@ -25,7 +26,9 @@ def limits(trial: RigTrial, joint: str) -> tuple[float, float]:
     none = (-np.inf, np.inf)
     if len(found) <= FEWEST:
         return none
-    if min(often[0], often[-1]) > CLIPPED * len(values) and abs(high + low) < SYMMETRIC * (high - low):
+    least, alike = min(int(often[0]), int(often[-1])), abs(high + low) < SYMMETRIC * (high - low)
+    outer = often[1:-1][np.abs(found[1:-1]) > OUTER * high]
+    if alike and (least > CLIPPED * len(values) or least > max(FEWEST, PILED * np.max(outer, initial=1))):
         return low, high
     speed = np.abs(np.gradient(fill_gaps(trial.time_s, trial.position[joint]), trial.time_s))
     moving = speed > 0.1 * np.quantile(speed, 0.9)

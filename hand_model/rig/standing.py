@@ -14,6 +14,7 @@ from .declared import DeclaredFit
 from .findings import NOT_BORNE_OUT, Finding, measured, whereabouts
 from .horizon import NO_LAW, open_loop
 from .model import RigModel
+from .name.candidates import WHOLE
 from .name.compete import LEAST_SHARE, Step
 from .name.problem import Term, pose, resampled, solution
 from .name.refit import refit
@@ -160,6 +161,8 @@ def _joint_finding(
     position, effort = rig.unit(c.joint), rig.effort_unit(c.joint)
     parameters = {}
     for k, ((name, unit, _, _), v) in enumerate(zip(c.amplitudes, amplitude, strict=True)):
+        if name == WHOLE[0]:
+            continue
         ends = None if spread is None else [float(x) for x in np.percentile(spread[:, k], [2.5, 97.5])]
         parameters[name] = {"value": float(v), "unit": joint_unit(unit, position, effort), "ci95": ends}
     # what a late drive leaves comes early in the balance: its command is ahead

@@ -19,20 +19,46 @@ from .states import choose_cutoff, differentiate, fill_gaps, low_pass, uniform_t
 
 Array = NDArray[np.float64]
 RATE_HZ = 100.0
+POWERS, FEWEST = 5, 50  # of a polynomial in MJCF; samples of a recording that it is asked of
+ALIKE = 1.1  # of an error: polynomials that foretell about as well
+TURNS = (0.05, 0.15, 0.3, 0.5, 0.7)  # of loads, above which one pushes a play to its other side
 
 
 def coupling_columns(coupling: Coupling) -> tuple[Column, ...]:
     """The declared polynomial: as many powers as the format allows (quartic)."""
-    return tuple(Column("polycoef", coupling.name, str(k), float(coupling.polycoef[k])) for k in range(5))
+    return tuple(Column("polycoef", coupling.name, str(k), float(coupling.polycoef[k])) for k in range(POWERS))
 
 
 def fit_coupling(rig: RigModel, coupling: Coupling) -> DeclaredFit | None:
-    """The coupling's polynomial fitted to the training recordings; None where an encoder of the two is missing."""
+    """The coupling's polynomial fitted to the training recordings; None where an encoder of the two is missing. Powers
+    that foretell none of them from the others stay as they are declared."""
     columns = coupling_columns(coupling)
     rows = tuple(r for t in rig.trials if (r := _rows(rig, coupling, columns, t)) is not None)
     if not any(not r.validate for r in rows):
         return None
+    told = _powers(rows, max(1, int(np.max(np.flatnonzero(coupling.polycoef), initial=0))))
+    rows = tuple(replace(r, columns=r.columns * told, full_columns=r.full_columns * told) for r in rows)
     return _robust_fit(columns, rows, rows[0].cutoff_hz)
+
+
+def _powers(rows: Sequence[Rows], declared: int) -> NDArray[np.bool_]:
+    """Which powers (5,) of a polynomial to fit: up to the highest degree, at least the declared one, by which each training
+    recording is foretold from the others about as well as by any; all where there is but one."""
+    parts = [(r.columns[r.moving], r.effort[r.moving]) for r in rows if not r.validate and r.moving.sum() > FEWEST]
+    if len(parts) < 2:
+        return np.ones(POWERS, bool)
+    errors = []
+    for count in range(declared + 1, POWERS + 1):
+        left = 0.0
+        for k, (columns, angle) in enumerate(parts):
+            others = [p for i, p in enumerate(parts) if i != k]
+            known, told = np.concatenate([c[:, :count] for c, _ in others]), np.concatenate([a for _, a in others])
+            scale = np.maximum(np.max(np.abs(known), axis=0), 1e-300)
+            theta = np.linalg.lstsq(known / scale, told, rcond=1e-10)[0] / scale
+            missed = angle - columns[:, :count] @ theta
+            left += float(np.mean(np.abs(missed - np.median(missed))))  # each recording may have a zero of its own
+        errors.append(left)
+    return np.arange(POWERS) <= declared + int(np.flatnonzero(np.array(errors) <= ALIKE * min(errors))[-1])
 
 
 def _rows(rig: RigModel, coupling: Coupling, columns: tuple[Column, ...], trial: RigTrial) -> Rows | None:
@@ -50,11 +76,11 @@ def _rows(rig: RigModel, coupling: Coupling, columns: tuple[Column, ...], trial:
     v = differentiate(q, rate)
     rest = max(3 * velocity_noise(raw, rate, cutoff), 1e-3 * float(np.std(v)))
     out = low_pass(even(trial.position[coupling.dependent]), rate, cutoff)
-    load = {f"effort:{j}": low_pass(even(e), rate, cutoff) for j, e in trial.effort.items()}
+    load = {f"effort:{j}": low_pass(even(e), rate, cutoff) for j, e in _loads(rig, trial).items()}
     extra = {k: even(c) for k, c in trial.extra.items()} | load
     skip = max(1, int(rate / RATE_HZ))
     s = slice(None, None, skip)
-    powers = np.stack([q[s] ** k for k in range(5)], 1)
+    powers = np.stack([q[s] ** k for k in range(POWERS)], 1)
     a = differentiate(v, rate)
     moving = np.ones(len(q[s]), bool)
     moving[: int(0.5 * rate / skip)] = False  # the first half second: the transmission is not yet wound up
@@ -74,14 +100,28 @@ def _rows(rig: RigModel, coupling: Coupling, columns: tuple[Column, ...], trial:
         rate / skip,
         {"effort": out[s], **{k: c[s] for k, c in extra.items()}},
         powers,
-        np.zeros(5, bool),
+        np.zeros(POWERS, bool),
         np.zeros(len(q[s])),
         1,
     )
 
 
+def _loads(rig: RigModel, trial: RigTrial) -> dict[str, Array]:
+    """Efforts (n,) by joint that are recorded, or that a servo on position gives by what it is told."""
+    asked = {
+        d.joint: trial.drives[d.joint].answer(
+            trial.setpoint[d.joint],
+            trial.position[d.joint],
+            np.gradient(fill_gaps(trial.time_s, trial.position[d.joint]), trial.time_s),
+        )
+        for d in rig.drives
+        if d.kind == "position" and d.joint in trial.live and d.joint in trial.setpoint and d.joint in trial.position
+    }
+    return {**asked, **trial.effort}
+
+
 def coupling_candidates(fit: DeclaredFit, coupling: Coupling) -> tuple[Candidate, ...]:
-    """Lost motion (a play that is crossed at every reversal) and stretch by each recorded effort."""
+    """Lost motion (a play that is crossed at every reversal of the motion, or of a load) and stretch by each load."""
     joint = coupling.dependent
     train = [r for r in fit.rows if not r.validate]
     span = max(float(np.ptp(r.position)) for r in train)
@@ -99,6 +139,18 @@ def coupling_candidates(fit: DeclaredFit, coupling: Coupling) -> tuple[Candidate
     ]
     for channel in sorted({k for r in train for k in r.extra if k.startswith("effort:")}):
         name = channel.split(":")[1]
+        loads = np.concatenate([np.abs(_load(r, channel)[r.moving]) for r in train])
+        turns = tuple({"turns_at": float(t)} for t in np.unique(np.quantile(loads, TURNS)))
+        out.append(
+            Candidate(
+                "drive_backlash",
+                f"crossed by the load at {name}",
+                joint,
+                (("half_gap", "rad", *free),),
+                turns,
+                lambda r, s, c=channel: last_pushed(_load(r, c), s["turns_at"])[:, None],
+            )
+        )
         out.append(
             Candidate(
                 "series_elasticity",
@@ -131,6 +183,17 @@ def coupling_candidates(fit: DeclaredFit, coupling: Coupling) -> tuple[Candidate
         )
     )
     return tuple(out)
+
+
+def last_pushed(load: Array, turns_at: float) -> Array:
+    """The side (n,), -1 or 1, to which a load (n,) last pushed by more than `turns_at`: there what has play lies, until
+    it is pushed to the other. Before it was, the side to which it is pushed first."""
+    side = np.where(np.abs(load) > turns_at, np.sign(load), 0.0)
+    known = np.flatnonzero(side)
+    if not len(known):
+        return side
+    last = np.searchsorted(known, np.arange(len(side)), side="right") - 1
+    return side[known[np.maximum(last, 0)]]
 
 
 def zero_shift(fit: DeclaredFit, theta: Array, terms: Sequence[Term]) -> DeclaredFit | None:

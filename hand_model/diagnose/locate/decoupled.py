@@ -17,6 +17,7 @@ from ..name.balance import Balance
 from ..name.evidence import gain, parameter_price, scale_of
 from ..name.station import Station, told
 from .angles import FingerAngles
+from .excursions import whiles_below
 
 Array = NDArray[np.float64]
 
@@ -65,9 +66,7 @@ def beside_excursions(states: Sequence[DriveState], ahead: Sequence[DriveState])
     """A linkage's states without whiles in which the joint before ran `ahead` of its drive (states of the encoder's
     balance): something held the finger then, and how the joint moved is told by no more than its markers."""
     found = {s.trial: spans(s) for s in ahead}
-    return tuple(
-        replace(s, effort=np.where(_during(s.time_s, found.get(s.trial, [])), np.nan, s.effort)) for s in states
-    )
+    return tuple(_without(s, found.get(s.trial, [])) for s in states)
 
 
 def _during(time_s: Array, whiles: Sequence[Sequence[float]]) -> NDArray[np.bool_]:
@@ -81,7 +80,8 @@ def without_excursions(
 ) -> tuple[DriveState, ...]:
     """A drive's states without the current of whiles in which the finger was ahead of it: it carried no spring then.
 
-    ahead: states of the encoder's balance, with excursions. angles: of the finger; by them the clocks are aligned.
+    ahead: states of the encoder's balance, with excursions. angles: of the finger; by them the clocks are aligned. What
+    pushes a finger does so where no marker looks on, too: there the whiles are those in which the current lies low.
     """
     found = {s.trial: s for s in ahead if np.any(s.extra.get("ahead", np.zeros(1)) > 0)}
     records = {r.trial.name: r for r in angles.records}
@@ -97,7 +97,12 @@ def without_excursions(
             ):  # seen only once its markers were put right: the whiles have no place in the log
                 out.append(state)
                 continue
-            free = _during(state.time_s, [clock.log_time(np.array(span)) for span in spans(found[state.trial])])
-            state = replace(state, effort=np.where(free, np.nan, state.effort))
+            state = _without(state, [clock.log_time(np.array(span)) for span in spans(found[state.trial])])
         out.append(state)
-    return tuple(out)
+    unseen = whiles_below(out, {s.trial for s in out if s.trial not in records})
+    return tuple(_without(s, unseen.get(s.trial, [])) for s in out)
+
+
+def _without(state: DriveState, whiles: Sequence[Sequence[float]]) -> DriveState:
+    """A recording without the effort of whiles [s], and right beside them."""
+    return replace(state, effort=np.where(_during(state.time_s, whiles), np.nan, state.effort))

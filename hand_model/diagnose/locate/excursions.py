@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ...effects import effect
 from ...effects.base import DriveState
+from ...effects.path import runs
 from ..name.balance import Balance
 from ..name.term import Term
 from .motion import lasting_errors, local_quadratic
@@ -55,6 +56,36 @@ def with_excursions(states: Sequence[DriveState]) -> tuple[DriveState, ...]:
             ahead[mask] = _course(one, max(LEAST, BEYOND * behind))
         out.append(replace(state, extra={**state.extra, "ahead": ahead}))
     return tuple(out)
+
+
+def whiles_below(states: Sequence[DriveState], trials: Collection[str]) -> dict[str, list[list[float]]]:
+    """[begin, end] [s of the recording] of the whiles, by trial of those given, in which the effort lies below what the
+    same place and direction give in other strokes, as plainly as an excursion stands out, and beyond what lies above."""
+    balance = Balance(tuple(states), everything=True)
+    residual = _beside_replicates(balance, balance.effort - balance.fit().prediction)
+    parts = np.split(residual, np.cumsum([m.sum() for m in balance.masks])[:-1])
+    told = {
+        s.trial: _Told.of(s.time_s[m], -r)
+        for s, m, r in zip(states, balance.masks, parts, strict=True)
+        if s.trial in trials and len(r) > FEWEST
+    }
+    above = max((_best_window(-t.residual, t.sigma, t.lengths)[0] for t in told.values()), default=0.0)
+    least = max(LEAST, BEYOND * above)
+    return {
+        trial: [[float(t.time_s[a]), float(t.time_s[b - 1])] for a, b in runs(_windows(t, least))]
+        for trial, t in told.items()
+    }
+
+
+def _windows(told: _Told, least: float) -> NDArray[np.bool_]:
+    """Samples (n,) of all windows whose mean stands out by that log likelihood ratio, one after the other."""
+    left, inside = told.residual.copy(), np.zeros(len(told.residual), bool)
+    for _ in range(len(left)):
+        gain, begin, end = _best_window(left, told.sigma, told.lengths)
+        if gain < least or end - begin >= told.lengths[-1]:
+            break
+        inside[begin:end], left[begin:end] = True, 0.0
+    return inside
 
 
 @dataclass(frozen=True)

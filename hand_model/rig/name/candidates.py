@@ -34,7 +34,7 @@ NOT_FOR_RIGS = frozenset(
 SMOOTH = ("nonlinear_spring",)  # its knee belongs to fingers with a return spring; a joint has stops and detents
 # what it damps at one end of a range is hardly told there from friction that differs by speed and way
 UNDAMPED = ("end_stop_contact",)
-LONGEST_DELAY_S = 0.03
+LONGEST_DELAY_S, LONGEST_TARGET_S = 0.03, 0.1  # of a channel or a drive, and of a target on its way to one
 # Samples. A drive that holds its torque from one control step to the next acts half a step late: less than a sample of
 # a log.
 DELAYS = (0.125, 0.25, 0.5, 1, 2, 3, 5, 8)
@@ -47,6 +47,7 @@ REACHES = tuple(np.geomspace(0.004, 0.5, 8))  # of the range, over which frictio
 # what has one of these can be there twice: two springs, two tight spots
 PLACED = frozenset({"reach", "period", "centre"})
 Bound = tuple[str, str, float, float]
+WHOLE: Bound = ("whole", "1", 0.99, 1.01)  # of an effect that has no size beside its shape
 
 
 @dataclass(frozen=True)
@@ -301,30 +302,43 @@ def _by_load(fit: DeclaredFit, joint: str, rows: list[Rows], driven: bool) -> li
     return found
 
 
+def _delays(sample_s: float, longest_s: float, signs: Sequence[float]) -> tuple[dict[str, float], ...]:
+    """Delays to begin with, of that many samples and up to the longest [s]."""
+    late = sorted({round(d, 6) for d in [k * sample_s for k in DELAYS] + [k * longest_s / 6 for k in range(1, 7)]})
+    return tuple({"delay": sign * d} for d in late if d <= max(8 * sample_s, longest_s) for sign in signs)
+
+
+def _late_target(rig: RigModel, joint: str, delays: tuple[dict[str, float], ...]) -> Candidate:
+    """A servo on position of which the target comes late and the joint's own position does not: what it gave by the
+    target of now was more by this than it gave."""
+    drives = {t.name: t.drives[joint] for t in rig.trials if joint in t.drives}
+
+    def columns(row: Rows, shape: Mapping[str, float]) -> Array:
+        drive, target = drives.get(row.trial), row.extra.get(f"setpoint:{joint}")
+        if drive is None or target is None:
+            return np.zeros((len(row.time_s), 1))
+        late = np.interp(row.time_s + shape["delay"], row.time_s, target)  # a target jumps: no spline
+        now, then = (drive.answer(t, row.position, row.velocity) for t in (target, late))
+        return (now - then)[:, None]
+
+    return Candidate("command_delay", "its target alone", joint, (WHOLE,), delays, columns)
+
+
 def _own(rig: RigModel, fit: DeclaredFit, joint: str, rows: list[Rows]) -> list[Candidate]:
     """Friction by load of several kinds, offset, delay between the channels."""
     free = (-np.inf, np.inf)
     drive = rig.drive(joint)
     sample = max(float(np.median(np.diff(t.time_s))) for t in rig.trials)
-    late = sorted({round(d, 6) for d in [k * sample for k in DELAYS] + [k * LONGEST_DELAY_S / 6 for k in range(1, 7)]})
-    delays = tuple({"delay": sign * d} for d in late if d <= max(8 * sample, LONGEST_DELAY_S) for sign in (-1.0, 1.0))
     driven = drive is not None and any(np.any(r.effort) for r in rows)  # connected somewhere, its channel not refused
     own = _by_load(fit, joint, rows, driven)
+    if driven and drive.kind == "position" and not any(joint in t.effort for t in rig.trials):
+        own.append(_late_target(rig, joint, _delays(sample, LONGEST_TARGET_S, (-1.0,))))
     if driven:
         measured = drive.kind == "force"
-        if not measured:  # a drive can act later than told, not earlier
-            delays = tuple(d for d in delays if d["delay"] < 0)
-        own.append(
-            Candidate(
-                "current_channel_delay" if measured else "command_delay",
-                "",
-                joint,
-                (),
-                delays,
-                lambda r, s: np.zeros((len(r.time_s), 0)),
-                True,
-            )
-        )
+        # a drive can act later than told, not earlier
+        delays = _delays(sample, LONGEST_DELAY_S, (-1.0, 1.0) if measured else (-1.0,))
+        name = "current_channel_delay" if measured else "command_delay"
+        own.append(Candidate(name, "", joint, (), delays, lambda r, s: np.zeros((len(r.time_s), 0)), True))
     if drive is None or not drive.offset:
         own.append(
             Candidate(
