@@ -61,6 +61,8 @@ def with_excursions(states: Sequence[DriveState]) -> tuple[DriveState, ...]:
 def whiles_below(states: Sequence[DriveState], trials: Collection[str]) -> dict[str, list[list[float]]]:
     """[begin, end] [s of the recording] of the whiles, by trial of those given, in which the effort lies below what the
     same place and direction give in other strokes, as plainly as an excursion stands out, and beyond what lies above."""
+    if not trials:
+        return {}
     balance = Balance(tuple(states), everything=True)
     residual = _beside_replicates(balance, balance.effort - balance.fit().prediction)
     parts = np.split(residual, np.cumsum([m.sum() for m in balance.masks])[:-1])
