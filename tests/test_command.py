@@ -270,13 +270,14 @@ def test_two_prompt_drives_have_no_delay() -> None:
     assert not command_findings(facts, {"index": "index", "ring": "ring"}, {})
 
 
-def test_drives_that_answer_as_far_apart_as_two_of_one_kind_may_are_in_time() -> None:
+@pytest.mark.parametrize(("samples", "late"), [(1.3, False), (3.0, True)])
+def test_drives_that_answer_as_far_apart_as_two_of_one_kind_may_are_in_time(samples: float, late: bool) -> None:
     facts = {
-        name: command_facts((s,), (c,))
-        for name, (s, c) in {"index": answering(0.02, 1), "ring": answering(0.0, 2)}.items()
+        name: replace(command_facts(*((x,) for x in answering(0.0, seed))), answers=late_answers(by, by, seed))
+        for seed, (name, by) in enumerate({"index": samples, "ring": 0.0}.items())
     }
-    assert len(lateness({name: f.answers for name, f in facts.items()})["index"].drive_s)  # seen it is
-    assert not delays(facts, {"index": "index", "ring": "ring"})
+    assert len(lateness({name: f.answers for name, f in facts.items()})["index"].drive_s)  # it is seen
+    assert bool(delays(facts, {"index": "index", "ring": "ring"})) == late
 
 
 def test_slow_references_of_all_drives_are_no_delay_of_the_one_that_friction_holds_longer() -> None:
