@@ -24,7 +24,7 @@ from .locate.encoder_error import encoder_corrections
 from .locate.gravity import with_gravity
 from .locate.late_current import current_in_time
 from .locate.markers import MarkerNaming
-from .locate.measurement import echoes_command, is_measured, rests_on_command
+from .locate.measurement import beyond, dead_zone, echoes_command, is_measured, rests_on_command
 from .locate.simulated import SimulatedDrive
 from .magnitude import magnitude
 from .name.balance import Balance
@@ -98,6 +98,10 @@ class Heard:
         self.unexplained += [
             _frozen(session, a, share) for a, states in drives.items() if (share := frozen_share(states)) > FROZEN
         ]
+        for actuator, zone in [(a, zone) for a, states in drives.items() if (zone := dead_zone(states)) > 0]:
+            drives[actuator] = beyond(drives[actuator], zone)
+            shape = f"the current reads zero below {zone:.0f} raw: those readings were left out"
+            self.unexplained.append(_unheard(session, actuator, "current", shape))
         for station in (s for s in self.stations if s.actuator in drives):
             named, states = station.standing("spring_decoupling"), drives[station.actuator]
             if named is not None and named.term.shape["form"] < 0.5:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,9 @@ PLACES, SPEEDS = 20, 8  # bins of position and of speed, each way
 # reading, from which it may have reached its end
 OFTEN, BY_CHANCE, AT_END = 0.5, 1e-4, 0.9
 ALONE, RUBS = 0.2, 0.1  # of a current's standard deviation: left by speed alone, and what friction it has at most
+# readings that tell a dead zone, and in its units of their steps; zeros for every reading as large again, at least;
+# standard deviations by which a current is beyond it
+FEWEST_SIZES, STEPS, LACKING, CLEAR = 50, 5, 0.3, 3.0
 CLIPPED = 0.05  # of a current's range: what is nearer to its ends may be clipped
 COMMANDED = 0.67  # of what state leaves of a current: less left by the way to the target, and it is asked for
 
@@ -72,6 +76,34 @@ def frozen(current: Array, moving: NDArray[np.bool_]) -> NDArray[np.bool_]:
             if len(current) * often ** int(np.sum(free[a:b])) < BY_CHANCE:
                 out[a - 1 : b] = True
     return out
+
+
+def dead_zone(states: tuple[DriveState, ...]) -> float:
+    """Size [raw] below which a current reads zero, zero where it reads what there is: no reading between, though many
+    are a little larger and about as many are zero."""
+    size = np.abs(np.concatenate([s.effort[np.isfinite(s.effort)] for s in states]))
+    read = np.unique(size)
+    if len(read) < FEWEST_SIZES or read[0] != 0:
+        return 0.0
+    step, least = float(np.min(np.diff(read[1:]))), float(read[1])
+    larger, none = int(np.sum((size >= least) & (size < 2 * least))), int(np.sum(size == 0))
+    return least if least > STEPS * step and larger > FEWEST_SIZES and none > LACKING * larger else 0.0
+
+
+def beyond(states: tuple[DriveState, ...], zone: float) -> tuple[DriveState, ...]:
+    """The states without the current where what the declared model expects is hardly outside a dead zone [raw]: to leave
+    out what reads low would leave in what reads high by chance."""
+    declared = np.concatenate([s.declared for s in states])
+    effort = np.concatenate([s.effort for s in states])
+    read = np.abs(effort) >= zone
+    beta = coefficients(declared[read], effort[read])
+    noise = 1.4826 * float(np.median(np.abs(effort[read] - declared[read] @ beta)))
+    least = zone + CLEAR * noise
+
+    def read_at(s: DriveState) -> NDArray[np.bool_]:
+        return (np.abs(s.declared @ beta) >= least) & (np.abs(s.effort) >= zone)
+
+    return tuple(replace(s, effort=np.where(read_at(s), s.effort, np.nan)) for s in states)
 
 
 def _level(states: tuple[DriveState, ...]) -> bool:

@@ -1,0 +1,44 @@
+"""Currents that read nothing below a threshold."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hand_model.diagnose.locate.measurement import beyond, coefficients, dead_zone
+from hand_model.effects.base import DriveState
+
+PLAIN = np.array([0.1, 20.0, 0.4, 6.0])  # viscous, friction, spring, preload
+
+
+def drive(seed: int) -> DriveState:
+    """A motor that goes to and fro over its range, read in whole raw units."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(0, 30, 0.02)
+    phase = 2 * np.pi * np.cumsum(rng.uniform(0.1, 0.35, 15).repeat(100)) * 0.02
+    x, v = 50 - 50 * np.cos(phase), 50 * np.sin(phase) * np.gradient(phase, t)
+    declared = np.stack([v, np.sign(v), x, np.ones(len(t))], 1)
+    current = np.round(declared @ PLAIN + 3.0 * rng.standard_normal(len(t)))
+    names = ("viscous", "coulomb", "spring", "preload")
+    return DriveState(f"log/{seed}.csv", "index", t, x, v, 0 * v, current, declared, "%", "raw", {}, names)
+
+
+@pytest.mark.parametrize("zone", [12.0, 25.0])
+def test_a_current_that_reads_zero_below_a_threshold_is_read_beyond_it_alone(zone: float) -> None:
+    states = tuple(
+        replace(s, effort=np.where(np.abs(s.effort) < zone, 0.0, s.effort)) for s in (drive(1), drive(2), drive(3))
+    )
+    assert dead_zone(states) == pytest.approx(zone, abs=1.0)
+    read = beyond(states, dead_zone(states))
+    effort, declared = (np.concatenate([getattr(s, k) for s in read]) for k in ("effort", "declared"))
+    known = np.isfinite(effort)
+    assert known.any() and np.abs(effort[known]).min() >= zone - 3
+    assert coefficients(declared[known], effort[known]) == pytest.approx(PLAIN, rel=0.1, abs=0.05)
+
+
+def test_a_current_that_is_read_all_along_has_no_dead_zone() -> None:
+    states = (drive(1), drive(2))
+    coarse = tuple(replace(s, effort=10.0 * np.round(s.effort / 10.0)) for s in states)
+    assert dead_zone(states) == dead_zone(coarse) == 0.0
