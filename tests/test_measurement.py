@@ -25,17 +25,26 @@ def drive(seed: int) -> DriveState:
     return DriveState(f"log/{seed}.csv", "index", t, x, v, 0 * v, current, declared, "%", "raw", {}, names)
 
 
-@pytest.mark.parametrize("zone", [12.0, 25.0])
-def test_a_current_that_reads_zero_below_a_threshold_is_read_beyond_it_alone(zone: float) -> None:
-    states = tuple(
+def dead_below(zone: float) -> tuple[DriveState, ...]:
+    """Recordings whose current reads zero below a threshold [raw]."""
+    return tuple(
         replace(s, effort=np.where(np.abs(s.effort) < zone, 0.0, s.effort)) for s in (drive(1), drive(2), drive(3))
     )
+
+
+def test_a_current_that_reads_zero_below_a_threshold_is_read_beyond_it_alone() -> None:
+    zone, states = 12.0, dead_below(12.0)
     assert dead_zone(states) == pytest.approx(zone, abs=1.0)
     read = beyond(states, dead_zone(states))
     effort, declared = (np.concatenate([getattr(s, k) for s in read]) for k in ("effort", "declared"))
     known = np.isfinite(effort)
     assert known.any() and np.abs(effort[known]).min() >= zone - 3
     assert coefficients(declared[known], effort[known]) == pytest.approx(PLAIN, rel=0.1, abs=0.05)
+
+
+def test_a_current_that_is_read_one_way_alone_is_not_read() -> None:
+    states = dead_below(25.0)  # opening takes less than 26 raw
+    assert dead_zone(states) == pytest.approx(25.0, abs=1.0) and beyond(states, 25.0) == ()
 
 
 def test_a_current_that_is_read_all_along_has_no_dead_zone() -> None:

@@ -99,7 +99,8 @@ class Heard:
             _frozen(session, a, share) for a, states in drives.items() if (share := frozen_share(states)) > FROZEN
         ]
         for actuator, zone in [(a, zone) for a, states in drives.items() if (zone := dead_zone(states)) > 0]:
-            drives[actuator] = beyond(drives[actuator], zone)
+            left = beyond(drives.pop(actuator), zone)
+            drives |= {actuator: left} if left else {}
             shape = f"the current reads zero below {zone:.0f} raw: those readings were left out"
             self.unexplained.append(_unheard(session, actuator, "current", shape))
         for station in (s for s in self.stations if s.actuator in drives):

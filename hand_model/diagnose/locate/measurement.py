@@ -27,6 +27,7 @@ ALONE, RUBS = 0.2, 0.1  # of a current's standard deviation: left by speed alone
 # readings that tell a dead zone, and in its units of their steps; zeros for every reading as large again, at least;
 # standard deviations by which a current is beyond it
 FEWEST_SIZES, STEPS, LACKING, CLEAR = 50, 5, 0.3, 3.0
+ONE_WAY = 0.1  # of the readings of one way, fewer of which tell nothing of it
 CLIPPED = 0.05  # of a current's range: what is nearer to its ends may be clipped
 COMMANDED = 0.67  # of what state leaves of a current: less left by the way to the target, and it is asked for
 
@@ -92,7 +93,8 @@ def dead_zone(states: tuple[DriveState, ...]) -> float:
 
 def beyond(states: tuple[DriveState, ...], zone: float) -> tuple[DriveState, ...]:
     """The states without the current where what the declared model expects is hardly outside a dead zone [raw]: to leave
-    out what reads low would leave in what reads high by chance."""
+    out what reads low would leave in what reads high by chance. None where next to nothing of one way is left: then friction
+    is not told from a preload."""
     declared = np.concatenate([s.declared for s in states])
     effort = np.concatenate([s.effort for s in states])
     read = np.abs(effort) >= zone
@@ -103,6 +105,10 @@ def beyond(states: tuple[DriveState, ...], zone: float) -> tuple[DriveState, ...
     def read_at(s: DriveState) -> NDArray[np.bool_]:
         return (np.abs(s.declared @ beta) >= least) & (np.abs(s.effort) >= zone)
 
+    way = np.concatenate([np.sign(s.velocity[np.isfinite(s.effort)]) for s in states])
+    left = np.concatenate([read_at(s)[np.isfinite(s.effort)] for s in states])
+    if min(float(np.mean(left[way == w])) if np.any(way == w) else 0.0 for w in (-1, 1)) < ONE_WAY:
+        return ()
     return tuple(replace(s, effort=np.where(read_at(s), s.effort, np.nan)) for s in states)
 
 
