@@ -34,6 +34,7 @@ def test_a_rigs_findings_say_names_and_units_as_the_format_has_them() -> None:
     assert joint_unit("rad/effort^2", "rad", "N m") == "rad/(N m)^2"
     assert joint_unit("effort", "m", "N") == "N"
     assert [shape_unit(n, "m") for n in ("reach", "stribeck_speed", "delay", "form")] == ["m", "m/s", "s", "1"]
+    assert shape_unit("turns_at", "rad", "N m") == "N m"
     rivals = [
         ("detent_load/a@hinge", 0.3),
         ("detent_load@hinge", 0.5),

@@ -82,6 +82,17 @@ def test_pauses_are_found_and_neither_slow_motion_nor_a_reversal() -> None:
         assert len(moving_weight(moving, RATE_HZ, 10.0, 30.0)) == 0
 
 
+def test_a_joint_that_dithers_in_its_pauses_stands_there_and_does_not_where_it_turns_round() -> None:
+    t, q, v, _ = strokes(12.0, 3.0, 0.2)
+    creep, seen = 1e-2 * float(np.std(v)), q + 5e-5 * np.sin(2 * np.pi * 0.9 * t)  # up to 0.3 mm/s
+    pause, far = v == 0, np.abs(v) > 0.01
+    assert stands(seen, RATE_HZ, 10.0)[pause].mean() < 0.3
+    still = stands(seen, RATE_HZ, 10.0, creep)
+    assert still[pause].mean() > 0.95 and not still[far].any()
+    turning = 0.2 * np.sin(2 * np.pi * 0.5 * t)
+    assert not stands(turning, RATE_HZ, 10.0, 1e-2 * 0.44).any()
+
+
 def test_what_holds_a_joint_changes_nothing_of_its_balance(tmp_path: Path) -> None:
     """The same strokes held by 3 N and by 12 N: the same parameters, the true ones; with rests kept they move with the
     hold."""

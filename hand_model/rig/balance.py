@@ -211,7 +211,11 @@ def trial_rows(
     sign = np.clip(v / rest, -1.0, 1.0)
     thin = max(1, int(rate / max(12 * cutoff, 24.0)))
     if weights is None:
-        weights = {j: moving_weight(raw[j], rate, cutoff, wide)[::thin] for j in rig.independent if j not in kept}
+        weights = {
+            j: moving_weight(raw[j], rate, cutoff, wide, rest[rig.joints.index(j)])[::thin]
+            for j in rig.independent
+            if j not in kept
+        }
     q, v, a, sign = (*(x[::thin] for x in (q, v, a)), _averaged(sign, thin))
     effort = {j: None if e is None else _thinned(e, rate, thin) for j, e in effort.items()}
     grid, channels = grid[::thin], {k: c[::thin] for k, c in channels.items()}

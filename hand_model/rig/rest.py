@@ -20,26 +20,26 @@ SHORTEST = 0.5  # periods of the cut-off: what is shorter the filter does not te
 EDGE = 1.0
 
 
-def stands(position: Array, rate_hz: float, cutoff_hz: float) -> Array:
+def stands(position: Array, rate_hz: float, cutoff_hz: float, creep: float = 0.0) -> Array:
     """Where a joint stands, (n,) bool: all readings (n,) [rad or m] of a stretch that the filter of a balance can tell
-    lie within their noise."""
+    lie within their noise, or within what a joint covers at a speed `creep` below which no direction is known: a
+    controller that hunts lets its joint dither."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
     size = max(3, round(SHORTEST * rate_hz / cutoff_hz)) | 1
     if size > len(position):
         return np.zeros(len(position), bool)
-    quiet = maximum_filter1d(position, size, mode="nearest") - minimum_filter1d(
-        position, size, mode="nearest"
-    ) <= QUIET * noise_std(position)
+    within = maximum_filter1d(position, size, mode="nearest") - minimum_filter1d(position, size, mode="nearest")
+    quiet = within <= max(QUIET * noise_std(position), creep * (size - 1) / rate_hz)
     return maximum_filter1d(quiet.astype(np.uint8), size) > 0  # the whole stretch, not its middle alone
 
 
-def moving_weight(position: Array, rate_hz: float, cutoff_hz: float, states_hz: float) -> Array:
+def moving_weight(position: Array, rate_hz: float, cutoff_hz: float, states_hz: float, creep: float = 0.0) -> Array:
     """Weight (n,) of every sample: zero where the joint stands, from there a cosine up to one over a period of the
     states' cut-off; empty where it never stands."""
     from scipy.ndimage import distance_transform_edt
 
-    still = stands(position, rate_hz, cutoff_hz)
+    still = stands(position, rate_hz, cutoff_hz, creep)
     if not still.any() or still.all():  # of a joint that is held throughout there is nothing else
         return np.zeros(0)
     away = distance_transform_edt(~still) / rate_hz

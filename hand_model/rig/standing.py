@@ -168,7 +168,7 @@ def _joint_finding(
     # what a late drive leaves comes early in the balance: its command is ahead
     sign = -1.0 if c.effect == "command_delay" else 1.0
     parameters |= {
-        k: {"value": sign * v if k == "delay" else v, "unit": shape_unit(k, position), "ci95": None}
+        k: {"value": sign * v if k == "delay" else v, "unit": shape_unit(k, position, effort), "ci95": None}
         for k, v in c.told(term.shape).items()
     }
     fall = max(proof["before"] ** 2 - proof["after"] ** 2, 0.0)

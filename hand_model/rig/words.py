@@ -12,12 +12,14 @@ from .findings import Finding
 # Shapes of effects at a joint, by what they measure; all others are plain numbers.
 POSITIONS = frozenset({"begin", "centre", "end", "gap", "inward", "knee", "period", "reach", "width"})
 SPEEDS = frozenset({"stribeck_speed"})
+LOADS = frozenset({"turns_at"})
 TIMES = frozenset({"cooling_time", "delay", "lag", "relaxation_time", "unseen", "warm_up_time"})
 
 
-def shape_unit(name: str, position: str) -> str:
-    """Unit of an effect's shape at a joint whose position is in the unit `position`."""
-    return position if name in POSITIONS else f"{position}/s" if name in SPEEDS else "s" if name in TIMES else "1"
+def shape_unit(name: str, position: str, effort: str = "effort") -> str:
+    """Unit of an effect's shape at a joint whose position and effort are in these units."""
+    units = {position: POSITIONS, f"{position}/s": SPEEDS, "s": TIMES, effort: LOADS}
+    return next((unit for unit, names in units.items() if name in names), "1")
 
 
 def joint_unit(unit: str, position: str, effort: str) -> str:
