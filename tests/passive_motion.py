@@ -21,6 +21,7 @@ DRIVE = [
     ("detent_load", {"form": 1.0, "centre": 60.0, "width": 4.0}, {"load": 12.0}, 0.01),
     ("drive_sag", {"form": 0.0}, {"torque_loss": SAG}, 0.01),
     ("drive_sag", {"form": 2.0, "lag": 0.3}, {"torque_loss": SAG}, 0.01),
+    ("drive_sag", {"form": 3.0}, {"torque_loss": SAG}, 0.01),
     ("elastoplastic_hysteresis", {"form": 0.0, "reach": 15.0}, {"yield_load": 14.0}, 0.02),
     ("elastoplastic_hysteresis", {"form": 1.0, "reach": 12.0}, {"yield_load": 14.0}, 0.02),
     ("end_stop_contact", {"side": 1.0, "begin": 82.0, "end": 97.0, "inward": 15.0}, {"stiffness": 1.5}, 0.01),

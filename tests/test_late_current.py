@@ -36,7 +36,7 @@ def filtered(states: tuple[DriveState, ...], delay_s: float) -> tuple[DriveState
     def one(state: DriveState) -> DriveState:
         seen = np.isfinite(state.effort)
         whole = np.interp(state.time_s, state.time_s[seen], state.effort[seen])
-        return replace(state, effort=np.where(seen, EFFECT.reading(whole, state.time_s, read), np.nan))
+        return replace(state, effort=np.where(seen, EFFECT.reading(whole, state.time_s, state.velocity, read), np.nan))
 
     return tuple(one(s) for s in states)
 

@@ -39,7 +39,7 @@ def motor_with(name: str, shape: dict[str, float], amplitude: dict[str, float]):
     root = etree.fromstring(MOTOR)
     place = effect(name).write_mjcf(root, {"actuator": "index"}, values)
     beyond = np.array([-1e3, 1e3])
-    read = not np.array_equal(effect(name).reading(beyond, np.array([0.0, 1.0]), values), beyond)
+    read = not np.array_equal(effect(name).reading(beyond, *np.array([[0.0, 1.0], [50.0, 50.0]]), values), beyond)
     # the file holds it, or the callback applies it, or it is in the reading of a sensor that cannot
     held, applied = place is not None, effect(name).law(values) is not None
     assert held != applied or not held and read

@@ -158,7 +158,7 @@ def test_a_sag_is_read_from_what_is_asked_beside_it() -> None:
     law, sag = effect("drive_sag").law(values), effect("drive_sag")
     delivered = asked - np.array([law(type("Now", (), {"load": u})) for u in asked])
     assert np.all(np.diff(delivered) > 0)
-    np.testing.assert_allclose(sag.reading(delivered, asked, values), asked, atol=1e-6)
+    np.testing.assert_allclose(sag.reading(delivered, asked, asked, values), asked, atol=1e-6)
 
 
 def test_preload_and_spring_of_the_file_hold_a_weight_in_the_pose_that_was_recorded() -> None:

@@ -293,8 +293,8 @@ class Effect:
         """Not native: the passive-force callback applies it, where there is a law."""
         return None
 
-    def reading(self, effort: Array, time_s: Array, parameters: Mapping[str, float]) -> Array:
-        """What a channel shows of the drive's effort (n,) [raw]: as it is, unless the effect is in the reading and no
+    def reading(self, effort: Array, time_s: Array, velocity: Array, parameters: Mapping[str, float]) -> Array:
+        """What a channel shows of the drive's effort (n,) [raw] at a velocity (n,) [%/s]: as it is, unless the effect is in the reading and no
         sensor holds it."""
         return effort
 

@@ -98,7 +98,7 @@ class CurrentChannelDelay(Effect):
         found = motor_sensor(root, where, "current" if parameters["delay"] >= 0 else "encoder")
         return None if found is None else delay(root, found, abs(parameters["delay"]))
 
-    def reading(self, effort: Array, time_s: Array, parameters: Mapping[str, float]) -> Array:
+    def reading(self, effort: Array, time_s: Array, velocity: Array, parameters: Mapping[str, float]) -> Array:
         """The effort (n,) behind the filter; a plain delay is the sensor's own."""
         return _filtered(effort, time_s, parameters["delay"]) if _filters(parameters) else effort
 

@@ -80,7 +80,7 @@ class CurrentSaturation(Effect):
         found.set("cutoff", repr(place[1] * parameters["limit"]))
         return f"sensor/actuatorfrc[@name='{found.get('name')}']/@cutoff"
 
-    def reading(self, effort: Array, time_s: Array, parameters: Mapping[str, float]) -> Array:
+    def reading(self, effort: Array, time_s: Array, velocity: Array, parameters: Mapping[str, float]) -> Array:
         """The effort (n,) within the limit of the end that clips; a limit at both ends is the sensor's own."""
         return effort if parameters.get("form", BOTH) == BOTH else self.clip(effort, parameters)
 

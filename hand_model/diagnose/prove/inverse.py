@@ -114,7 +114,7 @@ def current_along(motor: CompiledMotor, state: DriveState) -> Array:
             mujoco.mj_fwdActuation(model, data)
             out[i] = data.qfrc_inverse[0] + inertia * a - data.actuator_force[own].sum()
             mujoco.mj_step(model, data)
-    return _read(motor, np.interp(state.time_s, grid, out), state.time_s) / motor.unit
+    return _read(motor, np.interp(state.time_s, grid, out), state) / motor.unit
 
 
 def started(hand: Hand, state: DriveState) -> Hand:
@@ -135,17 +135,18 @@ def started(hand: Hand, state: DriveState) -> Hand:
     return replace(hand, effects=effects)
 
 
-def _read(motor: CompiledMotor, effort: Array, time_s: Array) -> Array:
-    """The effort (n,) through the sensor of the motor's current: its delay against the encoder's, what its channel
+def _read(motor: CompiledMotor, effort: Array, state: DriveState) -> Array:
+    """The effort (n,) along a motion through the sensor of the motor's current: its delay against the encoder's, what its channel
     does, its cutoff."""
     sensors = {s.get("name"): s for s in motor.root.iterfind("sensor/*")}
     current, encoder = (sensors.get(f"{motor.actuator}_{kind}") for kind in ("current", "encoder"))
+    time_s = state.time_s
     late = sum(sign * float(s.get("delay", 0.0)) for sign, s in ((1, current), (-1, encoder)) if s is not None)
     effort = np.interp(time_s - late, time_s, effort) if late else effort
     for e in motor.hand.effects:
         if e.where.get("actuator") == motor.actuator:
             effort = motor.unit * effect(e.effect).reading(
-                effort / motor.unit, time_s, {k: v.value for k, v in e.parameters.items()}
+                effort / motor.unit, time_s, state.velocity, {k: v.value for k, v in e.parameters.items()}
             )
     cutoff = np.inf if current is None else float(current.get("cutoff", 0.0)) or np.inf
     return np.clip(effort, -cutoff, cutoff)
