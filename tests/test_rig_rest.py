@@ -15,7 +15,7 @@ from hand_model.rig.declared import fit_declared
 from hand_model.rig.model import load_rig
 from hand_model.rig.name.candidates import candidates
 from hand_model.rig.name.problem import Term, pose, solution
-from hand_model.rig.rest import moving_weight, stands
+from hand_model.rig.rest import Creep, moving_weight, stands
 from hand_model.rig.rest_known import known_at_rest
 from hand_model.session import read_session
 
@@ -84,13 +84,15 @@ def test_pauses_are_found_and_neither_slow_motion_nor_a_reversal() -> None:
 
 def test_a_joint_that_dithers_in_its_pauses_stands_there_and_does_not_where_it_turns_round() -> None:
     t, q, v, _ = strokes(12.0, 3.0, 0.2)
-    creep, seen = 1e-2 * float(np.std(v)), q + 5e-5 * np.sin(2 * np.pi * 0.9 * t)  # up to 0.3 mm/s
-    pause, far = v == 0, np.abs(v) > 0.01
+    creep, seen = Creep(1e-2 * float(np.std(v)), 0.2), q + 5e-5 * np.sin(2 * np.pi * 0.9 * t)  # up to 0.3 mm/s
+    pause, far = v == 0, np.abs(v) > 0.05
     assert stands(seen, RATE_HZ, 10.0)[pause].mean() < 0.3
     still = stands(seen, RATE_HZ, 10.0, creep)
     assert still[pause].mean() > 0.95 and not still[far].any()
     turning = 0.2 * np.sin(2 * np.pi * 0.5 * t)
-    assert not stands(turning, RATE_HZ, 10.0, 1e-2 * 0.44).any()
+    assert not stands(turning, RATE_HZ, 10.0, Creep(1e-2 * 0.44, 0.5 / (2 * np.pi * 0.5))).any()
+    slow = 0.2 * np.sin(2 * np.pi * 0.05 * t)
+    assert not stands(slow, RATE_HZ, 10.0, Creep(1e-2 * 0.044, 0.5 / (2 * np.pi * 0.05))).any()
 
 
 def test_what_holds_a_joint_changes_nothing_of_its_balance(tmp_path: Path) -> None:

@@ -21,6 +21,7 @@ from .locate.course import FingerCourses
 from .locate.decoupled import TRIFLE, pulls, while_driven, while_returning, without_excursions
 from .locate.drive import drive_states, drive_trials, frozen_share, opposes, stand_still, too_short
 from .locate.encoder_error import encoder_corrections
+from .locate.encoder_step import coarse, encoder_step
 from .locate.gravity import with_gravity
 from .locate.late_current import current_in_time
 from .locate.markers import MarkerNaming
@@ -50,7 +51,11 @@ class Heard:
         self.markers: dict[str, MarkerNaming] = {}
         self.stations: list[Station] = []
         distrusted = _distrusted(session)
-        self.unexplained = [_false_stamps(session, a, s) for a, s in distrusted.items()]
+        steps = coarse({a: encoder_step([t.log() for t in trials]) for a, trials in drive_trials(session).items()})
+        self.unexplained = [
+            *(_false_stamps(session, a, s) for a, s in distrusted.items()),
+            *(_in_steps(session, a, s) for a, s in steps.items()),
+        ]
         unmeasured = {
             a: why for a, trials in drive_trials(session).items() if (why := _no_measurement([t.log() for t in trials]))
         }
@@ -58,7 +63,7 @@ class Heard:
             refused(a, _finger_of(session, a), tuple(t.name for t in drive_trials(session)[a]), "position", why)
             for a, why in unmeasured.items()
         ]
-        self.unread = (*distrusted, *unmeasured)  # actuators whose log is not believed
+        self.unread = (*dict.fromkeys([*distrusted, *steps, *unmeasured]),)  # actuators whose log is not believed
 
     def listen_to_fingers(self, beside: tuple[Callable[[], Any], ...] = ()) -> list[Any]:
         """What the cameras say of each finger. beside: further calls, made where a core is free meanwhile; what they
@@ -227,6 +232,14 @@ def _false_stamps(session: Session, actuator: str, wrong_s: float) -> dict[str, 
         "speed, current and encoder against time were not judged"
     )
     return _unheard(session, actuator, "log", shape)
+
+
+def _in_steps(session: Session, actuator: str, step: float) -> dict[str, Any]:
+    shape = (
+        f"the encoder reads in steps of {100 * step:.1f} % of its range, while another of this hand reads finely: speed, "
+        "current and encoder were not judged"
+    )
+    return _unheard(session, actuator, "position", shape)
 
 
 def _frozen(session: Session, actuator: str, share: float) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from ..session.log import rows_lost
 from .dynamics import INERTIAL, inertial_columns, inertial_parameters
 from .model import RigModel, RigTrial
 from .overrides import body_names, compile_model
-from .rest import moving_weight
+from .rest import TURN, Creep, moving_weight
 from .states import (
     PASSED,
     STEEP,
@@ -211,11 +211,12 @@ def trial_rows(
     sign = np.clip(v / rest, -1.0, 1.0)
     thin = max(1, int(rate / max(12 * cutoff, 24.0)))
     if weights is None:
-        weights = {
-            j: moving_weight(raw[j], rate, cutoff, wide, rest[rig.joints.index(j)])[::thin]
-            for j in rig.independent
-            if j not in kept
+        creeps = {
+            j: Creep(float(rest[i]), TURN * float(np.std(v[:, i]) / max(np.std(a[:, i]), 1e-300)))
+            for i, j in enumerate(rig.joints)
         }
+        moving = [j for j in rig.independent if j not in kept]
+        weights = {j: moving_weight(raw[j], rate, cutoff, wide, creeps[j])[::thin] for j in moving}
     q, v, a, sign = (*(x[::thin] for x in (q, v, a)), _averaged(sign, thin))
     effort = {j: None if e is None else _thinned(e, rate, thin) for j, e in effort.items()}
     grid, channels = grid[::thin], {k: c[::thin] for k, c in channels.items()}

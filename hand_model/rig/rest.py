@@ -8,6 +8,8 @@ functions that vanish at the ends of each stroke, as in weak-form identification
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,23 +20,45 @@ QUIET = 7.0  # standard deviations: within so much the readings of a joint at re
 SHORTEST = 0.5  # periods of the cut-off: what is shorter the filter does not tell from a reversal
 # periods of the states' cut-off, over which the weight rises: states are not known better beside a jump of acceleration
 EDGE = 1.0
+TURN = 0.5  # of the time in which a joint reaches its speed, by both's root mean squares
 
 
-def stands(position: Array, rate_hz: float, cutoff_hz: float, creep: float = 0.0) -> Array:
+@dataclass(frozen=True)
+class Creep:
+    """What is no motion of a joint, however smooth. speed: below which no direction is known [rad/s or m/s]; turn_s: for
+    how long a joint is slow where it turns round, at most [s]."""
+
+    speed: float = 0.0
+    turn_s: float = 0.0
+
+
+def stands(position: Array, rate_hz: float, cutoff_hz: float, creep: Creep = Creep()) -> Array:
     """Where a joint stands, (n,) bool: all readings (n,) [rad or m] of a stretch that the filter of a balance can tell
-    lie within their noise, or within what a joint covers at a speed `creep` below which no direction is known: a
+    lie within their noise; or those of a stretch longer than it takes to turn round within what it covers at a creep: a
     controller that hunts lets its joint dither."""
+    shortest = SHORTEST / cutoff_hz
+    quiet = _within(position, round(shortest * rate_hz), QUIET * noise_std(position))
+    if creep.speed <= 0:
+        return quiet
+    long = max(shortest, creep.turn_s)
+    return quiet | _within(position, round(long * rate_hz), creep.speed * long, whole=True)
+
+
+def _within(position: Array, size: int, width: float, whole: bool = False) -> Array:
+    """Samples (n,) of all stretches of a size that lie within a width [rad or m]."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-    size = max(3, round(SHORTEST * rate_hz / cutoff_hz)) | 1
+    size = max(3, size) | 1
     if size > len(position):
         return np.zeros(len(position), bool)
-    within = maximum_filter1d(position, size, mode="nearest") - minimum_filter1d(position, size, mode="nearest")
-    quiet = within <= max(QUIET * noise_std(position), creep * (size - 1) / rate_hz)
+    across = maximum_filter1d(position, size, mode="nearest") - minimum_filter1d(position, size, mode="nearest")
+    quiet = across <= width
+    if whole:  # those that reach beyond an end are shorter than they should be
+        quiet[: size // 2] = quiet[-(size // 2) :] = False
     return maximum_filter1d(quiet.astype(np.uint8), size) > 0  # the whole stretch, not its middle alone
 
 
-def moving_weight(position: Array, rate_hz: float, cutoff_hz: float, states_hz: float, creep: float = 0.0) -> Array:
+def moving_weight(position: Array, rate_hz: float, cutoff_hz: float, states_hz: float, creep: Creep = Creep()) -> Array:
     """Weight (n,) of every sample: zero where the joint stands, from there a cosine up to one over a period of the
     states' cut-off; empty where it never stands."""
     from scipy.ndimage import distance_transform_edt
