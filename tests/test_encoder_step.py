@@ -21,7 +21,7 @@ def log(step: float, noise: float, seed: int = 0) -> SimpleNamespace:
 
 @pytest.mark.parametrize(("step", "noise"), [(95.0, 0.0), (70.0, 8.0), (200.0, 10.0)])
 def test_the_step_of_an_encoder_is_read_under_noise(step: float, noise: float) -> None:
-    assert encoder_step([log(step, noise), log(step, noise, 1)]) == pytest.approx(step / 9000, rel=0.03)
+    assert encoder_step([log(step, noise), log(step, noise, 1)]) == pytest.approx(step / 9000, rel=0.05)
 
 
 @pytest.mark.parametrize(("step", "noise"), [(1.0, 0.0), (10.0, 2.0), (95.0, 60.0)])

@@ -202,17 +202,14 @@ def trial_rows(
     q = np.stack([low_pass(raw[j], rate, wide, STEEP) for j in rig.joints], 1)
     v = differentiate(q, rate, wide < PASSED * rate)
     a = differentiate(v, rate, wide < PASSED * rate)
-    rest = np.array(
-        [
-            max(3 * velocity_noise(raw[j], rate, min(wide, PASSED * rate)), RINGING * float(np.std(v[:, i])))
-            for i, j in enumerate(rig.joints)
-        ]
-    )
+    ringing = RINGING * np.std(v, axis=0)
+    noise = [3 * velocity_noise(raw[j], rate, min(wide, PASSED * rate)) for j in rig.joints]
+    rest = np.maximum(noise, ringing)
     sign = np.clip(v / rest, -1.0, 1.0)
     thin = max(1, int(rate / max(12 * cutoff, 24.0)))
     if weights is None:
         creeps = {
-            j: Creep(float(rest[i]), TURN * float(np.std(v[:, i]) / max(np.std(a[:, i]), 1e-300)))
+            j: Creep(float(ringing[i]), TURN * float(np.std(v[:, i]) / max(np.std(a[:, i]), 1e-300)))
             for i, j in enumerate(rig.joints)
         }
         moving = [j for j in rig.independent if j not in kept]
