@@ -32,6 +32,12 @@ DRIVE = [
         {"stiffness": 1.5},
         0.01,
     ),
+    (
+        "end_stop_contact",
+        {"side": -1.0, "form": 2.0, "lag": 0.06, "begin": 12.0, "end": 0.0, "inward": 12.0},
+        {"stiffness": 1.5},
+        0.02,
+    ),
     ("gravity_load", {"sweep": 1.3}, {"along": 9.0, "across": -4.0}, 0.01),
     ("load_dependent_friction", {}, {"per_load": 0.2}, 0.02),
     ("nonlinear_spring", {}, {"cubic_stiffness": 3e-5}, 0.01),

@@ -190,3 +190,11 @@ def test_a_springs_stiffness_is_that_of_its_line_through_the_bend() -> None:
     station = SimpleNamespace(naming=SimpleNamespace(balance=balance, fit=fit))
     line = np.polyfit(position, 0.05 * position + 2e-3 * position**2, 1)[0]
     assert _stiffness(station) == pytest.approx(line)
+
+
+def test_a_stop_that_damps_is_as_large_as_one_that_does_not() -> None:
+    plain = {"side": 1.0, "begin": 85.0, "stiffness": 2.0}
+    sizes = {magnitude("end_stop_contact", {**plain, **damped}) for damped in ({}, {"form": 1.0, "loss": 0.01})}
+    assert len(sizes) == 1
+    soft = {"begin": 95.0, "stiffness": 0.05}  # an obstacle's may grow with the square of its depth
+    assert magnitude("external_contact", {**soft, "form": 1.0}) < magnitude("external_contact", soft)

@@ -150,7 +150,9 @@ def _asymmetry(p: Mapping[str, float], _: Channel) -> float:
 def _depth(p: Mapping[str, float], c: Channel) -> float:
     """Load of a stop or an obstacle at the end of the range, for half of the effort's deviation."""
     reach = max(c.high - p["begin"], p["begin"] - c.low if p["begin"] < c.low + c.span / 4 else 0.0)
-    bent = p.get("form", 0.0) > 0.5  # the load grows with the square of the depth, as stiff as said at a tenth of 100
+    # an obstacle's load may grow with the square of the depth, as stiff as said at a tenth of 100; a stop's form says how
+    # it damps
+    bent = "side" not in p and p.get("form", 0.0) > 0.5
     return p["stiffness"] * reach * (reach / 10.0 if bent else 1.0) / (0.6 * c.effort)
 
 

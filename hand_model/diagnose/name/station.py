@@ -25,7 +25,9 @@ UNREST = 0.3  # of the noise: wander that every machine is granted; more is no e
 # times the noise of recordings kept out, and the share of what is above it that true names take
 KEPT_OUT, EXPLAINED_MOST = 1.05, 2 / 3
 CHANCE = 2.0  # standard errors
-IDLE = 0.05  # of what an effect does where it does most: less is nothing
+IDLE = 0.02  # of what an effect does where it does most: less is nothing
+BEFORE = 5  # samples
+ELSEWHERE = 0.5  # of what a small effect does (squared), at least, where the large ones do nothing
 SAME_PERIOD = 0.02  # by which a harmonic's may differ
 PATCHES = 2  # periods beside the first that are none of its harmonics: more than a second gear
 MAIN = 0.5  # of what names explain together: what one of them must hold where they do not do
@@ -283,13 +285,19 @@ class Station:
         for term in terms:
             added = np.abs(fit.prediction - balance.removed(fit, fit.terms.index(term)))
             idle &= added < IDLE * added.max()
+        # states are smooth: what begins is seen a few samples before
+        idle = np.convolve(idle, np.ones(2 * BEFORE + 1), mode="same") >= 2 * BEFORE + 1
         if not (idle & balance.train).any():
             return ()
         there = balance.only(idle)
         rest = there.fit(terms)
 
         def told(small: Named) -> bool:
-            return evidence(there, there.fit((*terms, small.term)), rest) >= EVIDENCE_LEAST
+            # what acts mostly where a large one does, and a little before, may be how that begins; and small names
+            # beside large ones are many
+            does = (fit.prediction - balance.removed(fit, fit.terms.index(small.term))) ** 2
+            mostly = float(does[idle].sum()) >= ELSEWHERE * float(does.sum())
+            return mostly and evidence(there, there.fit((*terms, small.term)), rest) >= 2 * EVIDENCE_LEAST
 
         return tuple(f for f in self.proven if f not in self._large and told(f))
 
