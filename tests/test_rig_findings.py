@@ -41,7 +41,11 @@ def test_a_rigs_findings_say_names_and_units_as_the_format_has_them() -> None:
         ("torque_ripple@hinge", 0.1),
         ("stribeck_friction/b@hinge", 0.1),
     ]
-    assert alternatives(rivals, "stribeck_friction") == (("detent_load", 0.5), ("torque_ripple", 0.1))
+    mine, others = alternatives(rivals, "stribeck_friction", 0.9)
+    assert dict(others) == pytest.approx({"detent_load": 0.72, "torque_ripple": 0.09})
+    assert [name for name, _ in others] == ["detent_load", "torque_ripple"]
+    assert mine + sum(share for _, share in others) == pytest.approx(0.9) and mine == pytest.approx(0.09)
+    assert alternatives((), "stribeck_friction", 0.9) == (0.9, ())
     assert rejection("load_dependent_friction/low speed@hinge", NOT_TAKEN) == {
         "effect": "load_dependent_friction",
         "variant": "low speed",

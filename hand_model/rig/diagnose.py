@@ -40,8 +40,8 @@ from .words import rejection, shares, told_on
 
 Array = NDArray[np.float64]
 PROBABILITY = (
-    "of an effect: share of resampled blocks of the training recordings, each left out of the fit, "
-    "on which it lowers the error against nothing; of an alternative: share on which it is the best of all"
+    "that anything is there: share of resampled blocks of the training recordings, each left out of the fit, on which "
+    "the effect lowers the error against nothing; shared out among it and its alternatives by how often each is the best"
 )
 UNMEASURED = {
     "metric": None,

@@ -176,8 +176,7 @@ def _joint_finding(
     return Finding(
         c.effect,
         (c.effect, *(e for e in step.equals if e != c.effect)),
-        step.probability,
-        alternatives(step.rivals, c.effect),
+        *alternatives(step.rivals, c.effect, step.probability),
         where,
         statement(c.effect, c.variant, c.joint, parameters, proof),
         parameters,

@@ -29,15 +29,18 @@ def joint_unit(unit: str, position: str, effort: str) -> str:
     return unit.replace("/effort", below).replace("effort", effort).replace("position", position)
 
 
-def alternatives(rivals: Sequence[tuple[str, float]], effect: str) -> tuple[tuple[str, float], ...]:
-    """Other effects with their probability, the likeliest variant of each: rivals are keys "effect/variant@joint" with
-    theirs."""
+def alternatives(
+    rivals: Sequence[tuple[str, float]], effect: str, probability: float = 1.0
+) -> tuple[float, tuple[tuple[str, float], ...]]:
+    """Probability of an effect, and of each other one, all variants together: that any of them is there, shared out by
+    how often each is the best. rivals: keys "effect/variant@joint" with that share; probability: against nothing."""
     out: dict[str, float] = {}
-    for key, probability in rivals:
+    for key, share in rivals:
         name, _, _ = named(key)
         if name != effect:
-            out[name] = max(out.get(name, 0.0), probability)
-    return tuple(sorted(out.items(), key=lambda item: -item[1]))
+            out[name] = out.get(name, 0.0) + probability * share
+    others = min(sum(out.values()), probability)
+    return probability - others, tuple(sorted(out.items(), key=lambda item: -item[1]))
 
 
 def rejection(key: str, reason: str) -> dict[str, str]:

@@ -297,8 +297,8 @@ def _swing_finding(rig: RigModel, variant: Variant, round_: Round, ends: Ends, l
     where = whereabouts(joint, rig.drive(joint), "position", measured(rig, proof), fall)
     native = set(variant.start) <= {"drag"}
     return Finding(
-        variant.effect, (variant.effect, *(e for e in round_.equals if e != variant.effect)), round_.probability,
-        alternatives(round_.rivals, variant.effect), where,
+        variant.effect, (variant.effect, *(e for e in round_.equals if e != variant.effect)),
+        *alternatives(round_.rivals, variant.effect, round_.probability), where,
         statement(variant.effect, variant.name, joint, parameters, proof), parameters, proof,
         {"native": native, "mjcf": f"joint[@name='{joint}']/@damping" if native else 'custom/text[@name="hand_model"]',
          "urdf": "not expressible: kept in rig.xml"},
