@@ -22,6 +22,8 @@ NEAR_BEST = 1.1
 ENOUGH_POWER = 1e-4  # share of the effort's power: a hundredth of its amplitude
 CUTOFFS = (2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 35.0, 60.0)
 MOST_NOISE = 0.1  # of the acceleration: a hundredth of its power
+MOSTLY = 0.5  # of what smooth loads leave, that is left beside what recordings share by place, at most
+NARROW = 256  # places along the range, at which recordings may have something in common
 PLACES, SLOW = 8, np.geomspace(0.05, 0.4, 3)  # hats along the range; Stribeck speeds over the greatest
 ALIKE = 1e-9  # of a column's square: columns that are the same but for so much are one
 END_S = 2.0 / CUTOFFS[-1]  # at the very ends any filter fails
@@ -135,11 +137,12 @@ def _choose_cutoff(
     rig: RigModel, columns: tuple[Column, ...], refused: set[tuple[str, str]], kept: Collection[str] = ()
 ) -> float | None:
     """The highest cut-off at which the share left is within NEAR_BEST of the least, below the first band that adds more
-    to the residual than to the effort: there is nothing of the motion in it; None where none can be tried. Shares are
-    asked with all rests, of which a wide band spreads least, and of two models, for what is missing may be seen in wide
+    to the residual than to the effort: there is nothing of the motion in it, or only what recordings share by place, and
+    beyond it those bands count that this explains for the most part; None where none can be tried. Shares are
+    asked with all rests, of which a wide band spreads least, and of three models, for what is missing may be seen in wide
     bands alone, and is no reason against them."""
-    sample, most, last = _sample(rig), 0.0, None
-    shares: dict[float, tuple[float, float]] = {}
+    sample, most, last, beyond = _sample(rig), 0.0, None, False
+    shares: dict[float, tuple[float, ...]] = {}
     for cutoff in CUTOFFS:
         # The same samples for all: what a low cut-off spoils near the ends counts against it.
         moving = [
@@ -167,10 +170,12 @@ def _choose_cutoff(
             break
         fit = _robust_fit(columns, tuple(rows), cutoff)
         powers = _powers(_robust_fit(columns, tuple(moving), cutoff) if stands else fit)
-        if last is not None and _only_noise(last, powers):
-            break
-        shares[cutoff], last = (_unexplained(fit, False), _unexplained(fit, True)), powers
-    least = np.min([*shares.values(), (1.0, 1.0)], 0)
+        beyond = beyond or last is not None and _only_noise(last, powers)
+        share, last = _unexplained(fit), powers
+        if beyond and share[2] > MOSTLY * share[1]:
+            continue
+        shares[cutoff] = (np.inf, np.inf, share[2]) if beyond else share
+    least = np.min([*shares.values(), (1.0, 1.0, 1.0)], 0)
     return max((c for c, share in shares.items() if np.any(share <= NEAR_BEST * least)), default=None)
 
 
@@ -187,16 +192,15 @@ def _drowns(rows: Sequence[Rows]) -> bool:
 
 
 def _powers(fit: DeclaredFit) -> Array:
-    """Mean squares of what the balance has to explain and of what it leaves, (joints, 2)."""
-    joints = sorted({r.joint for r in fit.rows})
-    sides = [
-        [
-            np.concatenate([side(r) for r in fit.rows if r.joint == j])
-            for side in (lambda r: _known(r, fit.columns), fit.residual)
-        ]
-        for j in joints
-    ]
-    return np.array([[np.mean(known**2), np.mean(left**2)] for known, left in sides])
+    """Mean squares of what the balance has to explain and of what it leaves beside what recordings share by place, (joints,
+    2)."""
+    out = []
+    for joint in sorted({r.joint for r in fit.rows}):
+        rows = [r for r in fit.rows if r.joint == joint]
+        known = np.concatenate([_known(r, fit.columns) for r in rows])
+        left = _beside_places([r.filtered(r.position) for r in rows], [fit.residual(r) for r in rows])
+        out.append([np.mean(known**2), np.mean(np.concatenate(left) ** 2)])
+    return np.array(out)
 
 
 def _only_noise(before: Array, after: Array) -> bool:
@@ -212,22 +216,50 @@ def _sample(rig: RigModel, most: int = 5) -> list[RigTrial]:
     return list(train[:: max(1, int(np.ceil(len(train) / most)))])
 
 
-def _unexplained(fit: DeclaredFit, beside: bool) -> float:
-    """Share of the training effort left (rms over rms, all trials of a joint pooled), geometric mean over joints;
-    beside: where any smooth load and friction stand beside the declared columns."""
+def _unexplained(fit: DeclaredFit) -> tuple[float, float, float]:
+    """Shares of the training effort left (rms over rms, all trials of a joint pooled), geometric means over joints: by the
+    declared columns; where any smooth load and friction stand beside them; and where also what each recording has in common
+    with the others by place does, however narrow."""
     shares = []
     for joint in {r.joint for r in fit.rows}:
         rows = [r for r in fit.rows if r.joint == joint and not r.validate and r.moving.any()]
         if rows:
-            left = np.concatenate([fit.residual(r)[r.moving] for r in rows])
-            if beside:
-                x = np.concatenate([np.concatenate([r.columns, _smooth(r)], 1)[r.moving] for r in rows])
-                x = x[:, np.any(x != 0, 0)]
-                x = x / np.linalg.norm(x, axis=0)
-                left = left - x @ np.linalg.solve(x.T @ x + ALIKE * np.eye(x.shape[1]), x.T @ left)
+            declared = [fit.residual(r)[r.moving] for r in rows]
+            beside = _beside_smooth(rows, declared)
             known = np.concatenate([_known(r, fit.columns)[r.moving] for r in rows])
-            shares.append(np.log(_rms(left) / (_rms(known) + 1e-300) + 1e-12))
-    return float(np.exp(np.mean(shares))) if shares else 1.0
+            places = [r.filtered(r.position)[r.moving] for r in rows]
+            left = (declared, beside, _beside_places(places, beside))
+            shares.append([np.log(_rms(np.concatenate(e)) / (_rms(known) + 1e-300) + 1e-12) for e in left])
+    if not shares:
+        return 1.0, 1.0, 1.0
+    one, two, three = np.exp(np.mean(shares, axis=0))
+    return float(one), float(two), float(three)
+
+
+def _beside_smooth(rows: Sequence[Rows], left: Sequence[Array]) -> list[Array]:
+    """What is left of residuals (moving samples of each row) beside any smooth load and friction."""
+    x = np.concatenate([np.concatenate([r.columns, _smooth(r)], 1)[r.moving] for r in rows])
+    x = x[:, np.any(x != 0, 0)]
+    x, y = x / np.linalg.norm(x, axis=0), np.concatenate(left)
+    y = y - x @ np.linalg.solve(x.T @ x + ALIKE * np.eye(x.shape[1]), x.T @ y)
+    return np.split(y, np.cumsum([len(e) for e in left])[:-1])
+
+
+def _beside_places(places: Sequence[Array], left: Sequence[Array]) -> list[Array]:
+    """What is left of residuals, of each recording at its positions, beside the mean that the other recordings have at each
+    of many places; as they are where it tells nothing of them."""
+    if len(left) < 2:
+        return list(left)
+    low, high = min(p.min() for p in places), max(p.max() for p in places)
+    at = [np.minimum(((p - low) / (high - low + 1e-300) * NARROW).astype(int), NARROW - 1) for p in places]
+    sums, counts = (
+        np.array([np.bincount(k, w, minlength=NARROW) for k, w in zip(at, weights, strict=True)])
+        for weights in (left, [np.ones(len(e)) for e in left])
+    )
+    others, count = sums.sum(0) - sums, counts.sum(0) - counts
+    means = np.divide(others, count, out=np.zeros_like(others), where=count > 0)
+    beside = [e - mean[k] for e, mean, k in zip(left, means, at, strict=True)]
+    return beside if _rms(np.concatenate(beside)) < _rms(np.concatenate(left)) else list(left)
 
 
 def _smooth(row: Rows) -> Array:
