@@ -173,7 +173,7 @@ def _choose_cutoff(
         beyond = beyond or last is not None and _only_noise(last, powers)
         share, last = _unexplained(fit), powers
         if beyond and share[2] > MOSTLY * share[1]:
-            continue
+            break
         shares[cutoff] = (np.inf, np.inf, share[2]) if beyond else share
     least = np.min([*shares.values(), (1.0, 1.0, 1.0)], 0)
     return max((c for c, share in shares.items() if np.any(share <= NEAR_BEST * least)), default=None)
