@@ -22,6 +22,7 @@ NEAR_BEST = 1.1
 ENOUGH_POWER = 1e-4  # share of the effort's power: a hundredth of its amplitude
 CUTOFFS = (2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 35.0, 60.0)
 MOST_NOISE = 0.1  # of the acceleration: a hundredth of its power
+FEWER = 0.9  # of the samples in which a joint is seen to move: below, noise hides it
 MOSTLY = 0.5  # of what smooth loads leave, that is left beside what recordings share by place, at most
 NARROW = 256  # places along the range, at which recordings may have something in common
 PLACES, SLOW = 8, np.geomspace(0.05, 0.4, 3)  # hats along the range; Stribeck speeds over the greatest
@@ -137,46 +138,61 @@ def _choose_cutoff(
     rig: RigModel, columns: tuple[Column, ...], refused: set[tuple[str, str]], kept: Collection[str] = ()
 ) -> float | None:
     """The highest cut-off at which the share left is within NEAR_BEST of the least, below the first band that adds more
-    to the residual than to the effort: there is nothing of the motion in it, or only what recordings share by place, and
-    beyond it those bands count that this explains for the most part; None where none can be tried. Shares are
-    asked with all rests, of which a wide band spreads least, and of three models, for what is missing may be seen in wide
-    bands alone, and is no reason against them."""
-    sample, most, last, beyond = _sample(rig), 0.0, None, False
-    shares: dict[float, tuple[float, ...]] = {}
+    to the residual than to the effort: there is nothing of the motion in it; or the widest band of all, where what
+    recordings share by place explains for the most part what is left there (a ripple that passes fast). None where none
+    can be tried.
+    Shares are asked with all rests, of which a wide band spreads least, and of two models, for what is missing may be
+    seen in wide bands alone, and is no reason against them."""
+    most, last, fit = 0.0, None, None
+    shares: dict[float, tuple[float, float]] = {}
     for cutoff in CUTOFFS:
-        # The same samples for all: what a low cut-off spoils near the ends counts against it.
-        moving = [
-            r
-            for t in sample
-            for r in trial_rows(rig, t, columns, cutoff, END_S, kept=kept)
-            if (r.trial, r.joint) not in refused
-        ]
-        stands = any(len(r.weight) for r in moving)
-        rows = (
-            [
-                r
-                for t in sample
-                for r in trial_rows(rig, t, columns, cutoff, END_S, kept=rig.joints)
-                if (r.trial, r.joint) not in refused
-            ]
-            if stands
-            else moving
-        )
+        moving, rows = _bands(rig, columns, refused, kept, cutoff)
         if not any(r.moving.sum() > 10 for r in moving) or cutoff > 0.3 * min(r.rate_hz for r in rows):
             continue
         seen = float(np.mean([r.moving.mean() for r in rows]))
         most = max(most, seen)
-        if seen < 0.9 * most or (shares and _drowns(rows)):  # noise hides when the joint moves, or how it accelerates
+        if seen < FEWER * most or (shares and _drowns(rows)):  # noise hides when the joint moves, or how it accelerates
             break
-        fit = _robust_fit(columns, tuple(rows), cutoff)
-        powers = _powers(_robust_fit(columns, tuple(moving), cutoff) if stands else fit)
-        beyond = beyond or last is not None and _only_noise(last, powers)
-        share, last = _unexplained(fit), powers
-        if beyond and share[2] > MOSTLY * share[1]:
+        fit = _robust_fit(columns, rows, cutoff)
+        powers = _powers(fit if moving is rows else _robust_fit(columns, moving, cutoff))
+        if last is not None and _only_noise(last, powers):
+            fit = _widest(rig, columns, refused, kept, most)
             break
-        shares[cutoff] = (np.inf, np.inf, share[2]) if beyond else share
-    least = np.min([*shares.values(), (1.0, 1.0, 1.0)], 0)
+        shares[cutoff], last = (_unexplained(fit, False), _unexplained(fit, True)), powers
+    if not shares:
+        return None
+    if fit is not None and _unexplained(fit, True, True) < MOSTLY * _unexplained(fit, True):
+        return fit.cutoff_hz
+    least = np.min([*shares.values(), (1.0, 1.0)], 0)
     return max((c for c, share in shares.items() if np.any(share <= NEAR_BEST * least)), default=None)
+
+
+def _bands(
+    rig: RigModel, columns: tuple[Column, ...], refused: set[tuple[str, str]], kept: Collection[str], cutoff: float
+) -> tuple[tuple[Rows, ...], tuple[Rows, ...]]:
+    """Balances of some training recordings at a cut-off [Hz], with rests as they are kept and with all of them (the same
+    where nothing rests). The same samples for all cut-offs: what a low one spoils near the ends counts against it."""
+
+    def rows(held: Collection[str]) -> tuple[Rows, ...]:
+        trials = _sample(rig)
+        found = (r for t in trials for r in trial_rows(rig, t, columns, cutoff, END_S, kept=held))
+        return tuple(r for r in found if (r.trial, r.joint) not in refused)
+
+    moving = rows(kept)
+    return moving, rows(rig.joints) if any(len(r.weight) for r in moving) else moving
+
+
+def _widest(
+    rig: RigModel, columns: tuple[Column, ...], refused: set[tuple[str, str]], kept: Collection[str], most: float
+) -> DeclaredFit | None:
+    """The fit at the highest cut-off that shows the motion; None where none does. most: share of samples in which joints
+    are seen to move."""
+    for cutoff in reversed(CUTOFFS):
+        moving, rows = _bands(rig, columns, refused, kept, cutoff)
+        seen = any(r.moving.sum() > 10 for r in moving) and cutoff <= 0.3 * min(r.rate_hz for r in rows)
+        if seen and np.mean([r.moving.mean() for r in rows]) >= FEWER * most and not _drowns(rows):
+            return _robust_fit(columns, rows, cutoff)
+    return None
 
 
 def _drowns(rows: Sequence[Rows]) -> bool:
@@ -192,15 +208,16 @@ def _drowns(rows: Sequence[Rows]) -> bool:
 
 
 def _powers(fit: DeclaredFit) -> Array:
-    """Mean squares of what the balance has to explain and of what it leaves beside what recordings share by place, (joints,
-    2)."""
-    out = []
-    for joint in sorted({r.joint for r in fit.rows}):
-        rows = [r for r in fit.rows if r.joint == joint]
-        known = np.concatenate([_known(r, fit.columns) for r in rows])
-        left = _beside_places([r.filtered(r.position) for r in rows], [fit.residual(r) for r in rows])
-        out.append([np.mean(known**2), np.mean(np.concatenate(left) ** 2)])
-    return np.array(out)
+    """Mean squares of what the balance has to explain and of what it leaves, (joints, 2)."""
+    joints = sorted({r.joint for r in fit.rows})
+    sides = [
+        [
+            np.concatenate([side(r) for r in fit.rows if r.joint == j])
+            for side in (lambda r: _known(r, fit.columns), fit.residual)
+        ]
+        for j in joints
+    ]
+    return np.array([[np.mean(known**2), np.mean(left**2)] for known, left in sides])
 
 
 def _only_noise(before: Array, after: Array) -> bool:
@@ -216,24 +233,21 @@ def _sample(rig: RigModel, most: int = 5) -> list[RigTrial]:
     return list(train[:: max(1, int(np.ceil(len(train) / most)))])
 
 
-def _unexplained(fit: DeclaredFit) -> tuple[float, float, float]:
-    """Shares of the training effort left (rms over rms, all trials of a joint pooled), geometric means over joints: by the
-    declared columns; where any smooth load and friction stand beside them; and where also what each recording has in common
-    with the others by place does, however narrow."""
+def _unexplained(fit: DeclaredFit, beside: bool, by_place: bool = False) -> float:
+    """Share of the training effort left (rms over rms, all trials of a joint pooled), geometric mean over joints;
+    beside: where any smooth load and friction stand beside the declared columns; by_place: and what each recording has in
+    common with the others by place."""
     shares = []
     for joint in {r.joint for r in fit.rows}:
         rows = [r for r in fit.rows if r.joint == joint and not r.validate and r.moving.any()]
         if rows:
-            declared = [fit.residual(r)[r.moving] for r in rows]
-            beside = _beside_smooth(rows, declared)
+            left = [fit.residual(r)[r.moving] for r in rows]
+            left = _beside_smooth(rows, left) if beside else left
+            if by_place:
+                left = _beside_places([r.filtered(r.position)[r.moving] for r in rows], left)
             known = np.concatenate([_known(r, fit.columns)[r.moving] for r in rows])
-            places = [r.filtered(r.position)[r.moving] for r in rows]
-            left = (declared, beside, _beside_places(places, beside))
-            shares.append([np.log(_rms(np.concatenate(e)) / (_rms(known) + 1e-300) + 1e-12) for e in left])
-    if not shares:
-        return 1.0, 1.0, 1.0
-    one, two, three = np.exp(np.mean(shares, axis=0))
-    return float(one), float(two), float(three)
+            shares.append(np.log(_rms(np.concatenate(left)) / (_rms(known) + 1e-300) + 1e-12))
+    return float(np.exp(np.mean(shares))) if shares else 1.0
 
 
 def _beside_smooth(rows: Sequence[Rows], left: Sequence[Array]) -> list[Array]:
