@@ -139,8 +139,8 @@ def _choose_cutoff(
 ) -> float | None:
     """The highest cut-off at which the share left is within NEAR_BEST of the least, below the first band that adds more
     to the residual than to the effort: there is nothing of the motion in it; or the widest band of all, where what
-    recordings share by place explains for the most part what is left there (a ripple that passes fast). None where none
-    can be tried.
+    recordings share by place explains for the most part what is left there, and more than is explained in that other band
+    (a ripple that passes fast). None where none can be tried.
     Shares are asked with all rests, of which a wide band spreads least, and of two models, for what is missing may be
     seen in wide bands alone, and is no reason against them."""
     most, last, fit = 0.0, None, None
@@ -159,12 +159,12 @@ def _choose_cutoff(
             fit = _widest(rig, columns, refused, kept, most)
             break
         shares[cutoff], last = (_unexplained(fit, False), _unexplained(fit, True)), powers
-    if not shares:
-        return None
-    if fit is not None and _unexplained(fit, True, True) < MOSTLY * _unexplained(fit, True):
-        return fit.cutoff_hz
     least = np.min([*shares.values(), (1.0, 1.0)], 0)
-    return max((c for c, share in shares.items() if np.any(share <= NEAR_BEST * least)), default=None)
+    best = max((c for c, share in shares.items() if np.any(share <= NEAR_BEST * least)), default=None)
+    if fit is None or best is None:
+        return best
+    by_place = _unexplained(fit, True, True)
+    return fit.cutoff_hz if by_place < min(MOSTLY * _unexplained(fit, True), shares[best][1]) else best
 
 
 def _bands(
