@@ -27,7 +27,7 @@ KEPT_OUT, EXPLAINED_MOST = 1.05, 2 / 3
 CHANCE = 2.0  # standard errors
 IDLE = 0.02  # of what an effect does where it does most: less is nothing
 BEFORE = 5  # samples
-ELSEWHERE = 0.5  # of what a small effect does (squared), at least, where the large ones do nothing
+ELSEWHERE = 0.2  # of what a small effect does (squared), at least, where the large ones do nothing
 SAME_PERIOD = 0.02  # by which a harmonic's may differ
 PATCHES = 2  # periods beside the first that are none of its harmonics: more than a second gear
 MAIN = 0.5  # of what names explain together: what one of them must hold where they do not do
@@ -293,11 +293,11 @@ class Station:
         rest = there.fit(terms)
 
         def told(small: Named) -> bool:
-            # what acts mostly where a large one does, and a little before, may be how that begins; and small names
+            # what acts nearly only where a large one does, and a little before, may be how that begins; and small names
             # beside large ones are many
             does = (fit.prediction - balance.removed(fit, fit.terms.index(small.term))) ** 2
-            mostly = float(does[idle].sum()) >= ELSEWHERE * float(does.sum())
-            return mostly and evidence(there, there.fit((*terms, small.term)), rest) >= 2 * EVIDENCE_LEAST
+            apart = float(does[idle].sum()) >= ELSEWHERE * float(does.sum())
+            return apart and evidence(there, there.fit((*terms, small.term)), rest) >= 2 * EVIDENCE_LEAST
 
         return tuple(f for f in self.proven if f not in self._large and told(f))
 
