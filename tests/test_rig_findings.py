@@ -46,6 +46,9 @@ def test_a_rigs_findings_say_names_and_units_as_the_format_has_them() -> None:
     assert [name for name, _ in others] == ["detent_load", "torque_ripple"]
     assert mine + sum(share for _, share in others) == pytest.approx(0.9) and mine == pytest.approx(0.09)
     assert alternatives((), "stribeck_friction", 0.9) == (0.9, ())
+    # the simplest of two that are not told apart has half of it, however seldom it is the best
+    mine, others = alternatives(rivals, "stribeck_friction", 0.9, members=2)
+    assert mine == pytest.approx(0.45) and dict(others) == pytest.approx({"detent_load": 0.4, "torque_ripple": 0.05})
     assert rejection("load_dependent_friction/low speed@hinge", NOT_TAKEN) == {
         "effect": "load_dependent_friction",
         "variant": "low speed",

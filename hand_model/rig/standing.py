@@ -173,10 +173,11 @@ def _joint_finding(
     }
     fall = max(proof["before"] ** 2 - proof["after"] ** 2, 0.0)
     where = whereabouts(c.joint, rig.drive(c.joint), "effort", measured(rig, proof), fall)
+    members = (c.effect, *(e for e in step.equals if e != c.effect))
     return Finding(
         c.effect,
-        (c.effect, *(e for e in step.equals if e != c.effect)),
-        *alternatives(step.rivals, c.effect, step.probability),
+        members,
+        *alternatives(step.rivals, c.effect, step.probability, len(members)),
         where,
         statement(c.effect, c.variant, c.joint, parameters, proof),
         parameters,

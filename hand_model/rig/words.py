@@ -30,17 +30,21 @@ def joint_unit(unit: str, position: str, effort: str) -> str:
 
 
 def alternatives(
-    rivals: Sequence[tuple[str, float]], effect: str, probability: float = 1.0
+    rivals: Sequence[tuple[str, float]], effect: str, probability: float = 1.0, members: int = 1
 ) -> tuple[float, tuple[tuple[str, float], ...]]:
     """Probability of an effect, and of each other one, all variants together: that any of them is there, shared out by
-    how often each is the best. rivals: keys "effect/variant@joint" with that share; probability: against nothing."""
+    how often each is the best; of the effect, which is the simplest of those that are not told apart, as much as an even
+    share at least. rivals: keys "effect/variant@joint" with how often; probability: against nothing; members: of its
+    class, itself included."""
     out: dict[str, float] = {}
     for key, share in rivals:
         name, _, _ = named(key)
         if name != effect:
             out[name] = out.get(name, 0.0) + probability * share
-    others = min(sum(out.values()), probability)
-    return probability - others, tuple(sorted(out.items(), key=lambda item: -item[1]))
+    others = sum(out.values())
+    mine = max(probability - others, probability / members if members > 1 else 0.0)
+    left = min((probability - mine) / others, 1.0) if others > 0 else 1.0
+    return mine, tuple(sorted(((name, left * share) for name, share in out.items()), key=lambda item: -item[1]))
 
 
 def rejection(key: str, reason: str) -> dict[str, str]:

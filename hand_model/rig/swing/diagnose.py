@@ -296,9 +296,9 @@ def _swing_finding(rig: RigModel, variant: Variant, round_: Round, ends: Ends, l
     fall = max(proof["before"] ** 2 - proof["after"] ** 2, 0.0)
     where = whereabouts(joint, rig.drive(joint), "position", measured(rig, proof), fall)
     native = set(variant.start) <= {"drag"}
+    members = (variant.effect, *(e for e in round_.equals if e != variant.effect))
     return Finding(
-        variant.effect, (variant.effect, *(e for e in round_.equals if e != variant.effect)),
-        *alternatives(round_.rivals, variant.effect, round_.probability), where,
+        variant.effect, members, *alternatives(round_.rivals, variant.effect, round_.probability, len(members)), where,
         statement(variant.effect, variant.name, joint, parameters, proof), parameters, proof,
         {"native": native, "mjcf": f"joint[@name='{joint}']/@damping" if native else 'custom/text[@name="hand_model"]',
          "urdf": "not expressible: kept in rig.xml"},
