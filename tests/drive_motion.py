@@ -28,3 +28,18 @@ def state(n: int = 1200, seed: int = 0) -> DriveState:
         declared_names=names,
         extra={"load": effort, "drag": np.zeros(n), "trial_index": np.zeros(n)},
     )
+
+
+TO_AND_FRO = np.array([0.1, 20.0, 0.4, 6.0])  # viscous, friction, spring, preload
+
+
+def to_and_fro(seed: int, speeds: int, noise: float) -> DriveState:
+    """A motor that goes to and fro over its range, two seconds at each of some speeds."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(0, 2 * speeds, 0.02)
+    phase = 2 * np.pi * np.cumsum(rng.uniform(0.1, 0.35, speeds).repeat(100)) * 0.02
+    x, v = 50 - 50 * np.cos(phase), 50 * np.sin(phase) * np.gradient(phase, t)
+    declared = np.stack([v, np.sign(v), x, np.ones(len(t))], 1)
+    effort = declared @ TO_AND_FRO + noise * rng.standard_normal(len(t))
+    names = ("viscous", "coulomb", "spring", "preload")
+    return DriveState(f"log/{seed}.csv", "index", t, x, v, 0 * v, effort, declared, "%", "raw", {}, names)

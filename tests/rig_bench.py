@@ -12,15 +12,19 @@ ARM = """<mujoco><compiler angle="radian"/><option timestep="0.001" integrator="
 <inertial pos="0 0 -0.2" mass="0.5" diaginertia="0.002 0.002 0.0002"/></body></worldbody>
 <actuator><motor name="motor" joint="hinge"/></actuator></mujoco>
 """
-HEAD = """format = "hand-session/1"
+RIG = """format = "hand-session/1"
 [hand]
 name = "bench"
 [rig]
 model = "rig.xml"
 [signals]
-position = "joint:hinge:position"
+"""
+HEAD = (
+    RIG
+    + """position = "joint:hinge:position"
 torque = "actuator:motor:force"
 """
+)
 Motion = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # time [s], angle [rad], velocity, acceleration
 
 
@@ -49,7 +53,8 @@ def recorded(
 
 
 def written(folder: Path, model: str, head: str, effort: str, tables: Sequence[np.ndarray]) -> Path:
-    """A session of recordings (n, 3) of time, position and an effort of that name, those after the fourth held out."""
+    """A session of recordings (n, k) of time, position and an effort of that name (or several columns, with commas between),
+    those after the fourth held out."""
     (folder / "log").mkdir(parents=True)
     (folder / "rig.xml").write_text(model)
     text = head

@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+from drive_motion import TO_AND_FRO, to_and_fro
 
 from hand_model.diagnose.locate.excursions import whiles_below
-from hand_model.effects.base import DriveState
 
-SPRING, FRICTION, NOISE = 0.4, 20.0, 4.0
+SPRING, PRELOAD = TO_AND_FRO[2:]
 
 
-def drive(seed: int, released: tuple[tuple[float, float], ...] = (), pushed: tuple[float, float] | None = None):
-    """A recording of a motor that goes to and fro over its range, its spring off for some whiles [s], or more load."""
-    rng = np.random.default_rng(seed)
-    t = np.arange(0, 20, 0.02)
-    phase = 2 * np.pi * np.cumsum(rng.uniform(0.1, 0.35, 10).repeat(100)) * 0.02
-    x, v = 50 - 50 * np.cos(phase), 50 * np.sin(phase) * np.gradient(phase, t)
-    declared = np.stack([v, np.sign(v), x, np.ones(len(t))], 1)
-    effort = declared @ [0.1, FRICTION, SPRING, 6.0] + NOISE * rng.standard_normal(len(t))
+def drive(seed: int, released: tuple[tuple[float, float], ...] = (), pushed: tuple[float, float] = (0.0, 0.0)):
+    """A recording of a motor, its spring off for some whiles [s], or more load for one."""
+    state = to_and_fro(seed, 10, 4.0)
+    t, effort = state.time_s, state.effort.copy()
     for a, b in released:
-        effort[(t > a) & (t < b)] -= (SPRING * x + 6.0)[(t > a) & (t < b)]
-    if pushed is not None:
-        effort[(t > pushed[0]) & (t < pushed[1])] += 20.0
-    names = ("viscous", "coulomb", "spring", "preload")
-    return DriveState(f"log/{seed}.csv", "index", t, x, v, 0 * v, effort, declared, "%", "raw", {}, names)
+        effort -= np.where((t > a) & (t < b), SPRING * state.position + PRELOAD, 0.0)
+    effort += np.where((t > pushed[0]) & (t < pushed[1]), 20.0, 0.0)
+    return replace(state, effort=effort)
 
 
 def test_whiles_without_its_spring_are_found_where_no_marker_sees_them() -> None:

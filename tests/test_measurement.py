@@ -6,23 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from drive_motion import TO_AND_FRO, to_and_fro
 
 from hand_model.diagnose.locate.measurement import beyond, coefficients, dead_zone
 from hand_model.effects.base import DriveState
 
-PLAIN = np.array([0.1, 20.0, 0.4, 6.0])  # viscous, friction, spring, preload
-
 
 def drive(seed: int) -> DriveState:
     """A motor that goes to and fro over its range, read in whole raw units."""
-    rng = np.random.default_rng(seed)
-    t = np.arange(0, 30, 0.02)
-    phase = 2 * np.pi * np.cumsum(rng.uniform(0.1, 0.35, 15).repeat(100)) * 0.02
-    x, v = 50 - 50 * np.cos(phase), 50 * np.sin(phase) * np.gradient(phase, t)
-    declared = np.stack([v, np.sign(v), x, np.ones(len(t))], 1)
-    current = np.round(declared @ PLAIN + 3.0 * rng.standard_normal(len(t)))
-    names = ("viscous", "coulomb", "spring", "preload")
-    return DriveState(f"log/{seed}.csv", "index", t, x, v, 0 * v, current, declared, "%", "raw", {}, names)
+    state = to_and_fro(seed, 15, 3.0)
+    return replace(state, effort=np.round(state.effort))
 
 
 def dead_below(zone: float) -> tuple[DriveState, ...]:
@@ -39,7 +32,7 @@ def test_a_current_that_reads_zero_below_a_threshold_is_read_beyond_it_alone() -
     effort, declared = (np.concatenate([getattr(s, k) for s in read]) for k in ("effort", "declared"))
     known = np.isfinite(effort)
     assert known.any() and np.abs(effort[known]).min() >= zone - 3
-    assert coefficients(declared[known], effort[known]) == pytest.approx(PLAIN, rel=0.1, abs=0.05)
+    assert coefficients(declared[known], effort[known]) == pytest.approx(TO_AND_FRO, rel=0.1, abs=0.05)
 
 
 def test_a_current_that_is_read_one_way_alone_is_not_read() -> None:

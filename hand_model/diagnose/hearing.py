@@ -50,20 +50,18 @@ class Heard:
         self.courses: dict[str, FingerCourses] = {}
         self.markers: dict[str, MarkerNaming] = {}
         self.stations: list[Station] = []
-        distrusted = _distrusted(session)
-        steps = coarse({a: encoder_step([t.log() for t in trials]) for a, trials in drive_trials(session).items()})
+        distrusted, driven = _distrusted(session), drive_trials(session)
+        steps = coarse({a: encoder_step([t.log() for t in trials]) for a, trials in driven.items()})
         self.unexplained = [
             *(_false_stamps(session, a, s) for a, s in distrusted.items()),
             *(_in_steps(session, a, s) for a, s in steps.items()),
         ]
-        unmeasured = {
-            a: why for a, trials in drive_trials(session).items() if (why := _no_measurement([t.log() for t in trials]))
-        }
+        unmeasured = {a: why for a, trials in driven.items() if (why := _no_measurement([t.log() for t in trials]))}
         self.found: list[tuple[float, Finding]] = [
-            refused(a, _finger_of(session, a), tuple(t.name for t in drive_trials(session)[a]), "position", why)
+            refused(a, _finger_of(session, a), tuple(t.name for t in driven[a]), "position", why)
             for a, why in unmeasured.items()
         ]
-        self.unread = (*dict.fromkeys([*distrusted, *steps, *unmeasured]),)  # actuators whose log is not believed
+        self.unread = (*distrusted, *steps, *unmeasured)  # actuators whose log is not believed
 
     def listen_to_fingers(self, beside: tuple[Callable[[], Any], ...] = ()) -> list[Any]:
         """What the cameras say of each finger. beside: further calls, made where a core is free meanwhile; what they
@@ -103,11 +101,10 @@ class Heard:
         self.unexplained += [
             _frozen(session, a, share) for a, states in drives.items() if (share := frozen_share(states)) > FROZEN
         ]
-        for actuator, zone in [(a, zone) for a, states in drives.items() if (zone := dead_zone(states)) > 0]:
-            left = beyond(drives.pop(actuator), zone)
-            drives |= {actuator: left} if left else {}
-            shape = f"the current reads zero below {zone:.0f} raw: those readings were left out"
-            self.unexplained.append(_unheard(session, actuator, "current", shape))
+        zones = {a: zone for a, states in drives.items() if (zone := dead_zone(states)) > 0}
+        self.unexplained += [_dead(session, a, zone) for a, zone in zones.items()]
+        drives = {a: beyond(states, zones[a]) if a in zones else states for a, states in drives.items()}
+        drives = {a: states for a, states in drives.items() if states}
         for station in (s for s in self.stations if s.actuator in drives):
             named, states = station.standing("spring_decoupling"), drives[station.actuator]
             if named is not None and named.term.shape["form"] < 0.5:
@@ -246,6 +243,11 @@ def _frozen(session: Session, actuator: str, share: float) -> dict[str, Any]:
     shape = (
         f"the current stands still while the motor moves, {100 * share:.0f} % of the time: those readings were left out"
     )
+    return _unheard(session, actuator, "current", shape)
+
+
+def _dead(session: Session, actuator: str, zone: float) -> dict[str, Any]:
+    shape = f"the current reads zero below {zone:.0f} raw: those readings were left out"
     return _unheard(session, actuator, "current", shape)
 
 

@@ -294,8 +294,8 @@ class Effect:
         return None
 
     def reading(self, effort: Array, time_s: Array, velocity: Array, parameters: Mapping[str, float]) -> Array:
-        """What a channel shows of the drive's effort (n,) [raw] at a velocity (n,) [%/s]: as it is, unless the effect is in the reading and no
-        sensor holds it."""
+        """What a channel shows of the drive's effort (n,) [raw] at a velocity (n,) [%/s]: as it is, unless the effect is
+        in the reading and no sensor holds it."""
         return effort
 
     def hurries(self, parameters: Mapping[str, float]) -> bool:

@@ -58,7 +58,7 @@ class EndStopContact(Effect):
         return (("stiffness", "effort/position", 0.0, np.inf),)
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """Depth into the stop, signed as its load and damped in form 1, (n, 1)."""
+        """Depth into the stop, signed as its load and damped as its form says, (n, 1)."""
         side = _side(shape)
         depth = np.maximum(side * (state.position - _begin(shape)), 0.0)
         return (side * _borne(depth, side * state.velocity, shape))[:, None]
@@ -66,7 +66,7 @@ class EndStopContact(Effect):
     def parameters(
         self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]
     ) -> dict[str, float]:
-        """Side, where the stop begins, its stiffness, and its loss where it damps."""
+        """Side, where the stop begins, its stiffness, and how it damps."""
         damping = {DAMPED: "loss", BESIDE: "lag"}.get(shape.get("form", 0.0))
         damped = {} if damping is None else {"form": shape["form"], damping: shape[damping]}
         return {"side": shape["side"], **damped, "begin": _begin(shape), **amplitude}

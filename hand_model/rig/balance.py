@@ -18,7 +18,7 @@ from ..session.log import rows_lost
 from .dynamics import INERTIAL, inertial_columns, inertial_parameters
 from .model import RigModel, RigTrial
 from .overrides import body_names, compile_model
-from .rest import TURN, Creep, moving_weight
+from .rest import Creep, moving_weight
 from .states import (
     PASSED,
     STEEP,
@@ -208,12 +208,11 @@ def trial_rows(
     sign = np.clip(v / rest, -1.0, 1.0)
     thin = max(1, int(rate / max(12 * cutoff, 24.0)))
     if weights is None:
-        creeps = {
-            j: Creep(float(ringing[i]), TURN * float(np.std(v[:, i]) / max(np.std(a[:, i]), 1e-300)))
-            for i, j in enumerate(rig.joints)
-        }
-        moving = [j for j in rig.independent if j not in kept]
-        weights = {j: moving_weight(raw[j], rate, cutoff, wide, creeps[j])[::thin] for j in moving}
+        weights = {}
+        for j in (j for j in rig.independent if j not in kept):
+            i = rig.joints.index(j)
+            creep = Creep.of(v[:, i], a[:, i], float(ringing[i]))
+            weights[j] = moving_weight(raw[j], rate, cutoff, wide, creep)[::thin]
     q, v, a, sign = (*(x[::thin] for x in (q, v, a)), _averaged(sign, thin))
     effort = {j: None if e is None else _thinned(e, rate, thin) for j, e in effort.items()}
     grid, channels = grid[::thin], {k: c[::thin] for k, c in channels.items()}
@@ -349,7 +348,7 @@ def _joint_effort(rig: RigModel, trial: RigTrial, grid: Array) -> dict[str, Arra
         elif drive.kind == "position" and joint in trial.setpoint:
             target = np.interp(grid, trial.time_s, fill_gaps(trial.time_s, trial.setpoint[joint]))
             position = np.interp(grid, trial.time_s, fill_gaps(trial.time_s, trial.position[joint]))
-            out[joint] = trial.drives[joint].answer(target, position, np.gradient(position, grid))
+            out[joint] = trial.drives[joint].along(grid, target, position)
         else:
             out[joint] = None
     return out

@@ -18,8 +18,8 @@ SYMMETRIC = 0.02  # of a channel's range, by which two limits of one size may di
 
 def limits(trial: RigTrial, joint: str) -> tuple[float, float]:
     """Least and greatest reading of an effort, each where the channel stands on it and the machine would not: the same
-    both ways, in many samples or where no reading a little below comes nearly as often; or on one side alone, in many samples while the joint moves, beside which no other value comes as often.
-    Infinite where there is none."""
+    both ways, in many samples or where no reading a little below comes nearly as often; or on one side alone, in many
+    samples while the joint moves, beside which no other value comes as often. Infinite where there is none."""
     values = fill_gaps(trial.time_s, trial.effort[joint])
     found, often = np.unique(values, return_counts=True)
     low, high = float(found[0]), float(found[-1])

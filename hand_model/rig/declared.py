@@ -139,29 +139,29 @@ def _choose_cutoff(
 ) -> float | None:
     """The highest cut-off at which the share left is within NEAR_BEST of the least, below the first band that adds more
     to the residual than to the effort: there is nothing of the motion in it; or the widest band of all, where what
-    recordings share by place explains for the most part what is left there, and more than is explained in that other band
-    (a ripple that passes fast). None where none can be tried.
+    recordings share by place explains for the most part what is left there, and less is left than in that other band (a
+    ripple that passes fast). None where none can be tried.
+
     Shares are asked with all rests, of which a wide band spreads least, and of two models, for what is missing may be
     seen in wide bands alone, and is no reason against them."""
     most, last, fit = 0.0, None, None
     shares: dict[float, tuple[float, float]] = {}
     for cutoff in CUTOFFS:
-        moving, rows = _bands(rig, columns, refused, kept, cutoff)
-        if not any(r.moving.sum() > 10 for r in moving) or cutoff > 0.3 * min(r.rate_hz for r in rows):
+        moving, rows, seen = _bands(rig, columns, refused, kept, cutoff)
+        if seen is None:
             continue
-        seen = float(np.mean([r.moving.mean() for r in rows]))
         most = max(most, seen)
         if seen < FEWER * most or (shares and _drowns(rows)):  # noise hides when the joint moves, or how it accelerates
             break
         fit = _robust_fit(columns, rows, cutoff)
         powers = _powers(fit if moving is rows else _robust_fit(columns, moving, cutoff))
         if last is not None and _only_noise(last, powers):
-            fit = _widest(rig, columns, refused, kept, most)
+            fit = _widest(rig, columns, refused, kept, cutoff, most) or fit
             break
         shares[cutoff], last = (_unexplained(fit, False), _unexplained(fit, True)), powers
     least = np.min([*shares.values(), (1.0, 1.0)], 0)
     best = max((c for c, share in shares.items() if np.any(share <= NEAR_BEST * least)), default=None)
-    if fit is None or best is None:
+    if fit is None or best in (None, fit.cutoff_hz):
         return best
     by_place = _unexplained(fit, True, True)
     return fit.cutoff_hz if by_place < min(MOSTLY * _unexplained(fit, True), shares[best][1]) else best
@@ -169,9 +169,10 @@ def _choose_cutoff(
 
 def _bands(
     rig: RigModel, columns: tuple[Column, ...], refused: set[tuple[str, str]], kept: Collection[str], cutoff: float
-) -> tuple[tuple[Rows, ...], tuple[Rows, ...]]:
+) -> tuple[tuple[Rows, ...], tuple[Rows, ...], float | None]:
     """Balances of some training recordings at a cut-off [Hz], with rests as they are kept and with all of them (the same
-    where nothing rests). The same samples for all cut-offs: what a low one spoils near the ends counts against it."""
+    where nothing rests), and the share of samples in which joints are seen to move; None where none do, or none is wide
+    enough. The same samples for all cut-offs: what a low one spoils near the ends counts against it."""
 
     def rows(held: Collection[str]) -> tuple[Rows, ...]:
         trials = _sample(rig)
@@ -179,18 +180,25 @@ def _bands(
         return tuple(r for r in found if (r.trial, r.joint) not in refused)
 
     moving = rows(kept)
-    return moving, rows(rig.joints) if any(len(r.weight) for r in moving) else moving
+    resting = rows(rig.joints) if any(len(r.weight) for r in moving) else moving
+    if not any(r.moving.sum() > 10 for r in moving) or cutoff > 0.3 * min(r.rate_hz for r in resting):
+        return moving, resting, None
+    return moving, resting, float(np.mean([r.moving.mean() for r in resting]))
 
 
 def _widest(
-    rig: RigModel, columns: tuple[Column, ...], refused: set[tuple[str, str]], kept: Collection[str], most: float
+    rig: RigModel,
+    columns: tuple[Column, ...],
+    refused: set[tuple[str, str]],
+    kept: Collection[str],
+    above: float,
+    most: float,
 ) -> DeclaredFit | None:
-    """The fit at the highest cut-off that shows the motion; None where none does. most: share of samples in which joints
-    are seen to move."""
-    for cutoff in reversed(CUTOFFS):
-        moving, rows = _bands(rig, columns, refused, kept, cutoff)
-        seen = any(r.moving.sum() > 10 for r in moving) and cutoff <= 0.3 * min(r.rate_hz for r in rows)
-        if seen and np.mean([r.moving.mean() for r in rows]) >= FEWER * most and not _drowns(rows):
+    """The fit at the highest cut-off above one [Hz] that shows the motion; None where none does. most: share of samples
+    in which joints are seen to move."""
+    for cutoff in reversed([c for c in CUTOFFS if c > above]):
+        _, rows, seen = _bands(rig, columns, refused, kept, cutoff)
+        if seen is not None and seen >= FEWER * most and not _drowns(rows):
             return _robust_fit(columns, rows, cutoff)
     return None
 
@@ -235,8 +243,8 @@ def _sample(rig: RigModel, most: int = 5) -> list[RigTrial]:
 
 def _unexplained(fit: DeclaredFit, beside: bool, by_place: bool = False) -> float:
     """Share of the training effort left (rms over rms, all trials of a joint pooled), geometric mean over joints;
-    beside: where any smooth load and friction stand beside the declared columns; by_place: and what each recording has in
-    common with the others by place."""
+    beside: where any smooth load and friction stand beside the declared columns; by_place: and what each recording has
+    in common with the others by place."""
     shares = []
     for joint in {r.joint for r in fit.rows}:
         rows = [r for r in fit.rows if r.joint == joint and not r.validate and r.moving.any()]
@@ -260,8 +268,8 @@ def _beside_smooth(rows: Sequence[Rows], left: Sequence[Array]) -> list[Array]:
 
 
 def _beside_places(places: Sequence[Array], left: Sequence[Array]) -> list[Array]:
-    """What is left of residuals, of each recording at its positions, beside the mean that the other recordings have at each
-    of many places; as they are where it tells nothing of them."""
+    """What is left of residuals, of each recording at its positions, beside the mean that the other recordings have at
+    each of many places; as they are where it tells nothing of them."""
     if len(left) < 2:
         return list(left)
     low, high = min(p.min() for p in places), max(p.max() for p in places)

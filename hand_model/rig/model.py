@@ -51,6 +51,10 @@ class Drive:
         effort = self.gain * np.clip(target, *self.targets) + constant + by_position * position + by_velocity * velocity
         return np.clip(effort, *self.limits)
 
+    def along(self, time_s: Array, target: Array, position: Array) -> Array:
+        """The same (n,) along a joint's recorded positions, at times [s]."""
+        return self.answer(target, position, np.gradient(position, time_s))
+
 
 @dataclass(frozen=True)
 class Coupling:

@@ -31,11 +31,16 @@ class Creep:
     speed: float = 0.0
     turn_s: float = 0.0
 
+    @classmethod
+    def of(cls, velocity: Array, acceleration: Array, speed: float) -> Creep:
+        """Of a joint that moves like that (n,) [rad/s or m/s, and per s]."""
+        return cls(speed, TURN * float(np.std(velocity) / max(np.std(acceleration), 1e-300)))
+
 
 def stands(position: Array, rate_hz: float, cutoff_hz: float, creep: Creep = Creep()) -> Array:
     """Where a joint stands, (n,) bool: all readings (n,) [rad or m] of a stretch that the filter of a balance can tell
-    lie within their noise; or those of a stretch longer than it takes to turn round within what it covers at a creep: a
-    controller that hunts lets its joint dither."""
+    lie within their noise; or those of a stretch longer than a turn takes, within what it covers at a creep: a controller
+    that hunts lets its joint dither."""
     shortest = SHORTEST / cutoff_hz
     quiet = _within(position, round(shortest * rate_hz), QUIET * noise_std(position))
     if creep.speed <= 0:

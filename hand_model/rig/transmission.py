@@ -42,8 +42,8 @@ def fit_coupling(rig: RigModel, coupling: Coupling) -> DeclaredFit | None:
 
 
 def _powers(rows: Sequence[Rows], declared: int) -> NDArray[np.bool_]:
-    """Which powers (5,) of a polynomial to fit: up to the highest degree, at least the declared one, by which each training
-    recording is foretold from the others about as well as by any; all where there is but one."""
+    """Which powers (5,) of a polynomial to fit: up to the highest degree, at least the declared one, by which each
+    training recording is foretold from the others about as well as by any; all where there is but one."""
     parts = [(r.columns[r.moving], r.effort[r.moving]) for r in rows if not r.validate and r.moving.sum() > FEWEST]
     if len(parts) < 2:
         return np.ones(POWERS, bool)
@@ -108,15 +108,11 @@ def _rows(rig: RigModel, coupling: Coupling, columns: tuple[Column, ...], trial:
 
 def _loads(rig: RigModel, trial: RigTrial) -> dict[str, Array]:
     """Efforts (n,) by joint that are recorded, or that a servo on position gives by what it is told."""
-    asked = {
-        d.joint: trial.drives[d.joint].answer(
-            trial.setpoint[d.joint],
-            trial.position[d.joint],
-            np.gradient(fill_gaps(trial.time_s, trial.position[d.joint]), trial.time_s),
-        )
-        for d in rig.drives
-        if d.kind == "position" and d.joint in trial.live and d.joint in trial.setpoint and d.joint in trial.position
-    }
+    asked = {}
+    for joint in (d.joint for d in rig.drives if d.kind == "position" and d.joint in trial.live):
+        if joint in trial.setpoint and joint in trial.position:
+            target, position = (fill_gaps(trial.time_s, x[joint]) for x in (trial.setpoint, trial.position))
+            asked[joint] = trial.drives[joint].along(trial.time_s, target, position)
     return {**asked, **trial.effort}
 
 
@@ -138,39 +134,7 @@ def coupling_candidates(fit: DeclaredFit, coupling: Coupling) -> tuple[Candidate
         )
     ]
     for channel in sorted({k for r in train for k in r.extra if k.startswith("effort:")}):
-        name = channel.split(":")[1]
-        loads = np.concatenate([np.abs(_load(r, channel)[r.moving]) for r in train])
-        turns = tuple({"turns_at": float(t)} for t in np.unique(np.quantile(loads, TURNS)))
-        out.append(
-            Candidate(
-                "drive_backlash",
-                f"crossed by the load at {name}",
-                joint,
-                (("half_gap", "rad", *free),),
-                turns,
-                lambda r, s, c=channel: last_pushed(_load(r, c), s["turns_at"])[:, None],
-            )
-        )
-        out.append(
-            Candidate(
-                "series_elasticity",
-                f"load at {name}",
-                joint,
-                (("compliance", "rad/effort", *free),),
-                ({},),
-                lambda r, s, c=channel: _load(r, c)[:, None],
-            )
-        )
-        out.append(
-            Candidate(
-                "series_elasticity",
-                f"stiffening with load at {name}",
-                joint,
-                (("compliance", "rad/effort", *free), ("stiffening", "rad/effort^2", *free)),
-                ({},),
-                lambda r, s, c=channel: np.stack([_load(r, c), _load(r, c) * np.abs(_load(r, c))], 1),
-            )
-        )
+        out += _by_load(joint, channel, train)
     delays = tuple({"lag": k * 1.0} for k in (1.0,))
     out.append(
         Candidate(
@@ -183,6 +147,39 @@ def coupling_candidates(fit: DeclaredFit, coupling: Coupling) -> tuple[Candidate
         )
     )
     return tuple(out)
+
+
+def _by_load(joint: str, channel: str, train: Sequence[Rows]) -> list[Candidate]:
+    """What one load does to a dependent joint: it crosses a play, stretches, and does so less the larger it is."""
+    free, name = (-np.inf, np.inf), channel.split(":")[1]
+    loads = np.concatenate([np.abs(_load(r, channel)[r.moving]) for r in train])
+    turns = tuple({"turns_at": float(t)} for t in np.unique(np.quantile(loads, TURNS)))
+    return [
+        Candidate(
+            "drive_backlash",
+            f"crossed by the load at {name}",
+            joint,
+            (("half_gap", "rad", *free),),
+            turns,
+            lambda r, s: last_pushed(_load(r, channel), s["turns_at"])[:, None],
+        ),
+        Candidate(
+            "series_elasticity",
+            f"load at {name}",
+            joint,
+            (("compliance", "rad/effort", *free),),
+            ({},),
+            lambda r, s: _load(r, channel)[:, None],
+        ),
+        Candidate(
+            "series_elasticity",
+            f"stiffening with load at {name}",
+            joint,
+            (("compliance", "rad/effort", *free), ("stiffening", "rad/effort^2", *free)),
+            ({},),
+            lambda r, s: np.stack([_load(r, channel), _load(r, channel) * np.abs(_load(r, channel))], 1),
+        ),
+    ]
 
 
 def last_pushed(load: Array, turns_at: float) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -42,18 +42,12 @@ def with_excursions(states: Sequence[DriveState]) -> tuple[DriveState, ...]:
     balance = Balance(states, everything=True)
     # a clock at another rate lifts the finger where it is fast
     drifting = balance.fit((Term(effect("clock_drift"), {}),))
-    residual = _beside_replicates(balance, balance.effort - drifting.prediction)
-    parts = np.split(residual, np.cumsum([m.sum() for m in balance.masks])[:-1])
-    told = [
-        _Told.of(s.time_s[m], r) if len(r) > FEWEST else None
-        for s, m, r in zip(states, balance.masks, parts, strict=True)
-    ]
-    behind = max((_best_window(-t.residual, t.sigma, t.lengths)[0] for t in told if t is not None), default=0.0)
-    out = []
-    for state, mask, one in zip(states, balance.masks, told, strict=True):
+    told = _recordings(balance, balance.effort - drifting.prediction)
+    least, out = _least(told.values()), []
+    for state, mask in zip(states, balance.masks, strict=True):
         ahead = np.zeros(len(state.time_s))
-        if one is not None:
-            ahead[mask] = _course(one, max(LEAST, BEYOND * behind))
+        if state.trial in told:
+            ahead[mask] = _course(told[state.trial], least)
         out.append(replace(state, extra={**state.extra, "ahead": ahead}))
     return tuple(out)
 
@@ -64,30 +58,15 @@ def whiles_below(states: Sequence[DriveState], trials: Collection[str]) -> dict[
     if not trials:
         return {}
     balance = Balance(tuple(states), everything=True)
-    residual = _beside_replicates(balance, balance.effort - balance.fit().prediction)
-    parts = np.split(residual, np.cumsum([m.sum() for m in balance.masks])[:-1])
-    told = {
-        s.trial: _Told.of(s.time_s[m], -r)
-        for s, m, r in zip(states, balance.masks, parts, strict=True)
-        if s.trial in trials and len(r) > FEWEST
-    }
-    above = max((_best_window(-t.residual, t.sigma, t.lengths)[0] for t in told.values()), default=0.0)
-    least = max(LEAST, BEYOND * above)
-    return {
-        trial: [[float(t.time_s[a]), float(t.time_s[b - 1])] for a, b in runs(_windows(t, least))]
-        for trial, t in told.items()
-    }
-
-
-def _windows(told: _Told, least: float) -> NDArray[np.bool_]:
-    """Samples (n,) of all windows whose mean stands out by that log likelihood ratio, one after the other."""
-    left, inside = told.residual.copy(), np.zeros(len(told.residual), bool)
-    for _ in range(len(left)):
-        gain, begin, end = _best_window(left, told.sigma, told.lengths)
-        if gain < least or end - begin >= told.lengths[-1]:
-            break
-        inside[begin:end], left[begin:end] = True, 0.0
-    return inside
+    told = _recordings(balance, balance.fit().prediction - balance.effort)
+    asked = {trial: t for trial, t in told.items() if trial in trials}
+    least, out = _least(asked.values()), {}
+    for trial, t in asked.items():
+        inside = np.zeros(len(t.residual), bool)
+        for begin, end in _windows(t, least):
+            inside[begin:end] = True
+        out[trial] = [[float(t.time_s[a]), float(t.time_s[b - 1])] for a, b in runs(inside)]
+    return out
 
 
 @dataclass(frozen=True)
@@ -110,6 +89,22 @@ class _Told:
         return cls(time_s, residual, max(float(np.sqrt(np.median(np.diff(residual) ** 2) / 0.9099)), coloured), lengths)
 
 
+def _recordings(balance: Balance, residual: Array) -> dict[str, _Told]:
+    """What each recording that is long enough tells, by trial, of a residual (n,)."""
+    parts = np.split(_beside_replicates(balance, residual), np.cumsum([m.sum() for m in balance.masks])[:-1])
+    return {
+        s.trial: _Told.of(s.time_s[m], r)
+        for s, m, r in zip(balance.states, balance.masks, parts, strict=True)
+        if len(r) > FEWEST
+    }
+
+
+def _least(told: Collection[_Told]) -> float:
+    """Log likelihood ratio that a window must have: more than chance has, and than any that stands out the other way."""
+    other_way = max((_best_window(-t.residual, t.sigma, t.lengths)[0] for t in told), default=0.0)
+    return max(LEAST, BEYOND * other_way)
+
+
 def _beside_replicates(balance: Balance, residual: Array) -> Array:
     """Residual (n,) minus the median over the strokes that pass the same place in the same direction."""
     position, velocity = balance.gather(lambda s: s.position), balance.gather(lambda s: s.velocity)
@@ -129,16 +124,22 @@ def _beside_replicates(balance: Balance, residual: Array) -> Array:
 def _course(told: _Told, least: float) -> Array:
     """Smoothed residual (n,) within the excursions of one recording, zero elsewhere. least: log likelihood ratio of
     each."""
-    left = told.residual.copy()
-    inside = np.zeros(len(left), bool)
+    inside = np.zeros(len(told.residual), bool)
     smooth = np.maximum(local_quadratic(told.time_s, told.residual, SMOOTH_S)[0], 0.0)
+    for begin, end in _windows(told, least):
+        inside[begin:end] = _lasting(told.time_s, smooth, begin, end)
+    return np.where(_to_zero(inside, smooth, int(EDGE_S / float(np.median(np.diff(told.time_s))))), smooth, 0.0)
+
+
+def _windows(told: _Told, least: float) -> Iterator[tuple[int, int]]:
+    """Windows (begin, end) whose mean stands out by that log likelihood ratio, each without those before it."""
+    left = told.residual.copy()
     for _ in range(len(left)):
         gain, begin, end = _best_window(left, told.sigma, told.lengths)
         if gain < least or end - begin >= told.lengths[-1]:
-            break
-        inside[begin:end] = _lasting(told.time_s, smooth, begin, end)
+            return
+        yield begin, end
         left[begin:end] = 0.0
-    return np.where(_to_zero(inside, smooth, int(EDGE_S / float(np.median(np.diff(told.time_s))))), smooth, 0.0)
 
 
 def _lasting(time_s: Array, smooth: Array, begin: int, end: int) -> bool:

@@ -93,23 +93,19 @@ def dead_zone(states: tuple[DriveState, ...]) -> float:
 
 def beyond(states: tuple[DriveState, ...], zone: float) -> tuple[DriveState, ...]:
     """The states without the current where what the declared model expects is hardly outside a dead zone [raw]: to leave
-    out what reads low would leave in what reads high by chance. None where next to nothing of one way is left: then friction
-    is not told from a preload."""
+    out what reads low would leave in what reads high by chance. None where next to nothing of one way is left: then
+    friction is not told from a preload."""
     declared = np.concatenate([s.declared for s in states])
     effort = np.concatenate([s.effort for s in states])
     read = np.abs(effort) >= zone
     beta = coefficients(declared[read], effort[read])
     noise = 1.4826 * float(np.median(np.abs(effort[read] - declared[read] @ beta)))
-    least = zone + CLEAR * noise
-
-    def read_at(s: DriveState) -> NDArray[np.bool_]:
-        return (np.abs(s.declared @ beta) >= least) & (np.abs(s.effort) >= zone)
-
-    way = np.concatenate([np.sign(s.velocity[np.isfinite(s.effort)]) for s in states])
-    left = np.concatenate([read_at(s)[np.isfinite(s.effort)] for s in states])
-    if min(float(np.mean(left[way == w])) if np.any(way == w) else 0.0 for w in (-1, 1)) < ONE_WAY:
+    read &= np.abs(declared @ beta) >= zone + CLEAR * noise
+    way = np.where(np.isfinite(effort), np.sign(np.concatenate([s.velocity for s in states])), 0)
+    if min(float(np.mean(read[way == w])) if np.any(way == w) else 0.0 for w in (-1, 1)) < ONE_WAY:
         return ()
-    return tuple(replace(s, effort=np.where(read_at(s), s.effort, np.nan)) for s in states)
+    parts = np.split(np.where(read, effort, np.nan), np.cumsum([len(s.effort) for s in states])[:-1])
+    return tuple(replace(s, effort=part) for s, part in zip(states, parts, strict=True))
 
 
 def _level(states: tuple[DriveState, ...]) -> bool:

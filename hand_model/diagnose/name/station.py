@@ -26,7 +26,7 @@ UNREST = 0.3  # of the noise: wander that every machine is granted; more is no e
 KEPT_OUT, EXPLAINED_MOST = 1.05, 2 / 3
 CHANCE = 2.0  # standard errors
 IDLE = 0.02  # of what an effect does where it does most: less is nothing
-BEFORE = 5  # samples
+BEFORE = 5  # samples, before and after which an effect shows what it does, for states are smooth
 ELSEWHERE = 0.2  # of what a small effect does (squared), at least, where the large ones do nothing
 SAME_PERIOD = 0.02  # by which a harmonic's may differ
 PATCHES = 2  # periods beside the first that are none of its harmonics: more than a second gear
@@ -285,7 +285,6 @@ class Station:
         for term in terms:
             added = np.abs(fit.prediction - balance.removed(fit, fit.terms.index(term)))
             idle &= added < IDLE * added.max()
-        # states are smooth: what begins is seen a few samples before
         idle = np.convolve(idle, np.ones(2 * BEFORE + 1), mode="same") >= 2 * BEFORE + 1
         if not (idle & balance.train).any():
             return ()

@@ -136,8 +136,8 @@ def started(hand: Hand, state: DriveState) -> Hand:
 
 
 def _read(motor: CompiledMotor, effort: Array, state: DriveState) -> Array:
-    """The effort (n,) along a motion through the sensor of the motor's current: its delay against the encoder's, what its channel
-    does, its cutoff."""
+    """The effort (n,) along a motion through the sensor of the motor's current: its delay against the encoder's, what
+    its channel does, its cutoff."""
     sensors = {s.get("name"): s for s in motor.root.iterfind("sensor/*")}
     current, encoder = (sensors.get(f"{motor.actuator}_{kind}") for kind in ("current", "encoder"))
     time_s = state.time_s
