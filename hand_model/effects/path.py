@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import lru_cache
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,12 +69,7 @@ def _strokes(position: bytes, threshold: float | None) -> tuple[tuple[int, int, 
 
 def travelled(position: Array, threshold: float | None = None) -> Array:
     """Distance (n,) since the last reversal [position unit], never falling within a stroke."""
-    x = np.asarray(position, float)
-    out = np.zeros(len(x))
-    for a, b, d in strokes(x, threshold):
-        if d:
-            out[a:b] = np.maximum.accumulate(np.maximum((x[a:b] - x[a]) * d, 0.0))
-    return out
+    return _ways(np.asarray(position, float).tobytes(), threshold)[0].copy()
 
 
 def runs(flag: NDArray[np.bool_]) -> list[tuple[int, int]]:
@@ -101,21 +97,36 @@ def jenkins(position: Array, length: float, start: float = 0.0, threshold: float
     """Jenkins element state (n,) in [-1, 1]: an elastic element of reach `length` [position unit] that yields (stop
     operator)."""
     reach = max(length, 1e-12)
-    return _along_strokes(position, lambda z, d, path: np.clip(z + d * path / reach, -1, 1), start, threshold)
+    return _along_strokes(
+        position, lambda z, d, path: np.minimum(np.maximum(z + d * path / reach, -1.0), 1.0), start, threshold
+    )
 
 
 def _along_strokes(
-    position: Array, law: Callable[[float, float, Array], Array], start: float, threshold: float | None
+    position: Array, law: Callable[[Any, Any, Any], Any], start: float, threshold: float | None
 ) -> Array:
     """A state (n,) that goes on from stroke to stroke and holds at rest; law: of the state at a stroke's begin, its
-    direction and the way since then (k,)."""
-    x = np.asarray(position, float)
-    out = np.empty(len(x))
-    z = start
-    for a, b, d in strokes(x, threshold):
-        out[a:b] = law(z, d, np.maximum.accumulate(np.maximum((x[a:b] - x[a]) * d, 0.0))) if d else z
-        z = out[b - 1]
-    return out
+    direction and the way since then, of numbers or of arrays."""
+    way, direction, stroke, lasts = _ways(np.asarray(position, float).tobytes(), threshold)
+    begins, z = np.empty(len(lasts)), start
+    for k, (end, d) in enumerate(lasts):
+        begins[k] = z
+        z = law(z, d, end) if d else z
+    return np.where(direction != 0, law(begins[stroke], direction, way), begins[stroke])
+
+
+@lru_cache(256)
+def _ways(
+    position: bytes, threshold: float | None
+) -> tuple[Array, Array, NDArray[np.int64], tuple[tuple[float, int], ...]]:
+    """Of every sample the way since its stroke began, the stroke's direction and number; of every stroke its way and
+    direction."""
+    x, every = np.frombuffer(position), _strokes(position, threshold)
+    way, direction, stroke = np.zeros(len(x)), np.zeros(len(x)), np.zeros(len(x), int)
+    for k, (a, b, d) in enumerate(every):
+        way[a:b] = np.maximum.accumulate(np.maximum((x[a:b] - x[a]) * d, 0.0)) if d else 0.0
+        direction[a:b], stroke[a:b] = d, k
+    return way, direction, stroke, tuple((float(way[b - 1]), d) for _, b, d in every)
 
 
 def lowpass(time_s: Array, values: Array, time_constant_s: float) -> Array:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...background import Pair
 from .candidates import Candidate
-from .problem import Problem, Term, extended, held_out, normal, training_error
+from .problem import Problem, Term, extended, held_out, normal, training_error, uncut
 from .refit import moves, refined, refit
 
 Array = NDArray[np.float64]
@@ -83,14 +83,14 @@ class Beside:
 def score(problem: Problem, terms: Sequence[Term], candidate: Candidate, parts: tuple) -> Score:
     """The candidate at the best of its starting shapes, by the training error, beside terms with these normal
     equations."""
-    best: tuple[float, Term, tuple] | None = None
-    for shape in candidate.grid:
-        term = Term(candidate, shape)
-        more = normal(problem, [*terms, term]) if candidate.delays else extended(problem, terms, term, parts)
-        train = training_error(problem, [*terms, term], more)
-        if best is None or train < best[0]:
-            best = train, term, more
-    return Score(best[1], held_out(problem, [*terms, best[1]], best[2]), best[2])
+    whole, sums = uncut(problem, parts)
+
+    def train(term: Term) -> float:
+        return training_error(whole, [*terms, term], extended(whole, terms, term, sums))
+
+    best = min((Term(candidate, shape) for shape in candidate.grid), key=train)
+    more = extended(problem, terms, best, parts)
+    return Score(best, held_out(problem, [*terms, best], more), more)
 
 
 def _at_best_start(state: _State, place: int) -> tuple[Shape, Array, tuple]:

@@ -126,7 +126,10 @@ def normal(problem: Problem, terms: Sequence[Term]) -> tuple[Array, Array, Array
 
 
 def extended(problem: Problem, terms: Sequence[Term], new: Term, parts: tuple) -> tuple:
-    """Normal equations with one more term, from those without it: only its own columns are multiplied out."""
+    """Normal equations with one more term, from those without it: only its own columns are multiplied out, where it
+    moves no others."""
+    if new.candidate.delays:
+        return normal(problem, [*terms, new])
     gram, moment, square, count = parts
     p, j = moment.shape[1], len(new.candidate.amplitudes)
     g, m = np.zeros((len(square), p + j, p + j)), np.zeros((len(square), p + j))
@@ -144,6 +147,13 @@ def extended(problem: Problem, terms: Sequence[Term], new: Term, parts: tuple) -
             g[b, p:, p:] += c[s].T @ c[s]
             m[b, p:] += c[s].T @ y[s]
     return g, m, square, count
+
+
+def uncut(problem: Problem, parts: tuple) -> tuple[Problem, tuple]:
+    """The problem in one block, and its normal equations from those by block: all that a training error asks for."""
+    one = np.zeros(1, int)
+    block = tuple(np.zeros_like(b) for b in problem.block)
+    return replace(problem, block=block, fold=one, group=one), tuple(p.sum(0, keepdims=True) for p in parts)
 
 
 def _moving_design(problem: Problem, row: Rows, terms: Sequence[Term]) -> Array:

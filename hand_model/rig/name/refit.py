@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...diagnose.name.term import DISCRETE
 from .candidates import Candidate
-from .problem import Problem, Term, extended, normal, training_error
+from .problem import Problem, Term, extended, normal, training_error, uncut
 
 Array = NDArray[np.float64]
 ROUNDS = 2  # of all terms in turn
@@ -61,10 +61,11 @@ def _error_beside(
 ) -> Callable[[Mapping[str, float]], float]:
     """Training error of the terms (with their normal equations) and one more, as a function of its shape."""
 
+    whole, sums = uncut(problem, parts)
+
     def train(shape: Mapping[str, float]) -> float:
         moved = Term(term.candidate, shape)
-        some = normal(problem, [*terms, moved]) if term.candidate.delays else extended(problem, terms, moved, parts)
-        return training_error(problem, [*terms, moved], some)
+        return training_error(whole, [*terms, moved], extended(whole, terms, moved, sums))
 
     return train
 
