@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -100,6 +101,19 @@ class Rows:
     declared: tuple[Column, ...] = ()
     still_columns: Array = field(default_factory=lambda: np.zeros((0, 0)))
     weight: Array = field(default_factory=lambda: np.zeros(0))
+
+    @cached_property
+    def used(self) -> NDArray[np.int64]:
+        """Which of the columns (P,) are not zero throughout: of a chain few parts move any one joint."""
+        return np.flatnonzero(np.any(self.full_columns != 0, axis=0))
+
+    @cached_property
+    def sums(self) -> tuple[Array, Array, float, int]:
+        """Of the moving samples: columns by columns (P, P), columns by effort (P,), effort squared, count."""
+        x, y = self.columns[self.moving][:, self.used], self.effort[self.moving]
+        gram, moment = np.zeros((self.columns.shape[1],) * 2), np.zeros(self.columns.shape[1])
+        gram[np.ix_(self.used, self.used)], moment[self.used] = x.T @ x, x.T @ y
+        return gram, moment, float(y @ y), len(y)
 
     def filtered(self, values: Array, delay_s: float = 0.0) -> Array:
         """Full-rate columns (n, ...), later by a delay, through the weight and filter of this balance, thinned to (m,

@@ -94,9 +94,8 @@ def fit_rows(
     gram, moment = np.zeros((p, p)), np.zeros(p)
     for row in rows:
         w = weight.get(row.trial, 1.0) / scale[row.joint] ** 2
-        x, y = row.columns[row.moving], row.effort[row.moving]
-        gram += w * x.T @ x
-        moment += w * x.T @ y
+        gram += w * row.sums[0]
+        moment += w * row.sums[1]
     low, high = bounds(columns)
     mean, stiff = prior(columns, anchored)
     return solve_bounded(gram, moment, low, high, mean, stiff)
@@ -311,7 +310,7 @@ def _robust_fit(columns: tuple[Column, ...], rows: tuple[Rows, ...], cutoff: flo
     theta = np.array([c.value for c in columns])
     for _ in range(12):
         theta = fit_rows(columns, train, scale, weight, anchored)
-        left = {(r.trial, r.joint): _rms((r.effort - r.columns @ theta)[r.moving]) for r in train}
+        left = {(r.trial, r.joint): _missed(r, theta) for r in train}
         for j in joints:
             scale[j] = max(float(np.median([left[r.trial, r.joint] for r in train if r.joint == j])), 1e-3 * size[j])
         weight = {
@@ -325,6 +324,12 @@ def _robust_fit(columns: tuple[Column, ...], rows: tuple[Rows, ...], cutoff: flo
     # of a joint that no training recording moves there is nothing to hold out
     fitted = tuple(r for r in rows if r.joint in scale)
     return DeclaredFit(columns, theta, scale, fitted, cutoff, quality, anchored=anchored)
+
+
+def _missed(row: Rows, theta: Array) -> float:
+    """What parameters (P,) leave of a row's moving samples, rms."""
+    gram, moment, square, count = row.sums
+    return float(np.sqrt(max(square - 2 * moment @ theta + theta @ gram @ theta, 0.0) / max(count, 1)))
 
 
 def _known(row: Rows, columns: Sequence[Column]) -> Array:

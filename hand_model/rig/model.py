@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from ..errors import DescriptionError, SessionError, did_you_mean
 from ..session import Session, Trial
 from ..session.check import check_interval
 from .complete import completed
+from .driven import driven_first
 from .glitches import glitches
 from .overrides import apply_overrides
 from .states import LEAST_SAMPLES
@@ -77,7 +79,7 @@ class RigTrial:
     joint -> (n,). extra: columns that no signal names. live: joints whose drive is connected (gear not zero). drives:
     joint -> its drive as this recording has it, the declared one where it is not connected. clipped:
     joint -> (n,) samples at which its effort stood on a limit of its reading; they are nan. dropped: column -> how many
-    of its readings no machine gave; they are nan.
+    of its readings no machine gave; they are nan. clock_s: what the recording's own clock [s] says at its begin.
     """
 
     name: str
@@ -94,6 +96,7 @@ class RigTrial:
     drives: Mapping[str, Drive] = field(default_factory=dict)
     clipped: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
     dropped: Mapping[str, int] = field(default_factory=dict)
+    clock_s: float = 0.0
 
     def tells(self, drive: Drive) -> bool:
         """Whether what a drive puts in is recorded, or what it is told, or it is not connected."""
@@ -142,6 +145,13 @@ class RigModel:
         """The drive of a joint, or None where it is passive."""
         return next((d for d in self.drives if d.joint == joint), None)
 
+    @property
+    def begun_s(self) -> Mapping[str, float]:
+        """When each trial began [s] since the first of them, where one clock runs on through all; else none."""
+        ordered = sorted(self.trials, key=lambda t: t.clock_s)
+        runs_on = all(b.clock_s >= a.clock_s + a.time_s[-1] for a, b in pairwise(ordered))
+        return {t.name: t.clock_s - ordered[0].clock_s for t in self.trials} if len(ordered) > 1 and runs_on else {}
+
     def untold(self) -> str:
         """What no training recording tells that a balance needs, "" where one tells all."""
         blind = [{j for j in self.joints if j not in t.position} for t in self.select(validate=False)]
@@ -174,6 +184,7 @@ def load_rig(session: Session, xml: bytes | None = None) -> RigModel:
         xml = completed(xml, session.rig.model.parent)
     except DescriptionError as error:
         raise DescriptionError(f"{session.rig.model}: {error}") from None
+    xml = driven_first(xml, mujoco.MjModel.from_xml_string(xml.decode()))
     model = mujoco.MjModel.from_xml_string(xml.decode())
     for j in range(model.njnt):
         if model.jnt_type[j] not in (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)):
@@ -360,4 +371,5 @@ def _map_trial(trial: Trial, quantity: Mapping[str, tuple], drives: tuple[Drive,
         live,
         acting,
         dropped={c: int(at.sum()) for c, at in wild.items()},
+        clock_s=float(log.time_s[0]),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from ..effects.path import jenkins
 from .balance import Column, Rows
 from .declared import DeclaredFit, _robust_fit
+from .dynamics import inertial_columns, inertial_parameters
 from .findings import CouplingResidual
 from .model import Coupling, RigModel, RigTrial
 from .name.candidates import Candidate
 from .name.problem import Term, design, pose, solution
+from .overrides import compile_model
 from .states import choose_cutoff, differentiate, fill_gaps, low_pass, uniform_time, velocity_noise
 
 Array = NDArray[np.float64]
@@ -77,6 +79,8 @@ def _rows(rig: RigModel, coupling: Coupling, columns: tuple[Column, ...], trial:
     rest = max(3 * velocity_noise(raw, rate, cutoff), 1e-3 * float(np.std(v)))
     out = low_pass(even(trial.position[coupling.dependent]), rate, cutoff)
     load = {f"effort:{j}": low_pass(even(e), rate, cutoff) for j, e in _loads(rig, trial).items()}
+    if coupling.dependent not in trial.effort and (carried := _carried(rig, coupling, trial, even, cutoff)) is not None:
+        load[f"effort:{coupling.dependent}"] = carried
     extra = {k: even(c) for k, c in trial.extra.items()} | load
     skip = max(1, int(rate / RATE_HZ))
     s = slice(None, None, skip)
@@ -116,6 +120,22 @@ def _loads(rig: RigModel, trial: RigTrial) -> dict[str, Array]:
     return {**asked, **trial.effort}
 
 
+def _carried(
+    rig: RigModel, coupling: Coupling, trial: RigTrial, even: Callable[[Array], Array], cutoff_hz: float
+) -> Array | None:
+    """What moves a dependent joint's bodies (n,) as they are declared: what goes through its coupling, where no effort is
+    recorded at the joint itself. None where another joint's angle is not recorded, or nothing hangs there."""
+    if any(j not in trial.position for j in rig.joints):
+        return None
+    model, time_s = compile_model(rig, trial), even(trial.time_s)
+    rate = (len(time_s) - 1) / (time_s[-1] - time_s[0])
+    q = np.stack([low_pass(even(trial.position[j]), rate, cutoff_hz) for j in rig.joints], 1)
+    v = differentiate(q, rate)
+    columns = inertial_columns(model, q, v, differentiate(v, rate), np.array(model.opt.gravity))
+    load = np.einsum("nbp,bp->n", columns[:, rig.joints.index(coupling.dependent)], inertial_parameters(model))
+    return load if np.ptp(load) > 0 else None
+
+
 def coupling_candidates(fit: DeclaredFit, coupling: Coupling) -> tuple[Candidate, ...]:
     """Lost motion (a play that is crossed at every reversal of the motion, or of a load) and stretch by each load."""
     joint = coupling.dependent
@@ -135,17 +155,13 @@ def coupling_candidates(fit: DeclaredFit, coupling: Coupling) -> tuple[Candidate
     ]
     for channel in sorted({k for r in train for k in r.extra if k.startswith("effort:")}):
         out += _by_load(joint, channel, train)
-    delays = tuple({"lag": k * 1.0} for k in (1.0,))
-    out.append(
-        Candidate(
-            "clock_drift",
-            "channels sampled apart",
-            joint,
-            (("lag", "s", *free),),
-            delays,
-            lambda r, s: r.velocity[:, None],
-        )
-    )
+    apart = (("lag", "s", *free),)
+    slope = np.polynomial.polynomial.polyder(coupling.polycoef)
+
+    def moved(row: Rows, _: Mapping[str, float]) -> Array:
+        return (row.velocity * np.polynomial.polynomial.polyval(row.position, slope))[:, None]
+
+    out.append(Candidate("clock_drift", "channels sampled apart", joint, apart, ({},), moved))
     return tuple(out)
 
 

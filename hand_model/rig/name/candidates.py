@@ -41,6 +41,7 @@ DELAYS = (0.125, 0.25, 0.5, 1, 2, 3, 5, 8)
 # of friction and the load that it is reckoned from: what one changes of the load, friction changes by a fraction of
 TURNS = 4
 SAME = 0.05  # of a column's variance
+WARMS, DRAG, DRY_AND_DRAG = "thermal_friction_drift", "viscous", "dry and viscous"
 UNDECLARED = "no spring is declared"
 BY_LEVEL = "a level for each that trials declare"
 REACHES = tuple(np.geomspace(0.004, 0.5, 8))  # of the range, over which friction turns round
@@ -99,6 +100,11 @@ def drive_state(rig: RigModel, row: Rows, theta: Array) -> DriveState:
     extra: dict[str, Array] = {"load": row.load(theta)}
     for channel, values in row.extra.items():
         extra[channel.split(":")[0] if channel == f"setpoint:{row.joint}" else channel] = values
+    begun = rig.begun_s
+    if row.trial in begun:
+        extra["elapsed"] = begun[row.trial] + row.time_s - row.time_s[0]
+    if (logged := _temperature(rig, row)) is not None:
+        extra["temperature"] = row.extra[logged]
     declared = np.stack([row.acceleration, row.velocity, row.direction], 1)
     effort = np.where(np.abs(row.velocity) > row.rest_speed, row.extra["effort"], np.nan)  # at rest friction is unknown
     return DriveState(
@@ -118,6 +124,15 @@ def drive_state(rig: RigModel, row: Rows, theta: Array) -> DriveState:
     )
 
 
+def _temperature(rig: RigModel, row: Rows) -> str | None:
+    """The extra channel that says how warm a joint or its drive is, or the only one that tells a temperature; None where
+    there is none."""
+    drive = rig.drive(row.joint)
+    told = [c for c in row.extra if "temp" in c.lower() and ":" not in c]
+    own = [c for c in told if row.joint in c or (drive is not None and drive.name in c)]
+    return next(iter(own or (told if len(told) == 1 else ())), None)
+
+
 def candidates(rig: RigModel, fit: DeclaredFit, joint: str, every: bool = False) -> tuple[Candidate, ...]:
     """All candidates at one joint, from the catalogue and from the rig itself; every: also those that its recordings
     could not tell from what is declared, as a file may name them."""
@@ -132,6 +147,7 @@ def candidates(rig: RigModel, fit: DeclaredFit, joint: str, every: bool = False)
         found += [_with_line(c) for c in bends]
     elif not _is_declared([r.filtered(r.position) for r in rows], rows):
         found = [c for c in found if c not in bends] + [_with_line(c) for c in bends]
+    found += [_warming(c, variant) for c in found if c.effect == WARMS for variant in (DRAG, DRY_AND_DRAG)]
     found += [*_own(rig, fit, joint, rows), *_turning_round(rig, fit, joint, train, states, rows)]
     return tuple(c for c in found if c.grid)
 
@@ -153,6 +169,20 @@ def _from_catalogue(
         lambda row, shape: np.asarray(found.columns(states[row.trial], shape), float),
         bool(found.warps),
         {s.name: s for s in found.shapes(train)},
+    )
+
+
+def _warming(dry: Candidate, variant: str) -> Candidate:
+    """Friction of a lubricant that thins as it warms: its viscous part alone, or with its dry part."""
+    drag = ("cold_viscous", "effort/velocity", -np.inf, np.inf)
+
+    def columns(row: Rows, shape: Mapping[str, float]) -> Array:
+        rubbing = dry.columns(row, shape)
+        dragged = rubbing * np.abs(row.velocity)[:, None]
+        return dragged if variant == DRAG else np.column_stack([rubbing, dragged])
+
+    return replace(
+        dry, variant=variant, amplitudes=(drag,) if variant == DRAG else (*dry.amplitudes, drag), columns=columns
     )
 
 

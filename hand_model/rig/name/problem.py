@@ -85,7 +85,10 @@ def term_columns(row: Rows, term: Term, delay_s: float = 0.0) -> Array:
 def design(row: Rows, terms: Sequence[Term]) -> Array:
     """Declared columns and those of the terms (m, P + J), each delayed where a term says so."""
     delay = delay_of(row, terms)
-    declared = row.filtered(row.full_columns, delay) if delay else row.columns
+    declared = row.columns
+    if delay:
+        declared = np.zeros(row.columns.shape)
+        declared[:, row.used] = row.filtered(row.full_columns[:, row.used], delay)
     return np.concatenate([declared, *(term_columns(row, t, delay) for t in terms)], 1)
 
 
@@ -110,16 +113,13 @@ def limits(problem: Problem, terms: Sequence[Term]) -> tuple[Array, Array, Array
 
 def normal(problem: Problem, terms: Sequence[Term]) -> tuple[Array, Array, Array, Array]:
     """Normal equations by block: gram (B, P, P), moment (B, P), square (B,), count (B,)."""
-    count, parts = len(problem.fold), None
+    count, width = len(problem.fold), len(problem.fit.columns) + sum(len(t.candidate.amplitudes) for t in terms)
+    parts = np.zeros((count, width, width)), np.zeros((count, width)), np.zeros(count), np.zeros(count)
     for row, block in zip(problem.rows, problem.block, strict=True):
-        x = design(row, terms)[row.moving] / problem.fit.scale[row.joint]
-        y = row.effort[row.moving] / problem.fit.scale[row.joint]
-        if parts is None:
-            p = x.shape[1]
-            parts = np.zeros((count, p, p)), np.zeros((count, p)), np.zeros(count), np.zeros(count)
+        x, y, used = _moving_design(problem, row, terms)
         for b, s in _pieces(block[row.moving]):
-            parts[0][b] += x[s].T @ x[s]
-            parts[1][b] += x[s].T @ y[s]
+            parts[0][np.ix_([b], used, used)] += x[s].T @ x[s]
+            parts[1][b, used] += x[s].T @ y[s]
             parts[2][b] += y[s] @ y[s]
             parts[3][b] += len(y[s])
     return parts
@@ -137,13 +137,12 @@ def extended(problem: Problem, terms: Sequence[Term], new: Term, parts: tuple) -
     for row, block in zip(problem.rows, problem.block, strict=True):
         if row.joint != new.candidate.joint:
             continue
-        scale = problem.fit.scale[row.joint]
-        x, y = _moving_design(problem, row, terms), row.effort[row.moving] / scale
-        c = term_columns(row, new, delay_of(row, terms))[row.moving] / scale
+        x, y, used = _moving_design(problem, row, terms)
+        c = term_columns(row, new, delay_of(row, terms))[row.moving] / problem.fit.scale[row.joint]
         for b, s in _pieces(block[row.moving]):
             cross = x[s].T @ c[s]
-            g[b, :p, p:] += cross
-            g[b, p:, :p] += cross.T
+            g[b, used, p:] += cross
+            g[b, p:, used] += cross
             g[b, p:, p:] += c[s].T @ c[s]
             m[b, p:] += c[s].T @ y[s]
     return g, m, square, count
@@ -156,16 +155,18 @@ def uncut(problem: Problem, parts: tuple) -> tuple[Problem, tuple]:
     return replace(problem, block=block, fold=one, group=one), tuple(p.sum(0, keepdims=True) for p in parts)
 
 
-def _moving_design(problem: Problem, row: Rows, terms: Sequence[Term]) -> Array:
-    """The scaled design of a row's moving samples, kept with the problem."""
+def _moving_design(problem: Problem, row: Rows, terms: Sequence[Term]) -> tuple[Array, Array, NDArray[np.int64]]:
+    """The scaled design (m, k) and effort (m,) of a row's moving samples, and which of all columns (k,) these are: those
+    that are not zero throughout. Kept with the problem, unless a delay makes them anew for every shape."""
     key = (row.trial, row.joint, tuple((id(t.candidate), *t.shape.items()) for t in terms))
     if key not in problem.designs:
         if len(problem.designs) > MOST_DESIGNS:
             problem.designs.clear()
-        problem.designs[key] = (
-            [t.candidate for t in terms],
-            design(row, terms)[row.moving] / problem.fit.scale[row.joint],
-        )
+        scale, width = problem.fit.scale[row.joint], row.columns.shape[1]
+        every = design(row, terms)
+        used = np.append(row.used, np.arange(width, every.shape[1]))
+        x = np.ascontiguousarray(every[:, used][row.moving]) / scale
+        problem.designs[key] = [t.candidate for t in terms], (x, row.effort[row.moving] / scale, used)
     return problem.designs[key][1]
 
 
