@@ -165,7 +165,7 @@ def _acting(
 
 def _rebuilt(rig: RigModel, fit: DeclaredFit, record: Mapping[str, Any]) -> Candidate:
     """The candidate that a record of the file names, at the loads of the file's parameters."""
-    for c in candidates(rig, fit, record["joint"], every=True):
-        if (c.effect, c.variant) == (record["effect"], record["variant"]):
+    for c in candidates(rig, fit, record["joint"], every=True, only={record["effect"]}):
+        if c.variant == record["variant"]:
             return c
     raise DescriptionError(f'custom/text "hand_model": no effect "{record["effect"]}" at joint "{record["joint"]}"')

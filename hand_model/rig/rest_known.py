@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 # as all others leave
 MOST = 3.0
 LEAST_SAMPLES = 20  # of a filtered balance, on both sides
+LEAST_REST = 0.05  # of the samples: rests that are fewer say nothing that motion does not
 
 
 def known_at_rest(fit: DeclaredFit, terms: Sequence[Term], theta: Array) -> tuple[str, ...]:
@@ -29,7 +30,8 @@ def known_at_rest(fit: DeclaredFit, terms: Sequence[Term], theta: Array) -> tupl
     for joint in dict.fromkeys(r.joint for r in fit.rows):
         sides = [_apart(r, _left(at, r, terms)) for r in at.rows if r.joint == joint and len(r.weight)]
         still, moving = (np.concatenate([s[k] for s in sides]) if sides else np.zeros(0) for k in (0, 1))
-        if min(len(still), len(moving)) >= LEAST_SAMPLES and np.mean(still**2) <= MOST**2 * np.mean(moving**2):
+        least = max(LEAST_SAMPLES, LEAST_REST * (len(still) + len(moving)))
+        if min(len(still), len(moving)) >= least and np.mean(still**2) <= MOST**2 * np.mean(moving**2):
             known.append(joint)
     return tuple(known)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -31,6 +31,7 @@ NOT_FOR_RIGS = frozenset(
         "load_dependent_friction",
     }
 )
+TURN_ROUND = frozenset({"elastoplastic_hysteresis", "load_dependent_friction", "stribeck_friction"})
 SMOOTH = ("nonlinear_spring",)  # its knee belongs to fingers with a return spring; a joint has stops and detents
 # what it damps at one end of a range is hardly told there from friction that differs by speed and way
 UNDAMPED = ("end_stop_contact",)
@@ -133,23 +134,30 @@ def _temperature(rig: RigModel, row: Rows) -> str | None:
     return next(iter(own or (told if len(told) == 1 else ())), None)
 
 
-def candidates(rig: RigModel, fit: DeclaredFit, joint: str, every: bool = False) -> tuple[Candidate, ...]:
+def candidates(
+    rig: RigModel, fit: DeclaredFit, joint: str, every: bool = False, only: Collection[str] | None = None
+) -> tuple[Candidate, ...]:
     """All candidates at one joint, from the catalogue and from the rig itself; every: also those that its recordings
-    could not tell from what is declared, as a file may name them."""
+    could not tell from what is declared, as a file may name them; only: names of effects, where others are not
+    asked for."""
     rows = [r for r in fit.rows if r.joint == joint and not r.validate]
     if not rows:
         return ()
     states = {r.trial: drive_state(rig, r, fit.theta) for r in fit.rows if r.joint == joint}
     train = tuple(states[r.trial] for r in rows)
-    found = [_from_catalogue(e, joint, train, states) for e in catalogue("drive") if _usable(e)]
+    asked = [e for e in catalogue("drive") if _usable(e) and (only is None or e.name in only)]
+    found = [_from_catalogue(e, joint, train, states) for e in asked]
     bends = [c for c in found if c.effect in SMOOTH]
     if every:
         found += [_with_line(c) for c in bends]
-    elif not _is_declared([r.filtered(r.position) for r in rows], rows):
+    elif bends and not _is_declared([r.filtered(r.position) for r in rows], rows):
         found = [c for c in found if c not in bends] + [_with_line(c) for c in bends]
     found += [_warming(c, variant) for c in found if c.effect == WARMS for variant in (DRAG, DRY_AND_DRAG)]
-    found += [*_own(rig, fit, joint, rows), *_turning_round(rig, fit, joint, train, states, rows)]
-    return tuple(c for c in found if c.grid)
+    if only is None or not NOT_FOR_RIGS.isdisjoint(only):
+        found += _own(rig, fit, joint, rows)
+    if only is None or not TURN_ROUND.isdisjoint(only):
+        found += _turning_round(rig, fit, joint, train, states, rows)
+    return tuple(c for c in found if c.grid and (only is None or c.effect in only))
 
 
 def _usable(found: Any) -> bool:

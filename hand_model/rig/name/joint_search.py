@@ -35,7 +35,7 @@ def offsets_of_chain(rig: RigModel, fit: DeclaredFit, joints: Sequence[str]) -> 
     """Of every joint, a constant offset of its effort where it wins a round among those of all joints, all declared
     parameters of the chain free beside them: a weight off its axis is shared by joints, and what it does at one posture
     an offset does, too."""
-    offsets = [c for j in joints for c in candidates(rig, fit, j) if c.effect == "asymmetric_friction"]
+    offsets = [c for j in joints for c in candidates(rig, fit, j, only={"asymmetric_friction"})]
     taken, steps, _ = compete(pose(fit), offsets, most=len(joints))
     won = {t.candidate.joint: _won(s, t) for t, s in zip(taken, steps, strict=True)}
     return {joint: won.get(joint) for joint in joints}

@@ -116,11 +116,11 @@ def normal(problem: Problem, terms: Sequence[Term]) -> tuple[Array, Array, Array
     count, width = len(problem.fold), len(problem.fit.columns) + sum(len(t.candidate.amplitudes) for t in terms)
     parts = np.zeros((count, width, width)), np.zeros((count, width)), np.zeros(count), np.zeros(count)
     for row, block in zip(problem.rows, problem.block, strict=True):
-        x, y, used = _moving_design(problem, row, terms)
+        (x, y, used), unit = _moving_design(problem, row, terms), problem.fit.scale[row.joint] ** 2
         for b, s in _pieces(block[row.moving]):
-            parts[0][np.ix_([b], used, used)] += x[s].T @ x[s]
-            parts[1][b, used] += x[s].T @ y[s]
-            parts[2][b] += y[s] @ y[s]
+            parts[0][np.ix_([b], used, used)] += x[s].T @ x[s] / unit
+            parts[1][b, used] += x[s].T @ y[s] / unit
+            parts[2][b] += y[s] @ y[s] / unit
             parts[3][b] += len(y[s])
     return parts
 
@@ -137,14 +137,14 @@ def extended(problem: Problem, terms: Sequence[Term], new: Term, parts: tuple) -
     for row, block in zip(problem.rows, problem.block, strict=True):
         if row.joint != new.candidate.joint:
             continue
-        x, y, used = _moving_design(problem, row, terms)
-        c = term_columns(row, new, delay_of(row, terms))[row.moving] / problem.fit.scale[row.joint]
+        (x, y, used), unit = _moving_design(problem, row, terms), problem.fit.scale[row.joint] ** 2
+        c = term_columns(row, new, delay_of(row, terms))[row.moving]
         for b, s in _pieces(block[row.moving]):
-            cross = x[s].T @ c[s]
+            cross = x[s].T @ c[s] / unit
             g[b, used, p:] += cross
             g[b, p:, used] += cross
-            g[b, p:, p:] += c[s].T @ c[s]
-            m[b, p:] += c[s].T @ y[s]
+            g[b, p:, p:] += c[s].T @ c[s] / unit
+            m[b, p:] += c[s].T @ y[s] / unit
     return g, m, square, count
 
 
@@ -156,17 +156,16 @@ def uncut(problem: Problem, parts: tuple) -> tuple[Problem, tuple]:
 
 
 def _moving_design(problem: Problem, row: Rows, terms: Sequence[Term]) -> tuple[Array, Array, NDArray[np.int64]]:
-    """The scaled design (m, k) and effort (m,) of a row's moving samples, and which of all columns (k,) these are: those
-    that are not zero throughout. Kept with the problem, unless a delay makes them anew for every shape."""
+    """The design (m, k) and effort (m,) of a row's moving samples, and which of all columns (k,) these are: those that
+    are not zero throughout. Kept with the problem."""
     key = (row.trial, row.joint, tuple((id(t.candidate), *t.shape.items()) for t in terms))
     if key not in problem.designs:
         if len(problem.designs) > MOST_DESIGNS:
             problem.designs.clear()
-        scale, width = problem.fit.scale[row.joint], row.columns.shape[1]
         every = design(row, terms)
-        used = np.append(row.used, np.arange(width, every.shape[1]))
-        x = np.ascontiguousarray(every[:, used][row.moving]) / scale
-        problem.designs[key] = [t.candidate for t in terms], (x, row.effort[row.moving] / scale, used)
+        used = np.append(row.used, np.arange(row.columns.shape[1], every.shape[1]))
+        x = np.ascontiguousarray(every[:, used][row.moving])
+        problem.designs[key] = [t.candidate for t in terms], (x, row.effort[row.moving], used)
     return problem.designs[key][1]
 
 
@@ -205,8 +204,10 @@ def rescaled(problem: Problem, terms: Sequence[Term]) -> Problem:
     known the recordings would say less than what was declared, and other joints would have to make up for it."""
     box, sums = limits(problem, terms), []
     for row in problem.rows:
-        x, y = design(row, terms)[row.moving], row.effort[row.moving]
-        sums.append((row.joint, x.T @ x, x.T @ y, float(y @ y), len(y)))
+        x, y, used = _moving_design(problem, row, terms)
+        gram, moment = np.zeros((len(box[0]),) * 2), np.zeros(len(box[0]))
+        gram[np.ix_(used, used)], moment[used] = x.T @ x, x.T @ y
+        sums.append((row.joint, gram, moment, float(y @ y), len(y)))
     scale = dict(problem.fit.scale)
     for _ in range(MOST_WEIGHINGS):
         gram, moment = (sum(s[k] / scale[s[0]] ** 2 for s in sums) for k in (1, 2))
@@ -219,7 +220,7 @@ def rescaled(problem: Problem, terms: Sequence[Term]) -> Problem:
             scale[joint] = max(float(np.sqrt(np.median(squares))), LEAST_SCALE * problem.fit.scale[joint])
         if all(abs(scale[j] - last[j]) < 0.01 * last[j] for j in left):
             break
-    return replace(problem, fit=replace(problem.fit, scale=scale), designs={})
+    return replace(problem, fit=replace(problem.fit, scale=scale))
 
 
 def solution(problem: Problem, terms: Sequence[Term]) -> Array:

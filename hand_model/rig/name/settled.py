@@ -23,8 +23,11 @@ def settled(rig: RigModel, fit: DeclaredFit, terms: Sequence[Term]) -> tuple[lis
     theta = solution(problem, terms)
     for _ in range(TURNS if any(t.candidate.effect == "load_dependent_friction" for t in terms) else 0):
         at = at_loads(fit, terms, theta)
-        known = {j: {c.key: c for c in candidates(rig, at, j)} for j in {t.candidate.joint for t in terms}}
-        terms = [replace(t, candidate=known[t.candidate.joint][t.candidate.key]) for t in terms]
+        named = {
+            j: {t.candidate.effect for t in terms if t.candidate.joint == j} for j in {t.candidate.joint for t in terms}
+        }
+        known = {c.key: c for j, effects in named.items() for c in candidates(rig, at, j, only=effects)}
+        terms = [replace(t, candidate=known[t.candidate.key]) for t in terms]
         theta = solution(problem, terms)
     return terms, theta, at
 
