@@ -26,6 +26,7 @@ from .locate.decoupled import beside_excursions
 from .locate.markers import HINGE, MarkerNaming, corrected_angles, name_markers, tilt
 from .locate.slips import marker_findings, steps, with_steps
 from .locate.slips import unexplained as unexplained_of
+from .locate.turned import turned_finding, turned_support
 from .name.judgement import judged
 from .name.station import Station
 from .prove.markers import OWN, marker_fit, of_chain
@@ -129,10 +130,16 @@ def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, f
     if states:
         effects = [*catalogue("encoder"), *outsiders("encoder")]
         stations.append(judged("encoder", finger.name, finger.actuator, finger.segments[0].name, states, effects))
+    turns: list[tuple[float, Finding]] = []
     parted = any(f.term.effect.signal == "log" for s in stations for f in s.outsiders)
     for joint in range(1, len(finger.segments)):
         expected = expected_angles(stations[0].naming) if stations and joint == 1 else {}
-        states = linkage_states(angles, joint, moments, expected, not parted and finger.actuator in counts)
+        logged = not parted and finger.actuator in counts
+        states = linkage_states(angles, joint, moments, expected, logged)
+        turned = turned_support(states, stations[0].naming.balance.states if stations and joint == 1 else ())
+        if turned is not None:
+            turns.append(turned_finding(turned, states, finger.name, finger.segments[joint].name))
+            states = linkage_states(angles, joint, [*moments, *turned.steps], expected, logged)
         if states and joint == 1 and stations and _leaves(stations[0]):
             states = beside_excursions(states, stations[0].naming.balance.states)
         if states:
@@ -149,7 +156,7 @@ def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, f
         finger.name,
         seen,
         tuple(stations),
-        found,
+        (*found, *turns),
         tuple(unexplained_of(seen, markers)),
         (),
         tuple(lines),

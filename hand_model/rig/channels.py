@@ -32,6 +32,7 @@ BOTH_WAYS = 0.1  # of the way that a joint goes to one side: as much to the othe
 LEAST_PERIODS = 2.0
 UNBEGUN = 0.02  # of a recording, at its begin, in which its controller need not run yet
 LEAST_TURNS = 4  # changes of sign that must be seen before a channel is said to have none
+LATEST = 2  # samples by which a copy may come late
 APART = 0.1  # of SAME: a copy in few recordings among others that are none is plainly one
 
 
@@ -102,9 +103,10 @@ def _looks(trial: RigTrial, joint: str, values: Array, measured: bool) -> list[t
     if share < SAME:
         out.append(("command_as_measurement", share, "is a static function of the position"))
     for name, other in trial.extra.items():
-        share = copy_left(values, fill_gaps(trial.time_s, other))
+        share, late = copied(values, fill_gaps(trial.time_s, other))
         if share < SAME:
-            out.append(("command_as_measurement", share, f'{REPEATS} "{name}"'))
+            when = f", {late} sample{'s' if late > 1 else ''} late" if late else ""
+            out.append(("command_as_measurement", share, f'{REPEATS} "{name}"{when}'))
     return out
 
 
@@ -216,6 +218,12 @@ def static_left(trial: RigTrial, joint: str, values: Array) -> float:
     scale = np.abs(x).max(0) + 1e-300
     left = values - (x / scale) @ np.linalg.lstsq(x / scale, values, rcond=1e-10)[0]
     return _share(left, values)
+
+
+def copied(values: Array, other: Array) -> tuple[float, int]:
+    """Share that a gain and an offset of another channel leave where it is read as many samples earlier as suits best,
+    and how many: a log may write down what was asked for a step ago."""
+    return min((copy_left(values[k:], other[: len(other) - k]), k) for k in range(LATEST + 1))
 
 
 def copy_left(values: Array, other: Array) -> float:

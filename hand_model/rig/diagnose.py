@@ -20,7 +20,7 @@ from .channels import ChannelIssue, check_balance, check_channels
 from .clipping import unclipped
 from .couplings import coupling_terms, with_couplings
 from .declared import DeclaredFit, fit_declared
-from .findings import NOT_TAKEN, CouplingResidual, Finding, RigFindings, measured, whereabouts
+from .findings import NOT_TAKEN, CouplingResidual, Finding, RigFindings, measured, whereabouts, within_a_sample
 from .horizon import open_loop
 from .model import RigModel, load_rig
 from .name.beside import Score, score
@@ -96,6 +96,7 @@ def diagnose_rig(
         angles += [residual] if residual is not None else []
         rejected = [*rejected, *said]
         say(f"{rig.name}: coupling {coupling.name}")
+    found, within = within_a_sample(found, 1.0 / _rate(rig))
     lack = dict(lack)
     declared = lack.pop("declared", {c.label: float(t) for c, t in zip(fit.columns, fit.theta, strict=True)})
     unexplained = _unexplained(lack, found)
@@ -124,7 +125,7 @@ def diagnose_rig(
         xml=xml,
         declared_xml=declared_xml,
         couplings=tuple(angles),
-        notes=(*rig.notes, *_silence(rig, fit, found), *_unproved(rig), *_lost(lack)),
+        notes=(*rig.notes, *_silence(rig, fit, found), *_unproved(rig), *_lost(lack), *within),
     )
     if output is not None:
         findings.write(output, model)

@@ -16,6 +16,7 @@ from .model import Drive, RigModel
 
 __all__ = ["CouplingResidual", "Finding", "Findings", "RigFindings"]
 Array = NDArray[np.float64]
+WITHIN = 0.5  # of a sample
 NOT_TAKEN = "error on training recordings left out of the fit does not fall enough"
 NOT_TOLD = "interval of its size holds zero"
 NOT_BORNE_OUT = "error on validation recordings does not fall enough"
@@ -36,6 +37,19 @@ def whereabouts(
         "region": None,
         "share_of_mismatch": share,
     }
+
+
+def within_a_sample(found: Sequence[Finding], sample_s: float) -> tuple[list[Finding], tuple[str, ...]]:
+    """Findings without delays of less than half a sample [s], and what is said of those: it is how a log is read, which
+    holds what was at some instant between two."""
+    told = {id(f): f.parameters["delay"]["value"] for f in found if "delay" in f.parameters}
+    short = [f for f in found if abs(told.get(id(f), sample_s)) < WITHIN * sample_s]
+    notes = tuple(
+        f"{f.where['joint']}: efforts and angles are read {1e3 * told[id(f)]:.2g} ms apart, less than half a sample: it is "
+        "taken into account, and no effect"
+        for f in short
+    )
+    return [f for f in found if all(f is not other for other in short)], notes
 
 
 def measured(rig: RigModel, proof: Mapping[str, Any]) -> list[str]:

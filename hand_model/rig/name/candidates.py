@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...effects import DriveState, catalogue, effect
 from ...effects.base import Shape
+from ...effects.thermal_friction_drift import TOLD
 from ..balance import Rows
 from ..declared import DeclaredFit
 from ..laws import GEAR, GEAR_LOW, GEAR_MORE, LINE, LOW, MORE, MOTOR, MOTOR_LOW, MOTOR_MORE, TURNING
@@ -69,7 +70,13 @@ class Candidate:
 
     def told(self, shape: Mapping[str, float]) -> dict[str, float]:
         """What of a shape says something in its form."""
-        return {k: float(v) for k, v in shape.items() if k not in self.shapes or self.shapes[k].matters(shape)}
+        told = TOLD[shape["form"]] if self.effect == WARMS else ()
+        silent = {name for names in TOLD.values() for name in names if name not in told} if told else set()
+        return {
+            k: float(v)
+            for k, v in shape.items()
+            if k not in silent and (k not in self.shapes or self.shapes[k].matters(shape))
+        }
 
     @property
     def repeats(self) -> bool:
@@ -182,7 +189,7 @@ def _from_catalogue(
 
 def _warming(dry: Candidate, variant: str) -> Candidate:
     """Friction of a lubricant that thins as it warms: its viscous part alone, or with its dry part."""
-    drag = ("cold_viscous", "effort/velocity", -np.inf, np.inf)
+    drag = ("cold_viscous", "effort s/position", -np.inf, np.inf)
 
     def columns(row: Rows, shape: Mapping[str, float]) -> Array:
         rubbing = dry.columns(row, shape)

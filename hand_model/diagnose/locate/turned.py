@@ -1,0 +1,225 @@
+"""A support that turned about its joint's own axis: markers alone cannot tell it from motion, the joint before it can."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...effects.base import DriveState
+from ...effects.path import strokes
+from ..findings import Finding, weighed
+from .angles import Step
+
+Array = NDArray[np.float64]
+
+BEYOND_CHANCE = 12.0  # log likelihood that a step must bring over none: for its size, and the moments that are tried
+PLAINER = 3.0  # that it must bring over a drift, and a while that ends may bring over it
+MOMENTS, WHILES = 72, 12  # that are tried along a recording
+FEWEST = 8  # strokes
+SAMPLES = 500  # of a recording
+STROKE = 0.2  # of the range, that a stroke covers
+CORRECTION = "the step of the angle is taken out of the map between the joints"
+
+
+@dataclass(frozen=True)
+class _Record:
+    """Thinned samples of a recording. share (n,): of its length; known (n, P): declared columns, the way of the motion
+    and the time; angle (n,) [deg]; stroke (n,): number, counted on through all recordings."""
+
+    share: Array
+    known: Array
+    angle: Array
+    stroke: NDArray[np.int64]
+    state: DriveState
+
+
+@dataclass(frozen=True)
+class Turned:
+    """step_deg: of the angle; evidence: log likelihood over no step; steps: when, in each recording."""
+
+    step_deg: float
+    evidence: float
+    share: float
+    steps: tuple[Step, ...]
+
+
+def turned_support(states: Sequence[DriveState], before: Sequence[DriveState] = ()) -> Turned | None:
+    """The step of a follower's angle against its driver's that sets in at one moment, the same share of each recording
+    or in one and all that come later, and stays; None where none stands out of how the strokes scatter, where a drift
+    or a while says as much, or where the driver's angle steps against its encoder then (before: its states), so that it
+    is not the follower's support."""
+    records = _records(states)
+    count = records[-1].stroke[-1] + 1 if records else 0
+    if count < FEWEST:
+        return None
+    none = _scatter(records, None)
+    tried = {
+        key: _scatter(records, [(r.share >= s).astype(float) for r, s in zip(records, key, strict=True)])
+        for key in _moments(records)
+    }
+    best = min(tried, key=lambda key: tried[key])
+    gain = 0.5 * count * float(np.log(none / tried[best]))
+    drift = 0.5 * count * float(np.log(none / _scatter(records, [r.share for r in records])))
+    if gain - np.log(len(tried)) < BEYOND_CHANCE or gain < drift + PLAINER or _ends(records, tried[best], count):
+        return None
+    if _steps_too(_records(before), best):
+        return None
+    best = _refined(records, best)
+    size = _size(records, best)
+    steps = tuple(
+        Step(int(r.state.extra["trial_index"][0]), _time(r, s), int(r.state.extra["trial_index"][0]))
+        for r, s in zip(records, best, strict=True)
+        if s < 1
+    )
+    return Turned(size, gain, float(min(best)), steps)
+
+
+def _records(states: Sequence[DriveState]) -> list[_Record]:
+    out, first = [], 0
+    for state in states:
+        good = np.flatnonzero(np.isfinite(state.effort))
+        good = good[:: max(1, len(good) // SAMPLES)]
+        if len(good) < FEWEST:
+            continue
+        number = np.zeros(len(state.time_s), int)
+        for k, (a, b, _) in enumerate(strokes(state.position, STROKE * float(np.ptp(state.position)))):
+            number[a:b] = k
+        _, number = np.unique(number[good], return_inverse=True)
+        known = np.concatenate([state.declared, np.sign(state.velocity)[:, None]], axis=1)
+        share = (state.time_s - state.time_s[0]) / (state.time_s[-1] - state.time_s[0])
+        out.append(_Record(share[good], known[good], state.effort[good], first + number, state))
+        first = out[-1].stroke[-1] + 1
+    return out
+
+
+def _moments(records: Sequence[_Record]) -> Iterator[tuple[float, ...]]:
+    """Shares of each recording from which it acts: the same of each, or none of those before one and all of those after
+    it."""
+    grid = np.linspace(0.04, 0.96, MOMENTS)
+    yield from ((float(s),) * len(records) for s in grid)
+    for k in range(len(records)) if len(records) > 1 else ():
+        yield from ((1.1,) * k + (float(s),) + (0.0,) * (len(records) - k - 1) for s in grid)
+
+
+def _fit(records: Sequence[_Record], column: Sequence[Array] | None) -> tuple[Array, Array]:
+    x, y = np.concatenate([r.known for r in records]), np.concatenate([r.angle for r in records])
+    if column is not None:
+        x = np.column_stack([x, np.concatenate(column)])
+    size = np.linalg.norm(x, axis=0) + 1e-300
+    theta = np.linalg.lstsq(x / size, y)[0] / size
+    return theta, y - x @ theta
+
+
+def _scatter(records: Sequence[_Record], column: Sequence[Array] | None) -> float:
+    """Sum of squares of the strokes' mean residuals [deg^2] beside the declared map, the way of the motion and a
+    column."""
+    left, stroke = _fit(records, column)[1], np.concatenate([r.stroke for r in records])
+    counts = np.bincount(stroke)
+    return float(np.sum((np.bincount(stroke, left) / np.maximum(counts, 1)) ** 2)) + 1e-12
+
+
+def _ends(records: Sequence[_Record], stays: float, count: int) -> bool:
+    """Whether it is over before the recordings are, rather: an obstacle, a while."""
+    grid = np.linspace(0.04, 0.9, WHILES)
+    least = min(
+        _scatter(records, [((r.share >= a) & (r.share < b)).astype(float) for r in records])
+        for i, a in enumerate(grid)
+        for b in grid[i + 1 :]
+    )
+    return 0.5 * count * float(np.log(stays / least)) > PLAINER
+
+
+def _steps_too(records: Sequence[_Record], best: tuple[float, ...]) -> bool:
+    """Whether the driver steps against its encoder at that moment."""
+    if len(records) != len(best) or not records or records[-1].stroke[-1] + 1 < FEWEST:
+        return False
+    column = [(r.share >= s).astype(float) for r, s in zip(records, best, strict=True)]
+    count = records[-1].stroke[-1] + 1
+    return 0.5 * count * float(np.log(_scatter(records, None) / _scatter(records, column))) > BEYOND_CHANCE
+
+
+def _refined(records: Sequence[_Record], best: tuple[float, ...]) -> tuple[float, ...]:
+    """The moment between those that were tried that suits the samples best."""
+
+    def left(moved: float) -> float:
+        column = [
+            (r.share >= (s + moved if 0 < s < 1 else s)).astype(float) for r, s in zip(records, best, strict=True)
+        ]
+        return float(np.sum(_fit(records, column)[1] ** 2))
+
+    moved = min(np.linspace(-1.0, 1.0, 25) * 0.92 / (MOMENTS - 1), key=left)
+    return tuple(float(s + moved) if 0 < s < 1 else s for s in best)
+
+
+def _size(records: Sequence[_Record], best: tuple[float, ...]) -> float:
+    return float(_fit(records, [(r.share >= s).astype(float) for r, s in zip(records, best, strict=True)])[0][-1])
+
+
+def _time(record: _Record, share: float) -> float:
+    """[s] in a recording, where the step fits its own samples best near a share of its length."""
+    time_s = record.state.time_s
+    return float(time_s[0] + max(share, 0.0) * (time_s[-1] - time_s[0]))
+
+
+def turned_finding(turned: Turned, states: Sequence[DriveState], finger: str, joint: str) -> tuple[float, Finding]:
+    """The finding, with its weight."""
+    records = _records(states)
+    shares = [next((s for s in turned.steps if s.record == r.state.extra["trial_index"][0]), None) for r in records]
+    columns = [
+        np.zeros(len(r.share))
+        if s is None
+        else (r.share >= (s.time_s - r.state.time_s[0]) / np.ptp(r.state.time_s)).astype(float)
+        for r, s in zip(records, shares, strict=True)
+    ]
+    known = [i for i, r in enumerate(records) if not r.state.validate] or list(range(len(records)))
+    told = [i for i in range(len(records)) if i not in known] or known
+    sides = [
+        _fit([records[i] for i in known], None if c is None else [c[i] for i in known])[0] for c in (None, columns)
+    ]
+    plain = np.concatenate([records[i].angle - records[i].known @ sides[0] for i in told])
+    beside = np.concatenate(
+        [records[i].angle - np.column_stack([records[i].known, columns[i]]) @ sides[1] for i in told]
+    )
+    noise = float(np.median(np.abs(np.diff(beside)))) / 0.6745 / 2**0.5 + 1e-12
+    before, after = (float(np.sqrt(np.mean(e**2))) for e in (plain, beside))
+    turn = abs(float(np.deg2rad(turned.step_deg)))
+    error = 1.96 * np.deg2rad(after) / np.sqrt(max(records[-1].stroke[-1], 1))
+    first = min(turned.steps, key=lambda s: s.record)
+    parameters = {
+        "turn": {"value": turn, "unit": "rad", "ci95": [max(turn - error, 0.0), turn + error]},
+        "moment": {"value": first.time_s, "unit": "s"},
+    }
+    acts = float(np.mean(np.concatenate(columns)))
+    moved = abs(turned.step_deg) * float(np.sqrt(acts * (1 - acts))) / noise
+    contrast = float(np.std(np.concatenate([r.angle for r in records]))) / noise
+    where = {
+        "finger": finger,
+        "joint": joint,
+        "actuator": None,
+        "signal": "markers",
+        "marker": None,
+        "trials": [s.trial for s in states],
+        "region": None,
+        "share_of_mismatch": max(1.0 - after**2 / before**2, 0.0),
+    }
+    fit = {
+        "metric": "angle_rmse",
+        "unit": "deg",
+        "before": before,
+        "after": after,
+        "noise_floor": noise,
+        "ci95_reduction": None,
+        "held_out": [records[i].state.trial for i in told if records[i].state.validate],
+        "engine": "map between the joints",
+    }
+    text = (
+        f"{finger} {joint}: the support turned about the joint's axis by {abs(turned.step_deg):.2f} deg at "
+        f"{first.time_s:.1f} s of {states[0].trial}: the angle steps against the joint before it, and stays."
+    )
+    probability = float(1 - np.exp(-min(turned.evidence, 700.0)))
+    return weighed(moved, contrast), Finding(
+        "support_slip", ("support_slip",), probability, (), where, text, parameters, fit, None, CORRECTION
+    )

@@ -1,0 +1,84 @@
+"""Friction that thins as a joint warms, over recordings of one clock; delays within a sample; late copies of commands."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rig_bench import ARM, HEAD, balance, recorded, written
+
+from hand_model.rig import diagnose_rig, load_rig
+from hand_model.rig.channels import check_channels
+from hand_model.rig.declared import fit_declared
+from hand_model.rig.name.candidates import candidates
+from hand_model.session import read_session
+
+pytest.importorskip("mujoco")
+
+WARM_UP_S, BETWEEN_S, DRAG = 150.0, 60.0, 0.25
+
+
+def warming(folder: Path, temperature: bool = False, apart: bool = True) -> Path:
+    """Six recordings of an arm whose drag falls as it warms, on one clock or on a clock each."""
+    random, tables = np.random.default_rng(5), []
+    t = np.arange(0, 12, 0.004)
+    for k in range(6):
+        rate, size = 2 * np.pi * random.uniform([0.2, 0.6], [0.45, 1.2]), random.uniform([0.5, 0.15], [0.9, 0.3])
+        phase = np.outer(rate, t) + random.uniform(0, 6, 2)[:, None]
+        q, v, a = size @ np.sin(phase), (size * rate) @ np.cos(phase), -(size * rate**2) @ np.sin(phase)
+        cold = np.exp(-(k * BETWEEN_S + t) / WARM_UP_S)
+        torque = balance((t, q, v, a)) + DRAG * cold * v + 0.01 * random.standard_normal(len(t))
+        clock = t + (k * BETWEEN_S if apart else 0.0)
+        more = [np.round((40 - 18 * cold) / 0.25) * 0.25] if temperature else []
+        tables.append(np.column_stack([clock, np.round(q / 4e-4) * 4e-4, torque, *more]))
+    return written(folder, ARM, HEAD, "torque" + (",hinge_temperature" if temperature else ""), tables)
+
+
+@pytest.mark.parametrize("temperature", [False, True])
+def test_drag_that_falls_as_a_joint_warms_is_named(tmp_path: Path, temperature: bool) -> None:
+    found = diagnose_rig(read_session(warming(tmp_path / "s", temperature)))
+    first = found.findings[0]
+    assert first.effect == "thermal_friction_drift"
+    assert found.lack_of_fit["after"] < 0.3
+    size = first.parameters["cold_viscous"]
+    assert size["unit"] == "N m s/rad"
+    told = set(first.parameters)
+    assert ("warm_up_time" in told) != ("coldest" in told)  # by time or by temperature, not both
+    if "warm_up_time" in told:
+        assert size["value"] == pytest.approx(DRAG, rel=0.15)
+        assert first.parameters["warm_up_time"]["value"] == pytest.approx(WARM_UP_S, rel=0.3)
+
+
+def test_clocks_that_run_on_tell_when_a_recording_began(tmp_path: Path) -> None:
+    on = load_rig(read_session(warming(tmp_path / "on")))
+    assert list(on.begun_s.values()) == pytest.approx([k * BETWEEN_S for k in range(6)])
+    assert load_rig(read_session(warming(tmp_path / "each", apart=False))).begun_s == {}
+    warms = [c for c in candidates(on, fit_declared(on), "hinge", only={"thermal_friction_drift"})]
+    assert {c.variant for c in warms} == {"", "viscous", "dry and viscous"}
+
+
+def test_a_delay_within_half_a_sample_is_no_effect(tmp_path: Path) -> None:
+    """A torque averaged over each sample: it is told in a note; one of two samples is named."""
+    for name, delay_s, named in (("within", 0.0015, False), ("beyond", 0.008, True)):
+
+        def late(motion, delay_s=delay_s):
+            t = motion[0]
+            return np.interp(t - delay_s, t, balance(motion))
+
+        found = diagnose_rig(read_session(recorded(tmp_path / name, ARM, 6, late, 0.004)))
+        assert ("current_channel_delay" in [f.effect for f in found.findings]) is named
+        assert any("less than half a sample" in note for note in found.notes) is not named
+
+
+def test_a_torque_that_repeats_its_command_a_sample_late_is_refused(tmp_path: Path) -> None:
+    random, t = np.random.default_rng(0), np.arange(0, 12, 0.004)
+    for name, noise, refused in (("copy", 0.0, True), ("measured", 0.05, False)):
+        q = 0.6 * np.sin(2.1 * t) + 0.2 * np.sin(5.3 * t + 1)
+        command = (
+            0.9 * np.sin(2.1 * t + 0.3) + 0.6 * np.sin(5.3 * t) + 0.4 * np.sin(9.7 * t) + 0.3 * np.sign(np.cos(2 * t))
+        )
+        torque = np.r_[command[:1], command[:-1]] + noise * random.standard_normal(len(t))
+        folder = written(tmp_path / name, ARM, HEAD, "torque,wanted", [np.c_[t, q, torque, command]])
+        reasons = [i.reason for i in check_channels(load_rig(read_session(folder))) if i.refuse]
+        assert any('repeats the channel "wanted", 1 sample late' in r for r in reasons) is refused
