@@ -30,6 +30,7 @@ CORRECTION = {
 }
 IN_STEP = "the markers leave the hinge's motion in step with the angle"
 DRAWS = 60  # of coefficients, for an interval
+ECHO = 0.2  # of the gain at a joint, below which the one beside it is no hinge for the form of the first one's law
 BENDS = 0.1  # of the gain of all that is found: the share of palm markers from which the palm is known to bend
 
 
@@ -43,8 +44,10 @@ def marker_findings(angles: FingerAngles, naming: MarkerNaming) -> list[tuple[fl
         groups.setdefault((effect.effect, effect.body, effect.label), []).append(effect)
     least, bends = _least(naming), palm_bends(naming)
     for (name, body, label), members in groups.items():
-        small = sum(e.gain for e in members) < least
-        if name in UNNAMED or small and not any(e.apart for e in members):
+        gain = sum(e.gain for e in members)
+        if name in UNNAMED or gain < least and not any(e.apart for e in members):
+            continue
+        if name in HINGE and gain < ECHO * _of_neighbours(naming, name, body):
             continue
         if bends and name in HINGE and body == 1:  # it carries the first joint's axis with it
             continue
@@ -52,6 +55,12 @@ def marker_findings(angles: FingerAngles, naming: MarkerNaming) -> list[tuple[fl
         moved = float(np.sqrt(sum(e.gain for e in members) / readings))  # over the noise of one reading
         out.append((weighed(moved, _contrast(angles)), _finding(angles, naming, name, body, label, members)))
     return out
+
+
+def _of_neighbours(naming: MarkerNaming, name: str, body: int) -> float:
+    """Gain of the same way of being no hinge at the joints next to a body's own: by another law than is taken there it
+    shows at these as well."""
+    return sum(e.gain for e in naming.found if e.effect == name and abs(e.body - body) == 1)
 
 
 def palm_bends(naming: MarkerNaming) -> bool:
