@@ -15,7 +15,7 @@ from hand_model.diagnose.locate.blocks import _assembled, frames_of_block, prese
 from hand_model.diagnose.locate.displacement import CREEP, NO_HINGE, WITH_FINGER, YIELDING
 from hand_model.diagnose.locate.lasting_noise import LastingNoise, lasting_noise
 from hand_model.diagnose.locate.markers import MarkerNaming, named_in, tilt
-from hand_model.diagnose.locate.slips import _finding, _turning, palm_bends, unexplained
+from hand_model.diagnose.locate.slips import _finding, _of_neighbours, _turning, palm_bends, unexplained
 from hand_model.diagnose.locate.stepwise import Stepwise
 from hand_model.identify.chain import Chain
 
@@ -367,3 +367,11 @@ def test_a_centre_that_travels_and_a_joint_that_tilts_are_both_told() -> None:
     tilt = tilting(lambda u, way: 0.02 * np.sin(6 * np.pi * u))
     naming = seen(lambda share, turn, arm: travel(share, turn, arm) + tilt(share, turn, arm), body=2)
     assert naming.believed and places(naming) == {("moving_centre", None), ("joint_wobble", None)}
+
+
+def test_what_a_wobble_shows_at_the_joints_beside_it_is_counted_with_it() -> None:
+    naming = seen(tilting(lambda u, way: 0.012 * way), body=2)
+    wobble = naming.found[0]
+    beside = (wobble, replace(wobble, body=1, gain=0.1 * wobble.gain), replace(wobble, effect="moving_centre", body=1))
+    assert _of_neighbours(replace(naming, found=beside), "joint_wobble", 1) == wobble.gain
+    assert _of_neighbours(replace(naming, found=beside), "joint_wobble", 2) == pytest.approx(0.1 * wobble.gain)
