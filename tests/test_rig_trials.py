@@ -236,7 +236,7 @@ def test_law_by_load_and_what_has_none() -> None:
     known = {"": (0.0, 1.5), "motor side": (0.0, 2.0), "low speed": (0.0, 1.5 / np.e), "with speed": (-3.0, 0.0)}
     for variant, expected in known.items():
         assert law({**record, "variant": variant})(now) == pytest.approx(expected)
-    assert law({"effect": "thermal_friction_drift"}) is None
+    assert law({"effect": "viscoelastic_spring"}) is None
 
 
 def test_motion_in_open_loop_falls_with_what_was_found(torque_bench: Path) -> None:

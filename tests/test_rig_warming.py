@@ -11,7 +11,9 @@ from rig_bench import ARM, HEAD, balance, recorded, written
 from hand_model.rig import diagnose_rig, load_rig
 from hand_model.rig.channels import check_channels
 from hand_model.rig.declared import fit_declared
+from hand_model.rig.laws import Now, law
 from hand_model.rig.name.candidates import candidates
+from hand_model.rig.warming import still_to_come
 from hand_model.session import read_session
 
 pytest.importorskip("mujoco")
@@ -41,6 +43,7 @@ def test_drag_that_falls_as_a_joint_warms_is_named(tmp_path: Path, temperature: 
     first = found.findings[0]
     assert first.effect == "thermal_friction_drift"
     assert found.lack_of_fit["after"] < 0.3
+    assert found.lack_of_fit["open_loop"]["ratio"] < 0.7  # MuJoCo on the file, as warm as the joint was
     size = first.parameters["cold_viscous"]
     assert size["unit"] == "N m s/rad"
     told = set(first.parameters)
@@ -82,3 +85,24 @@ def test_a_torque_that_repeats_its_command_a_sample_late_is_refused(tmp_path: Pa
         folder = written(tmp_path / name, ARM, HEAD, "torque,wanted", [np.c_[t, q, torque, command]])
         reasons = [i.reason for i in check_channels(load_rig(read_session(folder))) if i.refuse]
         assert any('repeats the channel "wanted", 1 sample late' in r for r in reasons) is refused
+
+
+def test_what_is_still_to_come_of_warming(tmp_path: Path) -> None:
+    """By the clock of the session, by that of each recording, by temperature; all of it where that is not logged."""
+    warm = load_rig(read_session(warming(tmp_path / "s", temperature=True)))
+    third = warm.trials[2]
+    elapsed = still_to_come(warm, third, "hinge", {"form": 0.0, "warm_up_time": WARM_UP_S})
+    np.testing.assert_allclose(elapsed, np.exp(-(2 * BETWEEN_S + third.time_s) / WARM_UP_S))
+    each = still_to_come(warm, third, "hinge", {"form": 3.0, "warm_up_time": WARM_UP_S})
+    np.testing.assert_allclose(each, np.exp(-third.time_s / WARM_UP_S))
+    logged = {"form": 2.0, "coldest": 22.0, "warmest": 40.0}
+    np.testing.assert_allclose(still_to_come(warm, third, "hinge", logged), elapsed, atol=0.01)
+    silent = load_rig(read_session(warming(tmp_path / "t")))
+    assert np.all(still_to_come(silent, silent.trials[2], "hinge", logged) == 1)
+
+
+def test_a_law_that_follows_its_warming() -> None:
+    act = law({"effect": "thermal_friction_drift", "shape": {}, "amplitude": {"cold_excess": 0.2, "cold_viscous": 0.5}})
+    assert act(Now(0.0, 2.0, 0.0, 0.0, 0.0, 3.0)) == pytest.approx((1.0, 0.2))
+    act.follow(np.array([0.0, 10.0]), np.array([1.0, 0.0]))
+    assert act(Now(0.0, -2.0, 0.0, 0.0, 0.0, 5.0)) == pytest.approx((-0.5, 0.1))

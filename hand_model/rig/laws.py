@@ -8,9 +8,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..effects import DriveState, effect
 
+Array = NDArray[np.float64]
 # Effects that depend on the present state alone; of those, the frictions.
 FRICTION = frozenset({"stribeck_friction", "position_dependent_friction"})
 # Variants of friction by load: by what the joint carries where nothing else is said.
@@ -25,13 +27,14 @@ OF_STATE = FRICTION | {"nonlinear_spring", "end_stop_contact", "detent_load", "t
 @dataclass(frozen=True)
 class Now:
     """One instant of a joint. position [rad or m], velocity [per s]; load: what the joint carries [N m or N]; drive:
-    what its own drive puts in; bias: the load without what acceleration asks for."""
+    what its own drive puts in; bias: the load without what acceleration asks for; time_s: since the recording began."""
 
     position: float
     velocity: float
     load: float
     drive: float
     bias: float = 0.0
+    time_s: float = 0.0
 
 
 # (effort against the motion that the drive must give besides, bound of further dry friction), both [N m or N].
@@ -45,6 +48,8 @@ def law(record: Mapping[str, Any]) -> Law | None:
     shape, size = record.get("shape", {}), tuple(record.get("amplitude", {}).values())
     if variant == TURNING:
         return _Stop(shape, size[0], by_load=name == "load_dependent_friction")
+    if name == "thermal_friction_drift":
+        return Warming(shape, record.get("amplitude", {}))
     if name == "load_dependent_friction":
         return _by_load(variant, shape, *size)
     if name == "elastoplastic_hysteresis":
@@ -143,3 +148,21 @@ class _Stop:
             self.state = way + (self.state - way) * math.exp(-abs(moved) / self.reach)
         by = math.exp(-((now.velocity / self.slow) ** 2)) * (abs(now.load) if self.by_load else 1.0)
         return self.size * self.state * by, 0.0
+
+
+class Warming:
+    """Friction that is more while a joint is cold: dry, and by speed. shape: what its warming goes by; until `follow` says
+    how warm it is, it is cold."""
+
+    def __init__(self, shape: Mapping[str, float], size: Mapping[str, float]) -> None:
+        self.shape, self.dry, self.drag = shape, size.get("cold_excess", 0.0), size.get("cold_viscous", 0.0)
+        self.time_s, self.left = np.zeros(1), np.ones(1)
+
+    def follow(self, time_s: Array, left: Array) -> None:
+        """What is still to come (n,) of the change at times (n,) [s] of a recording."""
+        self.time_s, self.left = time_s, left
+
+    def __call__(self, now: Now) -> tuple[float, float]:
+        """Drag against the motion, and the bound of what rubs dry."""
+        left = float(np.interp(now.time_s, self.time_s, self.left))
+        return left * self.drag * now.velocity, left * self.dry

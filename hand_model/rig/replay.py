@@ -12,13 +12,14 @@ from ..engines.mujoco import divergence
 from ..session import Session
 from .carried import CarriedLoad, bodies_inertia
 from .inverse import apply_levels, effort_residuals
-from .laws import Now, law
+from .laws import Now, Warming, law
 from .mjcf import read_effects
 from .model import RigModel, RigTrial, load_rig
 from .overrides import compile_model
 from .states import fill_gaps
 from .states import recorded_states as joint_states
 from .supply import supply_deviation
+from .warming import still_to_come
 
 Array = NDArray[np.float64]
 States = tuple[Array, Array, Array]  # times [s], positions, velocities
@@ -89,6 +90,12 @@ class EffectStepper:
         self.laws = [(model.joint(r["joint"]).id, act) for r in records if (act := law(r)) is not None]
         self.late = {r["joint"]: r["shape"]["delay"] for r in records if "delay" in r.get("shape", {})}
 
+    def follow(self, rig: RigModel, trial: RigTrial) -> None:
+        """Be as warm as the joints are in a recording."""
+        for joint, act in self.laws:
+            if isinstance(act, Warming):
+                act.follow(trial.time_s, still_to_come(rig, trial, self.model.joint(joint).name, act.shape))
+
     def delay_s(self, joint: str) -> float:
         """By how much the drive of a joint acts later than its channel says [s]."""
         named = [e.get("delay", 0.0) for j, e in self.entries if j == self.model.joint(joint).id]
@@ -140,7 +147,8 @@ class EffectStepper:
             drive = float(data.qfrc_actuator[joint])
             load = drive + float(data.qfrc_passive[joint] + data.qfrc_constraint[joint])
             bias = float(data.qfrc_bias[joint] - data.qfrc_spring[joint])
-            effort, friction = act(Now(float(data.qpos[joint]), float(data.qvel[joint]), load, drive, bias))
+            place, speed = float(data.qpos[joint]), float(data.qvel[joint])
+            effort, friction = act(Now(place, speed, load, drive, bias, float(data.time)))
             data.qfrc_passive[joint] -= effort
             bound[joint] = bound.get(joint, self.coulomb[joint]) + friction
         for joint, value in bound.items():
@@ -175,6 +183,7 @@ def simulate_trial(
     model = compile_model(rig, trial)
     apply_levels(model, rig, trial)
     effects = EffectStepper(model, read_effects(rig.xml))
+    effects.follow(rig, trial)
     step = float(model.opt.timestep)
     grid = np.arange(0.0, trial.time_s[-1] + step, step)
     control, applied = _controls(rig, trial, model, effects, grid)
@@ -244,6 +253,7 @@ def _simulated(
                     mujoco.mj_resetData(model, data)
                     broken.clear()
                 data.qpos[:], data.qvel[:] = (s[k // stride] for s in starts)
+                data.time = k * step
                 effects.restart()
             out[k] = np.nan if broken else data.qpos
             if broken:

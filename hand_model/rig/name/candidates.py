@@ -16,6 +16,7 @@ from ..balance import Rows
 from ..declared import DeclaredFit
 from ..laws import GEAR, GEAR_LOW, GEAR_MORE, LINE, LOW, MORE, MOTOR, MOTOR_LOW, MOTOR_MORE, TURNING
 from ..model import RigModel
+from ..warming import WARMS, warmth
 
 Array = NDArray[np.float64]
 # Those that rigs have in a form of their own, or that need a hand.
@@ -43,7 +44,7 @@ DELAYS = (0.125, 0.25, 0.5, 1, 2, 3, 5, 8)
 # of friction and the load that it is reckoned from: what one changes of the load, friction changes by a fraction of
 TURNS = 4
 SAME = 0.05  # of a column's variance
-WARMS, DRAG, DRY_AND_DRAG = "thermal_friction_drift", "viscous", "dry and viscous"
+DRAG, DRY_AND_DRAG = "viscous", "dry and viscous"
 UNDECLARED = "no spring is declared"
 BY_LEVEL = "a level for each that trials declare"
 REACHES = tuple(np.geomspace(0.004, 0.5, 8))  # of the range, over which friction turns round
@@ -108,11 +109,7 @@ def drive_state(rig: RigModel, row: Rows, theta: Array) -> DriveState:
     extra: dict[str, Array] = {"load": row.load(theta)}
     for channel, values in row.extra.items():
         extra[channel.split(":")[0] if channel == f"setpoint:{row.joint}" else channel] = values
-    begun = rig.begun_s
-    if row.trial in begun:
-        extra["elapsed"] = begun[row.trial] + row.time_s - row.time_s[0]
-    if (logged := _temperature(rig, row)) is not None:
-        extra["temperature"] = row.extra[logged]
+    extra |= warmth(rig, row.trial, row.joint, row.time_s, row.extra)
     declared = np.stack([row.acceleration, row.velocity, row.direction], 1)
     effort = np.where(np.abs(row.velocity) > row.rest_speed, row.extra["effort"], np.nan)  # at rest friction is unknown
     return DriveState(
@@ -130,15 +127,6 @@ def drive_state(rig: RigModel, row: Rows, theta: Array) -> DriveState:
         ("inertia", "viscous", "coulomb"),
         row.validate,
     )
-
-
-def _temperature(rig: RigModel, row: Rows) -> str | None:
-    """The extra channel that says how warm a joint or its drive is, or the only one that tells a temperature; None where
-    there is none."""
-    drive = rig.drive(row.joint)
-    told = [c for c in row.extra if "temp" in c.lower() and ":" not in c]
-    own = [c for c in told if row.joint in c or (drive is not None and drive.name in c)]
-    return next(iter(own or (told if len(told) == 1 else ())), None)
 
 
 def candidates(
@@ -159,7 +147,7 @@ def candidates(
         found += [_with_line(c) for c in bends]
     elif bends and not _is_declared([r.filtered(r.position) for r in rows], rows):
         found = [c for c in found if c not in bends] + [_with_line(c) for c in bends]
-    found += [_warming(c, variant) for c in found if c.effect == WARMS for variant in (DRAG, DRY_AND_DRAG)]
+    found += [_thinning(c, variant) for c in found if c.effect == WARMS for variant in (DRAG, DRY_AND_DRAG)]
     if only is None or not NOT_FOR_RIGS.isdisjoint(only):
         found += _own(rig, fit, joint, rows)
     if only is None or not TURN_ROUND.isdisjoint(only):
@@ -187,7 +175,7 @@ def _from_catalogue(
     )
 
 
-def _warming(dry: Candidate, variant: str) -> Candidate:
+def _thinning(dry: Candidate, variant: str) -> Candidate:
     """Friction of a lubricant that thins as it warms: its viscous part alone, or with its dry part."""
     drag = ("cold_viscous", "effort s/position", -np.inf, np.inf)
 
