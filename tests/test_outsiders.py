@@ -430,3 +430,27 @@ def test_what_a_hill_of_another_form_leaves_is_no_small_effect(lean: float) -> N
         return -30.0 * np.exp(-0.5 * (u / (1 + lean * np.tanh(u))) ** 2)
 
     assert {f.term.effect.name for f in heard(drive(3, leaning)).kept} <= {"detent_load"}
+
+
+def test_a_motor_does_not_warm_up_within_a_few_strokes() -> None:
+    """Of recordings that each begin cold: what is over at once is less likely a warm-up."""
+    prior = effect("thermal_friction_drift").log_prior
+    each, whole = {"form": 3.0, "ratio": 0.5}, {"form": 0.0, "ratio": 0.5}
+    assert prior({**each, "warm_up_time": 5.0}) < prior({**each, "warm_up_time": 8.0}) - 4
+    assert prior({**whole, "warm_up_time": 5.0}) == prior({**whole, "warm_up_time": 8.0}) == 0
+
+
+def test_what_a_long_rest_restored_wears_off_over_strokes_with_short_rests_between() -> None:
+    """Friction of a cold start: the next strokes begin where the last one ended."""
+    t = np.arange(0, 12, 0.02)
+    u = t % 3.0
+    position = np.where((t // 3) % 2 == 0, 1.0, 0.0) * 100 * np.clip(u / 2, 0, 1)
+    position += np.where((t // 3) % 2 == 1, 1.0, 0.0) * 100 * (1 - np.clip(u / 2, 0, 1))
+    velocity = np.gradient(position, t)
+    state = DriveState("a", "index", t, position, velocity, 0 * t, 0 * t, np.sign(velocity)[:, None])
+    state = replace(state, extra={"moving": (u < 2).astype(float)}, declared_names=("coulomb",))
+    worn = np.abs(BY_NAME["dwell_friction"].columns(state, {"distance": 150.0, "healing_time": 300.0})[:, 0])
+    begins = [worn[int((3 * k + 0.1) / 0.02)] for k in range(4)]
+    np.testing.assert_allclose(np.diff(np.log(begins)), -100 / 150, atol=0.03)
+    healed = np.abs(BY_NAME["dwell_friction"].columns(state, {"distance": 20.0, "healing_time": 0.1})[:, 0])
+    assert healed[int(3.1 / 0.02)] > 0.6  # each rest restores what each stroke wears off

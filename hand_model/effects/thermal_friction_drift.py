@@ -16,6 +16,7 @@ ELAPSED, WORKED, LOGGED, EACH = 0.0, 1.0, 2.0, 3.0  # forms
 WARM_UP, COOLING, TEMPERATURES = ("warm_up_time",), ("cooling_time",), ("coldest", "warmest")
 TOLD = {ELAPSED: WARM_UP, WORKED: WARM_UP + COOLING, LOGGED: TEMPERATURES, EACH: WARM_UP}  # what each form has
 SOONEST_S = 5.0  # what is recorded for less than this twice over shows no more than a line
+HASTY, UNLIKELY = 1.2, 8.0  # times that, within which no motor warms: log likelihood against it
 MOVING = 1.0  # %/s: below, a drive is at rest
 
 
@@ -96,9 +97,10 @@ class ThermalFrictionDrift(Effect):
         return {"cold": _before(state, parameters["warm_up_time"], parameters["cooling_time"])}
 
     def log_prior(self, parameters: Mapping[str, float]) -> float:
-        """Warming seldom takes more than the warm friction off."""
+        """Warming seldom takes more than the warm friction off, nor is it over within a few strokes."""
         ratio = abs(parameters["ratio"]) if np.isfinite(parameters["ratio"]) else 6.0
-        return -2.0 * max(0.0, min(ratio, 6.0) - 1.0) ** 2
+        hasty = parameters.get("form") == EACH and parameters["warm_up_time"] < HASTY * SOONEST_S
+        return -2.0 * max(0.0, min(ratio, 6.0) - 1.0) ** 2 - UNLIKELY * hasty
 
     def law(self, parameters: Mapping[str, float]) -> Law:
         """Friction that fades while time passes (forms 0 and 3) or while the drive moves (form 1), cold to begin with; of a

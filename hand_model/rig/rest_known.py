@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 # as all others leave
 MOST = 3.0
 LEAST_SAMPLES = 20  # of a filtered balance, on both sides
-LEAST_REST = 0.05  # of the samples: rests that are fewer say nothing that motion does not
+LEAST_REST = 0.02  # of the samples: rests that are fewer say nothing that motion does not
 
 
 def known_at_rest(fit: DeclaredFit, terms: Sequence[Term], theta: Array) -> tuple[str, ...]:

@@ -21,14 +21,15 @@ class DwellFriction(Outsider):
     rubs = True
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """The way on which it is worn off, and the time in which it heals."""
+        """The way on which it is worn off, up to a few strokes (what takes longer is a warm-up), and the time in which it
+        heals."""
         low, high = position_range(states)
         span = high - low
         return (
             Shape(
-                "distance", states[0].position_unit, 0.01 * span, 0.4 * span, tuple(np.geomspace(0.015, 0.25, 6) * span)
+                "distance", states[0].position_unit, 0.01 * span, 2.5 * span, tuple(np.geomspace(0.015, 1.5, 9) * span)
             ),
-            Shape("healing_time", "s", 0.02, 10.0, (0.05, 0.5, 2.0)),
+            Shape("healing_time", "s", 0.02, 300.0, (0.05, 0.5, 2.0, 60.0)),  # longer than a session: it was cold
         )
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
