@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,14 +36,19 @@ class _Record:
     stroke: NDArray[np.int64]
     state: DriveState
 
+    @property
+    def index(self) -> int:
+        """Number of the recording."""
+        return int(self.state.extra["trial_index"][0])
+
 
 @dataclass(frozen=True)
 class Turned:
-    """step_deg: of the angle; evidence: log likelihood over no step; steps: when, in each recording."""
+    """step_deg: of the angle; evidence: log likelihood over no step; steps: when, in each recording in which it sets
+    in."""
 
     step_deg: float
     evidence: float
-    share: float
     steps: tuple[Step, ...]
 
 
@@ -52,29 +58,24 @@ def turned_support(states: Sequence[DriveState], before: Sequence[DriveState] = 
     or a while says as much, or where the driver's angle steps against its encoder then (before: its states), so that it
     is not the follower's support."""
     records = _records(states)
-    count = records[-1].stroke[-1] + 1 if records else 0
+    count = _strokes_of(records)
     if count < FEWEST:
         return None
     none = _scatter(records, None)
-    tried = {
-        key: _scatter(records, [(r.share >= s).astype(float) for r, s in zip(records, key, strict=True)])
-        for key in _moments(records)
-    }
-    best = min(tried, key=lambda key: tried[key])
-    gain = 0.5 * count * float(np.log(none / tried[best]))
-    drift = 0.5 * count * float(np.log(none / _scatter(records, [r.share for r in records])))
-    if gain - np.log(len(tried)) < BEYOND_CHANCE or gain < drift + PLAINER or _ends(records, tried[best], count):
+    tried = {begins: _scatter(records, _acting(records, begins)) for begins in _moments(records)}
+    best = min(tried, key=lambda begins: tried[begins])
+    gain, drift = (_likelier(count, none, x) for x in (tried[best], _scatter(records, [r.share for r in records])))
+    if gain - np.log(len(tried)) < BEYOND_CHANCE or gain < drift + PLAINER or _ends(records, tried[best]):
         return None
     if _steps_too(_records(before), best):
         return None
     best = _refined(records, best)
-    size = _size(records, best)
     steps = tuple(
-        Step(int(r.state.extra["trial_index"][0]), _time(r, s), int(r.state.extra["trial_index"][0]))
+        Step(r.index, float(r.state.time_s[0] + max(s, 0.0) * np.ptp(r.state.time_s)), r.index)
         for r, s in zip(records, best, strict=True)
         if s < 1
     )
-    return Turned(size, gain, float(min(best)), steps)
+    return Turned(float(_fit(records, _acting(records, best))[0][-1]), gain, steps)
 
 
 def _records(states: Sequence[DriveState]) -> list[_Record]:
@@ -104,6 +105,20 @@ def _moments(records: Sequence[_Record]) -> Iterator[tuple[float, ...]]:
         yield from ((1.1,) * k + (float(s),) + (0.0,) * (len(records) - k - 1) for s in grid)
 
 
+def _acting(records: Sequence[_Record], begins: Sequence[float]) -> list[Array]:
+    """One from those shares of each recording on, else zero."""
+    return [(r.share >= begin).astype(float) for r, begin in zip(records, begins, strict=True)]
+
+
+def _strokes_of(records: Sequence[_Record]) -> int:
+    return int(records[-1].stroke[-1]) + 1 if records else 0
+
+
+def _likelier(count: int, before: float, after: float) -> float:
+    """Log likelihood by which sums of squares of so many strokes fall."""
+    return 0.5 * count * float(np.log(before / after))
+
+
 def _fit(records: Sequence[_Record], column: Sequence[Array] | None) -> tuple[Array, Array]:
     x, y = np.concatenate([r.known for r in records]), np.concatenate([r.angle for r in records])
     if column is not None:
@@ -121,7 +136,7 @@ def _scatter(records: Sequence[_Record], column: Sequence[Array] | None) -> floa
     return float(np.sum((np.bincount(stroke, left) / np.maximum(counts, 1)) ** 2)) + 1e-12
 
 
-def _ends(records: Sequence[_Record], stays: float, count: int) -> bool:
+def _ends(records: Sequence[_Record], stays: float) -> bool:
     """Whether it is over before the recordings are, rather: an obstacle, a while."""
     grid = np.linspace(0.04, 0.9, WHILES)
     least = min(
@@ -129,82 +144,82 @@ def _ends(records: Sequence[_Record], stays: float, count: int) -> bool:
         for i, a in enumerate(grid)
         for b in grid[i + 1 :]
     )
-    return 0.5 * count * float(np.log(stays / least)) > PLAINER
+    return _likelier(_strokes_of(records), stays, least) > PLAINER
 
 
-def _steps_too(records: Sequence[_Record], best: tuple[float, ...]) -> bool:
+def _steps_too(records: Sequence[_Record], begins: tuple[float, ...]) -> bool:
     """Whether the driver steps against its encoder at that moment."""
-    if len(records) != len(best) or not records or records[-1].stroke[-1] + 1 < FEWEST:
+    count = _strokes_of(records)
+    if len(records) != len(begins) or count < FEWEST:
         return False
-    column = [(r.share >= s).astype(float) for r, s in zip(records, best, strict=True)]
-    count = records[-1].stroke[-1] + 1
-    return 0.5 * count * float(np.log(_scatter(records, None) / _scatter(records, column))) > BEYOND_CHANCE
+    return _likelier(count, _scatter(records, None), _scatter(records, _acting(records, begins))) > BEYOND_CHANCE
 
 
-def _refined(records: Sequence[_Record], best: tuple[float, ...]) -> tuple[float, ...]:
+def _refined(records: Sequence[_Record], begins: tuple[float, ...]) -> tuple[float, ...]:
     """The moment between those that were tried that suits the samples best."""
 
-    def left(moved: float) -> float:
-        column = [
-            (r.share >= (s + moved if 0 < s < 1 else s)).astype(float) for r, s in zip(records, best, strict=True)
-        ]
-        return float(np.sum(_fit(records, column)[1] ** 2))
+    def moved(by: float) -> tuple[float, ...]:
+        return tuple(float(s + by) if 0 < s < 1 else s for s in begins)
 
-    moved = min(np.linspace(-1.0, 1.0, 25) * 0.92 / (MOMENTS - 1), key=left)
-    return tuple(float(s + moved) if 0 < s < 1 else s for s in best)
-
-
-def _size(records: Sequence[_Record], best: tuple[float, ...]) -> float:
-    return float(_fit(records, [(r.share >= s).astype(float) for r, s in zip(records, best, strict=True)])[0][-1])
-
-
-def _time(record: _Record, share: float) -> float:
-    """[s] in a recording, where the step fits its own samples best near a share of its length."""
-    time_s = record.state.time_s
-    return float(time_s[0] + max(share, 0.0) * (time_s[-1] - time_s[0]))
+    tried = np.linspace(-1.0, 1.0, 25) * 0.92 / (MOMENTS - 1)
+    return moved(min(tried, key=lambda by: float(np.sum(_fit(records, _acting(records, moved(by)))[1] ** 2))))
 
 
 def turned_finding(turned: Turned, states: Sequence[DriveState], finger: str, joint: str) -> tuple[float, Finding]:
     """The finding, with its weight."""
-    records = _records(states)
-    shares = [next((s for s in turned.steps if s.record == r.state.extra["trial_index"][0]), None) for r in records]
-    columns = [
-        np.zeros(len(r.share))
-        if s is None
-        else (r.share >= (s.time_s - r.state.time_s[0]) / np.ptp(r.state.time_s)).astype(float)
-        for r, s in zip(records, shares, strict=True)
+    records, begins = _records(states), {s.record: s.time_s for s in turned.steps}
+    acting = [
+        (r.state.time_s[0] + r.share * np.ptp(r.state.time_s) >= begins.get(r.index, np.inf)) * 1.0 for r in records
     ]
-    known = [i for i, r in enumerate(records) if not r.state.validate] or list(range(len(records)))
-    told = [i for i in range(len(records)) if i not in known] or known
-    sides = [
-        _fit([records[i] for i in known], None if c is None else [c[i] for i in known])[0] for c in (None, columns)
-    ]
-    plain = np.concatenate([records[i].angle - records[i].known @ sides[0] for i in told])
-    beside = np.concatenate(
-        [records[i].angle - np.column_stack([records[i].known, columns[i]]) @ sides[1] for i in told]
-    )
-    noise = float(np.median(np.abs(np.diff(beside)))) / 0.6745 / 2**0.5 + 1e-12
-    before, after = (float(np.sqrt(np.mean(e**2))) for e in (plain, beside))
-    turn = abs(float(np.deg2rad(turned.step_deg)))
-    error = 1.96 * np.deg2rad(after) / np.sqrt(max(records[-1].stroke[-1], 1))
-    first = min(turned.steps, key=lambda s: s.record)
+    fit, contrast = _proof(records, acting)
+    turn, steps = np.deg2rad([abs(turned.step_deg), fit["after"]]), max(_strokes_of(records), 1)
+    error = 1.96 * turn[1] / np.sqrt(steps)
+    first = turned.steps[0]
+    name = next(r.state.trial for r in records if r.index == first.record)
     parameters = {
-        "turn": {"value": turn, "unit": "rad", "ci95": [max(turn - error, 0.0), turn + error]},
+        "turn": {
+            "value": float(turn[0]),
+            "unit": "rad",
+            "ci95": [float(max(turn[0] - error, 0.0)), float(turn[0] + error)],
+        },
         "moment": {"value": first.time_s, "unit": "s"},
     }
-    acts = float(np.mean(np.concatenate(columns)))
-    moved = abs(turned.step_deg) * float(np.sqrt(acts * (1 - acts))) / noise
-    contrast = float(np.std(np.concatenate([r.angle for r in records]))) / noise
+    share = float(np.mean(np.concatenate(acting)))
+    moved = abs(turned.step_deg) * float(np.sqrt(share * (1 - share))) / fit["noise_floor"]
     where = {
         "finger": finger,
         "joint": joint,
         "actuator": None,
         "signal": "markers",
         "marker": None,
-        "trials": [s.trial for s in states],
+        "trials": [r.state.trial for r in records if r.index in begins],
         "region": None,
-        "share_of_mismatch": max(1.0 - after**2 / before**2, 0.0),
+        "share_of_mismatch": max(1.0 - fit["after"] ** 2 / fit["before"] ** 2, 0.0),
     }
+    text = (
+        f"{finger} {joint}: the support turned about the joint's axis by {abs(turned.step_deg):.2f} deg at "
+        f"{first.time_s:.1f} s of {name}: the angle steps against the joint before it, and stays."
+    )
+    probability = float(1 - np.exp(-min(turned.evidence, 700.0)))
+    return weighed(moved, contrast), Finding(
+        "support_slip", ("support_slip",), probability, (), where, text, parameters, fit, None, CORRECTION
+    )
+
+
+def _proof(records: Sequence[_Record], acting: Sequence[Array]) -> tuple[dict[str, Any], float]:
+    """`fit` of a finding: what the map between the joints leaves of recordings kept out (of all where none is) without
+    the step and with it, as it is learned from the others; and how large the angle is over its noise."""
+    known = [i for i, r in enumerate(records) if not r.state.validate] or list(range(len(records)))
+    told = [i for i in range(len(records)) if i not in known] or known
+    left = []
+    for columns in (None, acting):
+        theta = _fit([records[i] for i in known], columns and [columns[i] for i in known])[0]
+        designs = [
+            records[i].known if columns is None else np.column_stack([records[i].known, columns[i]]) for i in told
+        ]
+        left.append(np.concatenate([records[i].angle - x @ theta for i, x in zip(told, designs, strict=True)]))
+    noise = float(np.median(np.abs(np.diff(left[1])))) / 0.6745 / 2**0.5 + 1e-12
+    before, after = (float(np.sqrt(np.mean(e**2))) for e in left)
     fit = {
         "metric": "angle_rmse",
         "unit": "deg",
@@ -215,11 +230,4 @@ def turned_finding(turned: Turned, states: Sequence[DriveState], finger: str, jo
         "held_out": [records[i].state.trial for i in told if records[i].state.validate],
         "engine": "map between the joints",
     }
-    text = (
-        f"{finger} {joint}: the support turned about the joint's axis by {abs(turned.step_deg):.2f} deg at "
-        f"{first.time_s:.1f} s of {states[0].trial}: the angle steps against the joint before it, and stays."
-    )
-    probability = float(1 - np.exp(-min(turned.evidence, 700.0)))
-    return weighed(moved, contrast), Finding(
-        "support_slip", ("support_slip",), probability, (), where, text, parameters, fit, None, CORRECTION
-    )
+    return fit, float(np.std(np.concatenate([r.angle for r in records]))) / noise
