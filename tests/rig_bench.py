@@ -28,6 +28,14 @@ torque = "actuator:motor:force"
 Motion = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # time [s], angle [rad], velocity, acceleration
 
 
+def two_sines(random: np.random.Generator, t: np.ndarray, faster: float = 1.0) -> Motion:
+    """A motion [rad] of a slow sine and a small faster one."""
+    rate, size = 2 * np.pi * random.uniform([0.2, 0.6], [0.45, 1.2]), random.uniform([0.5, 0.15], [0.9, 0.3])
+    rate = rate * faster
+    phase = np.outer(rate, t) + random.uniform(0, 6, 2)[:, None]
+    return t, size @ np.sin(phase), (size * rate) @ np.cos(phase), -(size * rate**2) @ np.sin(phase)
+
+
 def balance(motion: Motion, mass: float = 0.5) -> np.ndarray:
     """Torque [N m] of the arm, as declared or with another mass [kg]."""
     _, q, v, a = motion
@@ -42,13 +50,9 @@ def recorded(
     random, tables = np.random.default_rng(4), []
     t = np.arange(0, 12, 0.004)
     for k in range(count):
-        rate, size = 2 * np.pi * random.uniform([0.2, 0.6], [0.45, 1.2]), random.uniform([0.5, 0.15], [0.9, 0.3])
-        rate = rate * (last if k == 3 else 1.0)
-        phase = np.outer(rate, t) + random.uniform(0, 6, 2)[:, None]
-        q, v, a = size @ np.sin(phase), (size * rate) @ np.cos(phase), -(size * rate**2) @ np.sin(phase)
-        tables.append(
-            np.stack([t, np.round(q / 4e-4) * 4e-4, torque((t, q, v, a)) + noise * random.standard_normal(len(t))], 1)
-        )
+        motion = two_sines(random, t, last if k == 3 else 1.0)
+        q, noisy = motion[1], torque(motion) + noise * random.standard_normal(len(t))
+        tables.append(np.stack([t, np.round(q / 4e-4) * 4e-4, noisy], 1))
     return written(folder, arm, HEAD, "torque", tables)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rig_bench import RIG, written
+from rig_bench import RIG, two_sines, written
 
 from hand_model.rig import load_rig
 from hand_model.rig.couplings import coupling_terms
@@ -38,10 +38,7 @@ def geared(folder: Path) -> Path:
     random, tables = np.random.default_rng(7), []
     t = np.arange(0, 16, 0.004)
     for _ in range(5):
-        rate = 2 * np.pi * random.uniform([0.15, 0.5], [0.3, 0.8])
-        size, phase = random.uniform([0.6, 0.1], [1.0, 0.2]), random.uniform(0, 6, 2)[:, None]
-        angle = np.outer(rate, t) + phase
-        q, v, a = size @ np.sin(angle), (size * rate) @ np.cos(angle), -(size * rate**2) @ np.sin(angle)
+        _, q, v, a = two_sines(random, t)
         load = (0.02 + 4.0 * 0.09) * a + ARM * 9.81 * np.sin(q)
         rotor = 0.5 + RATIO * (q + load / STIFFNESS)
         torque = load / RATIO + 1e-4 * RATIO * a + 0.01 * v + 0.03 * np.sign(v) + 0.002 * random.standard_normal(len(t))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rig_bench import ARM, HEAD, balance, recorded, written
+from rig_bench import ARM, HEAD, balance, recorded, two_sines, written
 
 from hand_model.rig import diagnose_rig, load_rig
 from hand_model.rig.channels import check_channels
@@ -26,11 +26,10 @@ def warming(folder: Path, temperature: bool = False, apart: bool = True) -> Path
     random, tables = np.random.default_rng(5), []
     t = np.arange(0, 12, 0.004)
     for k in range(6):
-        rate, size = 2 * np.pi * random.uniform([0.2, 0.6], [0.45, 1.2]), random.uniform([0.5, 0.15], [0.9, 0.3])
-        phase = np.outer(rate, t) + random.uniform(0, 6, 2)[:, None]
-        q, v, a = size @ np.sin(phase), (size * rate) @ np.cos(phase), -(size * rate**2) @ np.sin(phase)
+        motion = two_sines(random, t)
+        _, q, v, _ = motion
         cold = np.exp(-(k * BETWEEN_S + t) / WARM_UP_S)
-        torque = balance((t, q, v, a)) + DRAG * cold * v + 0.01 * random.standard_normal(len(t))
+        torque = balance(motion) + DRAG * cold * v + 0.01 * random.standard_normal(len(t))
         clock = t + (k * BETWEEN_S if apart else 0.0)
         more = [np.round((40 - 18 * cold) / 0.25) * 0.25] if temperature else []
         tables.append(np.column_stack([clock, np.round(q / 4e-4) * 4e-4, torque, *more]))

@@ -49,7 +49,7 @@ def test_a_step_that_stays_is_a_turned_support(added: str, begins: list[int]) ->
     assert [s.record for s in turned.steps] == begins
     at = turned.steps[0].time_s - states[begins[0]].time_s[0]
     assert at == pytest.approx(SHARE * np.ptp(states[begins[0]].time_s), abs=0.4)
-    weight, finding = turned_finding(turned, states, "index", "distal")
+    weight, finding = turned_finding(turned, "index", "distal")
     assert (finding.effect, finding.where["joint"], finding.where["signal"]) == ("support_slip", "distal", "markers")
     low, high = finding.parameters["turn"]["ci95"]
     assert low < np.deg2rad(abs(STEP_DEG)) < high

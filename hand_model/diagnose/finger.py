@@ -138,7 +138,7 @@ def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, f
         states = linkage_states(angles, joint, moments, expected, logged)
         turned = turned_support(states, stations[0].naming.balance.states if stations and joint == 1 else ())
         if turned is not None:
-            turns.append(turned_finding(turned, states, finger.name, finger.segments[joint].name))
+            turns.append(turned_finding(turned, finger.name, finger.segments[joint].name))
             states = linkage_states(angles, joint, [*moments, *turned.steps], expected, logged)
         if states and joint == 1 and stations and _leaves(stations[0]):
             states = beside_excursions(states, stations[0].naming.balance.states)

@@ -230,6 +230,10 @@ class Effect:
         """Parameters by their textbook names, from shapes, amplitudes and declared coefficients."""
         return {**shape, **amplitude}
 
+    def told(self, shape: Mapping[str, float]) -> dict[str, float]:
+        """What of a shape is said of its form, where what `shapes` names is not all; the whole shape."""
+        return dict(shape)
+
     def units(self, shape: Mapping[str, float]) -> Mapping[str, str]:
         """Units of what `parameters` makes of shapes and amplitudes, with "effort" and "position" for those of the
         state."""

@@ -65,8 +65,15 @@ class ThermalFrictionDrift(Effect):
         self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]
     ) -> dict[str, float]:
         """Cold excess, also as a ratio to the warm Coulomb friction, and what its form has of times and temperatures."""
-        told = {k: v for k, v in shape.items() if k in ("form", *TOLD[shape["form"]])}
-        return {**amplitude, **told, "ratio": amplitude["cold_excess"] / (declared.get("coulomb") or np.nan)}
+        return {
+            **amplitude,
+            **self.told(shape),
+            "ratio": amplitude["cold_excess"] / (declared.get("coulomb") or np.nan),
+        }
+
+    def told(self, shape: Mapping[str, float]) -> dict[str, float]:
+        """The form, and what it has of times and temperatures."""
+        return {k: v for k, v in shape.items() if k in ("form", *TOLD[shape["form"]])}
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
         """By how much cold friction differs, and how it fades."""

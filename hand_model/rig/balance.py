@@ -20,6 +20,7 @@ from .dynamics import INERTIAL, inertial_columns, inertial_parameters
 from .model import RigModel, RigTrial
 from .overrides import body_names, compile_model
 from .rest import Creep, moving_weight
+from .solve import sums_of
 from .states import (
     PASSED,
     STEEP,
@@ -110,10 +111,8 @@ class Rows:
     @cached_property
     def sums(self) -> tuple[Array, Array, float, int]:
         """Of the moving samples: columns by columns (P, P), columns by effort (P,), effort squared, count."""
-        x, y = self.columns[self.moving][:, self.used], self.effort[self.moving]
-        gram, moment = np.zeros((self.columns.shape[1],) * 2), np.zeros(self.columns.shape[1])
-        gram[np.ix_(self.used, self.used)], moment[self.used] = x.T @ x, x.T @ y
-        return gram, moment, float(y @ y), len(y)
+        x = self.columns[self.moving][:, self.used]
+        return sums_of(x, self.effort[self.moving], self.used, self.columns.shape[1])
 
     def filtered(self, values: Array, delay_s: float = 0.0) -> Array:
         """Full-rate columns (n, ...), later by a delay, through the weight and filter of this balance, thinned to (m,

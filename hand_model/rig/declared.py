@@ -12,7 +12,7 @@ from .balance import MOMENTS, STATE_CUTOFF, Column, Rows, declared_columns, tria
 from .dynamics import inertial_parameters
 from .model import RigModel, RigTrial
 from .overrides import compile_model
-from .solve import solve_bounded
+from .solve import solve_bounded, squared_error
 
 Array = NDArray[np.float64]
 
@@ -328,8 +328,8 @@ def _robust_fit(columns: tuple[Column, ...], rows: tuple[Rows, ...], cutoff: flo
 
 def _missed(row: Rows, theta: Array) -> float:
     """What parameters (P,) leave of a row's moving samples, rms."""
-    gram, moment, square, count = row.sums
-    return float(np.sqrt(max(square - 2 * moment @ theta + theta @ gram @ theta, 0.0) / max(count, 1)))
+    *sums, count = row.sums
+    return float(np.sqrt(max(squared_error(*sums, theta), 0.0) / max(count, 1)))
 
 
 def _known(row: Rows, columns: Sequence[Column]) -> Array:

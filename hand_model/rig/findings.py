@@ -42,14 +42,15 @@ def whereabouts(
 def within_a_sample(found: Sequence[Finding], sample_s: float) -> tuple[list[Finding], tuple[str, ...]]:
     """Findings without delays of less than half a sample [s], and what is said of those: it is how a log is read, which
     holds what was at some instant between two."""
-    told = {id(f): f.parameters["delay"]["value"] for f in found if "delay" in f.parameters}
-    short = [f for f in found if abs(told.get(id(f), sample_s)) < WITHIN * sample_s]
+    late_s = [f.parameters["delay"]["value"] if "delay" in f.parameters else np.inf for f in found]
+    short = [abs(late) < WITHIN * sample_s for late in late_s]
     notes = tuple(
-        f"{f.where['joint']}: efforts and angles are read {1e3 * told[id(f)]:.2g} ms apart, less than half a sample: it is "
+        f"{f.where['joint']}: efforts and angles are read {1e3 * late:.2g} ms apart, less than half a sample: it is "
         "taken into account, and no effect"
-        for f in short
+        for f, late, within in zip(found, late_s, short, strict=True)
+        if within
     )
-    return [f for f in found if all(f is not other for other in short)], notes
+    return [f for f, within in zip(found, short, strict=True) if not within], notes
 
 
 def measured(rig: RigModel, proof: Mapping[str, Any]) -> list[str]:

@@ -15,7 +15,7 @@ from ..errors import DescriptionError, SessionError, did_you_mean
 from ..session import Session, Trial
 from ..session.check import check_interval
 from .complete import completed
-from .driven import driven_first
+from .driven import Coupling, couplings_of, driven_first
 from .glitches import glitches
 from .overrides import apply_overrides
 from .states import LEAST_SAMPLES
@@ -56,17 +56,6 @@ class Drive:
     def along(self, time_s: Array, target: Array, position: Array) -> Array:
         """The same (n,) along a joint's recorded positions, at times [s]."""
         return self.answer(target, position, np.gradient(position, time_s))
-
-
-@dataclass(frozen=True)
-class Coupling:
-    """An equality between joints: `dependent` = polynomial of `independent`, coefficients ascending (MuJoCo
-    polycoef)."""
-
-    name: str
-    dependent: str
-    independent: str
-    polycoef: Array
 
 
 @dataclass(frozen=True)
@@ -184,13 +173,14 @@ def load_rig(session: Session, xml: bytes | None = None) -> RigModel:
         xml = completed(xml, session.rig.model.parent)
     except DescriptionError as error:
         raise DescriptionError(f"{session.rig.model}: {error}") from None
-    xml = driven_first(xml, mujoco.MjModel.from_xml_string(xml.decode()))
     model = mujoco.MjModel.from_xml_string(xml.decode())
     for j in range(model.njnt):
         if model.jnt_type[j] not in (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)):
             raise DescriptionError(f'{session.rig.model}: joint "{model.joint(j).name}" is neither hinge nor slide')
     joints = tuple(model.joint(j).name for j in range(model.njnt))
     drives = _drives(model, mujoco)
+    if (turned := driven_first(xml, couplings_of(model), {d.joint for d in drives})) is not xml:
+        xml, model = turned, mujoco.MjModel.from_xml_string(turned.decode())
     quantity = {c: _parse(session, c, q, joints, tuple(d.name for d in drives)) for c, q in session.rig.signals.items()}
     told, given = ({n for _, n, attribute in quantity.values() if attribute == a} for a in ("ctrl", "force"))
     if slower := [d.name for d in drives if d.kind == "velocity" and d.name in told - given]:
@@ -217,7 +207,7 @@ def load_rig(session: Session, xml: bytes | None = None) -> RigModel:
         joints=joints,
         slides=frozenset(n for j, n in enumerate(joints) if model.jnt_type[j] == int(mujoco.mjtJoint.mjJNT_SLIDE)),
         drives=drives,
-        couplings=_couplings(model, mujoco),
+        couplings=couplings_of(model),
         trials=tuple(t for t in trials if t not in short),
         quantity=quantity,
         notes=(
@@ -286,19 +276,6 @@ def _set_drives(drives: tuple[Drive, ...], model: Any, trial: Trial) -> tuple[Dr
     own = copy(model)
     apply_overrides(own, changes)
     return _drives(own, mujoco)
-
-
-def _couplings(model: Any, mujoco: Any) -> tuple[Coupling, ...]:
-    return tuple(
-        Coupling(
-            model.equality(e).name,
-            model.joint(int(model.eq_obj1id[e])).name,
-            model.joint(int(model.eq_obj2id[e])).name,
-            np.array(model.eq_data[e, :5], float),
-        )
-        for e in range(model.neq)
-        if model.eq_type[e] == int(mujoco.mjtEq.mjEQ_JOINT) and model.eq_obj2id[e] >= 0
-    )
 
 
 def _parse(session: Session, column: str, quantity: str, joints: tuple[str, ...], drives: tuple[str, ...]) -> tuple:

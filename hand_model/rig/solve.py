@@ -41,3 +41,16 @@ def solve_bounded(gram: Array, moment: Array, low: Array, high: Array, prior: Ar
         worst = np.argmax(np.abs(slope) * release)
         fixed[worst] = False
     return np.clip(theta, low, high) * scale
+
+
+def sums_of(x: Array, y: Array, used: NDArray[np.int64], width: int) -> tuple[Array, Array, float, int]:
+    """Normal equations of columns x (m, k), which stand at the places `used` (k,) among `width` others that are zero,
+    and y (m,): gram (width, width), moment (width,), square, count."""
+    gram, moment = np.zeros((width, width)), np.zeros(width)
+    gram[np.ix_(used, used)], moment[used] = x.T @ x, x.T @ y
+    return gram, moment, float(y @ y), len(y)
+
+
+def squared_error(gram: Array, moment: Array, square: float, theta: Array) -> float:
+    """Sum of squares that theta (P,) leaves, from normal equations: below zero by rounding at most."""
+    return float(square - 2 * moment @ theta + theta @ gram @ theta)

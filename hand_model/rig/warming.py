@@ -30,8 +30,7 @@ def still_to_come(rig: RigModel, trial: RigTrial, joint: str, shape: Mapping[str
     """Share (n,) of the change with warming that is still to come, at the recording's times; all of it where nothing is
     known of a shape that asks for more."""
     time_s, one = trial.time_s, np.ones(len(trial.time_s))
-    channels = {name: fill_gaps(time_s, values) for name, values in trial.extra.items()}
-    known = warmth(rig, trial.name, joint, time_s, channels)
+    known = {k: fill_gaps(time_s, v) for k, v in warmth(rig, trial.name, joint, time_s, trial.extra).items()}
     if "coldest" in shape and "temperature" not in known:
         return one
     state = DriveState("", "", time_s, one, one, 0 * one, one, one[:, None], extra=known, declared_names=("coulomb",))

@@ -18,7 +18,9 @@ Array = NDArray[np.float64]
 
 BEYOND_CHANCE = 12.0  # log likelihood that a step must bring over none: for its size, and the moments that are tried
 PLAINER = 3.0  # that it must bring over a drift, and a while that ends may bring over it
-MOMENTS, WHILES = 72, 12  # that are tried along a recording
+MOMENTS = np.linspace(0.04, 0.96, 72)  # shares of a recording that are tried
+WHILES = np.linspace(0.04, 0.9, 12)  # and those between which a while is
+NEVER = 1.1  # of a recording
 FEWEST = 8  # strokes
 SAMPLES = 500  # of a recording
 STROKE = 0.2  # of the range, that a stroke covers
@@ -27,8 +29,8 @@ CORRECTION = "the step of the angle is taken out of the map between the joints"
 
 @dataclass(frozen=True)
 class _Record:
-    """Thinned samples of a recording. share (n,): of its length; known (n, P): declared columns, the way of the motion
-    and the time; angle (n,) [deg]; stroke (n,): number, counted on through all recordings."""
+    """Thinned samples of a recording. share (n,): of its length; known (n, P): declared columns and the way of the
+    motion; angle (n,) [deg]; stroke (n,): number, counted on through all recordings."""
 
     share: Array
     known: Array
@@ -44,12 +46,22 @@ class _Record:
 
 @dataclass(frozen=True)
 class Turned:
-    """step_deg: of the angle; evidence: log likelihood over no step; steps: when, in each recording in which it sets
-    in."""
+    """step_deg: of the angle; evidence: log likelihood over no step; records: as they were read; begins: the share of
+    each from which it acts."""
 
     step_deg: float
     evidence: float
-    steps: tuple[Step, ...]
+    records: tuple[_Record, ...]
+    begins: tuple[float, ...]
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """When, in each recording in which it acts."""
+        return tuple(
+            Step(r.index, float(r.state.time_s[0] + begin * np.ptp(r.state.time_s)), r.index)
+            for r, begin in zip(self.records, self.begins, strict=True)
+            if begin < 1
+        )
 
 
 def turned_support(states: Sequence[DriveState], before: Sequence[DriveState] = ()) -> Turned | None:
@@ -70,12 +82,7 @@ def turned_support(states: Sequence[DriveState], before: Sequence[DriveState] = 
     if _steps_too(_records(before), best):
         return None
     best = _refined(records, best)
-    steps = tuple(
-        Step(r.index, float(r.state.time_s[0] + max(s, 0.0) * np.ptp(r.state.time_s)), r.index)
-        for r, s in zip(records, best, strict=True)
-        if s < 1
-    )
-    return Turned(float(_fit(records, _acting(records, best))[0][-1]), gain, steps)
+    return Turned(float(_fit(records, _acting(records, best))[0][-1]), gain, tuple(records), best)
 
 
 def _records(states: Sequence[DriveState]) -> list[_Record]:
@@ -99,10 +106,9 @@ def _records(states: Sequence[DriveState]) -> list[_Record]:
 def _moments(records: Sequence[_Record]) -> Iterator[tuple[float, ...]]:
     """Shares of each recording from which it acts: the same of each, or none of those before one and all of those after
     it."""
-    grid = np.linspace(0.04, 0.96, MOMENTS)
-    yield from ((float(s),) * len(records) for s in grid)
+    yield from ((float(s),) * len(records) for s in MOMENTS)
     for k in range(len(records)) if len(records) > 1 else ():
-        yield from ((1.1,) * k + (float(s),) + (0.0,) * (len(records) - k - 1) for s in grid)
+        yield from ((NEVER,) * k + (float(s),) + (0.0,) * (len(records) - k - 1) for s in MOMENTS)
 
 
 def _acting(records: Sequence[_Record], begins: Sequence[float]) -> list[Array]:
@@ -138,11 +144,10 @@ def _scatter(records: Sequence[_Record], column: Sequence[Array] | None) -> floa
 
 def _ends(records: Sequence[_Record], stays: float) -> bool:
     """Whether it is over before the recordings are, rather: an obstacle, a while."""
-    grid = np.linspace(0.04, 0.9, WHILES)
     least = min(
         _scatter(records, [((r.share >= a) & (r.share < b)).astype(float) for r in records])
-        for i, a in enumerate(grid)
-        for b in grid[i + 1 :]
+        for i, a in enumerate(WHILES)
+        for b in WHILES[i + 1 :]
     )
     return _likelier(_strokes_of(records), stays, least) > PLAINER
 
@@ -161,28 +166,25 @@ def _refined(records: Sequence[_Record], begins: tuple[float, ...]) -> tuple[flo
     def moved(by: float) -> tuple[float, ...]:
         return tuple(float(s + by) if 0 < s < 1 else s for s in begins)
 
-    tried = np.linspace(-1.0, 1.0, 25) * 0.92 / (MOMENTS - 1)
+    tried = np.linspace(-1.0, 1.0, 25) * (MOMENTS[1] - MOMENTS[0])
     return moved(min(tried, key=lambda by: float(np.sum(_fit(records, _acting(records, moved(by)))[1] ** 2))))
 
 
-def turned_finding(turned: Turned, states: Sequence[DriveState], finger: str, joint: str) -> tuple[float, Finding]:
+def turned_finding(turned: Turned, finger: str, joint: str) -> tuple[float, Finding]:
     """The finding, with its weight."""
-    records, begins = _records(states), {s.record: s.time_s for s in turned.steps}
-    acting = [
-        (r.state.time_s[0] + r.share * np.ptp(r.state.time_s) >= begins.get(r.index, np.inf)) * 1.0 for r in records
-    ]
-    fit, contrast = _proof(records, acting)
-    turn, steps = np.deg2rad([abs(turned.step_deg), fit["after"]]), max(_strokes_of(records), 1)
-    error = 1.96 * turn[1] / np.sqrt(steps)
-    first = turned.steps[0]
-    name = next(r.state.trial for r in records if r.index == first.record)
+    acting = _acting(turned.records, turned.begins)
+    fit, contrast = _proof(turned.records, acting)
+    turn, left = np.deg2rad([abs(turned.step_deg), fit["after"]])
+    error = 1.96 * left / np.sqrt(_strokes_of(turned.records))
+    trials = [r.state.trial for r, begin in zip(turned.records, turned.begins, strict=True) if begin < 1]
+    moment_s = turned.steps[0].time_s
     parameters = {
         "turn": {
-            "value": float(turn[0]),
+            "value": float(turn),
             "unit": "rad",
-            "ci95": [float(max(turn[0] - error, 0.0)), float(turn[0] + error)],
+            "ci95": [float(max(turn - error, 0.0)), float(turn + error)],
         },
-        "moment": {"value": first.time_s, "unit": "s"},
+        "moment": {"value": moment_s, "unit": "s"},
     }
     share = float(np.mean(np.concatenate(acting)))
     moved = abs(turned.step_deg) * float(np.sqrt(share * (1 - share))) / fit["noise_floor"]
@@ -192,13 +194,13 @@ def turned_finding(turned: Turned, states: Sequence[DriveState], finger: str, jo
         "actuator": None,
         "signal": "markers",
         "marker": None,
-        "trials": [r.state.trial for r in records if r.index in begins],
+        "trials": trials,
         "region": None,
         "share_of_mismatch": max(1.0 - fit["after"] ** 2 / fit["before"] ** 2, 0.0),
     }
     text = (
         f"{finger} {joint}: the support turned about the joint's axis by {abs(turned.step_deg):.2f} deg at "
-        f"{first.time_s:.1f} s of {name}: the angle steps against the joint before it, and stays."
+        f"{moment_s:.1f} s of {trials[0]}: the angle steps against the joint before it, and stays."
     )
     probability = float(1 - np.exp(-min(turned.evidence, 700.0)))
     return weighed(moved, contrast), Finding(

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from ...effects import DriveState, catalogue, effect
 from ...effects.base import Shape
-from ...effects.thermal_friction_drift import TOLD
 from ..balance import Rows
 from ..declared import DeclaredFit
 from ..laws import GEAR, GEAR_LOW, GEAR_MORE, LINE, LOW, MORE, MOTOR, MOTOR_LOW, MOTOR_MORE, TURNING
@@ -71,13 +70,8 @@ class Candidate:
 
     def told(self, shape: Mapping[str, float]) -> dict[str, float]:
         """What of a shape says something in its form."""
-        told = TOLD[shape["form"]] if self.effect == WARMS else ()
-        silent = {name for names in TOLD.values() for name in names if name not in told} if told else set()
-        return {
-            k: float(v)
-            for k, v in shape.items()
-            if k not in silent and (k not in self.shapes or self.shapes[k].matters(shape))
-        }
+        told = effect(self.effect).told(shape)
+        return {k: float(v) for k, v in told.items() if k not in self.shapes or self.shapes[k].matters(shape)}
 
     @property
     def repeats(self) -> bool:

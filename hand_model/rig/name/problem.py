@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..balance import Rows
 from ..consistent import consistent
 from ..declared import DeclaredFit, bounds, prior
-from ..solve import solve_bounded
+from ..solve import solve_bounded, squared_error, sums_of
 from .candidates import Candidate
 
 Array = NDArray[np.float64]
@@ -118,10 +118,9 @@ def normal(problem: Problem, terms: Sequence[Term]) -> tuple[Array, Array, Array
     for row, block in zip(problem.rows, problem.block, strict=True):
         (x, y, used), unit = _moving_design(problem, row, terms), problem.fit.scale[row.joint] ** 2
         for b, s in _pieces(block[row.moving]):
-            parts[0][np.ix_([b], used, used)] += x[s].T @ x[s] / unit
-            parts[1][b, used] += x[s].T @ y[s] / unit
-            parts[2][b] += y[s] @ y[s] / unit
-            parts[3][b] += len(y[s])
+            *sums, number = sums_of(x[s], y[s], used, width)
+            for part, of_block in zip(parts, (*(v / unit for v in sums), number), strict=True):
+                part[b] += of_block
     return parts
 
 
@@ -195,7 +194,7 @@ def training_error(problem: Problem, terms: Sequence[Term], parts: tuple) -> flo
     """Squared error of the fit to all blocks."""
     gram, moment = parts[0].sum(0), parts[1].sum(0)
     theta = solve_bounded(gram, moment, *limits(problem, terms))
-    return float(parts[2].sum() - 2 * moment @ theta + theta @ gram @ theta)
+    return squared_error(gram, moment, parts[2].sum(), theta)
 
 
 def rescaled(problem: Problem, terms: Sequence[Term]) -> Problem:
@@ -204,17 +203,14 @@ def rescaled(problem: Problem, terms: Sequence[Term]) -> Problem:
     known the recordings would say less than what was declared, and other joints would have to make up for it."""
     box, sums = limits(problem, terms), []
     for row in problem.rows:
-        x, y, used = _moving_design(problem, row, terms)
-        gram, moment = np.zeros((len(box[0]),) * 2), np.zeros(len(box[0]))
-        gram[np.ix_(used, used)], moment[used] = x.T @ x, x.T @ y
-        sums.append((row.joint, gram, moment, float(y @ y), len(y)))
+        sums.append((row.joint, *sums_of(*_moving_design(problem, row, terms), len(box[0]))))
     scale = dict(problem.fit.scale)
     for _ in range(MOST_WEIGHINGS):
         gram, moment = (sum(s[k] / scale[s[0]] ** 2 for s in sums) for k in (1, 2))
         theta = solve_bounded(gram, moment, *box)
         left: dict[str, list[float]] = {}
         for joint, g, m, square, count in sums:
-            left.setdefault(joint, []).append(max(square - 2 * m @ theta + theta @ g @ theta, 0.0) / count)
+            left.setdefault(joint, []).append(max(squared_error(g, m, square, theta), 0.0) / count)
         last, scale = scale, dict(scale)
         for joint, squares in left.items():
             scale[joint] = max(float(np.sqrt(np.median(squares))), LEAST_SCALE * problem.fit.scale[joint])
