@@ -60,21 +60,20 @@ def angle_nats(session: Session, trials: list[Trial], name: str, noise_rad: floa
         loads.append(passed[during])
         clocks.append(clock)
         groups.append((driver, during))
-    x = np.concatenate(drivers)
-    x = (x - x.min()) / np.ptp(x)
-    plain = np.c_[x[:, None] ** np.arange(4), *([np.concatenate(clocks)] if joint == 0 else [])]
-    y = np.concatenate(angles)
-    scale = np.ptp(y) / np.ptp(np.concatenate(drivers))  # of what follows, over what drives it
+    x, y = np.concatenate(drivers), np.concatenate(angles)
+    own_clock = [np.concatenate(clocks)] if joint == 0 else []
+
+    def mapped(driver: Array) -> Array:
+        """The map's columns of what drives, and every recording's clock."""
+        return np.c_[((driver - x.min()) / np.ptp(x))[:, None] ** np.arange(4), *own_clock]
+
+    plain = mapped(x)
+    scale = np.ptp(y) / np.ptp(x)  # of what follows, over what drives it
     if name.endswith("backlash"):
-        rivals = [np.concatenate(loads)[:, None]]
-    else:
-        rivals = [
-            np.concatenate([(play(driver, gap / scale) - driver)[rows] for driver, rows in groups])[:, None]
-            for gap in GAPS
-        ]
-    return tuple(
-        0.5 * left / noise_rad**2 for left in (left_over(plain, y), min(left_over(np.c_[plain, r], y) for r in rivals))
-    )
+        rivals = [np.c_[plain, np.concatenate(loads)]]
+    else:  # the map lies behind the play
+        rivals = [mapped(np.concatenate([play(driver, gap / scale)[rows] for driver, rows in groups])) for gap in GAPS]
+    return tuple(0.5 * left / noise_rad**2 for left in (left_over(plain, y), min(left_over(r, y) for r in rivals)))
 
 
 def noise_of(found: dict[str, Any], finger: str, joint: int) -> float:

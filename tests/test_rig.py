@@ -40,7 +40,7 @@ def test_planted_effects_are_named_first(tmp_path: Path, effect: str, name: str)
     findings = diagnose_rig(read_session(planted(tmp_path / "s", effect)))
     assert findings.verdict == "mismatch"
     assert name in findings.findings[0].members
-    assert findings.lack_of_fit["after"] < 0.8
+    assert findings.lack_of_fit["after"] < 0.8 < findings.lack_of_fit["before"] and findings.lack_of_fit["limit"] < 0.8
 
 
 def test_load_dependent_friction_is_named_and_measured(planted_load: Path, tmp_path: Path) -> None:
@@ -198,6 +198,7 @@ def test_noise_floor_of_a_balance_is_that_of_its_sensors(tmp_path: Path) -> None
     left = findings.lack_of_fit["joints"]["hinge"]
     assert findings.verdict == "consistent"
     assert left["noise_floor"] == pytest.approx(left["after"], rel=0.35)
+    assert findings.lack_of_fit["after"] < findings.lack_of_fit["limit"]
 
 
 @pytest.mark.slow

@@ -12,6 +12,7 @@ from rig_bench import ARM, Motion, balance, recorded
 from hand_model.rig import diagnose_rig, fit_declared, load_rig
 from hand_model.rig.channels import check_channels
 from hand_model.rig.clipping import limits, unclipped
+from hand_model.rig.diagnose import trusted_fit
 from hand_model.rig.glitches import glitches
 from hand_model.session import read_session
 
@@ -113,6 +114,28 @@ def test_a_copy_of_its_command_is_refused_for_that_alone(tmp_path: Path) -> None
     trials = tuple(replace(t, extra={"asked": t.effort["hinge"]}) for t in rig.trials)
     assert [i.kind for i in check_channels(rig)] == ["current_saturation"]
     assert {i.kind for i in check_channels(replace(rig, trials=trials))} == {"command_as_measurement"}
+
+
+@pytest.mark.parametrize(("late_s", "kinds"), [(0.3, ["command_as_measurement"]), (0.0, [])])
+def test_what_a_controller_asks_for_is_refused_where_the_drive_does_not_give_it(
+    tmp_path: Path, late_s: float, kinds: list[str]
+) -> None:
+    """A torque that target and position tell to the digit is as good as measured where the motion takes it, and is no
+    measurement where the drive gives it late."""
+
+    def torque(motion: Motion) -> np.ndarray:
+        return np.interp(motion[0] + late_s, motion[0], heavier(motion))
+
+    rig = load_rig(read_session(recorded(tmp_path / "s", ARM, 5, torque, 0.0)))
+
+    def asked(q: np.ndarray, effort: np.ndarray) -> np.ndarray:
+        return q + (effort - 0.3) / 6
+
+    trials = tuple(
+        replace(t, setpoint={"hinge": asked(t.position["hinge"], t.effort["hinge"])}) for t in rig.trials
+    )
+    issues = trusted_fit(replace(rig, trials=trials))[1]
+    assert [i.kind for i in issues] == kinds
 
 
 def test_a_target_that_comes_late_to_a_servo_is_told_from_a_late_servo(tmp_path: Path) -> None:

@@ -14,7 +14,8 @@ from scipy.signal import butter, filtfilt
 from hand_model.effects.path import jenkins
 from hand_model.errors import SessionError
 from hand_model.rig import diagnose_rig, fit_declared, load_rig, replay_rig
-from hand_model.rig.channels import check_channels, sinusoids_left
+from hand_model.rig.channels import check_channels
+from hand_model.rig.commanded import sinusoids_left
 from hand_model.rig.diagnose import trusted_fit
 from hand_model.rig.model import RigTrial
 from hand_model.rig.name.candidates import candidates

@@ -63,7 +63,9 @@ def with_weights(
         if other is None:
             if any(out[at].standing(name) is not None for name in BENDING):
                 # a bend of the spring that a weight explains is none beside it
-                out[at], pull = _beside(call, states, pull, partial(_weighed, usual, out[at].naming.balance, states))
+                out[at], pull = _beside(
+                    call, states, pull, out[at], partial(_weighed, usual, out[at].naming.balance, states)
+                )
             size, finding = odd[actuator]
             weights.append((size, _finding(finding, pull, _sweep(states[0]))))
         else:
@@ -102,10 +104,12 @@ def _beside(
     call: tuple[Any, ...],
     states: tuple[DriveState, ...],
     pull: Pull,
+    station: Station,
     weighed: Callable[[tuple[Term, ...], NDArray[np.bool_]], _Model],
 ) -> tuple[Station, Pull]:
     """The drive judged beside a weight, and that weight: of one that needs a bent spring the one without, unless what is
-    named beside that spring is then likelier by what any further effect must bring.
+    named beside that spring is then likelier by what any further effect must bring. The station as it was, where what
+    it names is likelier beside the weight than what is named in its place.
 
     weighed: a weight beside terms, of some samples.
     """
@@ -114,9 +118,15 @@ def _beside(
         effects = [e for e in call[5] if e.name != BENT or weight.alone is not None]
         return judged(*call[:4], tuple(_declaring(s, weight.weight) for s in states), effects, *call[6:])
 
+    def outdone(found: Station) -> bool:
+        old, new = station.naming.fit.terms, found.naming.fit.terms
+        inside = found.naming.balance.unclipped(old) & found.naming.balance.unclipped(new)
+        spared = EVIDENCE_LEAST * (len(old) - len(new))
+        return weighed(new, inside).log_evidence + spared < weighed(old, inside).log_evidence
+
     found = heard(pull)
     if pull.alone is None:
-        return found, pull
+        return (station if outdone(found) else found), pull
     other = heard(pull.alone)
     both = [s.naming.fit.terms for s in (found, other)]
     inside = found.naming.balance.unclipped(both[0]) & found.naming.balance.unclipped(both[1])

@@ -7,7 +7,7 @@ drives is unsigned.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -16,23 +16,21 @@ from numpy.typing import NDArray
 
 from .balance import Rows
 from .clipping import limits
+from .commanded import SAME, controller_left, copied, copy_left, linear, rms, sinusoids_left, static_left
 from .declared import DeclaredFit
 from .model import RigModel, RigTrial
-from .states import fill_gaps, uniform_time
+from .states import fill_gaps
 
 Array = NDArray[np.float64]
-SAME = 0.01  # a measured channel differs from its command by more than this share: drives, sensors and CAN buses do
 STRANGE = 0.7  # share of an effort that may stay unexplained before it is said to explain nothing
 UNSIGNED = "has no sign: it follows the size of the expected effort"
 BOTH_LIMITS, ONE_LIMIT = "stands on its limits, the same both ways", "stands on a limit, one way alone"
 REPEATS = "repeats the channel"
 DEAD = "never changes: dead"
 SINUSOID = "is a sinusoid of time"
-BOTH_WAYS = 0.1  # of the way that a joint goes to one side: as much to the other shows its friction twice
-LEAST_PERIODS = 2.0
-UNBEGUN = 0.02  # of a recording, at its begin, in which its controller need not run yet
 LEAST_TURNS = 4  # changes of sign that must be seen before a channel is said to have none
-LATEST = 2  # samples by which a copy may come late
+EXACTLY = 0.5  # of SAME: the law of a controller tells a true torque as closely as its sensor is quiet
+APART_FROM_MOTION = 0.25  # of the rms of an effort, at least, the declared model leaves of one that is not given
 APART = 0.1  # of SAME: a copy in few recordings among others that are none is plainly one
 
 
@@ -48,10 +46,6 @@ class ChannelIssue:
     reason: str
     refuse: bool
     share: float
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(np.square(values)))) if len(values) else 0.0
 
 
 def check_channels(rig: RigModel) -> tuple[ChannelIssue, ...]:
@@ -97,7 +91,7 @@ def _looks(trial: RigTrial, joint: str, values: Array, measured: bool) -> list[t
         share = float(np.mean((values == low) | (values == high)))
         out.append(("current_saturation", share, BOTH_LIMITS if both else ONE_LIMIT))
     share = sinusoids_left(trial.time_s, values)
-    if share < SAME and not _linear(trial, joint, values):
+    if share < SAME and not linear(trial, joint, values):
         out.append(("command_as_measurement", share, SINUSOID))
     share = static_left(trial, joint, values)
     if share < SAME:
@@ -108,12 +102,6 @@ def _looks(trial: RigTrial, joint: str, values: Array, measured: bool) -> list[t
             when = f", {late} sample{'s' if late > 1 else ''} late" if late else ""
             out.append(("command_as_measurement", share, f'{REPEATS} "{name}"{when}'))
     return out
-
-
-def _reverses(trial: RigTrial, joint: str) -> bool:
-    step = np.diff(fill_gaps(trial.time_s, trial.position[joint]))
-    up, down = step[step > 0].sum(), -step[step < 0].sum()
-    return min(up, down) > BOTH_WAYS * max(up, down)
 
 
 def _gather(rig: RigModel, joint: str, channel: str, found: dict, usable: int) -> list[ChannelIssue]:
@@ -135,103 +123,6 @@ def _gather(rig: RigModel, joint: str, channel: str, found: dict, usable: int) -
         closely = "" if reason == DEAD else f" (to {100 * share:.2g} %)"
         out.append(ChannelIssue(kind, channel, joint, trials, f"{channel} {reason}{closely}", refuse, share))
     return out
-
-
-def _linear(trial: RigTrial, joint: str, values: Array) -> bool:
-    """Whether a joint moves in sinusoids and a channel is of the same frequencies: a linear machine takes such a torque,
-    which says nothing."""
-    frequencies, left = _sinusoids(trial.time_s, fill_gaps(trial.time_s, trial.position[joint]), 2)
-    return left < SAME and _left_of(trial.time_s, values, frequencies) < SAME
-
-
-def sinusoids_left(time_s: Array, values: Array, most: int = 2) -> float:
-    """Share (residual rms over rms) that up to `most` sinusoids and a mean leave; frequencies refined from the
-    spectrum. One where the first does not come twice: any smooth curve is a piece of some sinusoid."""
-    return _sinusoids(time_s, values, most)[1]
-
-
-def _sinusoids(time_s: Array, values: Array, most: int) -> tuple[tuple[float, ...], float]:
-    """Frequencies [Hz] of sinusoids, and the share that `sinusoids_left` says."""
-    from scipy.optimize import minimize_scalar
-
-    grid, y = _begun(time_s, values)
-    if np.ptp(y) == 0 or len(y) < 49:
-        return (), 1.0
-    found: tuple[float, ...] = ()
-    left, step = y - y.mean(), 1.0 / (grid[-1] - grid[0])
-    for _ in range(most):
-        spectrum = np.abs(np.fft.rfft(left * np.hanning(len(left))))
-        k = int(np.argmax(spectrum[1:])) + 1
-
-        def cost(f: float, base: tuple[float, ...] = found) -> float:
-            return _rms(_solve(_waves(grid, (*base, f)), y))
-
-        f = minimize_scalar(
-            cost, bounds=((k - 1) * step, (k + 1) * step), method="bounded", options={"xatol": 1e-6 * step}
-        ).x
-        if f < LEAST_PERIODS * step and not found:
-            return (), 1.0
-        found = (*found, float(f))
-        left = _solve(_waves(grid, found), y)
-    return found, _share(left, y)
-
-
-def _begun(time_s: Array, values: Array) -> tuple[Array, Array]:
-    """Even times (n,) [s] and values, without the first instants, before the generator runs."""
-    grid = uniform_time(time_s)
-    trim = slice(int(UNBEGUN * len(grid)), None)
-    return grid[trim], np.interp(grid, time_s, values)[trim]
-
-
-def _waves(grid: Array, frequencies: Sequence[float]) -> list[Array]:
-    """A mean, and sine and cosine of each frequency [Hz], (n,) each."""
-    return [np.ones_like(grid), *(f(2 * np.pi * hz * grid) for hz in frequencies for f in (np.sin, np.cos))]
-
-
-def _left_of(time_s: Array, values: Array, frequencies: Sequence[float]) -> float:
-    """Share (as `_share`) that sinusoids of these frequencies [Hz] leave."""
-    grid, y = _begun(time_s, values)
-    return _share(_solve(_waves(grid, frequencies), y), y)
-
-
-def _share(left: Array, y: Array) -> float:
-    """What is left of a signal over what it varies by, by the median of the one and the rms of the other."""
-    return float(np.median(np.abs(left)) / 0.6745 / _rms(y - y.mean()))
-
-
-def _solve(columns: list[Array], y: Array) -> Array:
-    x = np.stack(columns, 1)
-    return y - x @ np.linalg.lstsq(x, y, rcond=None)[0]
-
-
-def static_left(trial: RigTrial, joint: str, values: Array) -> float:
-    """Share (as `_share`) that sine, cosine and cubic of the position leave, where the joint goes both ways: a function
-    of it is one at most samples, and need not be in the first instants, before its controller runs.
-
-    Friction alone keeps a true torque from being a function of the position: it changes sign with the motion.
-    """
-    q = fill_gaps(trial.time_s, trial.position[joint])
-    q, values = (v[int(UNBEGUN * len(q)) :] for v in (q, values))
-    if not _reverses(trial, joint) or np.ptp(q) == 0:
-        return 1.0
-    x = np.stack([np.ones_like(q), q, q**2, q**3, np.sin(q), np.cos(q)], 1)
-    scale = np.abs(x).max(0) + 1e-300
-    left = values - (x / scale) @ np.linalg.lstsq(x / scale, values, rcond=1e-10)[0]
-    return _share(left, values)
-
-
-def copied(values: Array, other: Array) -> tuple[float, int]:
-    """Share that a gain and an offset of another channel leave where it is read as many samples earlier as suits best,
-    and how many: a log may write down what was asked for a step ago."""
-    return min((copy_left(values[k:], other[: len(other) - k]), k) for k in range(LATEST + 1))
-
-
-def copy_left(values: Array, other: Array) -> float:
-    """Share that a gain and an offset of another channel leave."""
-    if np.ptp(other) == 0:
-        return 1.0
-    left = _solve([np.ones_like(other), other], values)
-    return _rms(left) / max(float(np.std(values)), 1e-300)
 
 
 def check_balance(rig: RigModel, fit: DeclaredFit) -> tuple[ChannelIssue, ...]:
@@ -269,8 +160,11 @@ def check_balance(rig: RigModel, fit: DeclaredFit) -> tuple[ChannelIssue, ...]:
                     share,
                 )
             )
-        elif _rms(y) > fit.scale[row.joint] and _stranger(fit, row) and (share := _own_fit(fit, row)) > STRANGE:
+        elif rms(y) > fit.scale[row.joint] and _stranger(fit, row) and (share := _own_fit(fit, row)) > STRANGE:
             looks.append((name, row, "explains nothing of the motion, though it does in other recordings", share))
+    looks += _asked_for(
+        trials, fit, {r.joint: force[d.name] for r in fit.rows if (d := rig.drive(r.joint)) and d.name in force}
+    )
     lacking = {row.joint: (name, share) for name, row, reason, share in looks if reason == UNSIGNED}
     known = {(row.trial, row.joint) for _, row, _, _ in looks}
     # A column that has no sign has none in recordings either whose efforts all go one way.
@@ -294,6 +188,33 @@ def check_balance(rig: RigModel, fit: DeclaredFit) -> tuple[ChannelIssue, ...]:
             )
         )
     return tuple(out)
+
+
+def _asked_for(
+    trials: Mapping[str, RigTrial], fit: DeclaredFit, channels: Mapping[str, str]
+) -> list[tuple[str, Rows, str, float]]:
+    """Efforts (channels: joint -> column) that in most recordings are what a controller asks for, and that the motion
+    does not explain: of a drive that gives it a controller's law is as true, and of one that does not it is all there
+    is."""
+    out = []
+    for joint, name in channels.items():
+        rows = [r for r in fit.rows if r.joint == joint and joint in trials[r.trial].effort]
+        told = [
+            (
+                r,
+                controller_left(
+                    trials[r.trial], joint, fill_gaps(trials[r.trial].time_s, trials[r.trial].effort[joint])
+                ),
+            )
+            for r in rows
+        ]
+        strange = [fit.quality[r.trial, joint] > APART_FROM_MOTION and share < EXACTLY * SAME for r, share in told]
+        if np.mean(strange or [False]) > 0.5:
+            out += [
+                (name, row, "is what a controller asks for, and is not what the motion takes", share)
+                for row, share in told
+            ]
+    return out
 
 
 def _unsigned(trial: RigTrial, row: Rows, start: Array) -> float | None:
@@ -336,7 +257,7 @@ def _own_fit(fit: DeclaredFit, row: Rows) -> float:
     x = np.concatenate([row.columns, np.ones((len(row.effort), 1))], 1)[row.moving]
     y = row.effort[row.moving]
     x = x / (np.abs(x).max(0) + 1e-300)
-    return _rms(y - x @ np.linalg.lstsq(x, y, rcond=1e-9)[0]) / max(_rms(y), 1e-300)
+    return rms(y - x @ np.linalg.lstsq(x, y, rcond=1e-9)[0]) / max(rms(y), 1e-300)
 
 
 def _static(row: Rows, x: Array, start: Array) -> float | None:
@@ -344,9 +265,9 @@ def _static(row: Rows, x: Array, start: Array) -> float | None:
     q, y = row.position[:: row.step][row.moving], row.effort[row.moving]
     static = np.stack([np.ones_like(q), q, q**2, q**3, np.sin(q), np.cos(q)], 1)
     static = static / (np.abs(static).max(0) + 1e-300)
-    left = _rms(y - static @ np.linalg.lstsq(static, y, rcond=1e-10)[0]) / max(_rms(y), 1e-300)
+    left = rms(y - static @ np.linalg.lstsq(static, y, rcond=1e-10)[0]) / max(rms(y), 1e-300)
     expected = x @ start
-    moving = _rms(expected - static @ np.linalg.lstsq(static, expected, rcond=1e-10)[0]) / max(_rms(expected), 1e-300)
+    moving = rms(expected - static @ np.linalg.lstsq(static, expected, rcond=1e-10)[0]) / max(rms(expected), 1e-300)
     return left if left < SAME and moving > 5 * left else None
 
 

@@ -97,7 +97,7 @@ def diagnose_rig(
         rejected = [*rejected, *said]
         say(f"{rig.name}: coupling {coupling.name}")
     found, within = within_a_sample(found, 1.0 / _rate(rig))
-    lack = dict(lack)
+    lack = {**lack, "limit": _limit(lack)}
     declared = lack.pop("declared", {c.label: float(t) for c, t in zip(fit.columns, fit.theta, strict=True)})
     unexplained = _unexplained(lack, found)
     again = repeated_trajectory(rig)
@@ -367,8 +367,7 @@ def _diagnose_coupling(
     return shares(named, declared), rejected, angle_residual(rig, coupling, fit, kept)
 
 
-# --- verdict
-# -----------------------------------------------------------------------------------------------------------
+# --- verdict ---------------------------------------------------------------------------------------------------------
 
 
 def _verdict(found: Sequence[Finding], lack: Mapping[str, Any]) -> str:
@@ -379,6 +378,16 @@ def _verdict(found: Sequence[Finding], lack: Mapping[str, Any]) -> str:
     joints = lack.get("joints", {"": lack})
     beyond = any(p["after"] > FITS * (p.get("noise_floor") or 0.0) for p in joints.values())
     return "unexplained" if beyond else "consistent"
+
+
+def _limit(lack: Mapping[str, Any]) -> float | None:
+    """Error below which, all joints together, nothing more than noise is left, in the units of the lack of fit."""
+    if lack.get("before") is None:
+        return None
+    if "joints" not in lack:
+        return float(FITS * lack["noise_floor"])
+    floors = [(p["noise_floor"] or 0.0) / max(p["before"], 1e-300) for p in lack["joints"].values()]
+    return float(FITS * np.sqrt(np.mean(np.square(floors))))
 
 
 def _unexplained(lack: Mapping[str, Any], found: Sequence[Finding]) -> tuple[Mapping[str, Any], ...]:

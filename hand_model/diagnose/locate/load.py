@@ -19,7 +19,7 @@ FEWEST = 50  # samples in motion
 LETS_GO = 1.6  # times what motion leaves unexplained of itself it leaves at rest, where a controller lets go
 ORDER = 4  # of the load over the position
 NEAR_S, LEAVES_S = 0.3, 0.1  # of a start or a stop; in which a controller that had let go takes hold
-JITTER = 4.0  # times the median departure of a resting position: more is no noise
+JITTER = 3.0  # times the median departure of a resting position: more is no noise
 
 
 @dataclass(frozen=True)
@@ -119,13 +119,13 @@ def _departure(time_s: Array, rest: Array, moving: NDArray[np.bool_], near: NDAr
 
 def _path(motion: Motion) -> Array:
     """The position (n,) without its noise at rest: that goes back and forth, and would undo what friction has built
-    up."""
+    up. How much of it there is most rests say, for a drive may creep in some while friction builds up."""
     out = motion.position.copy()
-    for begin, end in runs(~motion.moving):
-        level = float(np.median(out[begin:end]))
-        off = out[begin:end] - level
-        noise = JITTER * float(np.median(np.abs(off)))
-        out[begin:end] = level + np.sign(off) * np.maximum(np.abs(off) - noise, 0.0)
+    rests = [(slice(*run), float(np.median(out[slice(*run)]))) for run in runs(~motion.moving)]
+    noise = JITTER * float(np.median([np.median(np.abs(out[rest] - level)) for rest, level in rests] or [0.0]))
+    for rest, level in rests:
+        off = out[rest] - level
+        out[rest] = level + np.sign(off) * np.maximum(np.abs(off) - noise, 0.0)
     return out
 
 

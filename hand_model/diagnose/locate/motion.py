@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 
 SURE = 3.0  # standard deviations
 WIDER = (1.0, 1.6, 2.5, 4.0, 6.0)  # times a kernel, of which the acceleration's is one
+QUIETER = (1.6, 2.5, 4.0, 6.0, 9.0)  # times a kernel, where a position does not bend
+NARROW = 1.0  # standard deviations of such intervals: wide ones would let a corner be smoothed
 OWN = 0.6  # weight of a sample in its own value, times bandwidth over step: 3 / 2 phi(0)
 WIDENED = 4  # times a kernel may be widened
 # of the acceleration of fast motion, at most, is noise: as an error of a regressor it takes its square off the inertia
@@ -196,13 +198,33 @@ def smoothings(time_s: Array, values: Array, alike: Array = WHITE) -> Iterator[t
 
 def position_at(motion: Motion, time_s: Array, then: Array) -> Array:
     """Position (m,) at times (m,) of a motion estimated at (n,) [s]: what the kernel takes off a curve's corners is put
-    back, as much as it takes off once more ("twicing"; Stuetzle & Mittal 1979), and between samples the position goes
-    with its velocity (Hermite)."""
+    back, as much as it takes off once more ("twicing"; Stuetzle & Mittal 1979), where nothing bends noise is smoothed
+    away, and between samples the position goes with its velocity (Hermite)."""
     from scipy.interpolate import CubicHermiteSpline
 
     again = local_quadratic(time_s, motion.position, motion.bandwidth_s)
-    spline = CubicHermiteSpline(time_s, 2 * motion.position - again[0], 2 * motion.velocity - again[1])
+    exact = 2 * motion.position - again[0]
+    spline = CubicHermiteSpline(time_s, _quieter(motion, time_s, exact), 2 * motion.velocity - again[1])
     return spline(np.clip(then, time_s[0], time_s[-1]))
+
+
+def _quieter(motion: Motion, time_s: Array, exact: Array) -> Array:
+    """A position (n,) with the widest kernel at each sample whose value lies within the noise of all narrower ones
+    (intersection of confidence intervals; Goldenshluger & Nemirovski 1997)."""
+    step = float(np.median(np.diff(time_s)))
+    out, doubt = exact.copy(), NARROW * motion.noise * _left_of_noise(step, motion.bandwidth_s)
+    low, high = exact - doubt, exact + doubt
+    for wider in QUIETER:
+        smooth = local_quadratic(time_s, exact, wider * motion.bandwidth_s)[0]
+        doubt = NARROW * motion.noise * _left_of_noise(step, wider * motion.bandwidth_s)
+        low, high = np.maximum(low, smooth - doubt), np.minimum(high, smooth + doubt)
+        out = np.where(low <= high, smooth, out)
+    return out
+
+
+def _left_of_noise(step: float, bandwidth_s: float) -> float:
+    """Share of white noise that a local quadratic leaves of a value: the root of the integral of its kernel squared."""
+    return float(np.sqrt(27 / 32 / np.sqrt(np.pi) * step / bandwidth_s))
 
 
 def told_between(motion: Motion, time_s: Array, position: Array, then: Array) -> NDArray[np.bool_]:

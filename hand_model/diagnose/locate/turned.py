@@ -129,7 +129,8 @@ def _fit(records: Sequence[_Record], column: Sequence[Array] | None) -> tuple[Ar
     x, y = np.concatenate([r.known for r in records]), np.concatenate([r.angle for r in records])
     if column is not None:
         x = np.column_stack([x, np.concatenate(column)])
-    size = np.linalg.norm(x, axis=0) + 1e-300
+    size = np.linalg.norm(x, axis=0)
+    size[size == 0] = 1.0  # what acts in other recordings alone, as their clocks do, gets nothing
     theta = np.linalg.lstsq(x / size, y)[0] / size
     return theta, y - x @ theta
 
