@@ -35,6 +35,7 @@ MOVING = 2.0  # [%/s]
 GAPS = np.geomspace(5e-4, 0.05, 60)  # [rad] of the plays that are held against a give
 BOUNDS = (8.0, 20.0, 40.0)  # [nats]
 JOINTS = {"drive_backlash": 0, "series_elasticity": 0, "linkage_backlash": 1, "linkage_compliance": 1}
+BENT = {"spring_decoupling": 0, "coupling_deadband": 1, "distal_stop": 1}  # no lost motion; the map may take it up
 
 
 def left_over(columns: Array, values: Array) -> float:
@@ -43,9 +44,10 @@ def left_over(columns: Array, values: Array) -> float:
 
 
 def angle_nats(session: Session, trials: list[Trial], name: str, noise_rad: float) -> tuple[float, float]:
-    """What the map alone, and the likeliest law of the other kind, leave of a joint's angle [nats]; noise_rad: of it."""
+    """What the map alone, and the likeliest law of the other kind of lost motion, leave of a joint's angle [nats];
+    noise_rad: of it."""
     flexions = [t for t in trials if t.planned.kind == "flexion"]
-    joint = JOINTS[name]
+    joint = {**JOINTS, **BENT}[name]
     step = round(1 / session.laboratory.mocap_hz / ROW_S)
     angles, drivers, clocks, loads, groups = [], [], [], [], []
     for number, trial in enumerate(flexions):
@@ -68,6 +70,8 @@ def angle_nats(session: Session, trials: list[Trial], name: str, noise_rad: floa
         return np.c_[((driver - x.min()) / np.ptp(x))[:, None] ** np.arange(4), *own_clock]
 
     plain = mapped(x)
+    if name in BENT:
+        return 0.5 * left_over(plain, y) / noise_rad**2, np.inf
     scale = np.ptp(y) / np.ptp(x)  # of what follows, over what drives it
     if name.endswith("backlash"):
         rivals = [np.c_[plain, np.concatenate(loads)]]
@@ -97,8 +101,8 @@ def observed(answer: dict[str, Any], found: dict[str, Any]) -> tuple[float, floa
     if any(abs(float(drawn.figures[k]) - v) > 1e-9 * max(abs(v), 1.0) for k, v in known.items()):
         raise SystemExit(f"{answer['effects'][0]}: another recorder made this session")
     trials = run_finger(session, finger, [drawn])
-    if name in JOINTS:
-        return angle_nats(session, trials, name, noise_of(found, finger.name, JOINTS[name]))
+    if (joint := {**JOINTS, **BENT}.get(name)) is not None:
+        return angle_nats(session, trials, name, noise_of(found, finger.name, joint))
     if EFFECTS[name].channel == "current" or name == "drive_sag":
         gain, healthy = (current_gain(session, t, MOVING) for t in (trials, run_finger(session, finger, [])))
         return gain.above(healthy).log_likelihood, np.inf

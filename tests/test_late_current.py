@@ -181,3 +181,24 @@ def test_a_lateness_that_answers_surely_tell_stands_where_recordings_kept_out_do
     naming = SimpleNamespace(balance=SimpleNamespace(states=states))
     term = SimpleNamespace(effect=EFFECT, shape={"form": 0.0, "delay": 0.9 * late_s})
     assert station._stands(naming, SimpleNamespace(term=term, evidence=20.0), 0, 8.0) == stands
+
+
+@pytest.mark.parametrize(
+    ("told_s", "answers_doubt_s", "explained", "may_be"),
+    [
+        (-0.012, 0.007, True, True),
+        (0.012, 0.007, True, True),
+        (-0.012, 0.007, False, False),
+        (-0.012, 0.003, True, False),
+        (-0.006, 0.007, True, False),
+    ],
+)
+def test_a_simulation_whose_motion_is_the_recorded_one_tells_a_lateness_alone(
+    told_s: float, answers_doubt_s: float, explained: bool, may_be: bool
+) -> None:
+    """A balance may see nothing of it, since friction may hold a current that rises before the motion; answers may be
+    silent, and must not deny it."""
+    drives = {"index": drive(3), "ring": drive(4)}
+    timed = answering(drives, {"index": (told_s, 0.002), "ring": (0.0, 0.002)})
+    answered = {"index": Lateness(np.zeros(0), 0.0, answers_doubt_s)}
+    assert _late(drives, timed, answered, ("index", "ring") if explained else ()) == {"index": may_be, "ring": False}

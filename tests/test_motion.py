@@ -49,6 +49,18 @@ def test_a_slow_log_is_not_taken_for_a_segment_that_swings() -> None:
     assert np.abs(off[0]).max() < 0.6 * np.abs(off[1]).max()
 
 
+def test_a_position_is_quieter_where_nothing_bends_it_and_keeps_its_corners() -> None:
+    at = stamps(7, 0.012)
+    noise = np.random.default_rng(8).normal(0, 0.08, len(at))
+    motion = estimate_motion(at, strokes(at) + noise)
+    again = local_quadratic(at, motion.position, motion.bandwidth_s)[0]
+    narrow, quiet = (x - strokes(at) for x in (2 * motion.position - again, position_at(motion, at, at)))
+    bent = np.abs(np.gradient(np.gradient(strokes(at), at), at)) > 100.0
+    far = np.convolve(bent, np.ones(31), mode="same") == 0
+    assert far.sum() > 1000 and np.std(quiet[far]) < 0.65 * np.std(narrow[far])
+    assert np.sqrt(np.mean(quiet[bent] ** 2)) < 1.05 * np.sqrt(np.mean(narrow[bent] ** 2))
+
+
 def test_noise_of_the_position_is_not_found_again_with_the_acceleration() -> None:
     at = stamps(2)
     rng = np.random.default_rng(3)

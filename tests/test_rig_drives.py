@@ -131,9 +131,7 @@ def test_what_a_controller_asks_for_is_refused_where_the_drive_does_not_give_it(
     def asked(q: np.ndarray, effort: np.ndarray) -> np.ndarray:
         return q + (effort - 0.3) / 6
 
-    trials = tuple(
-        replace(t, setpoint={"hinge": asked(t.position["hinge"], t.effort["hinge"])}) for t in rig.trials
-    )
+    trials = tuple(replace(t, setpoint={"hinge": asked(t.position["hinge"], t.effort["hinge"])}) for t in rig.trials)
     issues = trusted_fit(replace(rig, trials=trials))[1]
     assert [i.kind for i in issues] == kinds
 

@@ -159,9 +159,28 @@ def test_a_bend_beside_a_weight_must_bring_what_any_further_effect_must(
     monkeypatch.setattr(weight, "judged", judged_as)
     alone = weight.Pull(np.array([-10.0, 10.0]), np.eye(2), 0.99)
     call = (None,) * 5 + ([effect("nonlinear_spring"), effect("detent_load")],)
-    station, pull = weight._beside(call, (), replace(alone, alone=alone), weighed)
+    station, pull = weight._beside(call, (), replace(alone, alone=alone), SimpleNamespace(), weighed)
     assert (station.naming.fit.terms, pull.alone is not None) == (stays, stays)
     assert seen == [[True, True, False]] * 2
+
+
+@pytest.mark.parametrize(("likelier", "stays"), [(11.0, True), (1.0, False)])
+def test_what_is_named_beside_a_weight_must_be_as_likely_as_what_it_replaces(
+    monkeypatch: pytest.MonkeyPatch, likelier: float, stays: bool
+) -> None:
+    """One name less may cost what a name must bring, and no more."""
+
+    def station(terms: int) -> Any:
+        balance = SimpleNamespace(unclipped=lambda terms: np.array([True]))
+        return SimpleNamespace(naming=SimpleNamespace(fit=SimpleNamespace(terms=(None,) * terms), balance=balance))
+
+    def weighed(terms: Any, inside: np.ndarray) -> Any:
+        return SimpleNamespace(log_evidence=likelier if len(terms) == 2 else 0.0)
+
+    before, after = station(2), station(1)
+    monkeypatch.setattr(weight, "judged", lambda *_: after)
+    call, pull = (None,) * 5 + ([effect("detent_load")],), weight.Pull(np.array([-10.0, 10.0]), np.eye(2), 0.99)
+    assert weight._beside(call, (), pull, before, weighed) == (before if stays else after, pull)
 
 
 @pytest.mark.parametrize(("at_the_lowest", "weighs"), [(-150.0, True), (-101.0, False)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,9 @@ DELAY_TOLD = 2.0
 SEEN = 0.5  # the same of a shift that is told otherwise (one standard deviation)
 ALIKE = 2.0  # standard deviations of answers within which they and what else is told say the same
 SURELY = 3.0  # standard deviations by which a simulation and answers each say a current late, and it is
+PLAIN = (
+    4.5  # standard deviations by which a simulation that explains the motion says alone that a current is not in time
+)
 ANSWERED = 1.5  # standard deviations by which answers bear a simulated lateness out
 
 
@@ -30,7 +34,8 @@ def timed_drives(
 ) -> tuple[dict[str, tuple[DriveState, ...]], dict[str, bool]]:
     """The drives with what is known of their current's lateness, and whether each may be late."""
     timed = with_lateness(drives, facts, simulated)
-    late = _late(drives, timed, lateness({a: f.answers for a, f in facts.items()}))
+    explained = frozenset(a for a, s in simulated.items() if s.motions)
+    late = _late(drives, timed, lateness({a: f.answers for a, f in facts.items()}), explained)
     in_time = [a for a in drives if not late[a]]
     if 0 < len(in_time) < len(drives):  # at a reversal a late current looks like a give, an early one like none
         known = {a: float(s[0].extra["late"][0]) for a, s in timed.items() if late[a] and _told(s)}
@@ -42,11 +47,12 @@ def _late(
     drives: dict[str, tuple[DriveState, ...]],
     timed: dict[str, tuple[DriveState, ...]],
     answered: dict[str, Lateness],
+    explained: Collection[str] = (),
 ) -> dict[str, bool]:
     """Whether each drive's current may be delayed: a delay that all drives of a session share is how the log is read.
     Answers to commands tell a late or an early current better than the balance does, and must bear it out. timed: the
     drives with what these answers, or simulations, tell, which says nothing yet to the balance. answered: by the answers
-    alone."""
+    alone. explained: the drives whose motion a simulation explains."""
     nearest, brought, seen_s = dict[str, float](), dict[str, float](), dict[str, tuple[float, float]]()
     for actuator, states in drives.items():
         balance = Balance(states)
@@ -68,6 +74,9 @@ def _late(
         earliest, latest = seen_s[actuator]
         told, doubt = late[actuator].tolist()
         beyond_chance = brought[actuator] > BEYOND_CHANCE
+        if actuator in explained and abs(told) > PLAIN * doubt:
+            # its motion is as simulated, so that neither the drive is late nor its controller another
+            return not _denied(answered.get(actuator), told, doubt, SURELY)
         # a controller that is another than simulated looks like a delay
         if _denied(answered.get(actuator), told, doubt):
             return beyond_chance and told * x > 0 and abs(x) > bound
@@ -121,11 +130,12 @@ def _told(states: tuple[DriveState, ...]) -> bool:
     return bool(abs(late_s) > SURE_DELAY * doubt_s)
 
 
-def _denied(answers: Lateness | None, told_s: float, doubt_s: float) -> bool:
-    """Whether answers to commands say a current in time, and surely not as late, or early, as a simulation tells."""
+def _denied(answers: Lateness | None, told_s: float, doubt_s: float, apart: float = ALIKE) -> bool:
+    """Whether answers to commands say a current in time, and by `apart` standard deviations not as late, or early, as a
+    simulation tells."""
     if answers is None or abs(answers.channel_s) > answers.doubt_s:
         return False
-    return abs(told_s - answers.channel_s) > ALIKE * float(np.hypot(answers.doubt_s, doubt_s))
+    return abs(told_s - answers.channel_s) > apart * float(np.hypot(answers.doubt_s, doubt_s))
 
 
 def _surely_late(answers: Lateness | None, told_s: float, doubt_s: float, bound_s: float) -> bool:

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 SURE = 3.0  # standard deviations
 WIDER = (1.0, 1.6, 2.5, 4.0, 6.0)  # times a kernel, of which the acceleration's is one
 QUIETER = (1.6, 2.5, 4.0, 6.0, 9.0)  # times a kernel, where a position does not bend
-NARROW = 1.0  # standard deviations of such intervals: wide ones would let a corner be smoothed
+NARROW = 0.6  # standard deviations of such intervals: wider ones let a corner be smoothed
 OWN = 0.6  # weight of a sample in its own value, times bandwidth over step: 3 / 2 phi(0)
 WIDENED = 4  # times a kernel may be widened
 # of the acceleration of fast motion, at most, is noise: as an error of a regressor it takes its square off the inertia

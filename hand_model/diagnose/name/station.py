@@ -19,6 +19,7 @@ from .selection import SMALL
 # channels of a session, times names: what no test of a channel sees must stand against as many. Of motors there are few
 # (in 140 healthy balances of currents the likeliest false name is at e^5, of angles, whose clocks err, at e^11)
 CHANCES, CHANCES_OF_MOTORS = 20 * 25, 4 * 25
+LIKELY = 3.0  # log odds of a motor's name against all of those
 PART = 0.5  # of the size of a trace that is another effect's
 ALIKE = 1 / 3  # of the size of a larger effect of the same family: below, no finding of its own
 UNREST = 0.3  # of the noise: wander that every machine is granted; more is no explanation
@@ -53,9 +54,9 @@ class Station:
         self.beside: Callable[[Station], Station] | None = None
         self.compared: tuple[str, ...] = ()
         self.tilt = 0.0
-        chances = CHANCES_OF_MOTORS if signal == "current" else CHANCES
         unseen = naming.before.p >= ALPHA
-        least = EVIDENCE_LEAST + (np.log(chances) if unseen else 0.0)
+        of_chance = LIKELY + np.log(CHANCES_OF_MOTORS) if signal == "current" else EVIDENCE_LEAST + np.log(CHANCES)
+        least = of_chance if unseen else EVIDENCE_LEAST
 
         def must(f: Named) -> float:  # what one recording alone may have, it may have anywhere and at any time
             return least + (EVIDENCE_LEAST if unseen and not f.term.effect.of_the_hand else 0.0)
