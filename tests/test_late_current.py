@@ -201,4 +201,7 @@ def test_a_simulation_whose_motion_is_the_recorded_one_tells_a_lateness_alone(
     drives = {"index": drive(3), "ring": drive(4)}
     timed = answering(drives, {"index": (told_s, 0.002), "ring": (0.0, 0.002)})
     answered = {"index": Lateness(np.zeros(0), 0.0, answers_doubt_s)}
-    assert _late(drives, timed, answered, ("index", "ring") if explained else ()) == {"index": may_be, "ring": False}
+    known = ("index", "ring") if explained else ()
+    assert _late(drives, timed, answered, known) == {"index": may_be, "ring": False}
+    late = {"index": replace(answered["index"], drive_s=np.full(9, 0.03))}  # and its motion with it
+    assert _late(drives, timed, late, known) == {"index": False, "ring": False}

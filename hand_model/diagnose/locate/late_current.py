@@ -23,9 +23,8 @@ DELAY_TOLD = 2.0
 SEEN = 0.5  # the same of a shift that is told otherwise (one standard deviation)
 ALIKE = 2.0  # standard deviations of answers within which they and what else is told say the same
 SURELY = 3.0  # standard deviations by which a simulation and answers each say a current late, and it is
-PLAIN = (
-    4.5  # standard deviations by which a simulation that explains the motion says alone that a current is not in time
-)
+# standard deviations by which a simulation that explains the motion says alone that a current is not in time
+PLAIN = 4.5
 ANSWERED = 1.5  # standard deviations by which answers bear a simulated lateness out
 
 
@@ -74,8 +73,9 @@ def _late(
         earliest, latest = seen_s[actuator]
         told, doubt = late[actuator].tolist()
         beyond_chance = brought[actuator] > BEYOND_CHANCE
-        if actuator in explained and abs(told) > PLAIN * doubt:
-            # its motion is as simulated, so that neither the drive is late nor its controller another
+        in_time = actuator in explained and not (actuator in answered and len(answered[actuator].drive_s))
+        if in_time and abs(told) > PLAIN * doubt:
+            # it moves as its controller is taken for, and as soon
             return not _denied(answered.get(actuator), told, doubt, SURELY)
         # a controller that is another than simulated looks like a delay
         if _denied(answered.get(actuator), told, doubt):

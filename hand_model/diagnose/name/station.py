@@ -55,8 +55,8 @@ class Station:
         self.compared: tuple[str, ...] = ()
         self.tilt = 0.0
         unseen = naming.before.p >= ALPHA
-        of_chance = LIKELY + np.log(CHANCES_OF_MOTORS) if signal == "current" else EVIDENCE_LEAST + np.log(CHANCES)
-        least = of_chance if unseen else EVIDENCE_LEAST
+        beyond_chance = LIKELY + np.log(CHANCES_OF_MOTORS) if signal == "current" else EVIDENCE_LEAST + np.log(CHANCES)
+        least = beyond_chance if unseen else EVIDENCE_LEAST
 
         def must(f: Named) -> float:  # what one recording alone may have, it may have anywhere and at any time
             return least + (EVIDENCE_LEAST if unseen and not f.term.effect.of_the_hand else 0.0)
