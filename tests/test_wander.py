@@ -306,5 +306,5 @@ def test_what_one_recording_alone_has_must_be_plain_where_no_test_sees_it(monkey
     for add, name in ((contact, "external_contact"), (rippled, "torque_ripple")):
         station = judged("current", "index", "index", None, drive(7, add), [effect(name)])
         assert station.naming.before.p >= ALPHA and [f.term.effect.name for f in station.naming.found] == [name]
-    chance = EVIDENCE_LEAST + np.log(100.0)
-    assert asked[0] == pytest.approx(chance + EVIDENCE_LEAST) and asked[-1] == pytest.approx(chance)
+    assert asked[0] == pytest.approx(2 * EVIDENCE_LEAST + np.log(100.0))
+    assert asked[-1] == pytest.approx(np.log(20.0 * 100.0), abs=0.01)

@@ -55,11 +55,12 @@ class Station:
         self.compared: tuple[str, ...] = ()
         self.tilt = 0.0
         unseen = naming.before.p >= ALPHA
-        beyond_chance = LIKELY + np.log(CHANCES_OF_MOTORS) if signal == "current" else EVIDENCE_LEAST + np.log(CHANCES)
-        least = beyond_chance if unseen else EVIDENCE_LEAST
+        odds, chances = (LIKELY, CHANCES_OF_MOTORS) if signal == "current" else (EVIDENCE_LEAST, CHANCES)
+        least = odds + np.log(chances) if unseen else EVIDENCE_LEAST
+        plain = 2 * EVIDENCE_LEAST + (np.log(chances) if unseen else 0.0)
 
         def must(f: Named) -> float:  # what one recording alone may have, it may have anywhere and at any time
-            return least + (EVIDENCE_LEAST if unseen and not f.term.effect.of_the_hand else 0.0)
+            return plain if unseen and not f.term.effect.of_the_hand else least
 
         reading = undisturbed(naming)
         stand, at_ends = list[int](), list[int]()
@@ -67,7 +68,7 @@ class Station:
             if _stands(naming, f, which := places[id(f)], must(f)):
                 if sized(reading, which):
                     stand.append(which)
-                elif _plain_at_ends(naming, f, which, least):
+                elif _plain_at_ends(naming, f, which, plain):
                     at_ends.append(which)
         stand += at_ends
         self.at_ends = frozenset(naming.fit.terms[which].effect.name for which in at_ends)
@@ -78,7 +79,7 @@ class Station:
         self._faint = {
             f.term.effect.name
             for f in self.proven
-            if unseen and not f.term.effect.listed and not _stands(naming, f, places[id(f)], least + EVIDENCE_LEAST)
+            if unseen and not f.term.effect.listed and not _stands(naming, f, places[id(f)], plain)
         }
 
     def renamed(self, naming: Naming) -> Station:
@@ -368,5 +369,5 @@ def _plain_at_ends(naming: Naming, named: Named, which: int, least: float) -> bo
     and stops, as a stop of the open hand. Many effects describe how these are read: it must explain no less than an even
     part. What no table names, or one recording alone has, and only starts and stops show may be how these are read."""
     kind, even = named.term.effect, 1 / len(naming.found)
-    plain = named.share >= even and kind.listed and kind.of_the_hand
-    return plain and _stands(naming, named, which, least + EVIDENCE_LEAST)
+    holds_most = named.share >= even and kind.listed and kind.of_the_hand
+    return holds_most and _stands(naming, named, which, least)
