@@ -34,8 +34,8 @@ Array = np.ndarray
 MOVING = 2.0  # [%/s]
 GAPS = np.geomspace(5e-4, 0.05, 60)  # [rad] of the plays that are held against a give
 BOUNDS = (8.0, 20.0, 40.0)  # [nats]
-JOINTS = {"drive_backlash": 0, "series_elasticity": 0, "linkage_backlash": 1, "linkage_compliance": 1}
 BENT = {"spring_decoupling": 0, "coupling_deadband": 1, "distal_stop": 1}  # no lost motion; the map may take it up
+JOINTS = {"drive_backlash": 0, "series_elasticity": 0, "linkage_backlash": 1, "linkage_compliance": 1, **BENT}
 
 
 def left_over(columns: Array, values: Array) -> float:
@@ -47,7 +47,7 @@ def angle_nats(session: Session, trials: list[Trial], name: str, noise_rad: floa
     """What the map alone, and the likeliest law of the other kind of lost motion, leave of a joint's angle [nats];
     noise_rad: of it."""
     flexions = [t for t in trials if t.planned.kind == "flexion"]
-    joint = {**JOINTS, **BENT}[name]
+    joint = JOINTS[name]
     step = round(1 / session.laboratory.mocap_hz / ROW_S)
     angles, drivers, clocks, loads, groups = [], [], [], [], []
     for number, trial in enumerate(flexions):
@@ -101,8 +101,8 @@ def observed(answer: dict[str, Any], found: dict[str, Any]) -> tuple[float, floa
     if any(abs(float(drawn.figures[k]) - v) > 1e-9 * max(abs(v), 1.0) for k, v in known.items()):
         raise SystemExit(f"{answer['effects'][0]}: another recorder made this session")
     trials = run_finger(session, finger, [drawn])
-    if (joint := {**JOINTS, **BENT}.get(name)) is not None:
-        return angle_nats(session, trials, name, noise_of(found, finger.name, joint))
+    if name in JOINTS:
+        return angle_nats(session, trials, name, noise_of(found, finger.name, JOINTS[name]))
     if EFFECTS[name].channel == "current" or name == "drive_sag":
         gain, healthy = (current_gain(session, t, MOVING) for t in (trials, run_finger(session, finger, [])))
         return gain.above(healthy).log_likelihood, np.inf

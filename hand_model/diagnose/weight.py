@@ -118,20 +118,20 @@ def _beside(
         effects = [e for e in call[5] if e.name != BENT or weight.alone is not None]
         return judged(*call[:4], tuple(_declaring(s, weight.weight) for s in states), effects, *call[6:])
 
-    def outdone(found: Station) -> bool:
-        old, new = station.naming.fit.terms, found.naming.fit.terms
-        inside = found.naming.balance.unclipped(old) & found.naming.balance.unclipped(new)
-        spared = EVIDENCE_LEAST * (len(old) - len(new))
-        return weighed(new, inside).log_evidence + spared < weighed(old, inside).log_evidence
-
     found = heard(pull)
+
+    def likelier(one: Station, other: Station) -> float:
+        """Log evidence of what one names over what the other does, on the samples that neither clips."""
+        both = [s.naming.fit.terms for s in (one, other)]
+        inside = found.naming.balance.unclipped(both[0]) & found.naming.balance.unclipped(both[1])
+        first, second = (weighed(terms, inside).log_evidence for terms in both)
+        return first - second
+
     if pull.alone is None:
-        return (station if outdone(found) else found), pull
+        spared = EVIDENCE_LEAST * (len(station.naming.fit.terms) - len(found.naming.fit.terms))
+        return (station if likelier(station, found) > spared else found), pull
     other = heard(pull.alone)
-    both = [s.naming.fit.terms for s in (found, other)]
-    inside = found.naming.balance.unclipped(both[0]) & found.naming.balance.unclipped(both[1])
-    bent, straight = (weighed(terms, inside).log_evidence for terms in both)
-    return (other, pull.alone) if other.believed and bent - straight < EVIDENCE_LEAST else (found, pull)
+    return (other, pull.alone) if other.believed and likelier(found, other) < EVIDENCE_LEAST else (found, pull)
 
 
 Usual = Mapping[str, tuple[float, float]]  # declared coefficient -> what to expect of it, and how surely

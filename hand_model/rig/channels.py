@@ -199,15 +199,7 @@ def _asked_for(
     out = []
     for joint, name in channels.items():
         rows = [r for r in fit.rows if r.joint == joint and joint in trials[r.trial].effort]
-        told = [
-            (
-                r,
-                controller_left(
-                    trials[r.trial], joint, fill_gaps(trials[r.trial].time_s, trials[r.trial].effort[joint])
-                ),
-            )
-            for r in rows
-        ]
+        told = [(r, controller_left(trials[r.trial], joint)) for r in rows]
         strange = [fit.quality[r.trial, joint] > APART_FROM_MOTION and share < EXACTLY * SAME for r, share in told]
         if np.mean(strange or [False]) > 0.5:
             out += [

@@ -127,19 +127,16 @@ def _reverses(trial: RigTrial, joint: str) -> bool:
     return min(up, down) > BOTH_WAYS * max(up, down)
 
 
-def controller_left(trial: RigTrial, joint: str, values: Array) -> float:
-    """Share (as `_share`) of a channel that the law of a controller leaves: target, position, speed, the rate of the
-    target and the sum of what position lacks, each with a gain; one without a target. Limits need not be met, for the
-    share is of most samples."""
+def controller_left(trial: RigTrial, joint: str) -> float:
+    """Share (as `_share`) of a joint's effort that the law of a controller leaves: target, position, speed, the rate of
+    the target and the sum of what position lacks, each with a gain; one without a target. Limits need not be met, for
+    the share is of most samples."""
     if joint not in trial.setpoint:
         return 1.0
-    time_s, target, q = (
-        trial.time_s,
-        fill_gaps(trial.time_s, trial.setpoint[joint]),
-        fill_gaps(trial.time_s, trial.position[joint]),
-    )
+    time_s = trial.time_s
+    effort, target, q = (fill_gaps(time_s, x[joint]) for x in (trial.effort, trial.setpoint, trial.position))
     lacks = target - q
     summed = np.r_[0.0, np.cumsum(0.5 * (lacks[1:] + lacks[:-1]) * np.diff(time_s))]
     speed = fill_gaps(time_s, trial.velocity[joint]) if joint in trial.velocity else np.gradient(q, time_s)
     columns = [np.ones_like(q), target, q, speed, summed, np.gradient(target, time_s)]
-    return _share(_solve(columns, values), values)
+    return _share(_solve(columns, effort), effort)

@@ -384,10 +384,9 @@ def _limit(lack: Mapping[str, Any]) -> float | None:
     """Error below which, all joints together, nothing more than noise is left, in the units of the lack of fit."""
     if lack.get("before") is None:
         return None
-    if "joints" not in lack:
-        return float(FITS * lack["noise_floor"])
-    floors = [(p["noise_floor"] or 0.0) / max(p["before"], 1e-300) for p in lack["joints"].values()]
-    return float(FITS * np.sqrt(np.mean(np.square(floors))))
+    joints = lack.get("joints", {"": lack}).values()
+    floors = [(p["noise_floor"] or 0.0) / max(p["before"], 1e-300) for p in joints]
+    return float(FITS * np.sqrt(np.mean(np.square(floors))) * lack["before"])
 
 
 def _unexplained(lack: Mapping[str, Any], found: Sequence[Finding]) -> tuple[Mapping[str, Any], ...]:

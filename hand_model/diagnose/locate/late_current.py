@@ -73,8 +73,7 @@ def _late(
         earliest, latest = seen_s[actuator]
         told, doubt = late[actuator].tolist()
         beyond_chance = brought[actuator] > BEYOND_CHANCE
-        in_time = actuator in explained and not (actuator in answered and len(answered[actuator].drive_s))
-        if in_time and abs(told) > PLAIN * doubt:
+        if actuator in explained and not _drive_late(answered.get(actuator)) and abs(told) > PLAIN * doubt:
             # it moves as its controller is taken for, and as soon
             return not _denied(answered.get(actuator), told, doubt, SURELY)
         # a controller that is another than simulated looks like a delay
@@ -128,6 +127,11 @@ def _told(states: tuple[DriveState, ...]) -> bool:
     """Whether it is known for sure how late a current is."""
     late_s, doubt_s = states[0].extra.get("late", (0.0, 1.0))
     return bool(abs(late_s) > SURE_DELAY * doubt_s)
+
+
+def _drive_late(answers: Lateness | None) -> bool:
+    """Whether answers to commands say that the drive is late, not its current alone."""
+    return answers is not None and len(answers.drive_s) > 0
 
 
 def _denied(answers: Lateness | None, told_s: float, doubt_s: float, apart: float = ALIKE) -> bool:

@@ -212,19 +212,14 @@ def _quieter(motion: Motion, time_s: Array, exact: Array) -> Array:
     """A position (n,) with the widest kernel at each sample whose value lies within the noise of all narrower ones
     (intersection of confidence intervals; Goldenshluger & Nemirovski 1997)."""
     step = float(np.median(np.diff(time_s)))
-    out, doubt = exact.copy(), NARROW * motion.noise * _left_of_noise(step, motion.bandwidth_s)
+    out, doubt = exact.copy(), NARROW * _position_noise(motion.noise, step, motion.bandwidth_s)
     low, high = exact - doubt, exact + doubt
     for wider in QUIETER:
         smooth = local_quadratic(time_s, exact, wider * motion.bandwidth_s)[0]
-        doubt = NARROW * motion.noise * _left_of_noise(step, wider * motion.bandwidth_s)
+        doubt = NARROW * _position_noise(motion.noise, step, wider * motion.bandwidth_s)
         low, high = np.maximum(low, smooth - doubt), np.minimum(high, smooth + doubt)
         out = np.where(low <= high, smooth, out)
     return out
-
-
-def _left_of_noise(step: float, bandwidth_s: float) -> float:
-    """Share of white noise that a local quadratic leaves of a value: the root of the integral of its kernel squared."""
-    return float(np.sqrt(27 / 32 / np.sqrt(np.pi) * step / bandwidth_s))
 
 
 def told_between(motion: Motion, time_s: Array, position: Array, then: Array) -> NDArray[np.bool_]:
@@ -263,6 +258,12 @@ def sure_acceleration(motion: Motion) -> Array:
     whatever the position is held against, and as an error of a regressor would take off its coefficient (Fuller 1987).
     What exceeds the noise stays as it is."""
     return np.where(np.abs(motion.acceleration) > SURE * motion.acceleration_noise, motion.acceleration, 0.0)
+
+
+def _position_noise(noise: float, step_s: float, bandwidth_s: float) -> float:
+    """Standard deviation of the value that a kernel makes of so noisy a position: its square is that of the noise times
+    step / h int ((3 - u^2) / 2 phi)^2 du = 27 / (32 sqrt(pi)) step / h."""
+    return noise * float(np.sqrt(27 / 32 / np.sqrt(np.pi) * step_s / bandwidth_s))
 
 
 def _acceleration_noise(noise: float, step_s: float, bandwidth_s: float) -> float:

@@ -56,8 +56,8 @@ class Station:
         self.tilt = 0.0
         unseen = naming.before.p >= ALPHA
         odds, chances = (LIKELY, CHANCES_OF_MOTORS) if signal == "current" else (EVIDENCE_LEAST, CHANCES)
-        least = odds + np.log(chances) if unseen else EVIDENCE_LEAST
-        plain = 2 * EVIDENCE_LEAST + (np.log(chances) if unseen else 0.0)
+        by_chance = np.log(chances) if unseen else 0.0
+        least, plain = (odds if unseen else EVIDENCE_LEAST) + by_chance, 2 * EVIDENCE_LEAST + by_chance
 
         def must(f: Named) -> float:  # what one recording alone may have, it may have anywhere and at any time
             return plain if unseen and not f.term.effect.of_the_hand else least
