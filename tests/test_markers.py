@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -11,11 +12,11 @@ from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from hand_model.diagnose.locate import markers
-from hand_model.diagnose.locate.blocks import _assembled, frames_of_block, present_way, project, way_of_motion
-from hand_model.diagnose.locate.displacement import CREEP, NO_HINGE, WITH_FINGER, YIELDING
+from hand_model.diagnose.locate.blocks import Blocks, _assembled, frames_of_block, present_way, project, way_of_motion
+from hand_model.diagnose.locate.displacement import CREEP, NO_HINGE, STRETCHED, WITH_FINGER, YIELDING
 from hand_model.diagnose.locate.lasting_noise import LastingNoise, lasting_noise
 from hand_model.diagnose.locate.markers import MarkerNaming, named_in, tilt
-from hand_model.diagnose.locate.slips import _finding, _of_neighbours, _turning, palm_bends, unexplained
+from hand_model.diagnose.locate.slips import SPACE, _finding, _of_neighbours, _turning, palm_bends, unexplained
 from hand_model.diagnose.locate.stepwise import Stepwise
 from hand_model.identify.chain import Chain
 
@@ -42,10 +43,15 @@ def seen(shift, seed: int = 0, body: int = 1, lasting: float = 0.0, rests: bool 
         residual = lfilter([np.sqrt(1 - lasting**2)], [1, -lasting], residual, axis=0)
     turn = Rotation.from_rotvec(angle[:, :1] * chain.axis_palm[0]).as_matrix()
     residual[:, BODY == body] += shift(share, turn, rest[BODY == body] - rest[BODY == body].mean(0))
+    return named_in(assembled(chain, residual, angle, share))
+
+
+def assembled(chain: Chain, residual, angle, share) -> Blocks:
+    """Blocks of recordings in each of which the hand is held another way."""
     record = np.repeat(np.arange(RECORDS), COUNT)
-    return named_in(
-        _assembled(chain, BODY, LABELS, residual, np.full((len(share), 12), 8.0), angle, record, 30 * share)
-    )
+    palm = Rotation.from_rotvec(np.outer(record, [0.3, -0.5, 0.4])).as_matrix()
+    weight = np.full((len(share), 12), 8.0)
+    return _assembled(chain, BODY, LABELS, residual, weight, angle, palm, record, 30 * share)
 
 
 def slipping(at: float):
@@ -123,6 +129,25 @@ def test_slips_close_to_each_other_are_told_apart_whatever_was_found_first() -> 
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("along", [0, 1, 2])
+def test_cameras_whose_space_is_stretched_make_no_slips_and_no_joint_that_is_no_hinge(monkeypatch, along: int) -> None:
+    strain = np.zeros((3, 3))
+    strain[along, along] = 0.02
+
+    def stretched(blocks: Blocks) -> MarkerNaming:
+        world = np.einsum("bij,bmj->bmi", blocks.palm, blocks.position)
+        shift = np.einsum("bji,bmj->bmi", blocks.palm, world @ strain)
+        return named_in(replace(blocks, residual=blocks.residual + shift))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(sys.modules[__name__], "named_in", stretched)
+        naming = seen(lambda share, turn, arm: np.zeros((len(share), 4, 3)))
+    assert naming.p_before < 1e-6 and naming.believed and places(naming) == {(STRETCHED, None)}
+    finger = SimpleNamespace(finger=SimpleNamespace(name="index", segments=[]))
+    (entry,) = unexplained(finger, naming)
+    assert entry["shape"] == SPACE and entry["where"]["joint"] is None and entry["share_of_mismatch"] == 1.0
+
+
 def test_a_support_that_turns_all_the_time_does_not_slip() -> None:
     naming = seen(creeping)
     assert naming.believed and places(naming) == {(CREEP, None)}

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from drive_motion import TO_AND_FRO, to_and_fro
 
-from hand_model.diagnose.locate.measurement import beyond, coefficients, dead_zone
+from hand_model.diagnose.locate.drive import dead_in, frozen_share
+from hand_model.diagnose.locate.measurement import beyond, coefficients, dead_zone, frozen
 from hand_model.effects.base import DriveState
 
 
@@ -44,3 +45,17 @@ def test_a_current_that_is_read_all_along_has_no_dead_zone() -> None:
     states = (drive(1), drive(2))
     coarse = tuple(replace(s, effort=10.0 * np.round(s.effort / 10.0)) for s in states)
     assert dead_zone(states) == dead_zone(coarse) == 0.0
+
+
+@pytest.mark.parametrize(("longest", "times"), [(0.3, 1), (0.03, 10)])
+def test_a_current_that_stands_still_on_end_is_dead_and_one_that_is_read_late_now_and_then_is_not(
+    longest: float, times: int
+) -> None:
+    state = to_and_fro(1, 15, 3.0)
+    moving, effort = np.abs(state.velocity) > 0.5, np.array(state.effort)
+    for begin in np.linspace(0, len(effort) * (1 - longest), times).astype(int):
+        effort[begin : begin + int(longest * len(effort))] = effort[begin]
+    extra = {**state.extra, "moving": moving.astype(float), "frozen": frozen(effort, moving).astype(float)}
+    state = replace(state, effort=effort, extra=extra, trial="flexion_index")
+    assert frozen_share([state]) == pytest.approx(0.3, abs=0.05)
+    assert dead_in([state]) == (("flexion_index",) if times == 1 else ())

@@ -19,7 +19,7 @@ from .locate.angles import FingerAngles
 from .locate.command import CommandFacts, command_facts, command_findings, delays, refused, sags_beneath
 from .locate.course import FingerCourses
 from .locate.decoupled import TRIFLE, pulls, while_driven, while_returning, without_excursions
-from .locate.drive import drive_states, drive_trials, frozen_share, opposes, stand_still, too_short
+from .locate.drive import dead_in, drive_states, drive_trials, frozen_share, opposes, stand_still, too_short
 from .locate.encoder_error import encoder_corrections
 from .locate.encoder_step import coarse, encoder_step
 from .locate.gravity import with_gravity
@@ -36,6 +36,7 @@ from .weight import with_weights
 
 REASON = 0.5  # of the size at which friction by load is plain: a soft controller falls behind by so much
 WRONG_STAMPS = 0.1  # of the step between rows, by which times may be wrong: a speed is by a fiftieth then
+LEFT_OUT = "those readings were left out"
 FROZEN = 0.02  # of the time in motion: a current that stands still for more is no slip of a bus
 
 
@@ -98,9 +99,11 @@ class Heard:
             for a, states in drive_states(session, encoder_corrections(self.stations), self.unread, simulated).items()
         }
         self.notes += [note for states in drives.values() for note in stand_still(states)]
-        self.unexplained += [
-            _frozen(session, a, share) for a, states in drives.items() if (share := frozen_share(states)) > FROZEN
-        ]
+        for a, share in {a: frozen_share(states) for a, states in drives.items()}.items():
+            if dead := dead_in(drives[a]):
+                self.found.append(refused(a, _finger_of(session, a), dead, why=f"it {_still(share)}", fate=LEFT_OUT))
+            elif share > FROZEN:
+                self.unexplained.append(_unheard(session, a, "current", f"the current {_still(share)}: {LEFT_OUT}"))
         zones = {a: zone for a, states in drives.items() if (zone := dead_zone(states)) > 0}
         self.unexplained += [_dead(session, a, zone) for a, zone in zones.items()]
         drives = {a: beyond(states, zones[a]) if a in zones else states for a, states in drives.items()}
@@ -239,15 +242,12 @@ def _in_steps(session: Session, actuator: str, step: float) -> dict[str, Any]:
     return _unheard(session, actuator, "position", shape)
 
 
-def _frozen(session: Session, actuator: str, share: float) -> dict[str, Any]:
-    shape = (
-        f"the current stands still while the motor moves, {100 * share:.0f} % of the time: those readings were left out"
-    )
-    return _unheard(session, actuator, "current", shape)
+def _still(share: float) -> str:
+    return f"stands still while the motor moves, {100 * share:.0f} % of the time"
 
 
 def _dead(session: Session, actuator: str, zone: float) -> dict[str, Any]:
-    shape = f"the current reads zero below {zone:.0f} raw: those readings were left out"
+    shape = f"the current reads zero below {zone:.0f} raw: {LEFT_OUT}"
     return _unheard(session, actuator, "current", shape)
 
 

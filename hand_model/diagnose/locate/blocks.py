@@ -29,7 +29,7 @@ class Blocks:
     residual: (b, m, 3) [m] observed minus chain, palm frame. weight: (b, m) share of its frames that a mean is of, times
     BLOCK. pose_basis: (b, 3m, 6+k) orthonormal basis of what poses explain. chain_columns: (b, 3m, s). rotation: (b, m,
     3, 3) body to palm. position: (b, m, 3). angle: (b, k). record, time_s: (b,). labels, body: of the markers. frames:
-    of a block.
+    of a block. palm: (b, 3, 3) palm to the cameras' frame.
     """
 
     residual: Array
@@ -45,6 +45,7 @@ class Blocks:
     time_s: Array
     labels: tuple[str, ...]
     body: NDArray[np.int64]
+    palm: Array
     frames: int = BLOCK
 
 
@@ -78,9 +79,10 @@ def blocks_of(angles: FingerAngles) -> Blocks:
         mean = np.nansum(residual, axis=1) / np.maximum(weight, 1)[..., None]
         weight *= _calm(residual - mean[:, None])[:, None] * BLOCK / length
         angle = record.pose.angle_rad[frames].mean(1)
-        parts.append((mean, weight, angle, np.full(len(frames), index), record.mocap.time_s[frames].mean(1)))
-    residual, weight, angle, record_index, time_s = (np.concatenate(p) for p in zip(*parts, strict=True))
-    blocks = _assembled(chain, body, labels, residual, weight, angle, record_index, time_s)
+        palm, when = record.pose.rotation[frames[:, length // 2]], record.mocap.time_s[frames].mean(1)
+        parts.append((mean, weight, angle, palm, np.full(len(frames), index), when))
+    residual, weight, angle, palm, record_index, time_s = (np.concatenate(p) for p in zip(*parts, strict=True))
+    blocks = _assembled(chain, body, labels, residual, weight, angle, palm, record_index, time_s)
     return replace(blocks, frames=frames_of_block(angles.records[0].mocap.time_s))
 
 
@@ -106,6 +108,7 @@ def _assembled(
     residual: Array,
     weight: Array,
     angle: Array,
+    palm: Array,
     record: Array,
     time_s: Array,
 ) -> Blocks:
@@ -132,6 +135,7 @@ def _assembled(
         time_s,
         labels,
         body,
+        palm,
     )
 
 

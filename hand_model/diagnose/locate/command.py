@@ -229,11 +229,12 @@ def refused(
     trials: tuple[str, ...],
     signal: str = "current",
     why: str = "it does not follow the motion",
+    fate: str = "nothing is fitted to it",
 ) -> tuple[float, Finding]:
     """The finding of a current (or position) channel that is no measurement."""
     fit = _unfitted(f"{signal}_rmse", "raw", None)
     where = {**_where(actuator, finger), "signal": signal, "trials": list(trials)}
-    text = f"The {signal} of {actuator} is no measurement: {why}; nothing is fitted to it."
+    text = f"The {signal} of {actuator} is no measurement: {why}; {fate}."
     return 1e9, Finding(
         "command_as_measurement",
         ("command_as_measurement",),

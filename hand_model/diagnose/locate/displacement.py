@@ -20,7 +20,8 @@ CREEP = "creep"  # of a marker or support that moves all the time; a slip has a 
 # of a marker or support that moves on its segment as the finger moves: a soft mount, a plate that bends
 YIELDING = "yielding"
 WITH_FINGER = "moves on what carries it as the finger moves"  # after the marker's name
-UNNAMED = (NO_HINGE, CREEP, YIELDING)  # what no table of effects names
+STRETCHED = "stretched"  # of what the cameras see: a calibration whose scale is not the same along all directions
+UNNAMED = (NO_HINGE, CREEP, YIELDING, STRETCHED)  # what no table of effects names
 
 
 @dataclass(frozen=True)
@@ -119,6 +120,18 @@ def creeping(blocks: Blocks, slip: Candidate) -> list[Candidate]:
         within[mine] = (t - t[0]) / max(t[-1] - t[0], 1e-9)
     whole = np.arange(len(within)) / max(len(within) - 1, 1)
     return [Candidate(CREEP, slip.body, slip.label, slip.base * ramp[:, None, None], False) for ramp in (whole, within)]
+
+
+def stretched(blocks: Blocks) -> Candidate:
+    """The cameras' space, stretched and sheared evenly: a symmetric strain in their frame. Turns and shifts are the
+    palm's pose."""
+    b, m = blocks.weight.shape
+    position = np.einsum("bij,bmj->bmi", blocks.palm, blocks.position)
+    columns = np.zeros((b, m, 3, 6))
+    for c, (i, j) in enumerate(zip(*np.triu_indices(3), strict=True)):
+        columns[..., i, c] += position[..., j]
+        columns[..., j, c] += position[..., i]
+    return Candidate(STRETCHED, 0, None, np.einsum("bji,bmjc->bmic", blocks.palm, columns).reshape(b, 3 * m, 6), False)
 
 
 def of_any_form(blocks: Blocks, slip: MarkerEffect) -> MarkerEffect:

@@ -32,6 +32,7 @@ SETTLE_SAMPLES = (14, 13)  # after a start and before a stop: where acceleration
 
 UNFOLLOWED = 0.25  # of the range: commands that end farther than this from where the motion does are not its own
 ROUNDS = 4  # in which the effort required and its square settle
+DEAD = 0.2  # of the time in motion of a recording: longer no reading that comes late stands still on end
 LATE_SAMPLES = 3  # by which a current may be late, at most
 # times smaller must the misfit be beside a late current: of 600 drives it is so where the current is late or the drive
 # gives long before it slides, and smaller by 1.046 once elsewhere
@@ -190,6 +191,18 @@ def frozen_share(states: Sequence[DriveState]) -> float:
     """Share of the time in motion in which a drive's current stands still."""
     moving, still = (np.concatenate([s.extra[name] for s in states]) > 0 for name in ("moving", "frozen"))
     return float(np.mean(still[moving])) if moving.any() else 0.0
+
+
+def dead_in(states: Sequence[DriveState]) -> tuple[str, ...]:
+    """Recordings of a drive whose current stands still on end for so much of the motion that it is dead there, and not
+    read late now and then."""
+    out = []
+    for state in states:
+        moving = state.extra["moving"] > 0
+        longest = max((int(np.sum(moving[a:b])) for a, b in runs(state.extra["frozen"] > 0)), default=0)
+        if longest > DEAD * np.sum(moving):
+            out.append(state.trial)
+    return tuple(out)
 
 
 def stand_still(states: Sequence[DriveState]) -> list[str]:

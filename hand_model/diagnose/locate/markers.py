@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ...effects.outside.outsider import UNLIKELY
 from .angles import FingerAngles, refitted
 from .blocks import Blocks, blocks_of, project
-from .displacement import NO_HINGE, MarkerEffect, candidates_of, creeping, of_any_form
+from .displacement import NO_HINGE, MarkerEffect, candidates_of, creeping, of_any_form, stretched
 from .lasting_noise import LastingNoise, lasting_noise
 from .stepwise import HINGE, Stepwise
 from .wobble import possible
@@ -66,8 +66,7 @@ def name_markers(angles: FingerAngles) -> MarkerNaming:
 
 
 def named_in(blocks: Blocks) -> MarkerNaming:
-    """The same of its blocks of frames. A way of a joint that no finger can go is what stays where nothing else
-    explains the markers, or, what other things leave told beside them, explains them better."""
+    """The same of its blocks of frames."""
     y = project(blocks, blocks.residual.reshape(len(blocks.residual), -1, 1))
     shared = project(blocks, blocks.chain_columns)
     sigma = _noise(y, blocks)
@@ -77,18 +76,34 @@ def named_in(blocks: Blocks) -> MarkerNaming:
         return MarkerNaming(blocks, (), sigma, p_before, p_before, excess_before, excess_before)
     candidates, before = candidates_of(blocks), (p_before, excess_before)
     search = Stepwise(blocks, candidates, y, shared, sigma, lasting)
+    return _unstretched(search, _within_reach(search, before), before)
+
+
+def _within_reach(search: Stepwise, before: tuple[float, float]) -> MarkerNaming:
+    """The naming of a search. A way of a joint that no finger can go is what stays where nothing else explains the
+    markers, or, what other things leave told beside them, explains them better."""
     naming = _named(search, before)
     beyond = {e.body for e in naming.found if e.effect == NO_HINGE}
     if not beyond:
         return naming
-    candidates = [c for c in candidates if c.effect not in UNHINGED or c.body not in beyond]
-    other = _named(Stepwise(blocks, candidates, y, shared, sigma, lasting), before)
+    candidates = [c for c in search.candidates if c.effect not in UNHINGED or c.body not in beyond]
+    other = _named(Stepwise(search.blocks, candidates, search.y, search.shared, search.sigma, search.lasting), before)
     if other.found and other.p_after >= ALPHA and all(e.effect != NO_HINGE for e in other.found):
         return other
     known = [e for e in other.found if e.effect not in UNHINGED]
     if not known:
         return naming
     again = _named(search, before, known)
+    return again if search.score(again.found) > search.score(naming.found) + UNLIKELY else naming
+
+
+def _unstretched(search: Stepwise, naming: MarkerNaming, before: tuple[float, float]) -> MarkerNaming:
+    """The naming, or the one beside cameras whose space is stretched, where that says clearly more."""
+    strain = search.alone(stretched(search.blocks))
+    missing = naming.found or naming.p_before < ALPHA
+    if not missing or search.score([*naming.found, strain]) < search.score(naming.found) + UNLIKELY:
+        return naming
+    again = _named(search, before, [strain])
     return again if search.score(again.found) > search.score(naming.found) + UNLIKELY else naming
 
 

@@ -15,7 +15,7 @@ from ..findings import UNWRITTEN, Finding, weighed
 from .angles import FingerAngles, Step
 from .blocks import BLOCK, Blocks
 from .course_amount import course_amount
-from .displacement import NO_HINGE, NOT_RIGID, UNNAMED, WITH_FINGER, YIELDING, MarkerEffect
+from .displacement import NO_HINGE, NOT_RIGID, STRETCHED, UNNAMED, WITH_FINGER, YIELDING, MarkerEffect
 from .markers import ALPHA, SMALL, UNHINGED, MarkerNaming
 from .stepwise import HINGE
 from .swaps import swaps
@@ -28,6 +28,7 @@ CORRECTION = {
     "palm_marker_slip": "the palm marker's displacement is taken out from the moment of the slip",
     "support_slip": "the support's turn is taken out from the moment of the slip",
 }
+SPACE = "the cameras' space is stretched: their scale is not the same along all directions"
 IN_STEP = "the markers leave the hinge's motion in step with the angle"
 DRAWS = 60  # of coefficients, for an interval
 ECHO = 0.2  # of the gain at a joint, below which the one beside it is no hinge for the form of the first one's law
@@ -84,6 +85,8 @@ def _shape(effect: MarkerEffect) -> str:
     """What is said of an effect that no table names."""
     if effect.effect == NO_HINGE:
         return f"{NO_HINGE}: {IN_STEP}"
+    if effect.effect == STRETCHED:
+        return SPACE
     return f"{effect.label or 'a support'} {WITH_FINGER if effect.effect == YIELDING else 'moves all the time'}"
 
 
