@@ -257,3 +257,12 @@ def test_no_marker_is_split_where_the_chain_settles_neither_with_the_slip_nor_wi
     monkeypatch.setattr(finger, "fit_chain", settling)
     again, found = finger._fit_with_slips(fit)
     assert len(found) == slips and (again is fit) is not settles and (settles or len(calls) <= 2)
+
+
+def test_a_marker_that_was_left_out_before_makes_no_other_seem_loose() -> None:
+    _, data, _ = recording(11)
+    fit = fitted(data)
+    residual = fit.residual_palm.copy()
+    residual[:, 6] = np.nan
+    fit = replace(fit, residual_palm=residual)
+    assert finger._without_loose(fit, (3, 4)) is fit

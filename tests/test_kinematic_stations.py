@@ -17,7 +17,7 @@ from hand_model.diagnose.name.evidence import gain
 from hand_model.diagnose.name.judgement import judged
 from hand_model.diagnose.name.selection import name_effects
 from hand_model.diagnose.name.shapes import polish, scan
-from hand_model.diagnose.name.station import Station
+from hand_model.diagnose.name.station import Station, bring_together
 from hand_model.effects import catalogue, effect, outsiders
 from hand_model.effects.backlash import GRADUAL
 from hand_model.effects.base import DriveState
@@ -595,6 +595,22 @@ def test_a_segment_held_back_for_a_while_gives_no_more_than_others(met: bool) ->
     findings = assemble([station], [(1.0, contact)] if met else [], [])
     assert [f.effect for f in findings.findings] == ["external_contact"] * met
     assert any("holds the distal segment back" in e["shape"] for e in findings.unexplained) is not met
+
+
+@pytest.mark.parametrize("met", [True, False])
+def test_what_is_smaller_than_the_trace_of_an_obstacle_stands_where_the_current_shows_that(met: bool) -> None:
+    def held_back_with_a_dead_band(t, x, v):
+        share = (t - t[0]) / np.ptp(t)
+        return -0.1 * np.maximum(x - 50.0, 0.0) * ((share > 0.2) & (share < 0.8)) + 0.3 * np.maximum(8.0 - x, 0.0)
+
+    effects = [*catalogue("linkage"), *outsiders("linkage")]
+    states = joint(5, add=held_back_with_a_dead_band)
+    station = judged("markers", "index", "index", "distal", states, effects)
+    named = SimpleNamespace(term=SimpleNamespace(effect=effect("external_contact" if met else "detent_load")))
+    bring_together([station, SimpleNamespace(finger="index", believed=True, kept=(named,))])
+    assert station.believed
+    assert [f.term.effect.name for f in station.kept] == (["coupling_deadband"] if met else [])
+    assert [f.term.effect.name for f in station.outsiders] == ([] if met else ["obstructed"])
 
 
 def test_a_departure_within_the_tilt_of_a_joint_that_is_no_hinge_does_not_stand_and_a_clock_does() -> None:

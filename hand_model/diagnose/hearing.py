@@ -31,7 +31,7 @@ from .magnitude import magnitude
 from .name.balance import Balance
 from .name.evidence import typical_coefficients
 from .name.judgement import judged
-from .name.station import Station, told
+from .name.station import Station, bring_together, told
 from .weight import with_weights
 
 REASON = 0.5  # of the size at which friction by load is plain: a soft controller falls behind by so much
@@ -156,6 +156,7 @@ class Heard:
         self.stations, odd = with_weights(self.session, self.fingers, self.stations, calls)
         for _, finding in odd:
             self.tell(finding.statement)
+        bring_together(self.stations)
         self.found = _without_settled_sags([*self.found, *odd], self.stations, facts)
         self._put_delays_right(facts)
 

@@ -168,9 +168,11 @@ def _fit_with_slips(fit: ChainFit) -> tuple[ChainFit, tuple[Slip, ...]]:
 
 def _without_loose(fit: ChainFit, columns: tuple[int, int]) -> ChainFit:
     """The fit without that epoch of a slipped marker which does not sit on its segment: its residuals stand out from
-    the rest."""
-    size = np.sqrt(np.nanmedian(np.sum(fit.residual_palm**2, axis=-1), axis=0))
-    others = np.median(np.delete(size, columns))
+    the rest, those aside that were left out so before."""
+    square = np.sum(fit.residual_palm**2, axis=-1)
+    seen, size = np.isfinite(square).any(axis=0), np.zeros(square.shape[1])
+    size[seen] = np.sqrt(np.nanmedian(square[:, seen], axis=0))
+    others = np.median(size[seen & ~np.isin(np.arange(len(size)), columns)])
     worst = max(columns, key=lambda j: size[j])
     if size[worst] < LOOSE * others:
         return fit

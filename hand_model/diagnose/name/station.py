@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -42,7 +42,8 @@ EXPLAINED_PARTLY = 0.5
 
 class Station:
     """One balance of one finger and what was named there. beside: reads its sizes again where more is known of the drive
-    than its own balance tells; compared: names of which other drives tell the size; at_ends: of what starts and stops
+    than its own balance tells; compared: names of which other drives tell the size; elsewhere: names
+    that stand at other balances of its finger; at_ends: of what starts and stops
     alone tell, beside which sizes are read as named; tilt: root mean square, in the unit of the balance, below which a
     departure of an angle may be what a joint that is no plain hinge leaves in it."""
 
@@ -53,6 +54,7 @@ class Station:
         places = {id(f): naming.fit.terms.index(f.term) for f in naming.found}
         self.beside: Callable[[Station], Station] | None = None
         self.compared: tuple[str, ...] = ()
+        self.elsewhere: frozenset[str] = frozenset()
         self.tilt = 0.0
         unseen = naming.before.p >= ALPHA
         odds, chances = (LIKELY, CHANCES_OF_MOTORS) if signal == "current" else (EVIDENCE_LEAST, CHANCES)
@@ -250,7 +252,9 @@ class Station:
         return next((f for f in self.kept if f.term.effect.name == name), None) if self.believed else None
 
     def _part(self, outsider: Named) -> bool:
-        """Whether an outsider is a trace of an effect that stands beside it, no smaller than half of it."""
+        """Whether an outsider is a trace of an effect that stands elsewhere, or beside it, no smaller than half of it."""
+        if outsider.term.effect.part_of in self.elsewhere:
+            return True
         whole = (f for f in self._beside if f.term.effect.name == outsider.term.effect.part_of)
         return any(f.size >= PART * outsider.size for f in whole)
 
@@ -342,6 +346,18 @@ def told(station: Station, named: Named) -> dict[str, Any]:
     """name -> value of the parameters of what was named at a station."""
     figures = station.parameters[station.naming.fit.terms.index(named.term)]
     return {name: figure["value"] for name, figure in figures.items()}
+
+
+def bring_together(stations: Sequence[Station]) -> None:
+    """Let every station know what stands at the others of its finger: what it shows of that is no stranger."""
+    standing = [frozenset(f.term.effect.name for f in s.kept) if s.believed else frozenset[str]() for s in stations]
+    for station in stations:
+        others = (
+            names
+            for other, names in zip(stations, standing, strict=True)
+            if other is not station and other.finger == station.finger
+        )
+        station.elsewhere = frozenset().union(*others)
 
 
 def _related(one: Named, other: Named) -> bool:
