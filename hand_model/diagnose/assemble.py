@@ -54,7 +54,7 @@ PLAIN = 30.0  # log evidence from which a name is: neither chance nor those impe
 CHANNELS = 15
 # of a weight counts where the declared model takes up what is named, so that nothing of the mismatch is its: only the
 # hand's other motors speak for it
-COMPARED = 0.01
+COMPARED = 0.001
 MANY = 3  # names of a finger, beside which a channel of it may be explained in part
 NEARLY_ALL = 0.95  # of a mismatch: names that take as much leave nothing worth a word
 UNSEEN = 0.01  # probability from which the test sees nothing
