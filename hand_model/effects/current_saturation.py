@@ -10,8 +10,16 @@ import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect, Shape, figure
 from .mjcf import motor_joint, motor_sensor
+from .pile_up import piled_up
 
 BOTH, ABOVE, BELOW = range(3)
+NONE = (0.0, 0.0)
+# log odds from which readings that pile up say that they clip (of some 3000 healthy motors the largest is 10.5), and as
+# much of these as counts
+PILED, MOST = 14.0, 40.0
+THERE = (
+    0.8  # of the largest reading, at least, is a limit at which readings pile up: its mean lies below, for noise clips
+)
 ONE_SIDED = 0.1  # probability of each of the two ways in which one end alone clips, as of an amplifier's offset
 
 
@@ -20,6 +28,15 @@ class CurrentSaturation(Effect):
 
     name = "current_saturation"
     clips = True
+
+    def __init__(self, upper: tuple[float, float] = NONE, lower: tuple[float, float] = NONE) -> None:
+        """upper, lower: the largest reading at each end, and the log odds that readings pile up there."""
+        self.upper, self.lower = upper, lower
+
+    def among(self, states: tuple[DriveState, ...]) -> CurrentSaturation:
+        """With what these readings alone say of clipping."""
+        ends = ([sign * s.effort for s in states] for sign in (1.0, -1.0))
+        return CurrentSaturation(*((float(np.nanmax(np.concatenate(end))), piled_up(end)) for end in ends))
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """Clipping level, among the highest recorded efforts; readings cut for nearly half of the time leave room below
@@ -32,12 +49,13 @@ class CurrentSaturation(Effect):
         )
 
     def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
-        """Levels among the readings of the end that clips."""
-        return [
+        """Levels among the readings of the end that clips; where readings pile up, there."""
+        every = [
             {"form": float(form), "limit": float(level)}
             for form, values in _levels(states).items()
             for level in values[1:]
         ]
+        return [shape for shape in every if self._piles(shape)] or every
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
         """No amplitude."""
@@ -48,8 +66,25 @@ class CurrentSaturation(Effect):
         return np.clip(prediction, *_ends(shape))
 
     def log_prior(self, parameters: Mapping[str, float]) -> float:
-        """Most that clips does so at both ends."""
-        return math.log(3 * (1 - 2 * ONE_SIDED if parameters.get("form", BOTH) == BOTH else ONE_SIDED))
+        """Most that clips does so at both ends, and readings pile up there."""
+        ends = math.log(3 * (1 - 2 * ONE_SIDED if parameters.get("form", BOTH) == BOTH else ONE_SIDED))
+        return ends + min(max((odds for _, odds in self._piles(parameters)), default=0.0), MOST)
+
+    def told_otherwise(self, states: tuple[DriveState, ...], shape: Mapping[str, float]) -> bool:
+        """Whether readings pile up at the limit."""
+        return bool(self._piles(shape))
+
+    def parameters(
+        self, shape: Mapping[str, float], amplitude: Mapping[str, float], declared: Mapping[str, float]
+    ) -> dict[str, float]:
+        """Form and limit; the largest reading where readings pile up there, below which their mean lies."""
+        return {**shape, "limit": min((end for end, _ in self._piles(shape)), default=shape["limit"])}
+
+    def _piles(self, parameters: Mapping[str, float]) -> list[tuple[float, float]]:
+        """The ends, each with its log odds, at which readings pile up at this limit."""
+        form = parameters.get("form", BOTH)
+        ends = [end for end, other in ((self.upper, BELOW), (self.lower, ABOVE)) if form != other]
+        return [(end, odds) for end, odds in ends if odds > PILED and parameters["limit"] > THERE * end]
 
     def further(
         self, states: tuple[DriveState, ...], parameters: Mapping[str, Mapping[str, Any]]

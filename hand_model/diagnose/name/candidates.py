@@ -54,7 +54,7 @@ def _looked_at(pair: Pair, rough: list[tuple[float, Fit]], fit: Fit, refine: int
     first ones, and those that may pass one of these. rough: evidence and fit of their starts, best first."""
     balance = pair.state
     first = _polished(pair, [start for _, start in rough[: min(refine, FIRST)]], len(fit.terms))
-    passed = [rough_evidence(balance, f, fit, scale_of(balance, f)) for f in first if allowed(balance, f)]
+    passed = [_promise(balance, f, fit, scale_of(balance, f)) for f in first if allowed(balance, f)]
     least, left = max(min(passed, default=0.0), 0.0), rough[len(first) :]
     hopeful = [i < refine - len(first) and _hope(balance, *item, fit) > least for i, item in enumerate(left)]
     more = _polished(pair, [start for (_, start), may in zip(left, hopeful, strict=True) if may], len(fit.terms))
@@ -74,11 +74,19 @@ def _hope(balance: Balance, rough: float, start: Fit, fit: Fit) -> float:
 
 def _rough(balance: Balance, effect: Any, terms: tuple[Term, ...], fit: Fit, least: float) -> tuple[float, Fit] | None:
     best = None if effect is None else scan(balance, effect, terms, least)
-    return None if best is None else (rough_evidence(balance, best, fit, scale_of(balance, best)), best)
+    return None if best is None else (_promise(balance, best, fit, scale_of(balance, best)), best)
+
+
+def _promise(balance: Balance, fit: Fit, reference: Fit, scale: float) -> float:
+    """Rough evidence of a fit's last term, with what else than the balance says the same for sure."""
+    term = fit.terms[-1]
+    told = term.effect.told_otherwise(balance.states, term.shape)
+    prior = term.effect.log_prior(term.effect.parameters(term.shape, fit.amplitudes[-1], fit.declared)) if told else 0.0
+    return rough_evidence(balance, fit, reference, scale) + prior
 
 
 def _weight(balance: Balance, candidate: tuple[Fit, bool], fit: Fit, scale: float) -> float:
-    return (evidence if candidate[1] else rough_evidence)(balance, candidate[0], fit, scale=scale)
+    return (evidence if candidate[1] else _promise)(balance, candidate[0], fit, scale=scale)
 
 
 def twice(balance: Balance, fit: Fit) -> bool:

@@ -23,7 +23,7 @@ from .candidates import EVIDENCE_LEAST, allowed, exchanged, least_evidence, rank
 from .evidence import evidence, gain, scale_of
 from .lack_of_fit import LackOfFit, lack_of_fit
 from .naming import ALPHA, CLASS_WIDTH, MANY, MOST_TERMS, Named, Naming, Rival, overwhelmed
-from .shapes import other_forms, polish, possible, scan
+from .shapes import polish, possible, scan
 from .tangent import Tangents, turned
 from .term import Term
 from .wander import Wander, estimate_wander
@@ -307,35 +307,13 @@ def _with_kept_out(balance: Balance, rivals: list[Rival]) -> list[Rival]:
     near = [r for r in rivals if r.evidence > rivals[0].evidence - CLASS_WIDTH]
     if len(near) < 2 or balance.train.all() or not all(r.fit.terms[-1].effect.of_the_hand for r in near):
         return rivals
-    every = [[r, *_other_forms(balance.learning(), r)] for r in near]
-    foretold = [[_foretold(balance, balance.fit(r.fit.terms)) for r in forms] for forms in every]
-    scale = max(min(square for forms in foretold for square, _ in forms), 1.0)  # a misfit there weighs all down
-    chosen = [
-        max(
-            ((r, brought / scale) for r, (_, brought) in zip(forms, said, strict=True)),
-            key=lambda i: i[0].evidence + i[1],
-        )
-        for forms, said in zip(every, foretold, strict=True)
-    ]
-    told = [t for _, t in chosen]
-    near = [r for r, _ in chosen]
+    foretold = [_foretold(balance, balance.fit(r.fit.terms)) for r in near]
+    scale = max(min(square for square, _ in foretold), 1.0)  # a misfit there weighs all down
+    told = [brought / scale for _, brought in foretold]
     likeliest = int(np.argmax([r.evidence + t for r, t in zip(near, told, strict=True)]))
     more = [t - told[likeliest] for t in told]
     heard = [replace(r, evidence=r.evidence + m, kept_out=m) for r, m in zip(near, more, strict=True)]
     return sorted([*heard, *rivals[len(near) :]], key=lambda r: -r.evidence)
-
-
-def _other_forms(balance: Balance, rival: Rival) -> list[Rival]:
-    """The rival in those other forms of its effect that the training recordings of `balance` cannot tell from its own:
-    they choose the one that suits their noise."""
-    last, out = len(rival.fit.terms) - 1, list[Rival]()
-    without, scale = balance.fit(rival.fit.terms[:last]), scale_of(balance, rival.fit)
-    own = evidence(balance, rival.fit, without, last, scale)
-    for fit in other_forms(balance, rival.fit, last):
-        less = own - evidence(balance, fit, without, last, scale)
-        if less < CLASS_WIDTH and possible(balance, fit, last):
-            out.append(replace(rival, evidence=rival.evidence - less, fit=fit))
-    return out
 
 
 def _foretold(balance: Balance, fit: Fit) -> tuple[float, float]:

@@ -199,15 +199,14 @@ def refit(balance: Balance, fit: Fit, rounds: int = 2) -> Fit:
 def reform(balance: Balance, fit: Fit, which: int) -> Fit:
     """The likeliest of the forms of one term, each with its shape optimised and paying for its parameters (Schwarz
     1978)."""
-    return likeliest(balance, [fit, *other_forms(balance, fit, which)], which, priced(balance))
-
-
-def other_forms(balance: Balance, fit: Fit, which: int) -> list[Fit]:
-    """The fit with one term in each other form of its effect, its shape optimised."""
     term = fit.terms[which]
     forms = next((s.starts for s in term.effect.shapes(balance.states) if s.name == "form"), ())
-    others = [reshaped(fit.terms, which, {**term.shape, "form": form}) for form in forms if form != term.shape["form"]]
-    return [polish(balance, balance.fit(terms), which) for terms in others]
+    fits = [fit]
+    for form in forms:
+        if form != term.shape["form"]:
+            other = reshaped(fit.terms, which, {**term.shape, "form": form})
+            fits.append(polish(balance, balance.fit(other), which))
+    return likeliest(balance, fits, which, priced(balance))
 
 
 def priced(balance: Balance) -> Callable[[Fit], float]:
