@@ -88,4 +88,6 @@ def test_readings_that_pile_up_at_the_largest_clip_there_however_few_they_are() 
 def test_a_channel_whose_noise_it_does_not_resolve_does_not_pile_up() -> None:
     coarse = [10.0 * np.round(s.effort / 10.0) for s in (loud(1), loud(2))]
     still = [np.minimum(s.effort, 20.0) for s in (drive(1), drive(2))]
+    level = np.concatenate([drive(1).effort, 90.0 + np.random.default_rng(0).integers(0, 2, 300)])  # said, not read
+    assert piled_up([level + np.random.default_rng(1).integers(-5, 6, len(level)) * (level < 90)]) < PILED
     assert piled_up(coarse) == piled_up(still) == piled_up([np.zeros(5), np.full(5, np.nan)]) == 0.0

@@ -14,7 +14,7 @@ from .pile_up import piled_up
 
 BOTH, ABOVE, BELOW = range(3)
 NONE = (0.0, 0.0)
-# log odds from which readings that pile up say that they clip (of some 3000 healthy motors the largest is 10.5), and as
+# log odds from which readings that pile up say that they clip (of some 3000 healthy motors the largest is 6), and as
 # much of these as counts
 PILED, MOST = 14.0, 40.0
 THERE = (
