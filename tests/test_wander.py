@@ -72,7 +72,7 @@ def test_replicates_that_repeat_have_no_wander(seed, colour):
 
 def test_an_obstacle_in_one_trial_is_still_named_beside_its_rival_chance():
     shape = {"trial": 1.0, "form": 0.0, "since": 0.4, "until": 1.0, "begin": 55.0}
-    contact = planted("external_contact", shape, [0.6, *[0.0] * 4])
+    contact = planted("external_contact", shape, [0.6, *[0.0] * 8])
     naming = name_effects(drive(7, contact), catalogue("drive"))
     assert [f.term.effect.name for f in naming.found] == ["external_contact"]
     assert naming.found[0].amplitudes["stiffness"] == pytest.approx(0.6, rel=0.15)
@@ -92,6 +92,24 @@ def test_the_while_of_a_weak_obstacle_is_found_between_its_starts(since, until, 
     figures = station.parameters[0]
     assert figures["stiffness"]["value"] == pytest.approx(0.3, rel=0.2)
     assert figures["begin"]["value"] == pytest.approx(58.0, abs=4.0)
+
+
+@pytest.mark.parametrize("later", [(0.15, 0.6), (0.0, 1.0)])
+def test_an_obstacle_of_one_recording_may_be_there_in_one_kept_out_for_the_same_while_or_for_all_of_it(later):
+    spans = {0.0: (0.15, 0.6), 3.0: later}
+
+    def contact(state):
+        since, until = spans.get(float(state.extra["trial_index"][0]), (2.0, 3.0))
+        share = (state.time_s - state.time_s[0]) / np.ptp(state.time_s)
+        return 1.0 * np.maximum(state.position - 60.0, 0.0) * ((share >= since) & (share <= until))
+
+    states = drive(7, contact)
+    assert states[3].validate
+    naming = name_effects(states, [effect("external_contact")])
+    station = station_module.Station("current", "index", "index", None, naming)
+    assert station.believed and [f.term.shape["trial"] for f in station.kept] == [0.0]
+    before, after = station._kept_out
+    assert before > 2.0 and after < 1.1
 
 
 @pytest.mark.slow

@@ -28,7 +28,7 @@ class ExternalContact(Effect):
 
     name = "external_contact"
     drifting = True
-    held = MOST_VALIDATION
+    held = 2 * MOST_VALIDATION
     repeats = True  # in another trial
     of_the_hand = False
     recorded = True
@@ -76,10 +76,12 @@ class ExternalContact(Effect):
         ]
 
     def amplitudes(self) -> tuple[Amplitude, ...]:
-        """Stiffness of the contact in that trial, and in each validation recording; never negative."""
+        """Stiffness of the contact in that trial, and in each validation recording, for the same while of it and, of one
+        that is still there, for all of it; never negative."""
         return (
             ("stiffness", "effort/position", 0.0, np.inf),
             *((f"stiffness_validation_{i}", "effort/position", 0.0, np.inf) for i in range(MOST_VALIDATION)),
+            *((f"stiffness_still_{i}", "effort/position", 0.0, np.inf) for i in range(MOST_VALIDATION)),
         )
 
     def acts(self, state: DriveState, shape: Mapping[str, float]) -> bool:
@@ -87,8 +89,8 @@ class ExternalContact(Effect):
         return (state.validate or _has(shape["trial"], _index(state))) and not self._all_along(shape)
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """Depth into the contact in that trial and in each validation recording, (n, 1 + MOST_VALIDATION)."""
-        out = np.zeros((len(state.time_s), 1 + MOST_VALIDATION))
+        """Depth into the contact in that trial and in each validation recording, (n, 1 + 2 MOST_VALIDATION)."""
+        out = np.zeros((len(state.time_s), 1 + 2 * MOST_VALIDATION))
         if not self.acts(state, shape):
             return out
         several, mine = shape["trial"] < 0, _has(shape["trial"], _index(state))
@@ -101,8 +103,10 @@ class ExternalContact(Effect):
         if mine and not (several and state.validate):
             out[:, 0] = within
         if state.validate:
-            rank = int(state.extra.get("validation_index", np.zeros(1))[0])
-            out[:, 1 + rank % MOST_VALIDATION] = within if several else depth
+            rank = int(state.extra.get("validation_index", np.zeros(1))[0]) % MOST_VALIDATION
+            out[:, 1 + rank] = within
+            if not several:
+                out[:, 1 + MOST_VALIDATION + rank] = depth
         return out
 
     def parameters(

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ...effects.base import DriveState
 from .grid import Grid, GridColumns, stacked
-from .least_squares import from_products
+from .least_squares import bounded_least_squares, from_products
 from .projection import Projection
 from .samples import Samples
 from .term import DISCRETE, Term, bending, key_of, keys, replaced, warped
@@ -289,7 +289,7 @@ class Balance(Samples):
             products = every if inside.all() else among(inside)
             coefficients = from_products(products[:-1, :-1], products[:-1, -1], *bounds)
             if held:
-                coefficients = self._own_nuisances(parts, coefficients, w, bounds[0])
+                coefficients = self._own_nuisances(parts, coefficients, w, *bounds)
             prediction = raw = _along(parts, coefficients)
             for term in clips:
                 prediction = term.effect.clip(prediction, term.shape)
@@ -385,7 +385,7 @@ class Balance(Samples):
         ]
         return ~np.any([np.isclose(free, level) for level in levels], axis=0) if levels else np.ones(len(free), bool)
 
-    def _own_nuisances(self, parts: list[Array], coefficients: Array, w: Array, low: Array) -> Array:
+    def _own_nuisances(self, parts: list[Array], coefficients: Array, w: Array, low: Array, high: Array) -> Array:
         """Coefficients of columns that act in validation recordings only (their own clock offset, a step in them, an
         obstacle that is still there) from those recordings: they belong to the recording, not to the model, which stays
         as trained."""
@@ -399,8 +399,8 @@ class Balance(Samples):
         held = self.weight * ~self.train
         left = (self.effort - matrix @ coefficients) * held
         out = coefficients.copy()
-        out[columns] += np.linalg.lstsq(matrix[:, columns] * held[:, None], left, rcond=None)[0]
-        return np.maximum(out, low)
+        out[columns] = bounded_least_squares(matrix[:, columns] * held[:, None], left, low[columns], high[columns])
+        return out
 
 
 def _weighted(parts: list[Array], effort: Array, w: Array) -> Array:

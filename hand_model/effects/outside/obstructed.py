@@ -20,7 +20,7 @@ class Obstructed(Outsider, ExternalContact):
     repeats = False  # whiles that follow each other would be a stop
 
     def columns(self, state: DriveState, shape: Mapping[str, float]) -> Array:
-        """How far it is pressed, taken from the angle; (n, 1 + MOST_VALIDATION)."""
+        """How far it is pressed, taken from the angle; (n, 1 + 2 MOST_VALIDATION)."""
         return -super().columns(state, shape)
 
     def sentence(self, where: Mapping[str, Any], parameters: Mapping[str, float]) -> str:
