@@ -17,14 +17,14 @@ NONE = (0.0, 0.0)
 # log odds from which readings that pile up say that they clip (of some 3000 healthy motors the largest is 6), and as
 # much of these as counts
 PILED, MOST = 14.0, 40.0
-THERE = (
-    0.8  # of the largest reading, at least, is a limit at which readings pile up: its mean lies below, for noise clips
-)
+# of the largest reading, at least, is a limit at which readings pile up: the mean of noise that clips lies below
+THERE = 0.8
 ONE_SIDED = 0.1  # probability of each of the two ways in which one end alone clips, as of an amplifier's offset
 
 
 class CurrentSaturation(Effect):
-    """measured = min(max(current, -limit), limit); of a reading that clips at one end only, one of the two."""
+    """measured = min(max(current, -limit), limit); of a reading that clips at one end only, one of the two. A reading that
+    clips piles up at its end, which says so without any motion."""
 
     name = "current_saturation"
     clips = True
@@ -35,8 +35,11 @@ class CurrentSaturation(Effect):
 
     def among(self, states: tuple[DriveState, ...]) -> CurrentSaturation:
         """With what these readings alone say of clipping."""
-        ends = ([sign * s.effort for s in states] for sign in (1.0, -1.0))
-        return CurrentSaturation(*((float(np.nanmax(np.concatenate(end))), piled_up(end)) for end in ends))
+        read = [s.effort[np.isfinite(s.effort)] for s in states]
+        ends = ([sign * r for r in read] for sign in (1.0, -1.0))
+        return CurrentSaturation(
+            *((max((float(np.max(r, initial=0.0)) for r in end), default=0.0), piled_up(end)) for end in ends)
+        )
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
         """Clipping level, among the highest recorded efforts; readings cut for nearly half of the time leave room below
