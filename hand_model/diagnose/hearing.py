@@ -99,8 +99,9 @@ class Heard:
             for a, states in drive_states(session, encoder_corrections(self.stations), self.unread, simulated).items()
         }
         self.notes += [note for states in drives.values() for note in stand_still(states)]
-        for a, share in {a: frozen_share(states) for a, states in drives.items()}.items():
-            if dead := dead_in(drives[a]):
+        for a, states in drives.items():
+            share = frozen_share(states)
+            if dead := dead_in(states):
                 self.found.append(refused(a, _finger_of(session, a), dead, why=f"it {_still(share)}", fate=LEFT_OUT))
             elif share > FROZEN:
                 self.unexplained.append(_unheard(session, a, "current", f"the current {_still(share)}: {LEFT_OUT}"))

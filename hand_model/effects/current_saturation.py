@@ -35,10 +35,8 @@ class CurrentSaturation(Effect):
 
     def among(self, states: tuple[DriveState, ...]) -> CurrentSaturation:
         """With what these readings alone say of clipping."""
-        read = [s.effort[np.isfinite(s.effort)] for s in states]
-        ends = ([sign * r for r in read] for sign in (1.0, -1.0))
         return CurrentSaturation(
-            *((max((float(np.max(r, initial=0.0)) for r in end), default=0.0), piled_up(end)) for end in ends)
+            *((_end(states, sign), piled_up([sign * s.effort for s in states])) for sign in (1.0, -1.0))
         )
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
@@ -123,13 +121,23 @@ class CurrentSaturation(Effect):
         return effort if parameters.get("form", BOTH) == BOTH else self.clip(effort, parameters)
 
 
+def _read(states: tuple[DriveState, ...]) -> Array:
+    """All efforts (n,) that were read."""
+    return np.concatenate([np.zeros(0), *(s.effort[np.isfinite(s.effort)] for s in states)])
+
+
+def _end(states: tuple[DriveState, ...], sign: float) -> float:
+    """The largest reading of an end, at least zero."""
+    return float(np.max(sign * _read(states), initial=0.0))
+
+
 def _levels(states: tuple[DriveState, ...]) -> dict[int, Array]:
     """Clipping levels of each form, from the least on."""
-    effort = np.concatenate([s.effort[np.isfinite(s.effort)] for s in states])
+    effort = _read(states)
     either = np.abs(effort) if len(effort) else np.ones(1)
     levels = {BOTH: np.linspace(min(np.percentile(either, 60), either.max() / 2), either.max(), 16)}
     for form, sign in ((ABOVE, 1.0), (BELOW, -1.0)):
-        end = float(np.max(sign * effort, initial=0.0))
+        end = _end(states, sign)
         if end > 0:
             levels[form] = np.linspace(end / 2, end, 9)
     return levels

@@ -17,8 +17,7 @@ def piled_up(readings: Sequence[Array]) -> float:
     """Log odds that recordings (n,) of one channel clip at their largest reading: how unlikely chance alone would have so
     many of that size. Noise smears the density of readings, so that just below the largest there are as many to a step as
     at it, or more, at the next step, too (Poisson); what stands still counts once. Zero where that is not told."""
-    known = [r[np.isfinite(r)] for r in readings]
-    known = [r for r in known if len(r) > 1]
+    known = [k for r in readings if len(k := r[np.isfinite(r)]) > 1]
     sizes = np.unique(np.concatenate(known)) if known else np.zeros(1)
     if len(sizes) < 2:
         return 0.0

@@ -99,9 +99,10 @@ def _within_reach(search: Stepwise, before: tuple[float, float]) -> MarkerNaming
 
 def _unstretched(search: Stepwise, naming: MarkerNaming, before: tuple[float, float]) -> MarkerNaming:
     """The naming, or the one beside cameras whose space is stretched, where that says clearly more."""
+    if not naming.found and naming.p_before >= ALPHA:
+        return naming
     strain = search.alone(stretched(search.blocks))
-    missing = naming.found or naming.p_before < ALPHA
-    if not missing or search.score([*naming.found, strain]) < search.score(naming.found) + UNLIKELY:
+    if search.score([*naming.found, strain]) < search.score(naming.found) + UNLIKELY:
         return naming
     again = _named(search, before, [strain])
     return again if search.score(again.found) > search.score(naming.found) + UNLIKELY else naming

@@ -10,7 +10,7 @@ import numpy as np
 from ...background import Pair
 from ...effects.base import least_delay, position_range
 from .balance import Balance, Fit
-from .evidence import evidence, gain, rough_evidence, scale_of
+from .evidence import evidence, gain, log_prior, rough_evidence, scale_of
 from .naming import Rival
 from .shapes import polish, possible, refit, reform, scan
 from .term import Term, additive, doubled
@@ -81,8 +81,7 @@ def _promise(balance: Balance, fit: Fit, reference: Fit, scale: float) -> float:
     """Rough evidence of a fit's last term, with what else than the balance says the same for sure."""
     term = fit.terms[-1]
     told = term.effect.told_otherwise(balance.states, term.shape)
-    prior = term.effect.log_prior(term.effect.parameters(term.shape, fit.amplitudes[-1], fit.declared)) if told else 0.0
-    return rough_evidence(balance, fit, reference, scale) + prior
+    return rough_evidence(balance, fit, reference, scale) + (log_prior(fit, -1) if told else 0.0)
 
 
 def _weight(balance: Balance, candidate: tuple[Fit, bool], fit: Fit, scale: float) -> float:

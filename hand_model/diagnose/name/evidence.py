@@ -58,13 +58,16 @@ def evidence(balance: Balance, fit: Fit, reference: Fit, which: int = -1, scale:
     return float(brought - volume + oddity(balance, reference) - oddity(balance, fit))
 
 
+def log_prior(fit: Fit, which: int) -> float:
+    """Log density of the parameters of a fit's term over that of ordinary ones, as its effect says."""
+    term = fit.terms[which]
+    return term.effect.log_prior(term.effect.parameters(term.shape, fit.amplitudes[which], fit.declared))
+
+
 def oddity(balance: Balance, fit: Fit) -> float:
     """Log density lost by declared coefficients unlike those of the hand's other motors (Laplace on their logarithms),
     and by effects' parameters that machines rarely have."""
-    lost = -sum(
-        t.effect.log_prior(t.effect.parameters(t.shape, a, fit.declared))
-        for t, a in zip(fit.terms, fit.amplitudes, strict=True)
-    )
+    lost = -sum(log_prior(fit, which) for which in range(len(fit.terms)))
     for name, typical in balance.typical.items():
         value = max(fit.declared.get(name, typical), 1e-2 * typical)
         lost += abs(float(np.log(value / typical))) / SPREAD

@@ -42,10 +42,10 @@ EXPLAINED_PARTLY = 0.5
 
 class Station:
     """One balance of one finger and what was named there. beside: reads its sizes again where more is known of the drive
-    than its own balance tells; compared: names of which other drives tell the size; elsewhere: names
-    that stand at other balances of its finger; at_ends: of what starts and stops
-    alone tell, beside which sizes are read as named; tilt: root mean square, in the unit of the balance, below which a
-    departure of an angle may be what a joint that is no plain hinge leaves in it."""
+    than its own balance tells; compared: names of which other drives tell the size; elsewhere: names that stand at other
+    balances of its finger; at_ends: of what starts and stops alone tell, beside which sizes are read as named; tilt: root
+    mean square, in the unit of the balance, below which a departure of an angle may be what a joint that is no plain
+    hinge leaves in it."""
 
     def __init__(
         self, signal: str, finger: str | None, actuator: str | None, joint: str | None, naming: Naming
