@@ -6,14 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_diagnose import drive
+from test_diagnose import TRUTH, drive
 
+from hand_model.diagnose.locate import late_current
 from hand_model.diagnose.locate.answers import Answers, Lateness, lateness
 from hand_model.diagnose.locate.command import BLIND, _lasting
-from hand_model.diagnose.locate.late_current import _late, current_in_time
+from hand_model.diagnose.locate.drive import with_gives
+from hand_model.diagnose.locate.late_current import _late, current_in_time, timed_drives
+from hand_model.diagnose.locate.simulated import SimulatedDrive
 from hand_model.diagnose.name.balance import Balance
 from hand_model.effects.base import DriveState
 from hand_model.effects.current_channel_delay import EFFECT
+from hand_model.effects.path import dahl
 
 SHIFT_S = -0.02
 
@@ -205,3 +209,33 @@ def test_a_simulation_whose_motion_is_the_recorded_one_tells_a_lateness_alone(
     assert _late(drives, timed, answered, known) == {"index": may_be, "ring": False}
     late = {"index": replace(answered["index"], drive_s=np.full(9, 0.03))}  # and its motion with it
     assert _late(drives, timed, late, known) == {"index": False, "ring": False}
+
+
+def test_an_early_current_makes_no_other_drives_give_odd(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At a reversal it seems to give nothing: what both drives' friction needs to turn over would be an effect of the
+    other one, or a delay of its current."""
+
+    def giving(state: DriveState) -> np.ndarray:
+        return TRUTH[2] * (dahl(state.position, 0.9) - np.sign(state.velocity))
+
+    def read(states: tuple[DriveState, ...]) -> tuple[DriveState, ...]:
+        noise = {"position_noise": 0.05, "bandwidth_s": 0.02, "smoothed": 0.0, "moving": 1.0, "steady": 1.0}
+        told = [{k: np.full(len(s.time_s), v) for k, v in noise.items()} for s in states]
+        return tuple(replace(s, extra={**s.extra, **extra}) for s, extra in zip(states, told, strict=True))
+
+    early = shifted(drive(3, giving, noise=0.5), -0.04)
+    drives = {"index": read(early), "ring": read(drive(4, giving, noise=0.5))}
+    drives = with_gives(drives, tuple(drives))
+    assert drives["ring"][0].extra["granted"].max() < 0.8
+    for motions, sure in (({"trial_0": ()}, True), ({}, False)):
+        told = {"index": SimulatedDrive("index", -0.04, 0.001, motions), "ring": SimulatedDrive("ring", 0.0, 0.001)}
+        asked: list[float] = []
+
+        def late(drives: dict[str, tuple[DriveState, ...]], *_: object, asked: list[float] = asked) -> dict[str, bool]:
+            asked.append(float(drives["ring"][0].extra["granted"].max()))
+            return {"index": True, "ring": True}
+
+        monkeypatch.setattr(late_current, "_late", late)
+        timed, _ = timed_drives(drives, {}, told)
+        assert timed["ring"][0].extra["granted"].max() == asked[0]
+        assert asked[0] > 0.9 if sure else asked[0] < 0.8

@@ -32,6 +32,9 @@ def timed_drives(
     drives: dict[str, tuple[DriveState, ...]], facts: dict[str, CommandFacts], simulated: dict[str, SimulatedDrive]
 ) -> tuple[dict[str, tuple[DriveState, ...]], dict[str, bool]]:
     """The drives with what is known of their current's lateness, and whether each may be late."""
+    untimely = {a: s.delay_s for a, s in simulated.items() if s.motions and abs(s.delay_s) > PLAIN * s.doubt_s}
+    if 0 < len(untimely) < len(drives):  # else an early one that seems to give nothing makes the others' gives odd
+        drives = with_gives(drives, [a for a in drives if a not in untimely], untimely)
     timed = with_lateness(drives, facts, simulated)
     explained = frozenset(a for a, s in simulated.items() if s.motions)
     late = _late(drives, timed, lateness({a: f.answers for a, f in facts.items()}), explained)
