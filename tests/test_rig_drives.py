@@ -76,6 +76,7 @@ def test_what_stands_on_a_limit_is_in_no_fit(tmp_path: Path, low: float, high: f
     findings = diagnose_rig(read_session(folder))
     assert [f.effect for f in findings.findings] == ["current_saturation"] and findings.verdict == "mismatch"
     assert said in findings.findings[0].statement
+    assert findings.findings[0].where["share_of_mismatch"] > 0.45  # of what the motion asked for beyond the limits
     assert -findings.declared["inertial:arm:hz"] / 0.2 == pytest.approx(0.6, rel=0.01)
     assert findings.declared["frictionloss:hinge"] == pytest.approx(0.05, rel=0.1)
 

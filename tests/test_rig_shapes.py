@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rig_bench import ARM, Motion, recorded
+from rig_bench import ARM, HEAD, Motion, balance, recorded, two_sines, written
 
-from hand_model.rig import load_rig
+from hand_model.rig import diagnose_rig, load_rig
 from hand_model.rig.diagnose import _rank, trusted_fit
 from hand_model.rig.findings import Finding
 from hand_model.rig.name.beside import Beside, score
@@ -20,6 +20,7 @@ from hand_model.rig.name.candidates import Candidate, candidates
 from hand_model.rig.name.compete import LEAST_SHARE, _met, compete
 from hand_model.rig.name.problem import Term, held_out, normal, pose
 from hand_model.rig.name.refit import refit
+from hand_model.rig.name.ripple import fine_periods
 from hand_model.rig.words import shares
 from hand_model.session import read_session
 
@@ -188,3 +189,39 @@ def test_two_processes_try_rivals_as_one_does(rig_fit: Any, monkeypatch: pytest.
         assert [s.term.candidate.key for s in two] == [c.key for c in rivals]
         assert [s.term.shape for s in two] == [s.term.shape for s in one]
         assert all(np.array_equal(a.error, b.error) for a, b in zip(two, one, strict=True))
+
+
+def slow_screw(folder: Path, period: float) -> Path:
+    """A session of slow motions with a Stribeck rise and a ripple of that period [rad]."""
+    random, tables = np.random.default_rng(4), []
+    t = np.arange(0, 60, 0.01)
+    for _ in range(5):
+        motion = two_sines(random, t, 0.15)
+        _, q, v, _ = motion
+        rise = 0.1 * np.exp(-((v / 0.1) ** 2))
+        torque = balance(motion, 0.6) + np.sign(v) * rise + 0.04 * np.sin(2 * np.pi * q / period + 0.4)
+        tables.append(np.stack([t, np.round(q / 4e-4) * 4e-4, torque + 0.005 * random.standard_normal(len(t))], 1))
+    return written(folder, ARM, HEAD, "torque", tables)
+
+
+@pytest.mark.parametrize("period", [0.03, 0.02])
+def test_a_ripple_that_comes_many_times_over_the_range_is_found(tmp_path: Path, period: float) -> None:
+    """As that of a screw, or of a gear's teeth; beside a Stribeck rise that is larger."""
+    findings = diagnose_rig(read_session(slow_screw(tmp_path / "s", period)))
+    named = {f.effect: f for f in findings.findings}
+    assert named.keys() == {"stribeck_friction", "torque_ripple"}
+    ripple = {name: entry["value"] for name, entry in named["torque_ripple"].parameters.items()}
+    assert ripple["period"] == pytest.approx(period, rel=1e-3)
+    assert np.hypot(ripple["sine"], ripple["cosine"]) == pytest.approx(0.04, rel=0.15)
+
+
+def test_no_fine_ripple_is_tried_where_none_could_be_seen(tmp_path: Path) -> None:
+    fit = trusted_fit(load_rig(read_session(slow_screw(tmp_path / "s", 0.03))))[0]
+    rows = [r for r in fit.rows if not r.validate]
+    periods = fine_periods(fit, rows, 0.05)
+    assert min(abs(p / 0.03 - 1) for p in periods) < 5e-3
+    slow = np.percentile(np.concatenate([np.abs(np.diff(r.position[:: r.step])) for r in rows]), 25)
+    assert 3 * slow < min(periods) and max(periods) < 0.052
+    assert fine_periods(fit, rows, slow) == []
+    still = [replace(r, moving=np.zeros_like(r.moving)) for r in rows]
+    assert fine_periods(fit, still, 0.05) == []

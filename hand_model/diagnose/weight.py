@@ -155,7 +155,7 @@ def _pulled(usual: Usual, station: Station, states: tuple[DriveState, ...], odd_
     plain = tuple(t for t in terms if t.effect.name != BENT)
     inside = balance.unclipped(terms)
     others = {"spring": usual["spring"], "preload": (0.0, _size(balance))} if odd_preload else usual
-    odd = _Model(balance, terms, inside, others)
+    odd = _model(balance, terms, inside, others)
     weighed = _weighed(usual, balance, states, plain, inside)
     spared = EVIDENCE_LEAST if len(plain) < len(terms) else 0.0  # one effect for two
     likelier = weighed.log_evidence - odd.log_evidence + (spared if odd_preload else -CLASS_WIDTH)
@@ -163,7 +163,7 @@ def _pulled(usual: Usual, station: Station, states: tuple[DriveState, ...], odd_
     if odd_preload and _impossible(odd, *usual["preload"]):
         # with the lowest preload that there may be, as sure as the usual one is: that is not what was recorded
         lowest = _lowest(odd, usual["preload"][0]), usual["preload"][1]
-        odd = _Model(balance, terms, inside, {**others, "preload": lowest})
+        odd = _model(balance, terms, inside, {**others, "preload": lowest})
         likelier = weighed.log_evidence - odd.log_evidence + spared
         both = _weighed(usual, balance, states, terms, inside) if spared else weighed
         if both.log_evidence > weighed.log_evidence + spared:
@@ -185,7 +185,22 @@ def _weighed(
 ) -> _Model:
     """The terms and a weight as `states` have it, preload and spring as usual, of the samples `inside`."""
     posed = {s.trial: s for s in states}
-    return _Model(balance, terms, inside, usual, balance.gather(lambda s: _weight(posed[s.trial])))
+    return _model(balance, terms, inside, usual, balance.gather(lambda s: _weight(posed[s.trial])))
+
+
+def _model(
+    balance: Balance,
+    terms: tuple[Term, ...],
+    inside: NDArray[np.bool_],
+    priors: Mapping[str, tuple[float, float]],
+    further: Array | None = None,
+) -> _Model:
+    """A `_Model`; of a bent spring the likelier one of two: that is usual as a whole, or where it begins."""
+    whole = _Model(balance, terms, inside, priors, further)
+    if not any(t.effect.name == BENT for t in terms):
+        return whole
+    begun = _Model(balance, terms, inside, priors, further, chords=False)
+    return max(whole, begun, key=lambda m: m.log_evidence)
 
 
 def _size(balance: Balance) -> float:
@@ -212,6 +227,7 @@ class _Model:
 
     priors: coefficient -> mean and standard deviation; of the others nothing is known, the terms are of the effort's size, and
     the further ones, of a weight, no more than the drive can lift in any pose, however little of it this one shows.
+    chords: whether those of preload and spring are of a bent spring as a whole, else of its tangent where it begins.
     mean, covariance: of the coefficients (m,), (m, m); possible: their mode (m,) within what physics allows.
     """
 
@@ -222,9 +238,10 @@ class _Model:
         inside: NDArray[np.bool_],
         priors: Mapping[str, tuple[float, float]],
         further: Array | None = None,
+        chords: bool = True,
     ) -> None:
         matrix, low, high = balance.design(terms)
-        matrix = _from_chords(balance, terms, matrix)
+        matrix = _from_chords(balance, terms, matrix) if chords else matrix
         if further is not None:
             matrix = np.c_[matrix, further]
             unbounded = np.full(further.shape[1], np.inf)
@@ -256,7 +273,7 @@ class _Model:
 
 def _from_chords(balance: Balance, terms: tuple[Term, ...], design: Array) -> Array:
     """The design (n, k) of terms, each column of a bent spring taken from the line between its ends: what is usual of
-    preload and stiffness is so of the whole spring, and not of where it is straight, or of its tangent at zero."""
+    preload and stiffness is so of the whole spring then."""
     position = balance.gather(lambda s: s.position)
     low, high = int(np.argmin(position)), int(np.argmax(position))
     way = (position - position[low]) / max(position[high] - position[low], 1e-12)

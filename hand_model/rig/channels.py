@@ -105,12 +105,16 @@ def _looks(trial: RigTrial, joint: str, values: Array, measured: bool) -> list[t
 
 
 def _gather(rig: RigModel, joint: str, channel: str, found: dict, usable: int) -> list[ChannelIssue]:
-    """One issue per kind and reason; a command in half of the recordings or more is one in all: the column is the same.
-    A sinusoid in fewer is what a joint that swings so takes."""
+    """One issue per kind and reason; a command in half of the recordings or more is one in all, by what most of them
+    show: the column is the same. A sinusoid in fewer is what a joint that swings so takes."""
     out = []
-    flagged = {n for (kind, _), hits in found.items() if kind == "command_as_measurement" for n, _, _ in hits}
+    commands = {key: hits for key, hits in found.items() if key[0] == "command_as_measurement"}
+    flagged = {n for hits in commands.values() for n, _, _ in hits}
     whole = usable > 0 and len(flagged) >= 0.5 * usable
+    plainest = max(commands, key=lambda key: len(commands[key]), default=None)
     for (kind, reason), hits in found.items():
+        if whole and (kind, reason) in commands and (kind, reason) != plainest:
+            continue
         if reason == SINUSOID and not whole or kind == "current_saturation" and whole:
             continue  # what is asked for may have limits
         if reason.startswith(REPEATS) and not whole and max(s for _, s, _ in hits) > APART * SAME:

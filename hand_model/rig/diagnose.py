@@ -16,6 +16,7 @@ from ..diagnose.findings import of_one_whole
 from ..errors import HandModelError, SessionError
 from ..output import refuse_file
 from ..session import Session
+from .channel_findings import channel_findings
 from .channels import ChannelIssue, check_balance, check_channels
 from .clipping import unclipped
 from .couplings import coupling_terms, with_couplings
@@ -43,16 +44,6 @@ PROBABILITY = (
     "that anything is there: share of resampled blocks of the training recordings, each left out of the fit, on which "
     "the effect lowers the error against nothing; shared out among it and its alternatives by how often each is the best"
 )
-UNMEASURED = {
-    "metric": None,
-    "unit": None,
-    "before": None,
-    "after": None,
-    "noise_floor": None,
-    "ci95_reduction": None,
-    "held_out": [],
-    "engine": None,
-}
 
 
 @single_threaded()
@@ -79,7 +70,7 @@ def diagnose_rig(
     if not rig.select(validate=False):
         raise SessionError(f'{session.path}: every trial has purpose = "validate"; at least one must be left to fit to')
     fit, issues = trusted_fit(rig, told)
-    found = [_channel_finding(i) for i in issues]
+    found = channel_findings(recorded, fit, issues)
     refused = {(t, i.joint) for i in issues if i.refuse for t in i.trials}
     say(f"{rig.name}: declared model fitted, {len(issues)} channel issues")
     if can_swing(rig) and not refused:
@@ -160,9 +151,11 @@ def _lost(lack: Mapping[str, Any]) -> tuple[str, ...]:
 
 def _rank(finding: Finding) -> tuple[int, int]:
     """What is refused first, for all else was found without it; then by share of the mismatch, in steps that are worth
-    a name (within one in the order found: efforts before angles between encoders); clipped samples last."""
-    place = 1 if finding.model is not None else 0 if finding.effect == "command_as_measurement" else 2
-    return place, -round(float(finding.where.get("share_of_mismatch") or 0.0) / LEAST_SHARE)
+    a name (within one in the order found: efforts before angles between encoders); clipped samples that hold none
+    last."""
+    steps = round(float(finding.where.get("share_of_mismatch") or 0.0) / LEAST_SHARE)
+    refused = finding.effect == "command_as_measurement" and finding.model is None
+    return 0 if refused else 1 if finding.model is not None or steps else 2, -steps
 
 
 def trusted_fit(
@@ -182,24 +175,6 @@ def trusted_fit(
 
 def _rate(rig: RigModel) -> float:
     return float(1.0 / np.median(np.concatenate([np.diff(t.time_s) for t in rig.trials])))
-
-
-def _channel_finding(issue: ChannelIssue) -> Finding:
-    action = (
-        "it is refused, nothing is fitted to it" if issue.refuse else "samples there say only that it is at least that"
-    )
-    return Finding(
-        issue.kind,
-        (issue.kind,),
-        1.0,
-        (),
-        whereabouts(issue.joint, None, issue.channel, issue.trials, 1.0 if issue.refuse else 0.0),
-        f"{issue.reason}: {action}.",
-        {"share_left": {"value": issue.share, "unit": "1"}},
-        UNMEASURED,
-        None,
-        "channel refused" if issue.refuse else "channel clipped",
-    )
 
 
 # --- joints by the balance of effort ---------------------------------------------------------------------------------

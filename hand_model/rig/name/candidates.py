@@ -16,6 +16,7 @@ from ..declared import DeclaredFit
 from ..laws import GEAR, GEAR_LOW, GEAR_MORE, LINE, LOW, MORE, MOTOR, MOTOR_LOW, MOTOR_MORE, TURNING
 from ..model import RigModel
 from ..warming import WARMS, warmth
+from .ripple import fine_periods
 
 Array = NDArray[np.float64]
 # Those that rigs have in a form of their own, or that need a hand.
@@ -32,6 +33,7 @@ NOT_FOR_RIGS = frozenset(
         "load_dependent_friction",
     }
 )
+RIPPLE = "torque_ripple"
 TURN_ROUND = frozenset({"elastoplastic_hysteresis", "load_dependent_friction", "stribeck_friction"})
 SMOOTH = ("nonlinear_spring",)  # its knee belongs to fingers with a return spring; a joint has stops and detents
 # what it damps at one end of a range is hardly told there from friction that differs by speed and way
@@ -136,6 +138,7 @@ def candidates(
     train = tuple(states[r.trial] for r in rows)
     asked = [e for e in catalogue("drive") if _usable(e) and (only is None or e.name in only)]
     found = [_from_catalogue(e, joint, train, states) for e in asked]
+    found = [_with_fine(c, fit, rows) if c.effect == RIPPLE else c for c in found]
     bends = [c for c in found if c.effect in SMOOTH]
     if every:
         found += [_with_line(c) for c in bends]
@@ -167,6 +170,17 @@ def _from_catalogue(
         bool(found.warps),
         {s.name: s for s in found.shapes(train)},
     )
+
+
+def _with_fine(ripple: Candidate, fit: DeclaredFit, rows: list[Rows]) -> Candidate:
+    """A ripple with starts at the periods shorter than those of its grid that show in what the declared model leaves."""
+    if not ripple.grid:
+        return ripple
+    periods = fine_periods(fit, rows, min(shape["period"] for shape in ripple.grid))
+    shape = ripple.shapes["period"]
+    wider = replace(shape, low=min([shape.low, *(0.9 * p for p in periods)]))
+    fine = tuple({**ripple.grid[0], "period": p} for p in periods)
+    return replace(ripple, grid=(*ripple.grid, *fine), shapes={**ripple.shapes, "period": wider})
 
 
 def _thinning(dry: Candidate, variant: str) -> Candidate:
