@@ -18,6 +18,11 @@ from hand_model.rig.swing.simulation import INDEX, PARAMETERS, Lane, Swing, simu
 from hand_model.rig.swing.variants import asked, begun, variants
 
 
+def link_of(error: float, stayed: float | None = None) -> SimpleNamespace:
+    """A model with that error, and that of the recordings that its simulation does not leave."""
+    return SimpleNamespace(error=error, stayed=error if stayed is None else stayed)
+
+
 def test_effects_that_help_only_together_stand_together() -> None:
     """An effect that makes the held-out error worse before a later one comes stands where all are worse without it; one
     that they do without is withdrawn, and one that helps last comes last."""
@@ -28,7 +33,7 @@ def test_effects_that_help_only_together_stand_together() -> None:
 
         def chain(some: list, table: dict = table) -> list[SimpleNamespace]:
             keys = ["".join(v.key for v, _ in some[:k]) for k in range(len(some) + 1)]
-            return [SimpleNamespace(error=table[key]) for key in keys]
+            return [link_of(table[key]) for key in keys]
 
         kept, links, rejected = _standing([(SimpleNamespace(key=k), None) for k in "abc"], chain)
         assert "".join(v.key for v, _ in kept) == order
@@ -36,15 +41,26 @@ def test_effects_that_help_only_together_stand_together() -> None:
         assert links[-1].error == min(table.values())
 
 
-@pytest.mark.parametrize(("left", "names"), [(0.2, "ab"), (0.3, "a")])
+@pytest.mark.parametrize(("left", "names"), [(0.3, "ab"), (0.4, "a")])
 def test_what_takes_most_of_what_is_left_stands_however_little_that_is(left: float, names: str) -> None:
     """Less than half of one percent of the declared model's squared error: more than half of what an earlier effect
     leaves."""
     table = {"": 10.0, "a": 0.5, "ab": left, "b": 9.9}
 
     def chain(some: list) -> list[SimpleNamespace]:
-        return [SimpleNamespace(error=table["".join(v.key for v, _ in some[:k])]) for k in range(len(some) + 1)]
+        return [link_of(table["".join(v.key for v, _ in some[:k])]) for k in range(len(some) + 1)]
 
+    kept, _, _ = _standing([(SimpleNamespace(key=k), None) for k in "ab"], chain)
+    assert "".join(v.key for v, _ in kept) == names
+
+
+@pytest.mark.parametrize(("stayed", "names"), [(1.0, "ab"), (10.0, "a")])
+def test_how_far_off_a_simulation_is_that_has_left_a_recording_says_nothing(stayed: float, names: str) -> None:
+    def chain(some: list) -> list[SimpleNamespace]:
+        keys = ["".join(v.key for v, _ in some[:k]) for k in range(len(some) + 1)]
+        return [link_of(table[key], stayed if not key else None) for key in keys]
+
+    table = {"": 10.0, "a": 0.5, "ab": 0.4, "b": 9.9}
     kept, _, _ = _standing([(SimpleNamespace(key=k), None) for k in "ab"], chain)
     assert "".join(v.key for v, _ in kept) == names
 
@@ -60,13 +76,13 @@ def test_an_effect_whose_size_cannot_be_told_leaves_its_place_to_the_next() -> N
         return [(a, SimpleNamespace(taken=(a,))), (second, SimpleNamespace(taken=(a, second)))]
 
     def chain(some):
-        return [SimpleNamespace(error=1.0 / (k + 1)) for k in range(len(some) + 1)]
+        return [link_of(1.0 / (k + 1)) for k in range(len(some) + 1)]
 
     def ends(link):
         return {"a": (0.5, 1.5), "b": (-1.0, 1.0), "c": (0.1, 0.2)}
 
     def links(sets):
-        return [SimpleNamespace(error=1.0 / (len(some) + 1)) for some in sets]
+        return [link_of(1.0 / (len(some) + 1)) for some in sets]
 
     kept, _, _, rejected = _searched(search, chain, ends, links)
     assert [v.key for v, _ in kept] == ["a", "c"] and [r["effect"] for r in rejected] == ["b"]
@@ -84,7 +100,7 @@ def test_what_stood_before_a_later_round_comes_back_where_that_holds_no_better()
     ):
 
         def links(sets: list, table: dict = error) -> list[SimpleNamespace]:
-            return [SimpleNamespace(error=table["".join(v.key for v, _ in some)]) for some in sets]
+            return [link_of(table["".join(v.key for v, _ in some)]) for some in sets]
 
         def chain(some: list, links: Any = links) -> list[SimpleNamespace]:
             return links([some[:k] for k in range(len(some) + 1)])
@@ -106,7 +122,7 @@ def test_a_form_that_predicts_worse_than_the_declared_model_leaves_its_place_to_
         return [(form, SimpleNamespace(taken=(form,)))]
 
     def links(sets: list) -> list[SimpleNamespace]:
-        return [SimpleNamespace(error=table["".join(v.key for v, _ in some)]) for some in sets]
+        return [link_of(table["".join(v.key for v, _ in some)]) for some in sets]
 
     for error, stands in ((0.5, ["a/y"]), (1.2, [])):
         asked, table = [], {"": 1.0, "a/x": 1.07, "a/y": error}

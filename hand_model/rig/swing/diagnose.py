@@ -31,7 +31,7 @@ from .variants import Variant, all_free, begun, free_declared
 RESAMPLES = 500
 MOST_SEARCHES = 2
 SMALL = 0.005  # of the declared squared error: less beside an earlier effect may be its form being another
-HALVED = 0.5  # of the error before: what leaves less says more than that
+HALVED = 0.5  # of the squared error before: what leaves less says more than that
 Taken = tuple[Variant, Round]
 Ends = Mapping[str, tuple[float, float]]
 
@@ -99,13 +99,14 @@ def diagnose_swing(rig: RigModel, session: Session, fit: DeclaredFit, say: Calla
 @dataclass(frozen=True)
 class Link:
     """The declared model with some effects: free parameters, their fit, the file, its replay, and the held-out error of
-    that."""
+    that; stayed: the same of the recordings that the simulation does not leave, of all where it leaves each."""
 
     free: tuple[str, ...]
     fit: Fitted
     xml: bytes
     replay: RigResiduals
     error: float
+    stayed: float
 
 
 def _searched(search: Callable[[list[Taken], frozenset[str]], list[Taken]], chain_of: Callable[[Sequence[Taken]], list[Link]],
@@ -214,8 +215,9 @@ def _falls(chain: Sequence[Link]) -> list[bool]:
 
 def _better(one: Link, other: Link, declared: Link) -> bool:
     """Whether one model predicts the recordings held out better than another; beside earlier effects only what takes a
-    share of the declared model's squared error, or most of what they left, is more than their form being another."""
-    least = 0.0 if other is declared or one.error < HALVED * other.error else SMALL * declared.error**2
+    share of the declared model's squared error, or most of what they left, is more than their form being another. How
+    far off a simulation is that has left a recording says nothing."""
+    least = 0.0 if other is declared or one.error**2 < HALVED * other.error**2 else SMALL * declared.stayed**2
     return one.error < (1.0 - LEAST_GAIN) * other.error and other.error**2 - one.error**2 >= least
 
 
@@ -241,7 +243,9 @@ def _links(rig: RigModel, session: Session, held: bool, stages: Sequence[tuple[S
     files = [write_swing(rig, stages[0][0], theta) for _, theta in tries]
     replays = Background(_replayed, [(session, x, held) for x in files]).results() if files else ()
     for k, (key, x, r) in enumerate(zip(new, files, replays, strict=True)):
-        known[key] = Link(free[k], best[k], x, r, r.figure("position_rmse", held))
+        stayed = RigResiduals(tuple(j for j in r.joints if not j.diverged)).figure("position_rmse", held)
+        error = r.figure("position_rmse", held)
+        known[key] = Link(free[k], best[k], x, r, error, stayed if np.isfinite(stayed) else error)
     return [known[key] for key in keys]
 
 
