@@ -76,8 +76,10 @@ def test_lopsided_friction_foretells_no_bend_and_stays_what_it_is(monkeypatch: p
     assert not any(s.kept for s in stations)
 
 
-def test_a_bent_spring_beside_a_usual_preload_stays_what_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
-    stations, findings = heard(monkeypatch, lambda s: 30 * (s.position / 100) ** 2)
+@pytest.mark.parametrize("bend", [30.0, -27.0])
+def test_a_bent_spring_beside_a_usual_preload_stays_what_it_is(monkeypatch: pytest.MonkeyPatch, bend: float) -> None:
+    """One that softens, too: as a whole it is much softer than those of other drives, where it begins it is as stiff."""
+    stations, findings = heard(monkeypatch, lambda s: bend * (s.position / 100) ** 2)
     assert not findings
     assert [f.term.effect.name for s in stations for f in s.kept] == ["nonlinear_spring"]
 
@@ -194,7 +196,7 @@ def test_a_weight_is_held_against_the_lowest_preload_that_there_may_be(
         names = ("inertia", "viscous", "coulomb", "spring", "preload")
 
         def __init__(self, *given: Any) -> None:
-            lowest, weighed = given[3]["preload"][0] == pytest.approx(8.0 - 0.9 * 35.0), len(given) > 4
+            lowest, weighed = given[3]["preload"][0] == pytest.approx(8.0 - 0.9 * 35.0), given[4] is not None
             self.log_evidence = -125.0 if weighed else at_the_lowest if lowest else -100.0
             self.mean = np.array([0.01, 0.1, 35.0, 0.4, -45.0, *([-40.0, 5.0] if weighed else [])])
             self.covariance = np.eye(len(self.mean))
