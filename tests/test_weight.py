@@ -196,7 +196,7 @@ def test_a_weight_is_held_against_the_lowest_preload_that_there_may_be(
         names = ("inertia", "viscous", "coulomb", "spring", "preload")
 
         def __init__(self, *given: Any) -> None:
-            lowest, weighed = given[3]["preload"][0] == pytest.approx(8.0 - 0.9 * 35.0), given[4] is not None
+            lowest, weighed = given[3]["preload"][0] == pytest.approx(8.0 - 0.9 * 35.0), len(given) > 4
             self.log_evidence = -125.0 if weighed else at_the_lowest if lowest else -100.0
             self.mean = np.array([0.01, 0.1, 35.0, 0.4, -45.0, *([-40.0, 5.0] if weighed else [])])
             self.covariance = np.eye(len(self.mean))

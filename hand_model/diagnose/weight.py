@@ -155,7 +155,8 @@ def _pulled(usual: Usual, station: Station, states: tuple[DriveState, ...], odd_
     plain = tuple(t for t in terms if t.effect.name != BENT)
     inside = balance.unclipped(terms)
     others = {"spring": usual["spring"], "preload": (0.0, _size(balance))} if odd_preload else usual
-    odd = _model(balance, terms, inside, others)
+    # two effects together are not given a choice
+    odd = (_Model if odd_preload else _either)(balance, terms, inside, others)
     weighed = _weighed(usual, balance, states, plain, inside)
     spared = EVIDENCE_LEAST if len(plain) < len(terms) else 0.0  # one effect for two
     likelier = weighed.log_evidence - odd.log_evidence + (spared if odd_preload else -CLASS_WIDTH)
@@ -163,7 +164,7 @@ def _pulled(usual: Usual, station: Station, states: tuple[DriveState, ...], odd_
     if odd_preload and _impossible(odd, *usual["preload"]):
         # with the lowest preload that there may be, as sure as the usual one is: that is not what was recorded
         lowest = _lowest(odd, usual["preload"][0]), usual["preload"][1]
-        odd = _model(balance, terms, inside, {**others, "preload": lowest})
+        odd = _Model(balance, terms, inside, {**others, "preload": lowest})
         likelier = weighed.log_evidence - odd.log_evidence + spared
         both = _weighed(usual, balance, states, terms, inside) if spared else weighed
         if both.log_evidence > weighed.log_evidence + spared:
@@ -185,22 +186,15 @@ def _weighed(
 ) -> _Model:
     """The terms and a weight as `states` have it, preload and spring as usual, of the samples `inside`."""
     posed = {s.trial: s for s in states}
-    return _model(balance, terms, inside, usual, balance.gather(lambda s: _weight(posed[s.trial])))
+    return _Model(balance, terms, inside, usual, balance.gather(lambda s: _weight(posed[s.trial])))
 
 
-def _model(
-    balance: Balance,
-    terms: tuple[Term, ...],
-    inside: NDArray[np.bool_],
-    priors: Mapping[str, tuple[float, float]],
-    further: Array | None = None,
+def _either(
+    balance: Balance, terms: tuple[Term, ...], inside: NDArray[np.bool_], priors: Mapping[str, tuple[float, float]]
 ) -> _Model:
-    """A `_Model`; of a bent spring the likelier one of two: that is usual as a whole, or where it begins."""
-    whole = _Model(balance, terms, inside, priors, further)
-    if not any(t.effect.name == BENT for t in terms):
-        return whole
-    begun = _Model(balance, terms, inside, priors, further, chords=False)
-    return max(whole, begun, key=lambda m: m.log_evidence)
+    """The likelier one of two models: a bent spring is usual as a whole, or where it begins."""
+    both = [_Model(balance, terms, inside, priors, chords=chords) for chords in (True, False)]
+    return max(both, key=lambda m: m.log_evidence)
 
 
 def _size(balance: Balance) -> float:

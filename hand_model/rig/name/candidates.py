@@ -138,7 +138,7 @@ def candidates(
     train = tuple(states[r.trial] for r in rows)
     asked = [e for e in catalogue("drive") if _usable(e) and (only is None or e.name in only)]
     found = [_from_catalogue(e, joint, train, states) for e in asked]
-    found = [_with_fine(c, fit, rows) if c.effect == RIPPLE else c for c in found]
+    found = [_with_fine(c, fit, rows) if c.effect == RIPPLE and not every else c for c in found]
     bends = [c for c in found if c.effect in SMOOTH]
     if every:
         found += [_with_line(c) for c in bends]
