@@ -96,8 +96,29 @@ def test_what_is_still_to_come_of_warming(tmp_path: Path) -> None:
     np.testing.assert_allclose(each, np.exp(-third.time_s / WARM_UP_S))
     logged = {"form": 2.0, "coldest": 22.0, "warmest": 40.0}
     np.testing.assert_allclose(still_to_come(warm, third, "hinge", logged), elapsed, atol=0.01)
+    oil = still_to_come(warm, third, "hinge", {**logged, "thinning": 1.5})
+    np.testing.assert_allclose(oil, np.expm1(1.5 * elapsed) / np.expm1(1.5), atol=0.01)
     silent = load_rig(read_session(warming(tmp_path / "t")))
     assert np.all(still_to_come(silent, silent.trials[2], "hinge", logged) == 1)
+
+
+@pytest.mark.parametrize("thinning", [0.0, 2.0])
+def test_how_a_lubricant_thins_is_read_of_the_temperature(tmp_path: Path, thinning: float) -> None:
+    """Evenly, or exponentially, as its viscosity falls (Reynolds 1886)."""
+    random, tables = np.random.default_rng(8), []
+    t = np.arange(0, 12, 0.004)
+    for k in range(5):
+        motion = two_sines(random, t)
+        degrees = 20 + 4 * k + t / 3
+        left = (36 - degrees) / 16  # of what the first four recordings see
+        cold = 0.3 * (np.expm1(thinning * left) / np.expm1(thinning) if thinning else left)
+        torque = balance(motion) + np.sign(motion[2]) * cold + 0.01 * random.standard_normal(len(t))
+        tables.append(np.stack([t, np.round(motion[1] / 4e-4) * 4e-4, torque, degrees], 1))
+    findings = diagnose_rig(read_session(written(tmp_path / "s", ARM, HEAD, "torque,hinge_temperature", tables)))
+    assert [f.effect for f in findings.findings] == ["thermal_friction_drift"]
+    told = {k: v["value"] for k, v in findings.findings[0].parameters.items()}
+    assert told["thinning"] == pytest.approx(thinning, abs=0.25)
+    assert told["cold_excess"] == pytest.approx(0.3, rel=0.15)
 
 
 def test_a_law_that_follows_its_warming() -> None:

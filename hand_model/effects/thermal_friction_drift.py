@@ -13,24 +13,28 @@ from .base import Amplitude, Array, DriveState, Effect, Shape, figure
 from .law import Law, Moment
 
 ELAPSED, WORKED, LOGGED, EACH = 0.0, 1.0, 2.0, 3.0  # forms
-WARM_UP, COOLING, TEMPERATURES = ("warm_up_time",), ("cooling_time",), ("coldest", "warmest")
+WARM_UP, COOLING, TEMPERATURES = ("warm_up_time",), ("cooling_time",), ("coldest", "warmest", "thinning")
 TOLD = {ELAPSED: WARM_UP, WORKED: WARM_UP + COOLING, LOGGED: TEMPERATURES, EACH: WARM_UP}  # what each form has
 SOONEST_S = 5.0  # what is recorded for less than this twice over shows no more than a line
 HASTY, UNLIKELY = 1.2, 8.0  # times that, within which no motor warms: log likelihood against it
+THINNEST = 4.0  # over the recorded temperatures viscosity falls to exp(-4)
+EVEN = 1e-3  # of that logarithm: less is none
 MOVING = 1.0  # %/s: below, a drive is at rest
 
 
 class ThermalFrictionDrift(Effect):
     """F = sign(v) A (1 - h): the change still to come. h rises to 1 with the time since the session began (form 0), or
     with the time in motion, and falls back at rest between recordings (form 1), with the logged temperature, whose
-    sensor need not sit where the friction is (form 2), or with the time since each recording began, cold (form 3).
+    sensor need not sit where the friction is (form 2: evenly, or as a lubricant's viscosity, exponentially; Reynolds
+    1886), or with the time since each recording began, cold (form 3).
     """
 
     name = "thermal_friction_drift"
     rubs = True
 
     def shapes(self, states: tuple[DriveState, ...]) -> tuple[Shape, ...]:
-        """Warm-up time between 5 s and four times the session, cooling time at rest, form."""
+        """Warm-up time between 5 s and four times the session, cooling time at rest, form; thinning: logarithm of how
+        much more friction changes per degree at the coldest than at the warmest."""
         total = max(_elapsed(states), 2 * SOONEST_S)
         forms = (ELAPSED, WORKED) if all("moving" in s.extra for s in states) else (ELAPSED,)
         forms += (LOGGED,) if _warming(states) else ()
@@ -46,6 +50,7 @@ class ThermalFrictionDrift(Effect):
                 forms=(ELAPSED, WORKED, EACH),
             ),
             Shape("cooling_time", "s", 2.0, 40 * total, (5.0, 25.0, 60.0, 120.0, 400.0), forms=(WORKED,)),
+            Shape("thinning", "1", 0.0, THINNEST, (0.0, 1.5, 3.0), forms=(LOGGED,)),
         )
 
     def grid(self, states: tuple[DriveState, ...]) -> list[dict[str, float]]:
@@ -148,7 +153,9 @@ def _warming(states: tuple[DriveState, ...]) -> dict[str, float]:
 def _share(state: DriveState, shape: Mapping[str, float]) -> Array:
     """Share (n,) of the change that is still to come."""
     if shape["form"] == LOGGED:
-        return (shape["warmest"] - state.extra["temperature"]) / (shape["warmest"] - shape["coldest"])
+        left = (shape["warmest"] - state.extra["temperature"]) / (shape["warmest"] - shape["coldest"])
+        thinning = shape.get("thinning", 0.0)
+        return np.expm1(thinning * left) / np.expm1(thinning) if thinning > EVEN else left
     if shape["form"] == WORKED:
         return _cold(state, shape["warm_up_time"], shape["cooling_time"])
     since = state.time_s - state.time_s[0] if shape["form"] == EACH else state.elapsed_s
