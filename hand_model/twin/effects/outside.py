@@ -81,10 +81,10 @@ def cycle_memory(draw: Draw) -> Influence:
         state[:] = [0.0, 0]
 
     def advance(now: DriveNow, step_s: float) -> None:
-        if now.velocity * state[0] < 0:
-            state[1] += 1
-        if abs(now.velocity) > 1.0:
-            state[0] = math.copysign(1.0, now.velocity)
+        if abs(now.velocity) <= 1.0:  # at a reversal many steps are as slow as that
+            return
+        state[1] += now.velocity * state[0] < 0
+        state[0] = math.copysign(1.0, now.velocity)
 
     def friction(now: DriveNow) -> float:
         return height if (state[1] // 2) % every == every - 1 else 0.0
