@@ -598,7 +598,9 @@ def test_a_segment_held_back_for_a_while_gives_no_more_than_others(met: bool) ->
 
 
 @pytest.mark.parametrize("met", [True, False])
-def test_what_is_smaller_than_the_trace_of_an_obstacle_stands_where_the_current_shows_that(met: bool) -> None:
+def test_what_is_smaller_than_the_trace_of_an_obstacle_stands_where_that_does_not_act(met: bool) -> None:
+    """Whether the current shows the obstacle or not: what is plain before and after it is no form of it."""
+
     def held_back_with_a_dead_band(t, x, v):
         share = (t - t[0]) / np.ptp(t)
         return -0.1 * np.maximum(x - 50.0, 0.0) * ((share > 0.2) & (share < 0.8)) + 0.3 * np.maximum(8.0 - x, 0.0)
@@ -609,8 +611,20 @@ def test_what_is_smaller_than_the_trace_of_an_obstacle_stands_where_the_current_
     named = SimpleNamespace(term=SimpleNamespace(effect=effect("external_contact" if met else "detent_load")))
     bring_together([station, SimpleNamespace(finger="index", believed=True, kept=(named,))])
     assert station.believed
-    assert [f.term.effect.name for f in station.kept] == (["coupling_deadband"] if met else [])
+    assert [f.term.effect.name for f in station.kept] == ["coupling_deadband"]
     assert [f.term.effect.name for f in station.outsiders] == ([] if met else ["obstructed"])
+
+
+def test_what_shows_only_while_an_obstacle_acts_falls_with_it() -> None:
+    def held_back(t, x, v):
+        share = (t - t[0]) / np.ptp(t)
+        while_there = (share > 0.2) & (share < 0.8)
+        return while_there * (-0.1 * np.maximum(x - 50.0, 0.0) + 0.3 * np.maximum(8.0 - x, 0.0))
+
+    effects = [*catalogue("linkage"), *outsiders("linkage")]
+    station = judged("markers", "index", "index", "distal", joint(5, add=held_back), effects)
+    assert "obstructed" in {f.term.effect.name for f in station.outsiders}
+    assert not station.kept
 
 
 def test_a_departure_within_the_tilt_of_a_joint_that_is_no_hinge_does_not_stand_and_a_clock_does() -> None:

@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..findings import Finding
 from .balance import Balance
@@ -15,6 +16,7 @@ from .evidence import evidence
 from .interval import as_named, brought_held_out, parameter_intervals, sized, undisturbed, variance_ratio
 from .naming import ALPHA, EXPLAINED_LEAST, MANY, Named, Naming
 from .selection import SMALL
+from .term import Term
 
 # channels of a session, times names: what no test of a channel sees must stand against as many. Of motors there are few
 # (in 140 healthy balances of currents the likeliest false name is at e^5, of angles, whose clocks err, at e^11)
@@ -221,8 +223,11 @@ class Station:
     def kept(self) -> tuple[Named, ...]:
         """The effects that stand beside each other: one of a small share may be no more than the form of the large one
         being another, and is left to the unexplained part; so is what is smaller than something that no table names, or,
-        where no test sees anything, holds less of it."""
-        strange = max((f.size for f in self._unlisted), default=0.0)
+        where no test sees anything, holds less of it; of what one recording alone has, where it is not told apart."""
+        strange, lasting = (
+            max((f.size for f in self._unlisted if f.term.effect.of_the_hand or passing), default=0.0)
+            for passing in (True, False)
+        )
         unseen = self.naming.before.p >= ALPHA
         held = max((f.share for f in self._unlisted), default=0.0) if unseen else 0.0
         covered = {name for f in self._unlisted for name in f.term.effect.covers}
@@ -231,7 +236,7 @@ class Station:
             f
             for f in self._beside
             if f.term.effect.listed
-            and f.size >= strange
+            and (f.size >= strange or f.size >= lasting and f in self._told_apart)
             and f.share >= held
             and f.term.effect.name not in covered
             and (f.size >= restless or not f.term.effect.drifting)
@@ -287,11 +292,8 @@ class Station:
         """Small effects that are told where none of the large ones acts, each by itself: there they are no form of theirs,
         nor of several which together describe one."""
         balance, fit = self.naming.balance, self.naming.fit
-        idle, terms = np.ones(len(balance.effort), bool), tuple(f.term for f in self._large)
-        for term in terms:
-            added = np.abs(fit.prediction - balance.removed(fit, fit.terms.index(term)))
-            idle &= added < IDLE * added.max()
-        idle = np.convolve(idle, np.ones(2 * BEFORE + 1), mode="same") >= 2 * BEFORE + 1
+        terms = tuple(f.term for f in self._large)
+        idle = self._idle(terms)
         if not (idle & balance.train).any():
             return ()
         there = balance.only(idle)
@@ -305,6 +307,31 @@ class Station:
             return apart and evidence(there, there.fit((*terms, small.term)), rest) >= 2 * EVIDENCE_LEAST
 
         return tuple(f for f in self.proven if f not in self._large and told(f))
+
+    @cached_property
+    def _told_apart(self) -> tuple[Named, ...]:
+        """Effects that are plain where nothing acts that one recording alone has and no table names."""
+        balance, passing = self.naming.balance, [f.term for f in self._unlisted if not f.term.effect.of_the_hand]
+        idle = self._idle(passing)
+        if not passing or not (idle & balance.train).any():
+            return ()
+        there, terms = balance.only(idle), tuple(t for t in self.naming.fit.terms if t not in passing)
+        whole = there.fit(terms)
+
+        def plain(named: Named) -> bool:
+            rest = there.fit(tuple(t for t in terms if t is not named.term))
+            return evidence(there, whole, rest, terms.index(named.term)) >= 2 * EVIDENCE_LEAST
+
+        return tuple(f for f in self._beside if f.term.effect.listed and plain(f))
+
+    def _idle(self, terms: Sequence[Term]) -> NDArray[np.bool_]:
+        """Samples (n,) at which none of the terms does anything, nor a little before or after."""
+        balance, fit = self.naming.balance, self.naming.fit
+        idle = np.ones(len(balance.effort), bool)
+        for term in terms:
+            added = np.abs(fit.prediction - balance.removed(fit, fit.terms.index(term)))
+            idle &= added < IDLE * added.max()
+        return np.convolve(idle, np.ones(2 * BEFORE + 1), mode="same") >= 2 * BEFORE + 1
 
     @property
     def forms(self) -> tuple[Named, ...]:
