@@ -659,7 +659,14 @@ def test_what_holds_less_than_something_no_table_names_stands_only_where_a_test_
     p: float, share: float, stands: bool
 ) -> None:
     def of(held: float, **kind: object) -> SimpleNamespace:
-        kind = {"listed": True, "name": "series_elasticity", "drifting": False, "covers": (), **kind}
+        kind = {
+            "listed": True,
+            "name": "series_elasticity",
+            "drifting": False,
+            "of_the_hand": True,
+            "covers": (),
+            **kind,
+        }
         return SimpleNamespace(term=SimpleNamespace(effect=SimpleNamespace(**kind)), size=1.0, share=held)
 
     give, strange = of(share), of(1 - share, listed=False, name="clock_wander")

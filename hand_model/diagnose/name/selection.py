@@ -22,7 +22,7 @@ from .bristles import with_bristles
 from .candidates import EVIDENCE_LEAST, allowed, exchanged, least_evidence, rank, settle, twice
 from .evidence import evidence, gain, scale_of
 from .lack_of_fit import LackOfFit, lack_of_fit
-from .naming import ALPHA, MANY, MOST_TERMS, Named, Naming, Rival, overwhelmed
+from .naming import ALPHA, CLASS_WIDTH, MANY, MOST_TERMS, Named, Naming, Rival, overwhelmed
 from .shapes import polish, possible, scan
 from .tangent import Tangents, turned
 from .term import Term
@@ -34,9 +34,6 @@ MOST_SEARCHES = 3  # each with noise that knows what did not repeat beside the e
 SMALL = 0.07  # share of the explained mismatch: less beside a larger effect may be no more than its form being another
 # change of the map's slope beside lost motion, from which another search is worth its time
 BENT = 0.01
-# log evidence of training recordings within which those kept out are asked, too: beside laws that are not quite those of
-# the machine it errs by more than chance
-ASKED = 10.0
 ABSORBED = 0.5  # of a column squared, at most, is left of what is mostly a level per while
 GROWN = 1.3  # change of that noise, from which another search is worth its time
 
@@ -307,7 +304,7 @@ def _outdone(pair: Pair, effects: tuple[Any, ...], fit: Fit, found: Iterable[Nam
 def _with_kept_out(balance: Balance, rivals: list[Rival]) -> list[Rival]:
     """Rivals, those that training cannot tell apart with what recordings kept out say of them as trained (prequential
     evidence; Dawid 1984); best first. What one recording had foretells nothing of another."""
-    near = [r for r in rivals if r.evidence > rivals[0].evidence - ASKED]
+    near = [r for r in rivals if r.evidence > rivals[0].evidence - CLASS_WIDTH]
     if len(near) < 2 or balance.train.all() or not all(r.fit.terms[-1].effect.of_the_hand for r in near):
         return rivals
     foretold = [_foretold(balance, balance.fit(r.fit.terms)) for r in near]

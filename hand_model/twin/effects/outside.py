@@ -87,7 +87,7 @@ def cycle_memory(draw: Draw) -> Influence:
         state[0] = math.copysign(1.0, now.velocity)
 
     def friction(now: DriveNow) -> float:
-        return height if (state[1] // 2) % every == every - 1 else 0.0
+        return height if (state[1] // 2) % every == 0 else 0.0
 
     return Influence(start=start, terms=DriveTerms(friction=(friction,), advance=(advance,)))
 
