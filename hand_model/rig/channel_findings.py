@@ -56,7 +56,7 @@ def _share(rig: RigModel, fit: DeclaredFit, issue: ChannelIssue) -> float:
         return 1.0
     effort = {t.name: t for t in rig.trials if issue.joint in t.effort}
     cut, left = 0.0, 0.0
-    for row in (r for r in fit.rows if r.joint == issue.joint):
+    for row in (r for r in fit.rows if r.joint == issue.joint and r.trial in effort):
         values, (low, high) = effort[row.trial].effort[row.joint], limits(effort[row.trial], row.joint)
         at = np.interp(row.time_s, effort[row.trial].time_s, np.isin(values, (low, high)).astype(float)) > 0.5
         asked = fit.expected(row)

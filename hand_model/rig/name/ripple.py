@@ -18,8 +18,9 @@ PEAKS = 4  # that are tried
 
 
 def fine_periods(fit: DeclaredFit, rows: Sequence[Rows], longest: float) -> list[float]:
-    """Periods of the highest peaks of the spectrum over position of what the declared model leaves of the rows' effort,
-    and those beside them, from which their width shows; shorter than `longest`, and no shorter than is seen."""
+    """Periods [rad or m] of the highest peaks of the spectrum over position (periodogram, Schuster 1898) of what the
+    declared model leaves of the rows' effort, and those beside them, from which their width shows; shorter than
+    `longest`, and no shorter than is seen."""
     rows = [r for r in rows if r.moving.any()]
     if not rows:
         return []
