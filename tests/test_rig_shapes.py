@@ -6,12 +6,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from rig_bench import ARM, HEAD, Motion, balance, recorded, two_sines, written
 
+from hand_model.report.rig_effort import _turn
 from hand_model.rig import diagnose_rig, load_rig
 from hand_model.rig.diagnose import _rank, trusted_fit
 from hand_model.rig.findings import Finding
@@ -225,3 +227,12 @@ def test_no_fine_ripple_is_tried_where_none_could_be_seen(tmp_path: Path) -> Non
     assert fine_periods(fit, rows, slow) == []
     still = [replace(r, moving=np.zeros_like(r.moving)) for r in rows]
     assert fine_periods(fit, still, 0.05) == []
+
+
+@pytest.mark.parametrize(("period", "turn"), [(0.01, 0.01), (0.2, 0.0), (None, 0.0)])
+def test_a_fine_ripple_is_shown_over_one_turn(period: float | None, turn: float) -> None:
+    """Over the whole range its picture would be a band."""
+    row = SimpleNamespace(position=np.linspace(-0.1, 0.5, 50))
+    parameters = {} if period is None else {"period": {"value": period}}
+    finding = SimpleNamespace(where={"joint": "slide"}, parameters=parameters)
+    assert _turn(finding, [(SimpleNamespace(joint="slide", row=row), None)]) == turn

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rig.findings import RigFindings
+from ..rig.findings import Finding, RigFindings
 from ..rig.inverse import EffortResidual, effort_residuals
 from ..rig.model import RigModel
 from .page import Element, Section, figures, key, note, table
@@ -31,6 +31,7 @@ BY_POSITION = frozenset(
         "viscoelastic_spring",
     }
 )
+MOST_WAVES = 8  # that are seen in a picture of a joint's range
 BY_TIME = frozenset({"thermal_friction_drift"})
 Pair = tuple[EffortResidual, EffortResidual]
 
@@ -77,14 +78,16 @@ def _states(r: EffortResidual) -> tuple[Array, Array, Array]:
 def effects_section(rig: RigModel, findings: RigFindings, pairs: Sequence[Pair]) -> Section:
     """The residual against what each effect acts through, before and after."""
     drawn = []
-    acting: dict[tuple[str, str], list[str]] = {}  # joint and variable -> effects that act through it: one picture
+    # joint, variable and period -> effects that act through it: one picture
+    acting: dict[tuple[str, str, float], list[str]] = {}
     for f in (f for f in findings.findings if f.fit.get("metric") == "effort_rmse"):
-        acting.setdefault((f.where["joint"], _variable(f.effect)), []).append(f.effect.replace("_", " "))
-    for (joint, variable), effects in list(acting.items())[:PICTURES]:
+        place = f.where["joint"], _variable(f.effect), _turn(f, pairs)
+        acting.setdefault(place, []).append(f.effect.replace("_", " "))
+    for (joint, variable, turn), effects in list(acting.items())[:PICTURES]:
         mine = [p for p in pairs if p[0].joint == joint]
         held = [p for p in mine if p[0].validate] or mine
         if held:
-            drawn.append((f"{joint}: {', '.join(dict.fromkeys(effects))}", _through(joint, variable, held, rig)))
+            drawn.append((f"{joint}: {', '.join(dict.fromkeys(effects))}", _through(joint, variable, turn, held, rig)))
     words = "Residual effort on held-out trials against what each effect acts through, mean and middle 80 % in bins."
     body = (key(("c1", "declared model"), ("ink", "with what was found")), figures(*drawn)) if drawn else ()
     return Section("effects", "Effects through the data", words if drawn else "No effect to show.", body)
@@ -103,14 +106,26 @@ def _variable(effect: str) -> str:
     )
 
 
-def _through(joint: str, variable: str, held: Sequence[Pair], rig: RigModel) -> bytes:
-    """Residual before and after against the variable."""
+def _turn(finding: Finding, pairs: Sequence[Pair]) -> float:
+    """The period [position unit] of what comes so often over a joint's range that a picture of the range shows none of
+    it; zero else."""
+    period = finding.parameters.get("period", {}).get("value") or 0.0
+    span = max((float(np.ptp(a.row.position)) for a, _ in pairs if a.joint == finding.where["joint"]), default=0.0)
+    return float(period) if period * MOST_WAVES < span else 0.0
+
+
+def _through(joint: str, variable: str, turn: float, held: Sequence[Pair], rig: RigModel) -> bytes:
+    """Residual before and after against the variable; against where in its turn a position is, where there is one."""
     q, v, before = (np.concatenate(x) for x in zip(*[_states(a) for a, _ in held], strict=True))
     after = np.concatenate([b.error for _, b in held])
     time_s = np.concatenate([a.row.time_s[:: a.row.step][a.row.moving] for a, _ in held])
     load = np.concatenate([a.expected[a.row.moving] for a, _ in held])
+    within = q % turn if turn else q
     x, label = {
-        "position": (q, f"position [{rig.unit(joint)}]"),
+        "position": (
+            within,
+            f"position{f' within each {turn:.3g} {rig.unit(joint)}' if turn else ''} [{rig.unit(joint)}]",
+        ),
         "time": (time_s, "time [s]"),
         "load": (load * np.sign(v), f"declared effort along the motion [{rig.effort_unit(joint)}]"),
         "velocity": (v, f"velocity [{rig.unit(joint)}/s]"),
