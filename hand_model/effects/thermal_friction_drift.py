@@ -13,8 +13,8 @@ from .base import Amplitude, Array, DriveState, Effect, Shape, figure
 from .law import Law, Moment
 
 ELAPSED, WORKED, LOGGED, EACH = 0.0, 1.0, 2.0, 3.0  # forms
-WARM_UP, COOLING, TEMPERATURES = ("warm_up_time",), ("cooling_time",), ("coldest", "warmest", "thinning")
-TOLD = {ELAPSED: WARM_UP, WORKED: WARM_UP + COOLING, LOGGED: TEMPERATURES, EACH: WARM_UP}  # what each form has
+WARM_UP, COOLING, BY_TEMPERATURE = ("warm_up_time",), ("cooling_time",), ("coldest", "warmest", "thinning")
+TOLD = {ELAPSED: WARM_UP, WORKED: WARM_UP + COOLING, LOGGED: BY_TEMPERATURE, EACH: WARM_UP}  # what each form has
 SOONEST_S = 5.0  # what is recorded for less than this twice over shows no more than a line
 HASTY, UNLIKELY = 1.2, 8.0  # times that, within which no motor warms: log likelihood against it
 THINNEST = 4.0  # over the recorded temperatures viscosity falls to exp(-4)

@@ -31,8 +31,8 @@ BY_POSITION = frozenset(
         "viscoelastic_spring",
     }
 )
-MOST_WAVES = 8  # that are seen in a picture of a joint's range
 BY_TIME = frozenset({"thermal_friction_drift"})
+MOST_WAVES = 8  # that are seen in a picture of a joint's range
 Pair = tuple[EffortResidual, EffortResidual]
 
 
@@ -120,15 +120,14 @@ def _through(joint: str, variable: str, turn: float, held: Sequence[Pair], rig: 
     after = np.concatenate([b.error for _, b in held])
     time_s = np.concatenate([a.row.time_s[:: a.row.step][a.row.moving] for a, _ in held])
     load = np.concatenate([a.expected[a.row.moving] for a, _ in held])
-    within = q % turn if turn else q
+    unit = rig.unit(joint)
     x, label = {
-        "position": (
-            within,
-            f"position{f' within each {turn:.3g} {rig.unit(joint)}' if turn else ''} [{rig.unit(joint)}]",
-        ),
+        "position": (q % turn, f"position within each {turn:.3g} {unit} [{unit}]")
+        if turn
+        else (q, f"position [{unit}]"),
         "time": (time_s, "time [s]"),
         "load": (load * np.sign(v), f"declared effort along the motion [{rig.effort_unit(joint)}]"),
-        "velocity": (v, f"velocity [{rig.unit(joint)}/s]"),
+        "velocity": (v, f"velocity [{unit}/s]"),
     }[variable]
     return before_and_after(x, label, before, after, f"residual [{rig.effort_unit(joint)}]")
 

@@ -32,11 +32,11 @@ def timed_drives(
     drives: dict[str, tuple[DriveState, ...]], facts: dict[str, CommandFacts], simulated: dict[str, SimulatedDrive]
 ) -> tuple[dict[str, tuple[DriveState, ...]], dict[str, bool]]:
     """The drives with what is known of their current's lateness, and whether each may be late."""
-    untimely = {a: s.delay_s for a, s in simulated.items() if s.motions and abs(s.delay_s) > PLAIN * s.doubt_s}
+    explained = {a: s for a, s in simulated.items() if s.motions}
+    untimely = {a: s.delay_s for a, s in explained.items() if abs(s.delay_s) > PLAIN * s.doubt_s}
     if 0 < len(untimely) < len(drives):  # else an early one that seems to give nothing makes the others' gives odd
         drives = with_gives(drives, [a for a in drives if a not in untimely], untimely)
     timed = with_lateness(drives, facts, simulated)
-    explained = frozenset(a for a, s in simulated.items() if s.motions)
     late = _late(drives, timed, lateness({a: f.answers for a, f in facts.items()}), explained)
     in_time = [a for a in drives if not late[a]]
     if 0 < len(in_time) < len(drives):  # at a reversal a late current looks like a give, an early one like none

@@ -224,10 +224,8 @@ class Station:
         """The effects that stand beside each other: one of a small share may be no more than the form of the large one
         being another, and is left to the unexplained part; so is what is smaller than something that no table names, or,
         where no test sees anything, holds less of it; of what one recording alone has, where it is not told apart."""
-        strange, lasting = (
-            max((f.size for f in self._unlisted if f.term.effect.of_the_hand or passing), default=0.0)
-            for passing in (True, False)
-        )
+        strange = max((f.size for f in self._unlisted), default=0.0)
+        lasting = max((f.size for f in self._unlisted if f.term.effect.of_the_hand), default=0.0)
         unseen = self.naming.before.p >= ALPHA
         held = max((f.share for f in self._unlisted), default=0.0) if unseen else 0.0
         covered = {name for f in self._unlisted for name in f.term.effect.covers}

@@ -243,7 +243,7 @@ def _links(rig: RigModel, session: Session, held: bool, stages: Sequence[tuple[S
     files = [write_swing(rig, stages[0][0], theta) for _, theta in tries]
     replays = Background(_replayed, [(session, x, held) for x in files]).results() if files else ()
     for k, (key, x, r) in enumerate(zip(new, files, replays, strict=True)):
-        stayed = RigResiduals(tuple(j for j in r.joints if not j.diverged)).figure("position_rmse", held)
+        stayed = RigResiduals(tuple(j for j in r.joints if j.followed)).figure("position_rmse", held)
         error = r.figure("position_rmse", held)
         known[key] = Link(free[k], best[k], x, r, error, stayed if np.isfinite(stayed) else error)
     return [known[key] for key in keys]
