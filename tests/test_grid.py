@@ -182,7 +182,7 @@ def test_without_a_delay_weights_stay_and_wider_errors_cost() -> None:
 
 
 def test_a_candidate_that_is_always_dropped_again_ends_the_search(monkeypatch) -> None:
-    from hand_model.diagnose.name import selection
+    from hand_model.diagnose.name import search
 
     balance = Balance(drive(7, planted("detent_load", {"form": 0.0, "centre": 50.0, "width": 6.0}, [12.0]), trials=3))
     kind = effect("torque_ripple")
@@ -192,9 +192,9 @@ def test_a_candidate_that_is_always_dropped_again_ends_the_search(monkeypatch) -
     def rank(*_arguments):
         tried.append(kind.name)
         assert len(tried) < 10
-        return [selection.Rival(kind.name, 50.0, offered)]
+        return [search.Rival(kind.name, 50.0, offered)]
 
-    monkeypatch.setattr(selection, "rank", rank)
-    monkeypatch.setattr(selection, "settle", lambda *_arguments: balance.fit())
-    fit, brought, _ = selection._search(selection.Pair(balance), (kind,), None)
+    monkeypatch.setattr(search, "rank", rank)
+    monkeypatch.setattr(search, "settle", lambda *_arguments: balance.fit())
+    fit, brought, _ = search.search(search.Pair(balance), (kind,), None)
     assert fit.terms == () and brought == {kind.name: 50.0}

@@ -14,6 +14,7 @@ from hand_model.rig.channels import check_channels
 from hand_model.rig.clipping import limits, unclipped
 from hand_model.rig.diagnose import trusted_fit
 from hand_model.rig.glitches import glitches
+from hand_model.rig.model import RigTrial
 from hand_model.session import read_session
 
 pytest.importorskip("mujoco")
@@ -135,6 +136,26 @@ def test_what_a_controller_asks_for_is_refused_where_the_drive_does_not_give_it(
     trials = tuple(replace(t, setpoint={"hinge": asked(t.position["hinge"], t.effort["hinge"])}) for t in rig.trials)
     issues = trusted_fit(replace(rig, trials=trials))[1]
     assert [i.kind for i in issues] == kinds
+
+
+@pytest.mark.parametrize("measured", [True, False])
+def test_what_the_planned_motion_would_take_is_refused(tmp_path: Path, measured: bool) -> None:
+    """The arm lags behind its target, and somebody leans on it: a true torque knows, one that is computed does not."""
+    lag_s, random = 0.08, np.random.default_rng(7)
+    rig = load_rig(read_session(recorded(tmp_path / "s", ARM, 5, heavier, 0.003)))
+
+    def along(trial: RigTrial) -> RigTrial:
+        asked = trial.position["hinge"]
+        went = np.interp(trial.time_s - lag_s, trial.time_s, asked)
+        if measured:  # the torque belongs to where it went, and the target is a little ahead
+            ahead = np.interp(trial.time_s + lag_s, trial.time_s, asked)
+            return replace(trial, setpoint={"hinge": ahead})
+        leant = 0.05 * np.sin(2 * np.pi * random.uniform(0.05, 0.2) * trial.time_s)
+        return replace(trial, position={"hinge": went + leant}, setpoint={"hinge": asked})
+
+    issues = trusted_fit(replace(rig, trials=tuple(along(t) for t in rig.trials)))[1]
+    assert [i.refuse for i in issues] == ([] if measured else [True])
+    assert measured or ("planned motion" in issues[0].reason and len(issues[0].trials) == 5)
 
 
 def test_a_target_that_comes_late_to_a_servo_is_told_from_a_late_servo(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 from test_diagnose import drive, planted
 from test_kinematic_stations import joint
 
-from hand_model.diagnose.name import candidates, selection
+from hand_model.diagnose.name import candidates, kept_out, search, selection
 from hand_model.diagnose.name.balance import Balance
 from hand_model.diagnose.name.judgement import _as_likely
 from hand_model.diagnose.name.naming import Named, Rival
@@ -78,6 +78,54 @@ def test_what_turns_out_likelier_in_the_place_of_a_term_takes_it(
     assert (better is not None and better.terms == (one, three)) == exchanged
 
 
+@pytest.mark.parametrize(
+    ("behind", "whole", "foretold", "taken"),
+    [
+        (7.0, 5.0, 0.0, True),
+        (7.0, 1.0, 0.0, False),
+        (7.0, 1.0, 3.0, True),
+        (7.0, -9.0, 30.0, False),
+        (12.0, 9.0, 0.0, False),
+    ],
+)
+def test_a_rival_whose_whole_is_likelier_starts_another_search(
+    monkeypatch: pytest.MonkeyPatch, behind: float, whole: float, foretold: float, taken: bool
+) -> None:
+    """It stays where it starts until all else is found beside it; recordings kept out say which of two alike."""
+    kinds = {name: SimpleNamespace(name=name, of_the_hand=True) for name in ("one", "two", "three", "four")}
+    one, two, three, four = (SimpleNamespace(effect=kind) for kind in kinds.values())
+    fit = SimpleNamespace(terms=(one, two), rss=0.0, size=2)
+    other = SimpleNamespace(terms=(three, four), rss=-2 * whole, size=2)
+    found = [
+        Named(
+            one,
+            {},
+            (Rival("one", 50.0, None), Rival("three", 50.0 - behind, SimpleNamespace(terms=(three,)))),
+            0.8,
+            1,
+            1,
+        ),
+        Named(two, {}, (Rival("two", 20.0, None),), 0.2, 1, 1),
+    ]
+    balance = SimpleNamespace(inflation=1.0, train=np.array([True, False]))
+
+    def beside(pair, effects, progress, start, held):
+        assert start == (three,) and held == "three"
+        return other, {}, []
+
+    monkeypatch.setattr(search, "search", beside)
+    monkeypatch.setattr(search, "twice", lambda *_: False)
+    monkeypatch.setattr(search, "possible", lambda *_: True)
+    monkeypatch.setattr(search, "oddity", lambda *_: 0.0)
+    monkeypatch.setattr(search, "parameter_price", lambda *_: 5.0)
+    monkeypatch.setattr(search, "scale_of", lambda *_: 1.0)
+    monkeypatch.setattr(search, "foretold", lambda balance, fits: [foretold, 0.0])
+    pair = SimpleNamespace(state=balance)
+    better = search.deeper(pair, balance, (), None, fit, found)
+    assert (better is other) == taken
+    assert search.deeper(pair, balance, (), None, fit, found[:1]) is None  # nothing stands beside it
+
+
 def rivals(balance: Balance, *told: tuple[str, dict[str, float], float]) -> list[Rival]:
     """Effects fitted to the training recordings, with the evidence that they are told to have there."""
     return [Rival(name, brought, balance.fit((Term(effect(name), shape),))) for name, shape, brought in told]
@@ -91,11 +139,11 @@ def test_recordings_kept_out_tell_apart_what_training_cannot(ahead: float, asked
     """Of a spring that seems likelier than the drag that is there; what training tells they are not asked of."""
     balance = Balance(drive(3, add=planted("quadratic_damping", {}, [0.002])))
     told = rivals(balance, (*BENT, 90.0 + ahead), (*DRAG, 90.0))
-    heard = selection._with_kept_out(balance, told)
+    heard = kept_out.with_kept_out(balance, told)
     assert (heard[0].name == "quadratic_damping") == asked
     assert heard[0].kept_out == 0.0 and heard[0].evidence == (90.0 if asked else 90.0 + ahead)
     assert heard[1].evidence == pytest.approx(told[0 if asked else 1].evidence + heard[1].kept_out)
-    assert selection._with_kept_out(balance.learning(), told) == told  # there is none
+    assert kept_out.with_kept_out(balance.learning(), told) == told  # there is none
 
 
 def test_recordings_kept_out_say_nothing_of_what_one_recording_had() -> None:
@@ -103,7 +151,7 @@ def test_recordings_kept_out_say_nothing_of_what_one_recording_had() -> None:
     balance = Balance(drive(3, add=planted("quadratic_damping", {}, [0.002])))
     touched = {"trial": 1.0, "form": 0.0, "since": 0.0, "until": 1.0, "begin": 60.0}
     told = rivals(balance, ("external_contact", touched, 91.0), (*DRAG, 90.0))
-    assert selection._with_kept_out(balance, told) == told
+    assert kept_out.with_kept_out(balance, told) == told
 
 
 def test_a_give_that_a_late_segment_makes_large_takes_another_form() -> None:
@@ -196,7 +244,8 @@ def test_more_than_five_effects_are_looked_for_where_five_explain_most(
             + 0.8 * np.maximum(x - 85, 0.0)
         )
 
-    monkeypatch.setattr(selection, "_overwhelmed", lambda balance, fit: hopeless and len(fit.terms) >= 5)
+    for module in (search, selection):
+        monkeypatch.setattr(module, "hopeless", lambda balance, fit: hopeless and len(fit.terms) >= 5)
     naming = name_effects(drive(4, six, noise=3.0, trials=3), [effect(name) for name in SIX])
     found = {f.term.effect.name for f in naming.found}
     assert len(found) == named and found <= set(SIX)
@@ -221,7 +270,7 @@ def test_what_recordings_kept_out_would_exchange_is_held_to_all_other_terms(monk
         return sorted(told, key=lambda r: -r.evidence)
 
     monkeypatch.setattr(selection, "_in_place", in_place)
-    monkeypatch.setattr(selection, "_with_kept_out", kept_out)
+    monkeypatch.setattr(selection, "with_kept_out", kept_out)
     monkeypatch.setattr(selection, "_size", lambda *_: 1.0)
     monkeypatch.setattr(selection, "Tangents", SimpleNamespace(of=lambda *_: None))
     found = selection._findings(SimpleNamespace(state=balance), None, (), fit)

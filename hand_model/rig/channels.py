@@ -19,6 +19,7 @@ from .clipping import limits
 from .commanded import SAME, controller_left, copied, copy_left, linear, rms, sinusoids_left, static_left
 from .declared import DeclaredFit
 from .model import RigModel, RigTrial
+from .planned import planned
 from .states import fill_gaps
 
 Array = NDArray[np.float64]
@@ -166,9 +167,9 @@ def check_balance(rig: RigModel, fit: DeclaredFit) -> tuple[ChannelIssue, ...]:
             )
         elif rms(y) > fit.scale[row.joint] and _stranger(fit, row) and (share := _own_fit(fit, row)) > STRANGE:
             looks.append((name, row, "explains nothing of the motion, though it does in other recordings", share))
-    looks += _asked_for(
-        trials, fit, {r.joint: force[d.name] for r in fit.rows if (d := rig.drive(r.joint)) and d.name in force}
-    )
+    channels = {r.joint: force[d.name] for r in fit.rows if (d := rig.drive(r.joint)) and d.name in force}
+    looks += _asked_for(trials, fit, channels)
+    looks += _planned(rig, fit, channels)
     lacking = {row.joint: (name, share) for name, row, reason, share in looks if reason == UNSIGNED}
     known = {(row.trial, row.joint) for _, row, _, _ in looks}
     # A column that has no sign has none in recordings either whose efforts all go one way.
@@ -210,6 +211,20 @@ def _asked_for(
                 (name, row, "is what a controller asks for, and is not what the motion takes", share)
                 for row, share in told
             ]
+    return out
+
+
+def _planned(rig: RigModel, fit: DeclaredFit, channels: Mapping[str, str]) -> list[tuple[str, Rows, str, float]]:
+    """Efforts (channels: joint -> column) that in most recordings are what the declared machine would take along its
+    targets, and that the motion as it was does not explain as well."""
+    along, out = planned(rig, fit), []
+    for joint, name in channels.items():
+        rows = [r for r in fit.rows if r.joint == joint]
+        shares = {r.trial: along[r.trial, joint] for r in rows if along.get((r.trial, joint), 1.0) < EXACTLY * SAME}
+        if len(shares) > 0.5 * len(rows):
+            typical = float(np.median([*shares.values()]))
+            reason = "is what the planned motion would take, and is not what the motion takes"
+            out += [(name, row, reason, shares.get(row.trial, typical)) for row in rows]
     return out
 
 

@@ -102,38 +102,39 @@ def allowed(balance: Balance, fit: Fit) -> bool:
     return possible(balance, fit, len(fit.terms) - 1)
 
 
-def settle(pair: Pair, effects: tuple[Any, ...], terms: tuple[Term, ...]) -> Fit:
-    """Joint refit; terms that no longer pay leave; a term that another effect replaces better is exchanged."""
+def settle(pair: Pair, effects: tuple[Any, ...], terms: tuple[Term, ...], held: str | None = None) -> Fit:
+    """Joint refit; terms that no longer pay leave; a term that another effect replaces better is exchanged. held: an
+    effect that stays."""
     balance = pair.state
     fit = reform(balance, refit(balance, balance.fit(terms)), len(terms) - 1)
     for which in range(len(terms) - 1):
         if not possible(balance, fit, which):  # what came after it says the same, and each makes the other large
             fit = reform(balance, fit, which)
     for _ in range(3):
-        dropped = _drop(balance, fit)
+        dropped = _drop(balance, fit, held)
         if dropped is not None:
             fit = dropped
             continue
-        swapped = _swap(pair, effects, fit) if len(fit.terms) > 1 else None
+        swapped = _swap(pair, effects, fit, held) if len(fit.terms) > 1 else None
         if swapped is None:
             break
         fit = swapped
     return fit
 
 
-def _drop(balance: Balance, fit: Fit) -> Fit | None:
+def _drop(balance: Balance, fit: Fit, held: str | None) -> Fit | None:
     """The fit without the term that costs more than it brings; None where every term pays."""
-    for which in range(len(fit.terms)):
+    for which in (i for i, t in enumerate(fit.terms) if t.effect.name != held):
         rest = balance.fit(tuple(t for i, t in enumerate(fit.terms) if i != which))
         if evidence(balance, fit, rest, which, scale_of(balance, fit)) < least_evidence(balance, len(rest.terms)):
             return refit(balance, rest)
     return None
 
 
-def _swap(pair: Pair, effects: tuple[Any, ...], fit: Fit) -> Fit | None:
+def _swap(pair: Pair, effects: tuple[Any, ...], fit: Fit, held: str | None) -> Fit | None:
     """The best exchange of one term for another effect, where it raises the evidence; else None."""
     balance = pair.state
-    for which in range(len(fit.terms)):
+    for which in (i for i, t in enumerate(fit.terms) if t.effect.name != held):
         rest = tuple(t for i, t in enumerate(fit.terms) if i != which)
         without = balance.fit(rest)
         own = evidence(balance, fit, without, which, scale_of(balance, fit))

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,11 +18,12 @@ from ...background import Pair
 from ...effects.base import LOST_MOTION
 from .balance import Balance, Fit
 from .bristles import with_bristles
-from .candidates import EVIDENCE_LEAST, allowed, exchanged, least_evidence, rank, settle, twice
+from .candidates import EVIDENCE_LEAST, allowed, exchanged, rank, settle, twice
 from .evidence import evidence, gain, scale_of
-from .lack_of_fit import LackOfFit, lack_of_fit
-from .naming import ALPHA, CLASS_WIDTH, MANY, MOST_TERMS, Named, Naming, Rival, overwhelmed
-from .shapes import polish, possible, scan
+from .kept_out import log_likelihood, with_kept_out
+from .naming import ALPHA, MANY, Named, Naming, Rival
+from .search import deeper, hopeless, lacks, names_of, search
+from .shapes import polish, scan
 from .tangent import Tangents, turned
 from .term import Term
 from .wander import Wander, estimate_wander
@@ -79,10 +79,10 @@ def _named(
     for _ in range(MOST_SEARCHES):
         balance = other.wandering(wander)
         pair = paired(balance.learning())
-        learned, brought, ranked = _search(pair, effects, progress, start)
+        learned, brought, ranked = search(pair, effects, progress, start)
         fit = balance.fit(learned.terms)
         wander = _unrepeated(balance, fit)
-        lost = _overwhelmed(balance, fit)
+        lost = hopeless(balance, fit)
         mapped = _remapped(balance, fit)
         other, bristled = with_bristles(mapped, fit)
         same = _alike(wander, balance.wander) and mapped is balance
@@ -92,19 +92,22 @@ def _named(
     rival = None if lost else _calmed(pair.state, learned, ranked)
     if rival is not None:
         other = balance.wandering(estimate_wander(balance, balance.fit(rival.fit.terms).prediction))
-        further, more, _ = _search(paired(other.learning()), effects, progress, rival.fit.terms)
-        if rival.name in _names(further) and not twice(other, further):
-            balance, brought = other.wandering(_unrepeated(other, other.fit(further.terms))), {**brought, **more}
+        again, more, _ = search(paired(other.learning()), effects, progress, rival.fit.terms)
+        if rival.name in names_of(again) and not twice(other, again):
+            balance, brought = other.wandering(_unrepeated(other, other.fit(again.terms))), {**brought, **more}
             pair = paired(balance.learning())
-            learned = settle(pair, effects, further.terms)  # beside other chance, another may explain it better
-            fit = balance.fit(learned.terms)
+            learned = settle(pair, effects, again.terms)  # beside other chance, another may explain it better
     found = _findings(pair, balance, effects, learned)
     likelier = _outdone(pair, effects, learned, found)
     if likelier is not None:
         learned = likelier
-        fit, found = balance.fit(learned.terms), _findings(pair, balance, effects, learned)
-    declared = balance.fit()
-    before, after = _lacks(balance, declared, fit)
+        found = _findings(pair, balance, effects, learned)
+    further = None if lost else deeper(pair, balance, effects, progress, learned, found)
+    if further is not None:
+        learned = further
+        found = _findings(pair, balance, effects, learned)
+    fit, declared = balance.fit(learned.terms), balance.fit()
+    before, after = lacks(balance, declared, fit)
     kept = {t.effect.name for t in fit.terms}
     rejected = tuple(sorted(((n, e) for n, e in brought.items() if n not in kept), key=lambda item: -item[1]))
     return Naming(balance, declared, fit, estimate_wander(balance, fit.prediction), before, after, found, rejected)
@@ -118,20 +121,6 @@ def _remapped(balance: Balance, fit: Fit) -> Balance:
     other = balance.remapped(fit)
     before, after = (b.gather(lambda s: s.slope)[b.train] for b in (balance, other))
     return other if np.sqrt(np.mean((after - before) ** 2)) > BENT * np.sqrt(np.mean(before**2)) else balance
-
-
-def _lacks(balance: Balance, declared: Fit, fit: Fit) -> tuple[LackOfFit, LackOfFit]:
-    """Of the declared model and of another fit, by one yardstick."""
-    after = _lack(balance, fit)
-    return _lack(balance, declared, after.unrest) if fit.terms else after, after
-
-
-def _lack(balance: Balance, fit: Fit, calmest: float = np.inf) -> LackOfFit:
-    return lack_of_fit(balance, fit.prediction, len(balance.names) + fit.size, ALPHA, calmest)
-
-
-def _overwhelmed(balance: Balance, fit: Fit) -> bool:
-    return len(fit.terms) >= MANY and overwhelmed(len(fit.terms), *_lacks(balance, balance.fit(), fit))
 
 
 def _calmed(balance: Balance, fit: Fit, ranked: Iterable[Rival]) -> Rival | None:
@@ -175,43 +164,6 @@ def _absorbed(balance: Balance, term: Term) -> bool:
     return bool(np.sum(balance.whiten(column, weight) ** 2) < ABSORBED * np.sum(column**2))
 
 
-def _search(
-    pair: Pair, effects: tuple[Any, ...], progress: Callable[[str], None] | None, start: tuple[Term, ...] = ()
-) -> tuple[Fit, dict[str, float], list[Rival]]:
-    """The fit to which no effect adds evidence, what every candidate brought at its best moment, and the last ones
-    refused. start:
-    terms to begin with."""
-    balance = pair.state
-    fit, brought, ranked = settle(pair, effects, start) if start else balance.fit(), {}, list[Rival]()
-    been, refused = {_names(fit)}, set[str]()
-    while len(fit.terms) < MOST_TERMS and not _overwhelmed(balance, fit):
-        ranked = rank(pair, effects, fit.terms, fit)
-        for rival in ranked:
-            brought[rival.name] = max(brought.get(rival.name, -np.inf), rival.evidence)
-        best = next(
-            (r for r in ranked if r.evidence >= least_evidence(balance, len(fit.terms)) and r.name not in refused), None
-        )
-        if best is None:
-            break
-        settled = settle(pair, effects, best.fit.terms)
-        if twice(balance, settled) or not all(possible(balance, settled, i) for i in range(len(settled.terms))):
-            refused.add(best.name)
-            continue
-        if _names(settled) in been:  # it went again beside the others: round and round from here
-            refused.add(best.name)
-            fit = min(fit, settled, key=lambda f: f.rss) if _names(settled) == _names(fit) else fit
-            continue
-        fit = settled
-        been.add(_names(fit))
-        if progress is not None:
-            progress(f"{balance.states[0].drive}: {', '.join(t.effect.name for t in fit.terms)}")
-    return fit, brought, ranked
-
-
-def _names(fit: Fit) -> tuple[str, ...]:
-    return tuple(sorted(t.effect.name for t in fit.terms))
-
-
 def _unrepeated(balance: Balance, fit: Fit) -> Wander | None:
     """What does not repeat beside `fit`. An event of one recording is never repeated: it must be likelier than a model
     without it in which the same residual is chance."""
@@ -235,15 +187,7 @@ def _alike(a: Wander | None, b: Wander | None) -> bool:
 
 
 def _likelihood(balance: Balance, fit: Fit, wander: Wander | None) -> float:
-    return _log_likelihood(balance, fit, wander, balance.weight * balance.train)
-
-
-def _log_likelihood(balance: Balance, fit: Fit, wander: Wander | None, weight: Array) -> float:
-    """Of samples with these weights (n,), zero for those that do not count."""
-    residual = (balance.effort - fit.prediction) * weight
-    if wander is None or not wander.real:
-        return -0.5 * float(np.sum(residual**2)) / balance.inflation
-    return wander.log_likelihood(residual, weight, balance.inflation)
+    return log_likelihood(balance, fit, wander, balance.weight * balance.train)
 
 
 def _findings(pair: Pair, every_recording: Balance, effects: tuple[Any, ...], fit: Fit) -> tuple[Named, ...]:
@@ -264,9 +208,9 @@ def _findings(pair: Pair, every_recording: Balance, effects: tuple[Any, ...], fi
             brought = sum(max(evidence(balance, fit, left[i], i, scale_of(balance, fit)), 0.0) for i in small)
             if own.evidence + brought > rivals[0].evidence:  # they do not stand for it: together they explain more
                 rivals = _in_place(pair, effects, fit, which, every, tangents)
-        likeliest, rivals = rivals[0].name, _with_kept_out(every_recording, rivals)
+        likeliest, rivals = rivals[0].name, with_kept_out(every_recording, rivals)
         if likeliest == term.effect.name != rivals[0].name and others != every:  # beside all, would they exchange it?
-            rivals = _with_kept_out(every_recording, _in_place(pair, effects, fit, which, every, tangents))
+            rivals = with_kept_out(every_recording, _in_place(pair, effects, fit, which, every, tangents))
         weights = np.exp(np.array([r.evidence for r in rivals] + [0.0]) - max(rivals[0].evidence, 0.0))
         mine = [r.name for r in rivals].index(term.effect.name)
         share = losses[which] / max(sum(losses), 1e-12)
@@ -299,30 +243,6 @@ def _outdone(pair: Pair, effects: tuple[Any, ...], fit: Fit, found: Iterable[Nam
         if other is not None and allowed(balance, other):
             return other if favour > 0 else settle(pair, effects, other.terms)
     return None
-
-
-def _with_kept_out(balance: Balance, rivals: list[Rival]) -> list[Rival]:
-    """Rivals, those that training cannot tell apart with what recordings kept out say of them as trained (prequential
-    evidence; Dawid 1984); best first. What one recording had foretells nothing of another."""
-    near = [r for r in rivals if r.evidence > rivals[0].evidence - CLASS_WIDTH]
-    if len(near) < 2 or balance.train.all() or not all(r.fit.terms[-1].effect.of_the_hand for r in near):
-        return rivals
-    foretold = [_foretold(balance, balance.fit(r.fit.terms)) for r in near]
-    scale = max(min(square for square, _ in foretold), 1.0)  # a misfit there weighs all down
-    told = [brought / scale for _, brought in foretold]
-    likeliest = int(np.argmax([r.evidence + t for r, t in zip(near, told, strict=True)]))
-    more = [t - told[likeliest] for t in told]
-    heard = [replace(r, evidence=r.evidence + m, kept_out=m) for r, m in zip(near, more, strict=True)]
-    return sorted([*heard, *rivals[len(near) :]], key=lambda r: -r.evidence)
-
-
-def _foretold(balance: Balance, fit: Fit) -> tuple[float, float]:
-    """Of a fit, in the recordings kept out: mean square of residual over noise, and log likelihood."""
-    weight = balance.weights(fit.terms) * ~balance.train
-    held = weight > 0
-    square = float(np.mean(((balance.effort - fit.prediction) * weight)[held] ** 2))
-    noise = float(np.sum(np.log(weight[held]))) / balance.inflation
-    return square, _log_likelihood(balance, fit, balance.wander, weight) + noise
 
 
 def _in_place(
