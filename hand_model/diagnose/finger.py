@@ -23,6 +23,7 @@ from .locate.angles import (
 )
 from .locate.course import FingerCourses, finger_courses, follows
 from .locate.decoupled import beside_excursions
+from .locate.lasting_noise import camera_drift
 from .locate.markers import HINGE, MarkerNaming, corrected_angles, name_markers, tilt
 from .locate.slips import marker_findings, steps, with_steps
 from .locate.slips import unexplained as unexplained_of
@@ -75,7 +76,7 @@ def _reading(session: Session, finger: Finger, shape: Any, counts: dict[str, tup
     except IdentificationError as error:
         return FingerReading(finger.name, notes=(str(error),))
     try:
-        return _judged(finger, seen, counts)
+        return _judged(finger, seen, counts, camera_drift(session))
     except IdentificationError as error:
         return FingerReading(finger.name, seen, notes=(str(error),))
 
@@ -120,8 +121,8 @@ def _held_out(
     )
 
 
-def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, float]]) -> FingerReading:
-    markers, found, courses = _held_out(seen, name_markers(seen))
+def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, float]], drift: float) -> FingerReading:
+    markers, found, courses = _held_out(seen, name_markers(seen, drift))
     names = ", ".join(f.effect for _, f in found) or "consistent"
     lines = [f"{finger.name} markers: {names} (p {markers.p_before:.2g} -> {markers.p_after:.2g})"]
     angles, moments = corrected_angles(seen, markers), steps(markers)

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from .blocks import Blocks
+from ...session import Session
+from .blocks import Blocks, frames_of_block
 
 Array = NDArray[np.float64]
 
@@ -18,6 +19,9 @@ LONGEST = 8  # blocks over which noise may last; what lasts longer is a misfit
 FEW = 100  # numbers, below which nothing is said of it
 SURE = 3.0  # standard errors by which noise must last
 SLOWEST = 0.8  # of what noise is alike from block to block, at most
+FARTHEST = 64  # blocks over which slow noise of the cameras fades, at most; readings farther apart share none of it
+OCTAVES = ((9, 16), (17, 32), (33, FARTHEST))  # blocks apart
+ALIKE_RAD = 0.02  # by which angles of two passes may differ: a segment's misfit by angle is the same
 
 
 @dataclass(frozen=True)
@@ -38,8 +42,18 @@ class LastingNoise:
         return float(f.sf(statistic / self.inflation / degrees, degrees, self.freedom))
 
 
-def lasting_noise(blocks: Blocks, y: Array) -> LastingNoise:
-    """How long noise lasts in readings y (b, 3m) [m], poses projected out, by the variogram (Matheron 1963) of blocks
+def lasting_noise(blocks: Blocks, y: Array, drift: float = 0.0) -> LastingNoise:
+    """How long noise lasts in readings y (b, 3m) [m], poses projected out: what lasts for a moment, and beside it what lasts
+    for seconds. drift: `camera_drift`."""
+    brief, slow = _brief(blocks, y), _slow(blocks, y, drift)
+    if slow == 0.0:
+        return brief
+    inflation = brief.inflation + slow
+    return LastingNoise(inflation, len(y) * (y.shape[1] - blocks.pose_basis.shape[-1]) / (2 * inflation))
+
+
+def _brief(blocks: Blocks, y: Array) -> LastingNoise:
+    """How long noise lasts, by the variogram (Matheron 1963) of blocks
     between which the finger stands still: no misfit by angle tells these apart. Beyond what is alike in neighbours it is
     taken to fade by the same share from block to block. The inflation is that of long means; those of blocks of many
     passes vary less, and a test of these is on the safe side."""
@@ -64,6 +78,85 @@ def lasting_noise(blocks: Blocks, y: Array) -> LastingNoise:
     share = float(np.clip(next_alike / alike, 0.0, SLOWEST))
     inflation = whole + 2 * alike / (1 - share)
     return LastingNoise(inflation, count * free / (2 * inflation))
+
+
+def camera_drift(session: Session) -> float:
+    """How much more distances between palm markers vary in seconds than from moment to moment (variance over variance,
+    less one): in the least of all flexion recordings, of all fingers, for a palm marker that creeps or slips is at fault
+    in some; zero where one of them shows nothing, or there is but one."""
+    if session.palm is None:
+        return 0.0
+    labels = session.palm.labels
+    rises = [
+        _drifts(trial.mocap().markers(labels), trial.mocap().time_s)
+        for trial in session.select("flexion")
+        if trial.mocap_path is not None
+    ]
+    return min(rises) if len(rises) > 1 else 0.0
+
+
+def _drifts(markers: Array, time_s: Array) -> float:
+    """The same of one recording of markers (n, m, 3) [m] at time_s (n,)."""
+    length = frames_of_block(time_s)
+    count = len(markers) // length
+    if count < 2 * FARTHEST:
+        return 0.0
+    one, other = np.triu_indices(markers.shape[1], 1)
+    apart = np.linalg.norm(markers[:, one] - markers[:, other], axis=-1)[: count * length]
+    means = apart.reshape(count, length, -1).mean(1)  # nan where one is not seen
+    far, near = (
+        np.concatenate([means[k:] - means[:-k] for k in range(first, last, stride)])
+        for first, last, stride in ((FARTHEST + 1, count // 2 + 1, 7), (1, LONGEST + 1, 1))
+    )
+    sound = [d[np.isfinite(d).all(1)] for d in (far, near)]
+    if min(len(d) for d in sound) < FEW:
+        return 0.0
+    rise = float(np.mean(np.median(sound[0] ** 2, axis=0) / np.median(sound[1] ** 2, axis=0))) - 1.0
+    return rise if rise > SURE * np.sqrt(4.0 / (count * min(len(one), 3))) else 0.0
+
+
+def _slow(blocks: Blocks, y: Array, drift: float) -> float:
+    """What cameras that drift for seconds add to the variance of long means of readings y (b, 3m) [m], over what
+    differences of neighbours promise; zero where they do not.
+
+    By the variogram between passes of the same angle, one way: no misfit by angle tells these apart. What slips or sways
+    is one segment, or one recording; noise of the cameras is in all of them, and as much as in the least of them.
+    """
+    if drift == 0.0:
+        return 0.0
+    far = [_apart(blocks, y, (FARTHEST + 1, len(y) // 2), r) for r in np.unique(blocks.record)]
+    near = _apart(blocks, y, (1, LONGEST))
+    counts = np.array([count for count, _ in far])
+    if counts.min() < FEW or near[0] < FEW:
+        return 0.0
+    rise = np.array([square for _, square in far]) / near[1] - 1.0
+    error = SURE * np.sqrt(1.0 / counts + 1.0 / near[0])  # of two of its degrees of freedom, or more
+    if np.any(rise < error[:, None]):
+        return 0.0
+    whole, lasts = 1.0 + float(np.median(rise)), float(LONGEST)
+    for first, last in OCTAVES:
+        count, square = _apart(blocks, y, (first, last))
+        share = (whole - np.median(square / near[1])) / (whole - 1.0) if count >= FEW else 1.0
+        lasts += float(np.clip(share, 0.0, 1.0)) * (last - first + 1)
+    return min(float(rise.min()), drift) * (1.0 + 2.0 * lasts)
+
+
+def _apart(blocks: Blocks, y: Array, lags: tuple[int, int], record: int | None = None) -> tuple[int, Array]:
+    """Pairs of blocks of a recording (of all: None) so many apart, both at the same angles and on the same way: how many
+    they are, and the median square of their difference, of every body (k,) [m^2]."""
+    still = _smoothed(blocks)
+    way = np.sign(np.gradient(still, axis=0))
+    of_body = [np.repeat(blocks.body, 3) == k for k in np.unique(blocks.body)]
+    squares = [np.zeros((0, len(of_body)))]
+    for k in range(lags[0], min(lags[1], len(y) - 1) + 1):
+        pair = (blocks.record[k:] == blocks.record[:-k]) & np.all(way[k:] == way[:-k], axis=1)
+        pair &= np.abs(still[k:] - still[:-k]).max(1) < ALIKE_RAD
+        if record is not None:
+            pair &= blocks.record[k:] == record
+        step = (y[k:] - y[:-k])[pair]
+        squares.append(np.stack([np.sum(step[:, own] ** 2, axis=1) for own in of_body], 1))
+    every = np.concatenate(squares)
+    return len(every), np.median(every, axis=0) if len(every) else np.full(len(of_body), np.nan)
 
 
 def _smoothed(blocks: Blocks) -> Array:

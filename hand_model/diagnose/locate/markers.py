@@ -60,17 +60,18 @@ class MarkerNaming:
         )
 
 
-def name_markers(angles: FingerAngles) -> MarkerNaming:
-    """Name slips and hinges that are none in the flexion recordings of one finger, by forward selection."""
-    return named_in(blocks_of(angles))
+def name_markers(angles: FingerAngles, drift: float = 0.0) -> MarkerNaming:
+    """Name slips and hinges that are none in the flexion recordings of one finger, by forward selection. drift:
+    `camera_drift` of the session."""
+    return named_in(blocks_of(angles), drift)
 
 
-def named_in(blocks: Blocks) -> MarkerNaming:
-    """The same of its blocks of frames."""
+def named_in(blocks: Blocks, drift: float = 0.0) -> MarkerNaming:
+    """The same of its blocks of frames. drift: `camera_drift`."""
     y = project(blocks, blocks.residual.reshape(len(blocks.residual), -1, 1))
     shared = project(blocks, blocks.chain_columns)
     sigma = _noise(y, blocks)
-    lasting = lasting_noise(blocks, y[..., 0])
+    lasting = lasting_noise(blocks, y[..., 0], drift)
     p_before, excess_before = _lack(_solve(shared, y)[1], blocks, lasting)
     if p_before > SKIP_P:
         return MarkerNaming(blocks, (), sigma, p_before, p_before, excess_before, excess_before)

@@ -17,6 +17,7 @@ from ...output import new_folder, refuse_file
 from ...session import Mocap, Session, Trial
 from ..findings import FILES, FOLDERS, Finding
 from ..locate.angles import FingerAngles, finger_angles
+from ..locate.lasting_noise import camera_drift
 from ..locate.markers import SLIPS, MarkerNaming, name_markers
 
 Array = NDArray[np.float64]
@@ -104,7 +105,7 @@ def _corrected_files(
             angles, naming = read[finger.name]
         else:
             angles = finger_angles(session, finger, palm_shape(session))
-            naming = name_markers(angles)
+            naming = name_markers(angles, camera_drift(session))
         for index, record in enumerate(angles.records):
             path = Path(str(record.trial.mocap_path))
             out[path] = corrected_markers(angles, naming, index, markers[finger.name], out.get(path, record.mocap))
