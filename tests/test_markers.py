@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from hand_model.diagnose.locate import markers
 from hand_model.diagnose.locate.blocks import Blocks, _assembled, frames_of_block, present_way, project, way_of_motion
 from hand_model.diagnose.locate.displacement import CREEP, NO_HINGE, STRETCHED, WITH_FINGER, YIELDING
-from hand_model.diagnose.locate.lasting_noise import LastingNoise, lasting_noise
+from hand_model.diagnose.locate.lasting_noise import LastingNoise, camera_drift, lasting_noise
 from hand_model.diagnose.locate.markers import MarkerNaming, named_in, tilt
 from hand_model.diagnose.locate.slips import SPACE, _finding, _of_neighbours, _turning, palm_bends, unexplained
 from hand_model.diagnose.locate.stepwise import Stepwise
@@ -30,11 +30,14 @@ def seen(shift, *arguments, **settings) -> MarkerNaming:
     return named_in(blocks_seen(shift, *arguments, **settings))
 
 
-def blocks_seen(shift, seed: int = 0, body: int = 1, lasting: float = 0.0, rests: bool = False) -> Blocks:
+def blocks_seen(
+    shift, seed: int = 0, body: int = 1, lasting: float = 0.0, rests: bool = False, slow: float = 0.0
+) -> Blocks:
     """Two recordings, in each of which the hand is held another way, of a finger of two joints whose markers are displaced
     by shift(share, turn, arm): (b, 4, 3) [m] of one segment's markers. share: (b,) of the recording. turn: (b, 3, 3) of the first segment. arm:
     (4, 3) [m] from the support's middle, at rest. lasting: share of the noise that neighbouring blocks have alike; rests:
-    whether the finger rests between its strokes, as it does beside such noise."""
+    whether the finger rests between its strokes, as it does beside such noise. slow: times the noise of blocks, what fades
+    in 3 s."""
     rng = np.random.default_rng(seed)
     rest = np.concatenate([rng.normal(0, 0.012, (4, 3)) + [0.03 * k + 0.01, 0, 0.01] for k in range(3)])
     chain = Chain(rest, np.array([[0, 1, 0], [0, 1, 0]], float), np.array([[0.03, 0, 0], [0.06, 0, 0]]))
@@ -45,6 +48,10 @@ def blocks_seen(shift, seed: int = 0, body: int = 1, lasting: float = 0.0, rests
         angle = np.clip(2 * angle - FLEXED, 0, 2 * FLEXED)
     if lasting:
         residual = lfilter([np.sqrt(1 - lasting**2)], [1, -lasting], residual, axis=0)
+    fades = np.exp(-30 / COUNT / 3.0)
+    for k in range(RECORDS):
+        drift = rng.normal(0, slow * 3e-5 * np.sqrt(1 - fades**2), (COUNT + 100, 12, 3))
+        residual[k * COUNT : (k + 1) * COUNT] += lfilter([1.0], [1.0, -fades], drift, axis=0)[100:]
     turn = Rotation.from_rotvec(angle[:, :1] * chain.axis_palm[0]).as_matrix()
     residual[:, BODY == body] += shift(share, turn, rest[BODY == body] - rest[BODY == body].mean(0))
     record = np.repeat(np.arange(RECORDS), COUNT)
@@ -93,8 +100,45 @@ def test_noise_that_lasts_is_no_misfit_and_hides_none(monkeypatch, seed: int) ->
     assert not healthy.found and healthy.p_before > 0.003
     slipped = seen(slipping(0.4), seed, lasting=0.5)
     assert slipped.believed and places(slipped) == {("marker_slip", "M4")}
-    monkeypatch.setattr(markers, "lasting_noise", lambda blocks, y: LastingNoise())
+    monkeypatch.setattr(markers, "lasting_noise", lambda *_: LastingNoise())
     assert seen(lambda share, turn, arm: np.zeros((len(share), 4, 3)), seed, lasting=0.5).p_before < 1e-6
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_cameras_that_drift_are_no_misfit_and_hide_none(seed: int) -> None:
+    """The palm's markers, of recordings in which nothing else moves, say whether it is the cameras."""
+    still = blocks_seen(lambda share, turn, arm: np.zeros((len(share), 4, 3)), seed, slow=0.8)
+    assert named_in(still).p_before < 0.003 < named_in(still, 0.6).p_before
+    slipped = named_in(blocks_seen(slipping(0.4), seed, slow=0.8), 0.6)
+    assert slipped.believed and places(slipped) == {("marker_slip", "M4")}
+    # one segment alone that changes from pass to pass is none of theirs, and white noise has next to no such part
+    loose = blocks_seen(lambda share, turn, arm: still.residual[:, BODY == 1], seed)
+    for blocks in (loose, blocks_seen(lambda share, turn, arm: np.zeros((len(share), 4, 3)), seed)):
+        y = project(blocks, blocks.residual.reshape(len(blocks.residual), -1, 1))[..., 0]
+        assert lasting_noise(blocks, y, 0.6).inflation < 8.0 and lasting_noise(blocks, y) == LastingNoise()
+
+
+def test_a_drift_of_the_cameras_is_in_every_recording() -> None:
+    """By the distances between palm markers, which no finger changes; one of them that creeps in some recordings is not."""
+    rng, fades = np.random.default_rng(3), np.exp(-1 / 300.0)
+    time_s = np.arange(6000) / 100.0
+
+    def session(*recordings: np.ndarray) -> SimpleNamespace:
+        trials = [
+            SimpleNamespace(mocap_path="m", mocap=lambda x=x: SimpleNamespace(markers=lambda _: x, time_s=time_s))
+            for x in recordings
+        ]
+        return SimpleNamespace(palm=SimpleNamespace(labels=("A", "B", "C")), select=lambda kind: trials)
+
+    at = rng.normal(0, 0.05, (3, 3))
+    white = [at + rng.normal(0, 1e-4, (6000, 3, 3)) for _ in range(4)]
+    drift = lfilter([1.0], [1.0, -fades], rng.normal(0, 3e-5 * np.sqrt(1 - fades**2), (4, 6000, 3, 3)), axis=1)
+    creeps = np.zeros((6000, 3, 3))
+    creeps[:, 0, 0] = np.linspace(0, 2e-3, 6000)
+    assert camera_drift(session(*white)) == 0.0
+    assert camera_drift(session(*(w + d for w, d in zip(white, drift, strict=True)))) > 0.2
+    assert camera_drift(session(white[0] + creeps, *white[1:])) == 0.0
+    assert camera_drift(session(white[0] + creeps)) == 0.0  # nothing says that it is the cameras
 
 
 def test_what_slips_at_rest_is_no_noise_that_lasts() -> None:

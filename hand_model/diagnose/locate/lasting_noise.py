@@ -130,8 +130,7 @@ def _slow(blocks: Blocks, y: Array, drift: float) -> float:
     if counts.min() < FEW or near[0] < FEW:
         return 0.0
     rise = np.array([square for _, square in far]) / near[1] - 1.0
-    error = SURE * np.sqrt(1.0 / counts + 1.0 / near[0])  # of two of its degrees of freedom, or more
-    if np.any(rise < error[:, None]):
+    if np.any(rise <= 0.0):
         return 0.0
     whole, lasts = 1.0 + float(np.median(rise)), float(LONGEST)
     for first, last in OCTAVES:
