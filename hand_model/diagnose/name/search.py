@@ -99,21 +99,21 @@ def deeper(
             other, _, _ = search(pair, effects, progress, (*larger, rival.fit.terms[-1]), rival.name)
             if twice(balance, other) or not all(possible(balance, other, i) for i in range(len(other.terms))):
                 continue
-            if _favour(balance, every_recording, other, best or fit) > (DEEPER if best is None else 0.0):
+            if _heard_favour(balance, every_recording, other, best or fit) > (DEEPER if best is None else 0.0):
                 best = other
     return best
 
 
-def _favour(balance: Balance, every_recording: Balance, fit: Fit, other: Fit) -> float:
+def _heard_favour(balance: Balance, every_recording: Balance, fit: Fit, other: Fit) -> float:
     """Log evidence of a whole fit over another one, with what recordings kept out say where these cannot tell."""
-    favour, kept_out = _trained_favour(balance, fit, other), not every_recording.train.all()
-    if abs(favour) < CLASS_WIDTH and kept_out and all(t.effect.of_the_hand for f in (fit, other) for t in f.terms):
+    brought, kept_out = favour(balance, fit, other), not every_recording.train.all()
+    if abs(brought) < CLASS_WIDTH and kept_out and all(t.effect.of_the_hand for f in (fit, other) for t in f.terms):
         mine, theirs = foretold(every_recording, [fit, other])
-        favour += mine - theirs
-    return favour
+        brought += mine - theirs
+    return brought
 
 
-def _trained_favour(balance: Balance, fit: Fit, other: Fit) -> float:
+def favour(balance: Balance, fit: Fit, other: Fit) -> float:
     """Log evidence of a whole fit over another one (Schwarz 1978), with what machines are like."""
     scale = min(scale_of(balance, fit), scale_of(balance, other))
     cost = [0.5 * (f.rss / scale + parameter_price(balance) * f.size) / balance.inflation for f in (fit, other)]

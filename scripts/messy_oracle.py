@@ -1,0 +1,99 @@
+"""Messy sessions whose main effect was not among the first three: information that is missing, or method?
+
+    python scripts/messy_oracle.py FOLDER [FOLDER ...]
+
+FOLDER: as `second_trial.py` left it. Where the main effect belongs to a balance (a motor's current, an angle against
+another), the search of that balance is begun with it, and it is kept there until no other effect comes or goes. Printed:
+the log evidence [nats] of that whole model over the one that was named, coefficients unlike the hand's other motors paid
+for. Below zero, what was named is likelier than the truth: the recordings do not tell. Above three, the search was at
+fault. A marker's effect has no balance, and is passed over.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from hand_model.background import Pair, single_threaded
+from hand_model.diagnose.hearing import Heard
+from hand_model.diagnose.locate.drive import drive_trials
+from hand_model.diagnose.locate.late_current import timed_drives
+from hand_model.diagnose.locate.simulated import delays_apart, simulated_drive
+from hand_model.diagnose.name.search import favour, search
+from hand_model.diagnose.name.shapes import scan
+from hand_model.diagnose.name.station import Station
+from hand_model.diagnose.name.term import Term
+from hand_model.effects import catalogue, outsiders
+from hand_model.session import read_session
+
+SIGNALS = {"current": "drive", "encoder": "encoder", "markers": "linkage"}
+
+
+def stations(folder: Path) -> tuple[Station, ...]:
+    """Every balance of a session, judged as the diagnosis does."""
+    session = read_session(folder)
+    heard = Heard(session, lambda _: None, lambda: None)
+    read = [a for a in drive_trials(session) if a not in heard.unread]
+    told = heard.listen_to_fingers(tuple(partial(simulated_drive, session, a) for a in read))
+    simulated = delays_apart({d.actuator: d for d in told[: len(read)] if d is not None})
+    drives = heard.drives(simulated)
+    facts = heard.listen_to_commands(drives, simulated)
+    heard.listen_to_drives(*timed_drives(drives, facts, simulated), facts)
+    return tuple(heard.stations)
+
+
+def forced(station: Station, name: str) -> tuple[float, tuple[str, ...]]:
+    """Log evidence of the likeliest whole with an effect kept by force over what was named, and its effects."""
+    balance, kind = station.naming.balance.learning(), SIGNALS[station.signal]
+    effects = (*catalogue(kind), *outsiders(kind))
+    effect = next(e for e in effects if e.name == name)
+    starts = [scan(balance, effect, beside) for beside in ((), station.naming.fit.terms)]  # alone it may bring nothing
+    shape = next((f.terms[-1].shape for f in starts if f is not None), balance.grid(effect).shapes[0])
+    named = balance.fit(station.naming.fit.terms)
+    with Pair(balance) as pair:
+        whole = search(pair, effects, None, (Term(effect, shape),), held=name)[0]
+    return favour(balance, whole, named), tuple(t.effect.name for t in whole.terms)
+
+
+def missed(folder: Path) -> list[tuple[str, dict[str, Any], list[str]]]:
+    """Messy sessions of a set whose main effect is not among the first three: case, main effect, what was named."""
+    out = []
+    for case, hidden in sorted(json.loads((folder / "answers.json").read_text()).items()):
+        path = folder / "findings" / case / "findings.json"
+        if hidden["case"] != "messy" or not path.exists():
+            continue
+        main, findings = hidden["effects"][0], json.loads(path.read_text())["findings"]
+        named = [(f["effect"], f["where"]["finger"]) for f in findings]
+        if (main["effect"], main["finger"]) not in named[:3]:
+            out.append((case, main, [name for name, _ in named]))
+    return out
+
+
+def main() -> None:
+    """Print a line per missed session."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("folders", nargs="+", type=Path, metavar="FOLDER")
+    for folder in parser.parse_args().folders:
+        for case, effect, named in missed(folder):
+            name, own = effect["effect"], {e.name: s for s, k in SIGNALS.items() for e in catalogue(k)}
+            line = f"{folder.name} {case}: {name}, named {', '.join(named[:4]) or 'nothing'}"
+            if name not in own:
+                print(f"{line}: no balance tells it", flush=True)
+                continue
+            with single_threaded():
+                told = [s for s in stations(folder / "sessions" / case) if s.finger == effect["finger"]]
+                for station in (s for s in told if s.signal == own[name]):
+                    kept = [f.term.effect.name for f in station.naming.found]
+                    if name in kept:
+                        print(f"{line}: named there", flush=True)
+                        continue
+                    brought, whole = forced(station, name)
+                    beside = ", ".join(n for n in whole if n != name)
+                    print(f"{line}: kept by force {brought:+.1f} nats, beside {beside}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
