@@ -50,12 +50,17 @@ def forced(station: Station, name: str) -> tuple[float, tuple[str, ...]]:
     balance, kind = station.naming.balance.learning(), SIGNALS[station.signal]
     effects = (*catalogue(kind), *outsiders(kind))
     effect = next(e for e in effects if e.name == name)
-    starts = [scan(balance, effect, beside) for beside in ((), station.naming.fit.terms)]  # alone it may bring nothing
-    shape = next((f.terms[-1].shape for f in starts if f is not None), balance.grid(effect).shapes[0])
+    every: dict[Any, list[dict[str, float]]] = {}
+    for shape in balance.grid(effect).shapes:
+        every.setdefault(shape.get("form"), []).append(shape)
+    starts = [shapes[len(shapes) // 2] for shapes in every.values()]  # of every form
+    alone = scan(balance, effect, ())
+    starts += [] if alone is None else [alone.terms[-1].shape]
     named = balance.fit(station.naming.fit.terms)
     with Pair(balance) as pair:
-        whole = search(pair, effects, None, (Term(effect, shape),), held=name)[0]
-    return favour(balance, whole, named), tuple(t.effect.name for t in whole.terms)
+        wholes = [search(pair, effects, None, (Term(effect, shape),), held=name)[0] for shape in starts]
+    best = max(wholes, key=lambda whole: favour(balance, whole, named))
+    return favour(balance, best, named), tuple(t.effect.name for t in best.terms)
 
 
 def missed(folder: Path) -> list[tuple[str, dict[str, Any], list[str]]]:

@@ -211,7 +211,8 @@ PLAIN: Mapping[str, Rule] = {
     "command_delay": lambda p, _: p["delay"] / 0.11,
     "clock_drift": lambda p, _: p["rate_minus_one"] / 0.001,
     "joint_wobble": lambda p, _: p["amplitude"] / 0.05,
-    "moving_centre": lambda p, _: min(p["travel"] / 0.002, 1.0),
+    # of a travel of 2 mm half is told: the rest another hinge would explain
+    "moving_centre": lambda p, _: min(p["travel"] / 0.001, 1.0),
     "marker_slip": lambda p, _: p["distance"] / 0.002,
     "palm_marker_slip": lambda p, _: p["distance"] / 0.0025,
     "support_slip": lambda p, _: p["turn"] / 0.05,
