@@ -310,6 +310,8 @@ def test_a_segment_that_jumps_against_its_encoder_is_not_lifted(anew: bool) -> N
     )
     assert not station.kept and "zero_jump" in {f.term.effect.name for f in station.outsiders}
     assert station.outsiders[0].amplitudes["jump_0"] == pytest.approx(-1.4, abs=0.15)
+    station.swaying = station.outsiders[0].evidence / 6.0 + 1.0  # cameras that drift may do that
+    assert "zero_jump" not in {f.term.effect.name for f in station.outsiders}
 
 
 @pytest.mark.parametrize("rate", [9e-5, -9e-5])

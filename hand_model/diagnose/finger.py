@@ -23,7 +23,7 @@ from .locate.angles import (
 )
 from .locate.course import FingerCourses, finger_courses, follows
 from .locate.decoupled import beside_excursions
-from .locate.lasting_noise import camera_drift
+from .locate.lasting_noise import camera_drift, long_means
 from .locate.markers import HINGE, MarkerNaming, corrected_angles, name_markers, tilt
 from .locate.slips import marker_findings, steps, with_steps
 from .locate.slips import unexplained as unexplained_of
@@ -150,7 +150,7 @@ def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, f
             )
     tilt_deg = tilt(markers)
     for station in stations:
-        station.tilt = tilt_deg
+        station.tilt, station.swaying = tilt_deg, long_means(drift)
     lines += [s.line() for s in stations]
     found = with_steps(found, seen, markers, {s.joint: s.naming.fit.declared for s in stations})
     return FingerReading(

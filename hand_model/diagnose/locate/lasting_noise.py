@@ -95,6 +95,11 @@ def camera_drift(session: Session) -> float:
     return min(rises) if len(rises) > 1 else 0.0
 
 
+def long_means(drift: float) -> float:
+    """Variance of means over many seconds over what differences of moments promise, at most, where cameras drift."""
+    return 1.0 + 2.0 * FARTHEST * drift
+
+
 def _drifts(markers: Array, time_s: Array) -> float:
     """The same of one recording of markers (n, m, 3) [m] at time_s (n,)."""
     length = frames_of_block(time_s)

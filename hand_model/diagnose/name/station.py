@@ -47,7 +47,8 @@ class Station:
     than its own balance tells; compared: names of which other drives tell the size; elsewhere: names that stand at other
     balances of its finger; at_ends: of what starts and stops alone tell, beside which sizes are read as named; tilt: root
     mean square, in the unit of the balance, below which a departure of an angle may be what a joint that is no plain
-    hinge leaves in it."""
+    hinge leaves in it; swaying: times the evidence of what no table names, and moments or levels of recordings tell, that
+    cameras which drift for seconds may make."""
 
     def __init__(
         self, signal: str, finger: str | None, actuator: str | None, joint: str | None, naming: Naming
@@ -57,7 +58,7 @@ class Station:
         self.beside: Callable[[Station], Station] | None = None
         self.compared: tuple[str, ...] = ()
         self.elsewhere: frozenset[str] = frozenset()
-        self.tilt = 0.0
+        self.tilt, self.swaying = 0.0, 1.0
         unseen = naming.before.p >= ALPHA
         odds, chances = (LIKELY, CHANCES_OF_MOTORS) if signal == "current" else (EVIDENCE_LEAST, CHANCES)
         by_chance = np.log(chances) if unseen else 0.0
@@ -279,6 +280,7 @@ class Station:
             if (f in self._large or any(_outgrows(f, g) for g in self._large) or f in self._told_elsewhere)
             and f not in self.forms
             and (f.size * self.naming.balance.sigma >= self.tilt or f.term.effect.signal == "log")
+            and (f.term.effect.listed or f.evidence >= self.swaying * EVIDENCE_LEAST)
         )
 
     @property
