@@ -50,7 +50,7 @@ READINGS: Mapping[str, Mapping[str | None, Mapping[str, Read]]] = {
     "encoder_periodic_error": {EVERY: {"period": _same("period_percent")}},
     "end_stop_contact": {
         "linear": {"begin": _same("at_percent"), "stiffness": _same("stiffness_raw")},
-        "open_side": {"begin": _same("at_percent"), "stiffness": _same("stiffness_raw")},
+        "open_side": {"begin": _same("at_percent"), "stiffness": _same("stiffness_raw", 1.8)},
     },
     "external_contact": {"stiff": {"begin": _same("at_percent"), "stiffness": _same("stiffness_raw")}},
     "linkage_backlash": {"play": {"gap": _same("gap_rad", math.degrees(1.0))}},
