@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from hand_model.errors import HandModelError
+from hand_model.textbook import readings
 from hand_model.twin import CATALOGUE, KINDS, Hidden, Plan, bebionic, draw_case, outside, record, vocabulary
 from hand_model.twin.effects.shapes import play
 from hand_model.twin.influence import activate, merge_terms
@@ -227,6 +228,15 @@ def test_physics_of_the_forms():
         > friction_at("load_dependent_friction", "transmitted", 10, 30)
         > 0
     )
+
+
+@pytest.mark.parametrize(("form", "inside"), [("linear", 95.0), ("open_side", 3.0)])
+def test_a_stop_is_as_stiff_as_the_textbook_reads_it(form: str, inside: float) -> None:
+    """By how much its load changes along a percent of the range inside it."""
+    figures = {"at_percent": 88.0 if form == "linear" else 8.0, "stiffness_raw": 1.2}
+    one, other = (friction_at("end_stop_contact", form, at, 1.0, **figures) for at in (inside, inside + 1.0))
+    told = readings({"effect": "end_stop_contact", "form": form, "parameters": figures})
+    assert told["stiffness"] == pytest.approx(other - one) and told["begin"] == figures["at_percent"]
 
 
 def test_play_is_backlash():
