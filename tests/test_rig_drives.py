@@ -158,6 +158,18 @@ def test_what_the_planned_motion_would_take_is_refused(tmp_path: Path, measured:
     assert measured or ("planned motion" in issues[0].reason and len(issues[0].trials) == 5)
 
 
+@pytest.mark.parametrize("told", [np.zeros_like, lambda t: np.sign(np.sin(t)), lambda t: 0.1 * t, "noise"])
+def test_targets_that_do_not_move_as_the_arm_does_tell_of_no_plan(tmp_path: Path, told) -> None:
+    """However little there is left to explain along them."""
+    rig = load_rig(
+        read_session(recorded(tmp_path / "s", ARM, 5, lambda m: heavier(m) * (1 + 0.3 * np.sin(7 * m[0])), 0.05))
+    )
+    random = np.random.default_rng(0)
+    target = (lambda t: random.standard_normal(len(t))) if told == "noise" else told
+    trials = tuple(replace(t, setpoint={"hinge": target(t.time_s)}) for t in rig.trials)
+    assert trusted_fit(replace(rig, trials=trials))[1] == trusted_fit(rig)[1]
+
+
 def test_a_target_that_comes_late_to_a_servo_is_told_from_a_late_servo(tmp_path: Path) -> None:
     servo = ARM.replace(MOTOR, '<position name="motor" joint="hinge" kp="6" kv="0.1"/>')
 

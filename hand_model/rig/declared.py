@@ -261,7 +261,7 @@ def _beside_smooth(rows: Sequence[Rows], left: Sequence[Array]) -> list[Array]:
     """What is left of residuals (moving samples of each row) beside any smooth load and friction."""
     x = np.concatenate([np.concatenate([r.columns, _smooth(r)], 1)[r.moving] for r in rows])
     x = x[:, np.any(x != 0, 0)]
-    x, y = x / np.linalg.norm(x, axis=0), np.concatenate(left)
+    x, y = x / (np.linalg.norm(x, axis=0) + 1e-300), np.concatenate(left)
     y = y - x @ np.linalg.solve(x.T @ x + ALIKE * np.eye(x.shape[1]), x.T @ y)
     return np.split(y, np.cumsum([len(e) for e in left])[:-1])
 

@@ -11,6 +11,7 @@ from .model import RigModel, RigTrial
 
 FOLLOWED = 0.02  # of the rms of an effort: where the motion leaves no more, nobody need ask what the targets leave
 APART = 0.1  # of what the motion leaves, at most, the targets leave of an effort that is theirs
+MOVED = 0.5  # of the range, and of the time, of the motion, over which a joint's target must move
 
 
 def planned(rig: RigModel, fit: DeclaredFit) -> dict[tuple[str, str], float]:
@@ -26,13 +27,20 @@ def planned(rig: RigModel, fit: DeclaredFit) -> dict[tuple[str, str], float]:
         return {}
     refused = {(t.name, j) for t in asked for j in rig.joints} - set(fit.quality)
     along = fit_declared(replace(rig, trials=tuple(_along_targets(t) for t in asked)), refused)
-    return {k: share for k, share in along.quality.items() if share < APART * fit.quality[k]}
+    moved, told = ({(r.trial, r.joint): float(np.mean(r.moving)) for r in f.rows} for f in (fit, along))
+    return {
+        k: share for k, share in along.quality.items() if share < APART * fit.quality[k] and told.get(k, 0.0) > MOVED * moved[k]
+    }
 
 
 def _has_targets(trial: RigTrial) -> bool:
-    """Whether every joint that moves has a target, all samples finite, that is not what was measured over again."""
+    """Whether every joint has a target, all samples finite, that moves as far as it, or nearly, and is not what was
+    measured over again."""
     return bool(trial.effort) and all(
-        j in trial.setpoint and np.isfinite(trial.setpoint[j]).all() and not np.array_equal(trial.setpoint[j], q)
+        j in trial.setpoint
+        and np.isfinite(trial.setpoint[j]).all()
+        and np.ptp(trial.setpoint[j]) > MOVED * np.ptp(q[np.isfinite(q)])
+        and not np.array_equal(trial.setpoint[j], q)
         for j, q in trial.position.items()
     )
 
