@@ -29,7 +29,9 @@ def planned(rig: RigModel, fit: DeclaredFit) -> dict[tuple[str, str], float]:
     along = fit_declared(replace(rig, trials=tuple(_along_targets(t) for t in asked)), refused)
     moved, told = ({(r.trial, r.joint): float(np.mean(r.moving)) for r in f.rows} for f in (fit, along))
     return {
-        k: share for k, share in along.quality.items() if share < APART * fit.quality[k] and told.get(k, 0.0) > MOVED * moved[k]
+        k: share
+        for k, share in along.quality.items()
+        if share < APART * fit.quality[k] and told.get(k, 0.0) > MOVED * moved[k]
     }
 
 

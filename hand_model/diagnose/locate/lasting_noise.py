@@ -53,10 +53,10 @@ def lasting_noise(blocks: Blocks, y: Array, drift: float = 0.0) -> LastingNoise:
 
 
 def _brief(blocks: Blocks, y: Array) -> LastingNoise:
-    """How long noise lasts, by the variogram (Matheron 1963) of blocks
-    between which the finger stands still: no misfit by angle tells these apart. Beyond what is alike in neighbours it is
-    taken to fade by the same share from block to block. The inflation is that of long means; those of blocks of many
-    passes vary less, and a test of these is on the safe side."""
+    """How long noise lasts, by the variogram (Matheron 1963) of blocks between which the finger stands still: no misfit by
+    angle tells these apart. Beyond what is alike in neighbours it is taken to fade by the same share from block to
+    block. The inflation is that of long means; those of blocks of many passes vary less, and a test of these is on the
+    safe side."""
     free = y.shape[1] - blocks.pose_basis.shape[-1]
     still = _smoothed(blocks)
     step_s = float(np.median(np.diff(blocks.time_s)[np.diff(blocks.record) == 0]))
@@ -116,7 +116,10 @@ def _drifts(markers: Array, time_s: Array) -> float:
     sound = [d[np.isfinite(d).all(1)] for d in (far, near)]
     if min(len(d) for d in sound) < FEW:
         return 0.0
-    rise = float(np.mean(np.median(sound[0] ** 2, axis=0) / np.median(sound[1] ** 2, axis=0))) - 1.0
+    seconds, moments = (np.median(d**2, axis=0) for d in sound)
+    if np.any(moments == 0):  # no noise at all
+        return 0.0
+    rise = float(np.mean(seconds / moments)) - 1.0
     return rise if rise > SURE * np.sqrt(4.0 / (count * min(len(one), 3))) else 0.0
 
 

@@ -89,8 +89,9 @@ def deeper(
 ) -> Fit | None:
     """A likelier fit, found from another start: a rival near behind one of the largest of `found`, in its place beside
     the larger ones and held there until nothing else comes or goes. What was taken up beside the wrong one stands for
-    what that lacks, so that exchanging one term at a time does not get away from it. None where there is none. pair: of the training
-    recordings of the balance `every_recording`; those kept out say which of two that these cannot tell apart."""
+    what that lacks, so that exchanging one term at a time does not get away from it. None where there is none. pair: of
+    the training recordings of the balance `every_recording`; those kept out say which of two that these cannot tell
+    apart."""
     balance, best, ordered = pair.state, None, list(found)
     for place, named in enumerate(ordered[:STARTS] if len(ordered) > 1 else ()):
         larger = tuple(n.term for n in ordered[:place])
