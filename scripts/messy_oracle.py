@@ -13,15 +13,11 @@ from __future__ import annotations
 
 import argparse
 import json
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from hand_model.background import Pair, single_threaded
-from hand_model.diagnose.hearing import Heard
-from hand_model.diagnose.locate.drive import drive_trials
-from hand_model.diagnose.locate.late_current import timed_drives
-from hand_model.diagnose.locate.simulated import delays_apart, simulated_drive
+from hand_model.diagnose.diagnosis import hear
 from hand_model.diagnose.name.search import favour, search
 from hand_model.diagnose.name.shapes import scan
 from hand_model.diagnose.name.station import Station
@@ -30,19 +26,6 @@ from hand_model.effects import catalogue, outsiders
 from hand_model.session import read_session
 
 SIGNALS = {"current": "drive", "encoder": "encoder", "markers": "linkage"}
-
-
-def stations(folder: Path) -> tuple[Station, ...]:
-    """Every balance of a session, judged as the diagnosis does."""
-    session = read_session(folder)
-    heard = Heard(session, lambda _: None, lambda: None)
-    read = [a for a in drive_trials(session) if a not in heard.unread]
-    told = heard.listen_to_fingers(tuple(partial(simulated_drive, session, a) for a in read))
-    simulated = delays_apart({d.actuator: d for d in told[: len(read)] if d is not None})
-    drives = heard.drives(simulated)
-    facts = heard.listen_to_commands(drives, simulated)
-    heard.listen_to_drives(*timed_drives(drives, facts, simulated), facts)
-    return tuple(heard.stations)
 
 
 def forced(station: Station, name: str) -> tuple[float, tuple[str, ...]]:
@@ -89,7 +72,8 @@ def main() -> None:
                 print(f"{line}: no balance tells it", flush=True)
                 continue
             with single_threaded():
-                told = [s for s in stations(folder / "sessions" / case) if s.finger == effect["finger"]]
+                heard, _ = hear(read_session(folder / "sessions" / case), lambda _: None, lambda: None)
+                told = [s for s in heard.stations if s.finger == effect["finger"]]
                 for station in (s for s in told if s.signal == own[name]):
                     kept = [f.term.effect.name for f in station.naming.found]
                     if name in kept:

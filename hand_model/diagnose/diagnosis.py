@@ -65,18 +65,8 @@ def diagnose(
     step()
     if output is not None:
         refuse_output(Path(output))
-    heard = Heard(session, tell, step)
     owned = output is not None and model is None
-    read = [a for a in drive_trials(session) if a not in heard.unread]
-    beside = (
-        *(partial(simulated_drive, session, a) for a in read),
-        *((partial(_identified, session),) if owned else ()),
-    )
-    told = heard.listen_to_fingers(beside)
-    simulated = delays_apart({d.actuator: d for d in told[: len(read)] if d is not None})
-    drives = heard.drives(simulated)
-    facts = heard.listen_to_commands(drives, simulated)
-    heard.listen_to_drives(*timed_drives(drives, facts, simulated), facts)
+    heard, told = hear(session, tell, step, (partial(_identified, session),) if owned else ())
     stations = heard.stations
     findings = assemble(stations, heard.found, heard.notes, heard.unexplained)
     listed, written = reread(findings.findings, stations)
@@ -93,6 +83,27 @@ def diagnose(
     if progress is not None:
         progress(1.0)
     return findings
+
+
+def hear(
+    session: Session,
+    tell: Callable[[str], None],
+    step: Callable[[], None],
+    beside: tuple[Callable[[], Any], ...] = (),
+) -> tuple[Heard, list[Any]]:
+    """What every finger and every drive of a hand session says. tell, step: as of `Heard`. beside: further calls, made where
+    a core is free meanwhile; what they return comes second.
+
+    Raises SessionError where a drive's signs contradict each other.
+    """
+    heard = Heard(session, tell, step)
+    read = [a for a in drive_trials(session) if a not in heard.unread]
+    told = heard.listen_to_fingers((*(partial(simulated_drive, session, a) for a in read), *beside))
+    simulated = delays_apart({d.actuator: d for d in told[: len(read)] if d is not None})
+    drives = heard.drives(simulated)
+    facts = heard.listen_to_commands(drives, simulated)
+    heard.listen_to_drives(*timed_drives(drives, facts, simulated), facts)
+    return heard, told[len(read) :]
 
 
 def _diagnosed_rig(

@@ -65,10 +65,13 @@ def finger_calls(session: Session, unread: tuple[str, ...] = ()) -> list[Callabl
     except IdentificationError as error:
         return [partial(FingerReading, "palm", notes=(str(error),))]
     counts = {a: c for a, c in ranges_of_counts(session).items() if a not in unread}
-    return [partial(_reading, session, finger, shape, counts) for finger in session.fingers]
+    drift = camera_drift(session)
+    return [partial(_reading, session, finger, shape, counts, drift) for finger in session.fingers]
 
 
-def _reading(session: Session, finger: Finger, shape: Any, counts: dict[str, tuple[float, float]]) -> FingerReading:
+def _reading(
+    session: Session, finger: Finger, shape: Any, counts: dict[str, tuple[float, float]], drift: float
+) -> FingerReading:
     if _on_a_line(session, finger):  # `check_session` notes it
         return FingerReading(finger.name)
     try:
@@ -76,7 +79,7 @@ def _reading(session: Session, finger: Finger, shape: Any, counts: dict[str, tup
     except IdentificationError as error:
         return FingerReading(finger.name, notes=(str(error),))
     try:
-        return _judged(finger, seen, counts, camera_drift(session))
+        return _judged(finger, seen, counts, drift)
     except IdentificationError as error:
         return FingerReading(finger.name, seen, notes=(str(error),))
 

@@ -132,38 +132,37 @@ def _slow(blocks: Blocks, y: Array, drift: float) -> float:
     """
     if drift == 0.0:
         return 0.0
-    far = [_apart(blocks, y, (FARTHEST + 1, len(y) // 2), r) for r in np.unique(blocks.record)]
-    near = _apart(blocks, y, (1, LONGEST))
-    counts = np.array([count for count, _ in far])
-    if counts.min() < FEW or near[0] < FEW:
+    lag, record, square = _passes(blocks, y)
+    near, far = square[lag <= LONGEST], [square[(lag > FARTHEST) & (record == r)] for r in np.unique(blocks.record)]
+    if min(len(pairs) for pairs in (near, *far)) < FEW:
         return 0.0
-    rise = np.array([square for _, square in far]) / near[1] - 1.0
+    usual = np.median(near, axis=0)
+    rise = np.array([np.median(pairs, axis=0) for pairs in far]) / usual - 1.0
     if np.any(rise <= 0.0):
         return 0.0
     whole, lasts = 1.0 + float(np.median(rise)), float(LONGEST)
     for first, last in OCTAVES:
-        count, square = _apart(blocks, y, (first, last))
-        share = (whole - np.median(square / near[1])) / (whole - 1.0) if count >= FEW else 1.0
+        pairs = square[(lag >= first) & (lag <= last)]
+        share = (whole - np.median(np.median(pairs, axis=0) / usual)) / (whole - 1.0) if len(pairs) >= FEW else 1.0
         lasts += float(np.clip(share, 0.0, 1.0)) * (last - first + 1)
     return min(float(rise.min()), drift) * (1.0 + 2.0 * lasts)
 
 
-def _apart(blocks: Blocks, y: Array, lags: tuple[int, int], record: int | None = None) -> tuple[int, Array]:
-    """Pairs of blocks of a recording (of all: None) so many apart, both at the same angles and on the same way: how many
-    they are, and the median square of their difference, of every body (k,) [m^2]."""
+def _passes(blocks: Blocks, y: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+    """Pairs of blocks of a recording at the same angles and on the same way: how many blocks they are apart (p,), their
+    recording (p,), and the square of their difference, of every body (p, k) [m^2]."""
     still = _smoothed(blocks)
     way = np.sign(np.gradient(still, axis=0))
     of_body = [np.repeat(blocks.body, 3) == k for k in np.unique(blocks.body)]
-    squares = [np.zeros((0, len(of_body)))]
-    for k in range(lags[0], min(lags[1], len(y) - 1) + 1):
+    lags, records, squares = [], [], []
+    for k in range(1, len(y) // 2 + 1):
         pair = (blocks.record[k:] == blocks.record[:-k]) & np.all(way[k:] == way[:-k], axis=1)
         pair &= np.abs(still[k:] - still[:-k]).max(1) < ALIKE_RAD
-        if record is not None:
-            pair &= blocks.record[k:] == record
         step = (y[k:] - y[:-k])[pair]
+        lags.append(np.full(len(step), k))
+        records.append(blocks.record[k:][pair])
         squares.append(np.stack([np.sum(step[:, own] ** 2, axis=1) for own in of_body], 1))
-    every = np.concatenate(squares)
-    return len(every), np.median(every, axis=0) if len(every) else np.full(len(of_body), np.nan)
+    return np.concatenate(lags), np.concatenate(records), np.concatenate(squares)
 
 
 def _smoothed(blocks: Blocks) -> Array:

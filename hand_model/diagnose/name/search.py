@@ -3,7 +3,7 @@ deeper."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -45,7 +45,7 @@ def search(
         if best is None:
             break
         settled = settle(pair, effects, best.fit.terms, held)
-        if twice(balance, settled) or not all(possible(balance, settled, i) for i in range(len(settled.terms))):
+        if not _tenable(balance, settled):
             refused.add(best.name)
             continue
         if names_of(settled) in been:  # it went again beside the others: round and round from here
@@ -57,6 +57,11 @@ def search(
         if progress is not None:
             progress(f"{balance.states[0].drive}: {', '.join(t.effect.name for t in fit.terms)}")
     return fit, brought, ranked
+
+
+def _tenable(balance: Balance, fit: Fit) -> bool:
+    """Whether a machine may have every term of a fit, and none says what another does."""
+    return not twice(balance, fit) and all(possible(balance, fit, i) for i in range(len(fit.terms)))
 
 
 def names_of(fit: Fit) -> tuple[str, ...]:
@@ -85,22 +90,21 @@ def deeper(
     effects: tuple[Any, ...],
     progress: Callable[[str], None] | None,
     fit: Fit,
-    found: Iterable[Named],
+    found: Sequence[Named],
 ) -> Fit | None:
     """A likelier fit, found from another start: a rival near behind one of the largest of `found`, in its place beside
     the larger ones and held there until nothing else comes or goes. What was taken up beside the wrong one stands for
     what that lacks, so that exchanging one term at a time does not get away from it. None where there is none. pair: of
     the training recordings of the balance `every_recording`; those kept out say which of two that these cannot tell
     apart."""
-    balance, best, ordered = pair.state, None, list(found)
-    for place, named in enumerate(ordered[:STARTS] if len(ordered) > 1 else ()):
-        larger = tuple(n.term for n in ordered[:place])
+    balance, best = pair.state, None
+    for place, named in enumerate(found[:STARTS] if len(found) > 1 else ()):
+        larger = tuple(n.term for n in found[:place])
         near = [r for r in named.rivals if named.evidence - NEAR < r.evidence and r.name not in names_of(fit)]
         for rival in near[:STARTS]:
             other, _, _ = search(pair, effects, progress, (*larger, rival.fit.terms[-1]), rival.name)
-            if twice(balance, other) or not all(possible(balance, other, i) for i in range(len(other.terms))):
-                continue
-            if _heard_favour(balance, every_recording, other, best or fit) > (DEEPER if best is None else 0.0):
+            ahead = 0.0 if best else DEEPER
+            if _tenable(balance, other) and _heard_favour(balance, every_recording, other, best or fit) > ahead:
                 best = other
     return best
 

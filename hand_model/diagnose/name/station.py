@@ -270,7 +270,8 @@ class Station:
 
     @property
     def _unlisted(self) -> tuple[Named, ...]:
-        return tuple(f for f in self._beside if not (f.term.effect.listed or self._part(f)))
+        unlisted = (f for f in self._beside if not f.term.effect.listed)
+        return tuple(f for f in unlisted if f.evidence >= self.swaying * EVIDENCE_LEAST and not self._part(f))
 
     @property
     def _beside(self) -> tuple[Named, ...]:
@@ -280,7 +281,6 @@ class Station:
             if (f in self._large or any(_outgrows(f, g) for g in self._large) or f in self._told_elsewhere)
             and f not in self.forms
             and (f.size * self.naming.balance.sigma >= self.tilt or f.term.effect.signal == "log")
-            and (f.term.effect.listed or f.evidence >= self.swaying * EVIDENCE_LEAST)
         )
 
     @property
