@@ -12,7 +12,15 @@ from scipy.spatial.transform import Rotation
 
 from hand_model.diagnose.locate import markers
 from hand_model.diagnose.locate.blocks import Blocks, _assembled, frames_of_block, present_way, project, way_of_motion
-from hand_model.diagnose.locate.displacement import CREEP, NO_HINGE, STRETCHED, WITH_FINGER, YIELDING
+from hand_model.diagnose.locate.displacement import (
+    CREEP,
+    NO_HINGE,
+    STRETCHED,
+    WITH_FINGER,
+    YIELDING,
+    MarkerEffect,
+    candidates_of,
+)
 from hand_model.diagnose.locate.lasting_noise import LastingNoise, camera_drift, lasting_noise
 from hand_model.diagnose.locate.markers import MarkerNaming, named_in, tilt
 from hand_model.diagnose.locate.slips import SPACE, _finding, _of_neighbours, _turning, palm_bends, unexplained
@@ -169,6 +177,19 @@ def test_slips_close_to_each_other_are_told_apart_whatever_was_found_first() -> 
         for record in range(RECORDS)
         for effect, at in (("support_slip", 0.26), ("marker_slip", 0.32), ("marker_slip", 0.28))
     }
+
+
+def test_what_was_put_right_before_the_next_recording_slips_there_again() -> None:
+    blocks = blocks_seen(slipping(0.3))
+    y, shared = (
+        project(blocks, v) for v in (blocks.residual.reshape(len(blocks.residual), -1, 1), blocks.chain_columns)
+    )
+    search = Stepwise(blocks, candidates_of(blocks), y, shared, 3e-5 / np.sqrt(8), LastingNoise())
+    at, end = round(0.3 * COUNT), COUNT * RECORDS
+    slip = next(c for c in search.candidates if c.label == "M4" and c.lasting and c.step)
+    lasts = MarkerEffect(slip.effect, slip.body, slip.label, at, end, slip.columns, 0.0, 0.0)  # and is not put right
+    once = search.settled([lasts])
+    assert {(e.label, e.begin, e.end) for e in once} == {("M4", at, COUNT), ("M4", COUNT + at, end)}
 
 
 @pytest.mark.parametrize("along", [1, *(pytest.param(i, marks=pytest.mark.slow) for i in (0, 2))])

@@ -184,7 +184,21 @@ class Stepwise:
                     found, swapped = other, True
             if found is before:
                 break
+        if (parted := self._parted(found)) is not found:
+            return self._ordered(parted)
         return self._ordered(found) if swapped else found
+
+    def _parted(self, found: list[MarkerEffect]) -> list[MarkerEffect]:
+        """A step that lasts beyond its recording ends with that, where something else beside it says more: what is put
+        right before the next recording may slip there again."""
+        for effect in found:
+            if effect.begin is None or effect.end <= self.last[effect.begin]:
+                continue
+            beside = [*(e for e in found if e is not effect), replace(effect, end=int(self.last[effect.begin]))]
+            other = [*beside, self.next(beside, known=True)]
+            if self.score(other) > self.score(found) + BETTER:
+                return other
+        return found
 
     def _ordered(self, found: list[MarkerEffect]) -> list[MarkerEffect]:
         """By what each brings beside those before it."""
