@@ -56,7 +56,10 @@ READINGS: Mapping[str, Mapping[str | None, Mapping[str, Read]]] = {
     "linkage_backlash": {"play": {"gap": _same("gap_rad", math.degrees(1.0))}},
     "load_dependent_friction": {"transmitted": {"load_coefficient": _same("share")}},
     "marker_slip": {EVERY: {"distance": _same("distance_m")}},
-    "moving_centre": {EVERY: {"travel": _same("travel_m")}},
+    "moving_centre": {
+        "ellipse": {"travel": _same("travel_m", 1.2)},
+        EVERY: {"travel": _same("travel_m")},
+    },  # 0.6 of a diameter
     "nonlinear_spring": {"knee": {"knee": _same("knee_percent")}},
     "palm_marker_slip": {EVERY: {"distance": _same("distance_m")}},
     "position_dependent_friction": {

@@ -73,15 +73,16 @@ def test_a_turn_is_whole_with_what_a_small_slip_and_the_angle_took_of_it() -> No
         (),
         {"joint": "proximal"},
         "",
-        {"turn": {"value": 0.03, "unit": "rad"}},
+        {"turn": {"value": 0.03, "unit": "rad", "ci95": [0.027, 0.033]}},
         {},
         None,
     )
-    ((weight, told),) = with_steps(
-        [(2.0, found)], SimpleNamespace(finger=finger), naming, {"proximal": {"step_0": np.rad2deg(step)}}
-    )
+    sd = 0.002  # of what the angle tells
+    told_deg = {"proximal": {"step_0": (np.rad2deg(step), np.rad2deg(sd))}}
+    ((weight, told),) = with_steps([(2.0, found)], SimpleNamespace(finger=finger), naming, told_deg)
     assert told.parameters["turn"]["value"] == pytest.approx(np.linalg.norm(whole), rel=0.01)
     assert weight == pytest.approx(2.0 * told.parameters["turn"]["value"] / 0.03)
+    assert np.ptp(told.parameters["turn"]["ci95"]) / 2 == pytest.approx(np.hypot(0.003, 1.96 * sd))
 
 
 @pytest.mark.parametrize(

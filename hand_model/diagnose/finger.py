@@ -28,6 +28,7 @@ from .locate.markers import HINGE, MarkerNaming, corrected_angles, name_markers,
 from .locate.slips import marker_findings, steps, with_steps
 from .locate.slips import unexplained as unexplained_of
 from .locate.turned import turned_finding, turned_support
+from .name.interval import declared_sd
 from .name.judgement import judged
 from .name.station import Station
 from .prove.markers import OWN, marker_fit, of_chain
@@ -95,6 +96,13 @@ def _on_a_line(session: Session, finger: Finger) -> bool:
     )
 
 
+def _told(station: Station) -> dict[str, tuple[float, float]]:
+    """Declared coefficients of a station's balance, each with its standard deviation."""
+    fit = station.naming.fit
+    sd = declared_sd(station.naming.balance, fit)
+    return {name: (value, sd.get(name, 0.0)) for name, value in fit.declared.items()}
+
+
 def _leaves(encoder: Station) -> bool:
     """Whether a finger is found to run ahead of its drive for a while."""
     named = encoder.standing("spring_decoupling")
@@ -155,7 +163,7 @@ def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, f
     for station in stations:
         station.tilt, station.swaying = tilt_deg, long_means(drift)
     lines += [s.line() for s in stations]
-    found = with_steps(found, seen, markers, {s.joint: s.naming.fit.declared for s in stations})
+    found = with_steps(found, seen, markers, {s.joint: _told(s) for s in stations}) if moments else found
     return FingerReading(
         finger.name,
         seen,

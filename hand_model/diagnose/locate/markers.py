@@ -163,13 +163,13 @@ def _within_noise(search: Stepwise, found: list[MarkerEffect]) -> bool:
 
 
 def _ahead(search: Stepwise, found: list[MarkerEffect]) -> list[MarkerEffect]:
-    """A larger set of effects that leaves nothing but noise, where `found` leaves more: several together may do what
-    each of them alone, the others still hidden in what it leaves, does not. `found` where there is no such set."""
+    """A larger set of effects, clearly likelier than `found`: several together may do what each of them alone, the
+    others still hidden in what it leaves, does not. `found` where there is no such set."""
     larger = found
     while len(larger) < MOST and (best := search.next(larger)).evidence > 0:
         larger = search.settled([*larger, best])
     larger = _pruned(search, larger)
-    return larger if larger and _within_noise(search, larger) else found
+    return larger if search.score(larger) > search.score(found) + UNLIKELY else found
 
 
 def _pruned(search: Stepwise, found: list[MarkerEffect]) -> list[MarkerEffect]:

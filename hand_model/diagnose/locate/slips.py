@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -135,11 +135,12 @@ def _finding(
         record = angles.records[int(blocks.record[main.begin])]
         at = float(blocks.time_s[main.begin])
         trials = [record.trial.name]
-        sd = naming.sigma_m / np.sqrt(max((main.end or len(blocks.residual)) - main.begin, 1)) * 4
         if name == "support_slip":
-            parameters["turn"] = {"value": turn(blocks, members, main), "unit": "rad"}
+            seen, interval = _likely(lambda own: turn(blocks, [*_beside(members, main), own], own), main)
+            parameters["turn"] = {"value": seen, "unit": "rad", "ci95": interval}
         else:
-            parameters["distance"] = {"value": size, "unit": "m", "ci95": [size - sd, size + sd]}
+            size, interval = _likely(lambda own: displacement([*_beside(members, main), own], own), main)
+            parameters["distance"] = {"value": size, "unit": "m", "ci95": interval}
         parameters["moment"] = {"value": at, "unit": "s"}
         text = f"{label or f'{angles.finger.name} {joint}'}: {name.replace('_', ' ')} of {1e3 * size:.2f} mm at {at:.1f} s of {record.trial.name}."
     elif name == "joint_wobble":
@@ -205,24 +206,27 @@ def with_steps(
     found: Sequence[tuple[float, Finding]],
     angles: FingerAngles,
     naming: MarkerNaming,
-    stepped_deg: Mapping[str, Mapping[str, float]],
+    stepped_deg: Mapping[str, Mapping[str, tuple[float, float]]],
 ) -> tuple[tuple[float, Finding], ...]:
     """Findings with what supports turned about their joint's own axis, which markers alone cannot tell from motion, and
     what they share with slips too small to report. stepped_deg: joint -> declared coefficients of the balance of its
-    angle, in which "step_i" [deg] belongs to the i-th of `steps`."""
+    angle, in which "step_i" [deg] belongs to the i-th of `steps`, and their standard deviations."""
     out = []
     for weight, finding in found:
         if "turn" in finding.parameters:
             body = 1 + next(k for k, s in enumerate(angles.finger.segments) if s.name == finding.where["joint"])
-            seen = finding.parameters["turn"]["value"]
-            whole = _whole_turn(naming, body, stepped_deg.get(finding.where["joint"], {}))
-            weight *= whole / max(seen, 1e-3 * whole)
-            finding = replace(finding, parameters={**finding.parameters, "turn": {"value": whole, "unit": "rad"}})
+            seen = finding.parameters["turn"]
+            whole, sd = _whole_turn(naming, body, stepped_deg.get(finding.where["joint"], {}))
+            weight *= whole / max(seen["value"], 1e-3 * whole)
+            half = float(np.hypot(np.ptp(seen["ci95"]) / 2, 1.96 * sd))
+            turned = {"value": whole, "unit": "rad", "ci95": [whole - half, whole + half]}
+            finding = replace(finding, parameters={**finding.parameters, "turn": turned})
         out.append((weight, finding))
     return tuple(out)
 
 
-def _whole_turn(naming: MarkerNaming, body: int, stepped_deg: Mapping[str, float]) -> float:
+def _whole_turn(naming: MarkerNaming, body: int, stepped_deg: Mapping[str, tuple[float, float]]) -> tuple[float, float]:
+    """A support's turn [rad], and the standard deviation of its part about the joint's axis."""
     blocks, least = naming.blocks, _least(naming)
     main = max((e for e in naming.found if e.effect == "support_slip" and e.body == body), key=lambda e: e.gain)
     acting = [
@@ -230,11 +234,13 @@ def _whole_turn(naming: MarkerNaming, body: int, stepped_deg: Mapping[str, float
         for e in naming.found
         if e.body == body and (e.effect == "support_slip" or e.effect == "marker_slip" and e.gain < least)
     ]
-    step_deg = sum(
-        stepped_deg.get(f"step_{i}", 0.0) * e.active for i, e in enumerate(_stepping(naming)) if e.body == body
-    )
-    along = (np.deg2rad(step_deg)[:, None] * blocks.axes[:, body - 1])[main.begin : main.end]
-    return float(np.median(np.linalg.norm(_turned(blocks, acting, main) + along, axis=1)))
+    told = [
+        (stepped_deg.get(f"step_{i}", (0.0, 0.0)), e.active) for i, e in enumerate(_stepping(naming)) if e.body == body
+    ]
+    along = np.deg2rad(sum(step * active for (step, _), active in told))[:, None] * blocks.axes[:, body - 1]
+    turned = np.linalg.norm(_turned(blocks, acting, main) + along[main.begin : main.end], axis=1)
+    varying = sum((sd * active) ** 2 for (_, sd), active in told)[main.begin : main.end]
+    return float(np.median(turned)), float(np.deg2rad(np.sqrt(np.median(varying))))
 
 
 def _shift(members: Sequence[MarkerEffect], main: MarkerEffect) -> Array:
@@ -245,20 +251,29 @@ def _shift(members: Sequence[MarkerEffect], main: MarkerEffect) -> Array:
 
 def _amount(naming: MarkerNaming, effect: MarkerEffect) -> tuple[float, list[float]]:
     """Amplitude of a joint's second rotation [rad], or the largest travel of its centre [m], over the recorded angles,
-    with its 95 % interval; of a play that changes sides (a centre travels from one to the other), what the fitted
-    coefficients' covariance lets it be (parametric bootstrap, Efron & Tibshirani 1993, ch. 6)."""
+    with its 95 % interval; a play changes sides (a centre travels from one to the other)."""
     if not effect.sides:
         return course_amount(naming, effect)
     blocks, shifts = naming.blocks, all(effect.shifts)
 
-    def amount(coefficients: Array) -> float:
-        moved = (effect.columns @ coefficients).reshape(len(blocks.residual), -1, 3)
-        return (1 + shifts) * side_to_side(blocks, effect.body, moved, shifts)
+    def amount(own: MarkerEffect) -> float:
+        moved = (own.columns @ own.coefficients).reshape(len(blocks.residual), -1, 3)
+        return (1 + shifts) * side_to_side(blocks, own.body, moved, shifts)
 
+    return _likely(amount, effect)
+
+
+def _likely(amount: Callable[[MarkerEffect], float], effect: MarkerEffect) -> tuple[float, list[float]]:
+    """An amount of an effect, and the 95 % interval that the fitted coefficients' covariance lets it have (parametric
+    bootstrap, Efron & Tibshirani 1993, ch. 6)."""
     rng = np.random.default_rng(0)
     drawn = rng.multivariate_normal(effect.coefficients, effect.covariance, DRAWS, method="eigh")
-    value, sd = amount(effect.coefficients), float(np.std([amount(c) for c in drawn]))
+    value, sd = amount(effect), float(np.std([amount(replace(effect, coefficients=c)) for c in drawn]))
     return value, [value - 1.96 * sd, value + 1.96 * sd]
+
+
+def _beside(members: Sequence[MarkerEffect], main: MarkerEffect) -> list[MarkerEffect]:
+    return [e for e in members if e is not main]
 
 
 def _proof(naming: MarkerNaming) -> dict[str, Any]:

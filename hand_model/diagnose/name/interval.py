@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .balance import Balance, Fit
-from .evidence import gain, oddity
+from .evidence import gain, oddity, scale_of
 from .naming import Naming
 from .noise import loudness
 from .shapes import likeliest, polish, refit
@@ -40,7 +40,7 @@ def parameter_intervals(reading: Reading, which: int) -> dict[str, dict[str, Any
     4). Where the model does not fit (residual variance more than 1.5 times the pure error) the interval is left out.
     """
     balance, fit = reading.balance, reading.fit
-    scale = max(fit.rss / max(balance.train.sum(), 1), 1.0)
+    scale = scale_of(balance, fit)
     values, units = _figures(balance, fit, which)
     out: dict[str, dict[str, Any]] = {k: {"value": v, "unit": units.get(k, "1")} for k, v in values.items()}
     if scale >= MISFIT_LIMIT:
@@ -76,6 +76,12 @@ def _figures(balance: Balance, fit: Fit, which: int) -> tuple[dict[str, float], 
     """Parameters of a term as fitted, with what follows from them, and their units."""
     term = fit.terms[which]
     return _all(balance, term, term.shape, fit.amplitudes[which], fit.declared), _units(term, balance)
+
+
+def declared_sd(balance: Balance, fit: Fit) -> dict[str, float]:
+    """Standard deviation of each declared coefficient of a fit, beside its terms; units of the coefficients."""
+    covariance = _covariance(balance, fit, *_vector(fit)) * scale_of(balance, fit) * balance.inflation
+    return dict(zip(fit.declared, np.sqrt(np.diag(covariance)).tolist(), strict=False))
 
 
 def _variances(balance: Balance, fit: Fit, which: int, scale: float) -> dict[str, float]:
@@ -276,7 +282,7 @@ def sized(reading: Reading, which: int) -> bool:
     fit."""
     balance, fit = reading.balance, reading.fit
     count = len(fit.amplitudes[which])
-    scale = max(fit.rss / max(balance.train.sum(), 1), 1.0)
+    scale = scale_of(balance, fit)
     if not count or scale >= MISFIT_LIMIT:
         return True
     from scipy.stats import chi2
