@@ -81,7 +81,7 @@ def _figures(balance: Balance, fit: Fit, which: int) -> tuple[dict[str, float], 
 def declared_sd(balance: Balance, fit: Fit) -> dict[str, float]:
     """Standard deviation of each declared coefficient of a fit, beside its terms; units of the coefficients."""
     covariance = _covariance(balance, fit, *_vector(fit)) * scale_of(balance, fit) * balance.inflation
-    return dict(zip(fit.declared, np.sqrt(np.diag(covariance)).tolist(), strict=False))
+    return dict(zip(fit.declared, np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist(), strict=False))
 
 
 def _variances(balance: Balance, fit: Fit, which: int, scale: float) -> dict[str, float]:
