@@ -158,6 +158,26 @@ def test_what_the_planned_motion_would_take_is_refused(tmp_path: Path, measured:
     assert measured or ("planned motion" in issues[0].reason and len(issues[0].trials) == 5)
 
 
+@pytest.mark.parametrize("told", [True, False])
+def test_an_effort_that_does_not_carry_the_loads_it_is_told_of_is_refused(tmp_path: Path, told: bool) -> None:
+    """Friction may be any; what hangs on the arm has to be carried."""
+    hung_kg = [0.2, 0.5, 0.8, 0.3, 0.6]
+    hung = iter(hung_kg)
+    weight = '<body name="weight" pos="0 0 -0.3"><inertial pos="0 0 0" mass="0.4" diaginertia="1e-9 1e-9 1e-9"/></body>'
+    arm = ARM.replace("</body></worldbody>", f"{weight}</body></worldbody>")
+
+    def torque(motion: Motion) -> np.ndarray:
+        _, q, v, a = motion
+        mass = told * next(hung)
+        return balance(motion) + mass * (0.3**2 * a + 0.3 * 9.81 * np.sin(q)) + 0.3 * v
+
+    folder = recorded(tmp_path / "s", arm, 5, torque, 0.01)
+    set_in(folder, [f'"body:weight:mass" = {mass}' for mass in hung_kg])
+    issues = trusted_fit(load_rig(read_session(folder)))[1]
+    assert [i.refuse for i in issues] == ([] if told else [True])
+    assert told or "carry the loads" in issues[0].reason
+
+
 @pytest.mark.parametrize("told", [np.zeros_like, lambda t: np.sign(np.sin(t)), lambda t: 0.1 * t, "noise"])
 def test_targets_that_do_not_move_as_the_arm_does_tell_of_no_plan(tmp_path: Path, told) -> None:
     """However little there is left to explain along them."""

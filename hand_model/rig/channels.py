@@ -21,6 +21,7 @@ from .declared import DeclaredFit
 from .model import RigModel, RigTrial
 from .planned import planned
 from .states import fill_gaps
+from .unloaded import unloaded
 
 Array = NDArray[np.float64]
 STRANGE = 0.7  # share of an effort that may stay unexplained before it is said to explain nothing
@@ -28,6 +29,7 @@ UNSIGNED = "has no sign: it follows the size of the expected effort"
 BOTH_LIMITS, ONE_LIMIT = "stands on its limits, the same both ways", "stands on a limit, one way alone"
 REPEATS = "repeats the channel"
 DEAD = "never changes: dead"
+UNLOADED = "does not carry the loads that the recordings are told to carry"
 SINUSOID = "is a sinusoid of time"
 LEAST_TURNS = 4  # changes of sign that must be seen before a channel is said to have none
 EXACTLY = 0.5  # of SAME: the law of a controller tells a true torque as closely as its sensor is quiet
@@ -170,6 +172,10 @@ def check_balance(rig: RigModel, fit: DeclaredFit) -> tuple[ChannelIssue, ...]:
     channels = {r.joint: force[d.name] for r in fit.rows if (d := rig.drive(r.joint)) and d.name in force}
     looks += _asked_for(trials, fit, channels)
     looks += _planned(rig, fit, channels)
+    for joint, name in channels.items():
+        measured = [r for r in fit.rows if r.joint == joint and joint in trials[r.trial].effort]
+        if measured and (share := unloaded(measured)) is not None:
+            looks += [(name, r, UNLOADED, share) for r in measured]
     lacking = {row.joint: (name, share) for name, row, reason, share in looks if reason == UNSIGNED}
     known = {(row.trial, row.joint) for _, row, _, _ in looks}
     # A column that has no sign has none in recordings either whose efforts all go one way.
