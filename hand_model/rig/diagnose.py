@@ -33,10 +33,11 @@ from .noise import effort_noise
 from .proof import Bench
 from .rest_known import known_at_rest
 from .same_path import one_load_each, repeated_trajectory
-from .standing import FITS, first_of, proved, solved
+from .standing import first_of, proved, solved
 from .swing.build import can_swing
 from .swing.diagnose import diagnose_swing
 from .transmission import angle_residual
+from .verdict import accuracy_notes, accurate, limit, unexplained, verdict
 from .words import rejection, shares, told_on
 
 Array = NDArray[np.float64]
@@ -88,15 +89,15 @@ def diagnose_rig(
         rejected = [*rejected, *said]
         say(f"{rig.name}: coupling {coupling.name}")
     found, within = within_a_sample(found, 1.0 / _rate(rig))
-    lack = {**lack, "limit": _limit(lack)}
+    lack, well_known = {**lack, "limit": limit(lack)}, accurate(fit)
     declared = lack.pop("declared", {c.label: float(t) for c, t in zip(fit.columns, fit.theta, strict=True)})
-    unexplained = _unexplained(lack, found)
+    left = unexplained(lack, found, well_known)
     again = repeated_trajectory(rig)
     found = one_load_each(found) if again and len(rig.joints) > 1 else found
-    ranked, unexplained = of_one_whole(sorted(found, key=_rank), unexplained)
+    ranked, left = of_one_whole(sorted(found, key=_rank), left)
     findings = RigFindings(
         session=rig.name,
-        verdict=_verdict(found, lack),
+        verdict=verdict(found, lack, well_known),
         lack_of_fit=lack,
         protocol={
             "repeats": len(rig.select(False)),
@@ -110,13 +111,20 @@ def diagnose_rig(
         },
         findings=ranked,
         rejected=tuple(rejection(r["effect"], r["reason"]) for r in rejected),
-        unexplained=unexplained,
+        unexplained=left,
         next_experiment=_next(found, issues, again),
         declared=declared,
         xml=xml,
         declared_xml=declared_xml,
         couplings=tuple(angles),
-        notes=(*rig.notes, *_silence(rig, fit, found), *_unproved(rig), *_lost(lack), *within),
+        notes=(
+            *rig.notes,
+            *_silence(rig, fit, found),
+            *_unproved(rig),
+            *_lost(lack),
+            *within,
+            *accuracy_notes(lack, found, well_known),
+        ),
     )
     if output is not None:
         findings.write(output, model)
@@ -340,45 +348,6 @@ def _diagnose_coupling(
         named.append(replace(f, where=where, statement=f.statement + zero))
     declared = {f.where["joint"]: f.fit for f in reversed(named)}  # the first was held to nothing else
     return shares(named, declared), rejected, angle_residual(rig, coupling, fit, kept)
-
-
-# --- verdict ---------------------------------------------------------------------------------------------------------
-
-
-def _verdict(found: Sequence[Finding], lack: Mapping[str, Any]) -> str:
-    if found:
-        return "mismatch"
-    if lack.get("before") is None:
-        return "unexplained"
-    joints = lack.get("joints", {"": lack})
-    beyond = any(p["after"] > FITS * (p.get("noise_floor") or 0.0) for p in joints.values())
-    return "unexplained" if beyond else "consistent"
-
-
-def _limit(lack: Mapping[str, Any]) -> float | None:
-    """Error below which, all joints together, nothing more than noise is left, in the units of the lack of fit."""
-    if lack.get("before") is None:
-        return None
-    joints = lack.get("joints", {"": lack}).values()
-    floors = [(p["noise_floor"] or 0.0) / max(p["before"], 1e-300) for p in joints]
-    return float(FITS * np.sqrt(np.mean(np.square(floors))) * lack["before"])
-
-
-def _unexplained(lack: Mapping[str, Any], found: Sequence[Finding]) -> tuple[Mapping[str, Any], ...]:
-    out = []
-    for joint, p in lack.get("joints", {} if lack.get("before") is None else {"": lack}).items():
-        floor = p.get("noise_floor") or 0.0
-        excess, whole = p["after"] ** 2 - floor**2, p["before"] ** 2 - floor**2
-        if whole > 0 and excess > 0.02 * whole and p["after"] > FITS * floor:
-            signal = "position" if lack.get("metric") == "position_rmse" else "effort"
-            out.append(
-                {
-                    "where": {"finger": None, "joint": joint or None, "signal": signal},
-                    "share_of_mismatch": float(min(excess / whole, 1.0)),
-                    "shape": "what no effect known here lowers on recordings held out",
-                }
-            )
-    return tuple(out)
 
 
 def _next(found: Sequence[Finding], issues: Sequence[ChannelIssue], again: bool) -> str:
