@@ -39,6 +39,7 @@ SHIFTED = 0.5  # of what a drive's answers are late, at least, is a shift of its
 VARIOUS, AS_FAST = 2.0, 1.5  # times another drive's scatter of answers and length of rise
 RISEN_T = 6.0  # standard errors by which a current must have risen before the changes come
 EARLY_S = 0.2  # by which a current's time stamps may run ahead
+STAYS_S = 0.1  # a setpoint that changes again within it is no command but a path: nothing answers each point of that
 
 
 @dataclass(frozen=True)
@@ -235,7 +236,7 @@ def _changes(
     the current's answer, None where there is none."""
     for state, current in zip(states, currents, strict=True):
         setpoint, t = state.extra.get("setpoint", np.zeros(len(state.time_s))), state.time_s
-        for k in np.flatnonzero(np.diff(setpoint)) + 1:
+        for k in commands(t, setpoint):
             before = (t > t[k] - EARLY_S) & (t < t[k])
             if before.sum() >= 5 and np.ptp(state.position[before]) < STOOD:
                 rise = np.sign(setpoint[k] - setpoint[k - 1]) * (current - np.median(current[before]))
@@ -302,6 +303,15 @@ def _answered(state: DriveState, channel: Array, early_s: float = 0.0) -> list[f
     return latencies(state.time_s, state.extra["setpoint"], channel, early_s) if "setpoint" in state.extra else []
 
 
+def commands(time_s: Array, setpoint: Array) -> NDArray[np.intp]:
+    """First samples (k,) of what a setpoint (n,) [%] asks for anew, at times (n,) [s]: it stood before, and stays a
+    while."""
+    changed = np.flatnonzero(np.diff(setpoint)) + 1
+    at_s = time_s[changed]
+    alone = np.diff(at_s, prepend=-np.inf, append=np.inf) > STAYS_S
+    return changed[alone[:-1] & alone[1:]]
+
+
 def latencies(time_s: Array, setpoint: Array, channel: Array, early_s: float = 0.0) -> list[float]:
     """Time [s] from each change of the setpoint (n,) to the first two samples of a channel (n,) beyond three standard
     deviations, in its direction.
@@ -309,7 +319,7 @@ def latencies(time_s: Array, setpoint: Array, channel: Array, early_s: float = 0
     early_s: by how much a channel may answer before it is told; it does where that much before the change it stood, and
     no longer does at the change.
     """
-    found = (_latency(time_s, setpoint, channel, k, early_s) for k in np.flatnonzero(np.diff(setpoint)) + 1)
+    found = (_latency(time_s, setpoint, channel, k, early_s) for k in commands(time_s, setpoint))
     return [x for x in found if x is not None]
 
 
