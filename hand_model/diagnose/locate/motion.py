@@ -99,7 +99,7 @@ def estimate_motion(time_s: Array, position: Array, bandwidth_s: float | None = 
             break
         h *= 1.4
     moving = np.abs(v) > max(5 * velocity_noise, 0.03 * fastest)
-    moving = _drop_short(moving & ~_beside_lost_rows(time_s), 3)
+    moving = _drop_short(moving & ~_beside_lost_rows(time_s) & ~_turning_back(v), 3)
     a, rough_a = _sure_enough(time_s, position, h, noise, a, moving)
     return Motion(x, v, a, noise, h, moving, *since_rest(time_s, moving), acceleration_noise=rough_a)
 
@@ -113,6 +113,12 @@ def _beside_lost_rows(time_s: Array) -> NDArray[np.bool_]:
     """Samples (n,) beside which rows were lost: the drive may have stopped between them."""
     lost = rows_lost(time_s)
     return np.r_[lost, False] | np.r_[False, lost]
+
+
+def _turning_back(velocity: Array) -> NDArray[np.bool_]:
+    """Samples (n,) between which a drive turns round: it stands in between, however short, and when is not known."""
+    turns = velocity[1:] * velocity[:-1] < 0
+    return np.r_[turns, False] | np.r_[False, turns]
 
 
 def _sure_enough(
