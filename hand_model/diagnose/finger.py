@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any
 
 from ..effects import catalogue, outsiders
+from ..effects.base import DriveState
 from ..errors import IdentificationError
 from ..session import Finger, Session
 from ..session.check import on_a_line
@@ -32,6 +33,7 @@ from .name.interval import declared_sd
 from .name.judgement import judged
 from .name.station import Station
 from .prove.markers import OWN, marker_fit, of_chain
+from .unrelated import Heard, together
 
 
 @dataclass(frozen=True)
@@ -96,6 +98,17 @@ def _on_a_line(session: Session, finger: Finger) -> bool:
     )
 
 
+def _heard(signal: str, finger: Finger, joint: int, states: tuple[DriveState, ...]) -> Heard:
+    """A station of a finger's angles, judged among the effects of its kind."""
+    kind = "encoder" if signal == "encoder" else "linkage"
+    effects = [*catalogue(kind), *outsiders(kind)]
+
+    def judge(told: tuple[DriveState, ...]) -> Station:
+        return judged(signal, finger.name, finger.actuator, finger.segments[joint].name, told, effects)
+
+    return Heard(judge(states), states, judge)
+
+
 def _told(station: Station) -> dict[str, tuple[float, float]]:
     """Declared coefficients of a station's balance, each with its standard deviation."""
     fit = station.naming.fit
@@ -139,9 +152,10 @@ def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, f
     angles, moments = corrected_angles(seen, markers), steps(markers)
     stations: list[Station] = []
     states = encoder_states(angles, *counts[finger.actuator], moments) if finger.actuator in counts else ()
+    heard: list[Heard] = []
     if states:
-        effects = [*catalogue("encoder"), *outsiders("encoder")]
-        stations.append(judged("encoder", finger.name, finger.actuator, finger.segments[0].name, states, effects))
+        heard.append(_heard("encoder", finger, 0, states))
+        stations.append(heard[0].station)
     turns: list[tuple[float, Finding]] = []
     parted = any(f.term.effect.signal == "log" for s in stations for f in s.outsiders)
     for joint in range(1, len(finger.segments)):
@@ -155,10 +169,10 @@ def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, f
         if states and joint == 1 and stations and _leaves(stations[0]):
             states = beside_excursions(states, stations[0].naming.balance.states)
         if states:
-            effects = [*catalogue("linkage"), *outsiders("linkage")]
-            stations.append(
-                judged("markers", finger.name, finger.actuator, finger.segments[joint].name, states, effects)
-            )
+            heard.append(_heard("markers", finger, joint, states))
+            stations.append(heard[-1].station)
+    if len(heard) == 2:
+        stations = list(together(*heard))
     tilt_deg = tilt(markers)
     for station in stations:
         station.tilt, station.swaying = tilt_deg, long_means(drift)
