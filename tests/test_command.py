@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hand_model.diagnose.locate.answers import Answers, lateness
+from hand_model.diagnose.locate.answers import Answers, commands, lateness
 from hand_model.diagnose.locate.command import (
+    CommandFacts,
     _sags,
     command_facts,
     command_findings,
@@ -260,6 +261,27 @@ def test_a_late_drive_is_told_by_how_much_beside_a_prompt_one() -> None:
     assert [(f.effect, f.where["finger"]) for _, f in found] == [("command_delay", "index")]
     low, high = found[0][1].parameters["delay"]["ci95"]
     assert low < 0.09 < high and high - low < 2 * STEP_S
+
+
+def test_who_follows_a_path_answers_none_of_its_points() -> None:
+    t = np.arange(0, 30.0, STEP_S)
+    steps = np.where(np.arange(len(t)) < 200, 0.0, 50.0)
+    path = np.where(t < 10, 0.0, 50 - 50 * np.cos(0.8 * (t - 10)))
+    assert commands(t, steps).tolist() == [200]
+    assert len(commands(t, path)) == 0
+    assert commands(t, np.where(t > 20, 80.0, np.minimum(steps, 50.0))).tolist() == [200, int(np.argmax(t > 20))]
+
+
+def test_answers_that_differ_by_more_than_they_are_late_are_no_delay() -> None:
+    rng = np.random.default_rng(3)
+    prompt = Answers(rng.uniform(0, STEP_S, 40), rng.uniform(0, STEP_S, 40), STEP_S)
+    for of_them, late in ((1.0, True), (0.3, False)):
+        apart = rng.uniform(0, STEP_S, 40) + 0.1 / of_them * (np.arange(40) < 40 * of_them)
+        facts = {
+            name: CommandFacts(x, Loss(), Loss())
+            for name, x in (("index", replace(prompt, current_s=apart, motion_s=apart)), ("ring", prompt))
+        }
+        assert bool(delays(facts, {}, in_time=["index"])) == late
 
 
 def test_two_prompt_drives_have_no_delay() -> None:

@@ -49,6 +49,15 @@ def test_a_slow_log_is_not_taken_for_a_segment_that_swings() -> None:
     assert np.abs(off[0]).max() < 0.6 * np.abs(off[1]).max()
 
 
+def test_a_drive_that_turns_round_between_two_samples_stands_there() -> None:
+    at = np.arange(0.0, 6.0, 0.014)
+    there_and_back = 100 * np.abs((at / 1.5) % 2 - 1)  # at full speed to the turn
+    motion = estimate_motion(at, there_and_back)
+    turns = np.flatnonzero(np.diff(np.sign(motion.velocity)) != 0)
+    assert len(turns) == 3 and not motion.moving[turns].any() and not motion.moving[turns + 1].any()
+    assert motion.moving.mean() > 0.9 and np.isfinite(motion.until_stop_s[turns[0] - 10])
+
+
 def test_a_position_is_quieter_where_nothing_bends_it_and_keeps_its_corners() -> None:
     at = stamps(7, 0.012)
     noise = np.random.default_rng(8).normal(0, 0.08, len(at))

@@ -99,7 +99,8 @@ def delays(
     return [
         _delay(a, fingers.get(a), facts[a], x.drive_s - channel_s.get(a, 0.0))
         for a, x in lateness({a: f.answers for a, f in facts.items()}, in_time).items()
-        if len(x.drive_s) and float(np.mean(x.drive_s)) > channel_s.get(a, 0.0) + TUNED_S
+        # a delay is what answers have in common, and not by how much they differ
+        if len(x.drive_s) and float(np.mean(x.drive_s)) > max(channel_s.get(a, 0.0) + TUNED_S, np.std(x.drive_s))
     ]
 
 
