@@ -10,12 +10,14 @@ from test_kinematic_stations import joint
 
 from hand_model.diagnose.name.judgement import judged
 from hand_model.diagnose.name.station import Station
-from hand_model.diagnose.unrelated import Heard, left_of, less_foretold, together
+from hand_model.diagnose.unrelated import Heard, left_of_seen, less_foretold, together
 from hand_model.effects import catalogue
 from hand_model.effects.base import DriveState
 
 ALIKE = -0.8  # correlation of what the markers say wrongly of the two angles
 NOISE = 0.4  # deg
+SLOPE = 0.7  # of the second angle over the first
+FULL = 80.0  # deg of the first angle
 States = tuple[DriveState, ...]
 
 
@@ -23,15 +25,28 @@ def ripple(amplitude_deg: float):
     return lambda t, x, v: amplitude_deg * np.sin(2 * np.pi * x / 23.0)
 
 
-def two_joints(seed: int, first=None, second=None) -> tuple[States, States]:
-    """Recordings of an angle behind its encoder and of the next one behind it, without noise but that of markers, which
-    they have alike. first, second: (t, x, v) on either."""
+def follower(driver: DriveState, add=None) -> DriveState:
+    """Recording of an angle that follows another one (its noise-free course), and what is added to it."""
+    first, rate = driver.effort, np.gradient(driver.effort, driver.time_s)
+    angle = SLOPE * first + (0.0 if add is None else add(driver.time_s, driver.position, driver.velocity))
+    declared = np.stack([(first / FULL) ** k for k in range(5)], axis=-1)
+    extra = {**driver.extra, "scale": np.full(len(first), FULL), "slope": np.full(len(first), SLOPE)}
+    names = tuple(f"power_{k}" for k in range(5))
+    return replace(
+        driver, position=first, velocity=rate, acceleration=0 * rate, effort=angle, declared=declared, position_unit="deg",
+        extra=extra, declared_names=names,
+    )  # fmt: skip
+
+
+def two_joints(seed: int, first=None, second=None, alike: float = ALIKE) -> tuple[States, States]:
+    """Recordings of an angle behind its encoder and of the next one behind it, with the noise of markers, which they have
+    alike. first, second: (t, x, v) on either; what is on the first moves the second, too."""
     rng = np.random.default_rng(seed)
-    made = [joint(seed, add=add, noise=0.0) for add in (first, second)]
+    drivers = joint(seed, add=first, noise=0.0)
     out = ([], [])
-    for pair in zip(*made, strict=True):
-        errors = rng.multivariate_normal([0, 0], NOISE**2 * np.array([[1, ALIKE], [ALIKE, 1]]), len(pair[0].time_s))
-        for k, state in enumerate(pair):
+    for driver in drivers:
+        errors = rng.multivariate_normal([0, 0], NOISE**2 * np.array([[1, alike], [alike, 1]]), len(driver.time_s))
+        for k, state in enumerate((driver, follower(driver, second))):
             out[k].append(replace(state, effort=state.effort + errors[:, k]))
     return tuple(out[0]), tuple(out[1])
 
@@ -45,44 +60,46 @@ def heard(states: States, kind: str) -> Heard:
     return Heard(judge(states), states, judge)
 
 
+def both(first: States, second: States) -> tuple[Heard, Heard, tuple[Station, Station]]:
+    driver, follows = heard(first, "encoder"), heard(second, "linkage")
+    return driver, follows, together(driver, follows, lambda _: second)
+
+
 def names(station: Station) -> list[str]:
     return [f.term.effect.name for f in station.naming.found]
 
 
 def test_what_one_angle_errs_by_is_taken_off_the_other_and_nothing_else() -> None:
     states, others = two_joints(1, first=ripple(0.05))
-    plain, beside = heard(states, "encoder"), heard(others, "linkage")
-    less = less_foretold(states, plain.left, beside.left)
-    quieter = [
-        np.nanstd(a.effort - b.effort + c) / np.nanstd(c)
-        for a, b, c in zip(
-            less, states, (left_of(states, plain.station.naming)[s.trial][1] for s in states), strict=True
-        )
-    ]
-    assert quieter == pytest.approx([np.sqrt(1 - ALIKE**2)] * 2, rel=0.05)
+    driver, follows = heard(states, "encoder"), heard(others, "linkage")
+    less = less_foretold(states, driver.left, left_of_seen(follows, driver))
+    clean = joint(1, add=ripple(0.05), noise=0.0)
+    left = np.concatenate([a.effort - b.effort for a, b in zip(less, clean, strict=True)])
+    # of errors a and b, b - SLOPE a is seen, whatever moves both
+    seen = np.array([-SLOPE, 1.0]) @ np.array([[1, ALIKE], [ALIKE, 1]])
+    foretold = seen[0] ** 2 / (seen @ np.array([-SLOPE, 1.0]))
+    assert np.std(left) == pytest.approx(NOISE * np.sqrt(1 - foretold), rel=0.05)
+    x = np.concatenate([s.position for s in clean])
+    assert abs(np.polyfit(ripple(1.0)(0, x, 0), left, 1)[0]) < 0.01  # the ripple is as it was
 
 
 def test_an_effect_that_the_noise_of_one_angle_hides_is_named() -> None:
-    states, others = two_joints(2, first=ripple(0.035))
-    plain, beside = heard(states, "encoder"), heard(others, "linkage")
-    own, other = together(plain, beside)
-    assert names(plain.station) == [] and names(own) == ["encoder_periodic_error"] and names(other) == []
+    driver, _, (own, other) = both(*two_joints(2, first=ripple(0.03)))
+    assert names(driver.station) == [] and names(own) == ["encoder_periodic_error"] and names(other) == []
 
 
 def test_what_the_other_angle_lacks_is_not_named_here() -> None:
     states, others = two_joints(2, second=ripple(0.06))  # no linkage has such a law: it is found at neither
-    plain, beside = heard(states, "encoder"), heard(others, "linkage")
-    mirrored = plain.judge(less_foretold(states, plain.left, beside.left))
-    assert names(mirrored) == ["encoder_periodic_error"] and names(together(plain, beside)[0]) == []
+    driver, follows, stations = both(states, others)
+    mirrored = driver.judge(less_foretold(states, driver.left, left_of_seen(follows, driver)))
+    assert names(mirrored) == ["encoder_periodic_error"] and names(stations[0]) == []
 
 
 def test_healthy_joints_stay_consistent() -> None:
-    states, others = two_joints(3)
-    assert [names(s) for s in together(heard(states, "encoder"), heard(others, "linkage"))] == [[], []]
+    assert [names(s) for s in both(*two_joints(3))[2]] == [[], []]
 
 
-def test_angles_that_err_apart_are_left_as_they_are() -> None:
-    states, others = joint(4, noise=NOISE), joint(5, noise=NOISE)
-    plain, beside = heard(states, "encoder"), heard(others, "linkage")
-    assert less_foretold(states, plain.left, beside.left) is None
-    assert together(plain, beside) == (plain.station, beside.station)
+def test_a_follower_that_tells_nothing_of_its_driver_leaves_it_as_it_is() -> None:
+    driver, follows, stations = both(*two_joints(4, alike=SLOPE))  # what is seen of both is then none of the first's
+    assert less_foretold(driver.states, driver.left, left_of_seen(follows, driver)) is None
+    assert stations[0] is driver.station

@@ -16,6 +16,7 @@ from ..session.check import on_a_line
 from .findings import Finding
 from .locate.angles import (
     FingerAngles,
+    Step,
     encoder_states,
     expected_angles,
     finger_angles,
@@ -28,7 +29,7 @@ from .locate.lasting_noise import camera_drift, long_means
 from .locate.markers import HINGE, MarkerNaming, corrected_angles, name_markers, tilt
 from .locate.slips import marker_findings, steps, with_steps
 from .locate.slips import unexplained as unexplained_of
-from .locate.turned import turned_finding, turned_support
+from .locate.turned import Turned, turned_finding, turned_support
 from .name.interval import declared_sd
 from .name.judgement import judged
 from .name.station import Station
@@ -98,6 +99,27 @@ def _on_a_line(session: Session, finger: Finger) -> bool:
     )
 
 
+def _parted(encoder: Station | None) -> bool:
+    """Whether the clocks of markers and log part, so that the log tells nothing of a follower."""
+    return encoder is not None and any(f.term.effect.signal == "log" for f in encoder.outsiders)
+
+
+def _follower(
+    angles: FingerAngles, joint: int, moments: list[Step], encoder: Station | None, logged: bool
+) -> tuple[tuple[DriveState, ...], Turned | None]:
+    """Recordings of a joint's angle against that of the joint before it, and a support that turned there. encoder: the
+    station of that joint, where it has one; logged: whether logs are believed."""
+    expected = expected_angles(encoder.naming) if encoder is not None else {}
+    driven = encoder.naming.balance.states if encoder is not None else ()
+    states = linkage_states(angles, joint, moments, expected, logged)
+    turned = turned_support(states, driven)
+    if turned is not None:
+        states = linkage_states(angles, joint, [*moments, *turned.steps], expected, logged)
+    if states and encoder is not None and _leaves(encoder):
+        states = beside_excursions(states, driven)
+    return states, turned
+
+
 def _heard(signal: str, finger: Finger, joint: int, states: tuple[DriveState, ...]) -> Heard:
     """A station of a finger's angles, judged among the effects of its kind."""
     kind = "encoder" if signal == "encoder" else "linkage"
@@ -150,29 +172,22 @@ def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, f
     names = ", ".join(f.effect for _, f in found) or "consistent"
     lines = [f"{finger.name} markers: {names} (p {markers.p_before:.2g} -> {markers.p_after:.2g})"]
     angles, moments = corrected_angles(seen, markers), steps(markers)
-    stations: list[Station] = []
-    states = encoder_states(angles, *counts[finger.actuator], moments) if finger.actuator in counts else ()
     heard: list[Heard] = []
+    states = encoder_states(angles, *counts[finger.actuator], moments) if finger.actuator in counts else ()
     if states:
         heard.append(_heard("encoder", finger, 0, states))
-        stations.append(heard[0].station)
+    encoder = heard[0].station if heard else None
+    logged = finger.actuator in counts and not _parted(encoder)
     turns: list[tuple[float, Finding]] = []
-    parted = any(f.term.effect.signal == "log" for s in stations for f in s.outsiders)
     for joint in range(1, len(finger.segments)):
-        expected = expected_angles(stations[0].naming) if stations and joint == 1 else {}
-        logged = not parted and finger.actuator in counts
-        states = linkage_states(angles, joint, moments, expected, logged)
-        turned = turned_support(states, stations[0].naming.balance.states if stations and joint == 1 else ())
+        states, turned = _follower(angles, joint, moments, encoder if joint == 1 else None, logged)
         if turned is not None:
             turns.append(turned_finding(turned, finger.name, finger.segments[joint].name))
-            states = linkage_states(angles, joint, [*moments, *turned.steps], expected, logged)
-        if states and joint == 1 and stations and _leaves(stations[0]):
-            states = beside_excursions(states, stations[0].naming.balance.states)
         if states:
             heard.append(_heard("markers", finger, joint, states))
-            stations.append(heard[-1].station)
-    if len(heard) == 2:
-        stations = list(together(*heard))
+    stations = [h.station for h in heard]
+    if encoder is not None and len(heard) == 2:
+        stations = list(together(*heard, lambda driver: _follower(angles, 1, moments, driver, logged)[0]))
     tilt_deg = tilt(markers)
     for station in stations:
         station.tilt, station.swaying = tilt_deg, long_means(drift)
