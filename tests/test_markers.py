@@ -446,6 +446,26 @@ def test_an_axis_beside_the_joint_is_a_travelling_centre_where_that_explains_mor
     assert search.next(()) == named
 
 
+def test_a_centre_is_told_by_the_form_that_brings_evidence_and_not_by_the_one_that_fits_most(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def candidate(effect: str, gain: float, evidence: float, shifts: bool) -> SimpleNamespace:
+        kind = SimpleNamespace(effect=effect, body=1, shifts=(shifts,))
+        return SimpleNamespace(candidate=kind, gain=gain, evidence=evidence, effect=lambda: evidence)
+
+    search = object.__new__(Stepwise)
+    search.candidates = []
+    monkeypatch.setattr(Stepwise, "_beside", lambda *_: None)
+    tried = [
+        candidate("joint_wobble", 180.0, 72.2, True),
+        candidate("joint_wobble", 10.0, 1.0, False),
+        candidate("moving_centre", 179.0, 72.1, True),
+        candidate("moving_centre", 187.0, 10.0, True),
+    ]
+    monkeypatch.setattr(Stepwise, "_tried", lambda *_: tried)
+    assert search.next(()) == 72.1
+
+
 def test_a_centre_that_travels_and_a_joint_that_tilts_are_both_told() -> None:
     travel = travelling(lambda u: 0.3e-3 * np.stack([np.sin(np.pi * u), 1 - np.cos(np.pi * u)], axis=1))
     tilt = tilting(lambda u, way: 0.02 * np.sin(6 * np.pi * u))

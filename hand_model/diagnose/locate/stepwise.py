@@ -353,11 +353,15 @@ def _or_centre(wobble: _Trial, tried: Sequence[_Trial]) -> _Trial:
     the other comes after it."""
     mine = [t for t in tried if t.candidate.body == wobble.candidate.body]
     through, centre = (
-        max((t for t in mine if t.candidate.effect == name and any(t.candidate.shifts) == shifts), key=lambda t: t.gain)
+        max((t for t in mine if t.candidate.effect == name and any(t.candidate.shifts) == shifts), key=_evidence)
         for name, shifts in (("joint_wobble", False), ("moving_centre", True))
     )
     parted = through.gain < MOSTLY * wobble.gain < through.gain + centre.gain
-    return max(through, centre, key=lambda t: t.gain) if parted else wobble
+    return max(through, centre, key=_evidence) if parted else wobble
+
+
+def _evidence(trial: _Trial) -> float:
+    return trial.evidence
 
 
 def _flat(columns: Array) -> Array:
