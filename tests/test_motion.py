@@ -15,6 +15,7 @@ from hand_model.diagnose.locate.motion import (
     least_error,
     local_quadratic,
     position_at,
+    standing_at_turns,
     sure_acceleration,
     told_between,
 )
@@ -52,7 +53,7 @@ def test_a_slow_log_is_not_taken_for_a_segment_that_swings() -> None:
 def test_a_drive_that_turns_round_between_two_samples_stands_there() -> None:
     at = np.arange(0.0, 6.0, 0.014)
     there_and_back = 100 * np.abs((at / 1.5) % 2 - 1)  # at full speed to the turn
-    motion = estimate_motion(at, there_and_back)
+    motion = standing_at_turns(estimate_motion(at, there_and_back), at)
     turns = np.flatnonzero(np.diff(np.sign(motion.velocity)) != 0)
     assert len(turns) == 3 and not motion.moving[turns].any() and not motion.moving[turns + 1].any()
     assert motion.moving.mean() > 0.9 and np.isfinite(motion.until_stop_s[turns[0] - 10])

@@ -16,7 +16,7 @@ from ...session import Log, Session, Trial
 from ..name.bristles import bristled
 from .doubt import LEAST_GIVE, LONGER, with_doubt
 from .measurement import coefficients, extremes, frozen, is_measured
-from .motion import Motion, estimate_motion, sure_acceleration
+from .motion import Motion, estimate_motion, standing_at_turns, sure_acceleration
 from .simulated import SimulatedDrive, with_simulated
 
 Array = NDArray[np.float64]
@@ -119,7 +119,7 @@ def _prepare(
             continue
         time_s, position = log.time_s[seen], 100 * (counts[seen] - low) / (high - low)
         believed = position if correct is None else correct(position)
-        motion = estimate_motion(time_s, believed, uneven=log.uneven)
+        motion = standing_at_turns(estimate_motion(time_s, believed, uneven=log.uneven), time_s)
         if simulated is not None and trial.name in simulated.motions:
             motion = with_simulated(motion, time_s, simulated.motions[trial.name]) or motion
         extra = {

@@ -7,7 +7,7 @@ motion starts or stops within the kernel the estimate is smeared, and such sampl
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,9 +99,18 @@ def estimate_motion(time_s: Array, position: Array, bandwidth_s: float | None = 
             break
         h *= 1.4
     moving = np.abs(v) > max(5 * velocity_noise, 0.03 * fastest)
-    moving = _drop_short(moving & ~_beside_lost_rows(time_s) & ~_turning_back(v), 3)
+    moving = _drop_short(moving & ~_beside_lost_rows(time_s), 3)
     a, rough_a = _sure_enough(time_s, position, h, noise, a, moving)
     return Motion(x, v, a, noise, h, moving, *since_rest(time_s, moving), acceleration_noise=rough_a)
+
+
+def standing_at_turns(motion: Motion, time_s: Array) -> Motion:
+    """The same where samples (n,) [s] between which a drive turns round are at rest: it stands in between, however
+    short, and when is not known."""
+    turns = motion.velocity[1:] * motion.velocity[:-1] < 0
+    moving = _drop_short(motion.moving & ~(np.r_[turns, False] | np.r_[False, turns]), 3)
+    since, until = since_rest(time_s, moving)
+    return replace(motion, moving=moving, since_start_s=since, until_stop_s=until)
 
 
 def _apart(position: Array) -> Array:
@@ -113,12 +122,6 @@ def _beside_lost_rows(time_s: Array) -> NDArray[np.bool_]:
     """Samples (n,) beside which rows were lost: the drive may have stopped between them."""
     lost = rows_lost(time_s)
     return np.r_[lost, False] | np.r_[False, lost]
-
-
-def _turning_back(velocity: Array) -> NDArray[np.bool_]:
-    """Samples (n,) between which a drive turns round: it stands in between, however short, and when is not known."""
-    turns = velocity[1:] * velocity[:-1] < 0
-    return np.r_[turns, False] | np.r_[False, turns]
 
 
 def _sure_enough(
