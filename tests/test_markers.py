@@ -466,6 +466,16 @@ def test_a_centre_is_told_by_the_form_that_brings_evidence_and_not_by_the_one_th
     assert search.next(()) == 72.1
 
 
+def test_a_faint_centre_is_named_where_the_test_sees_a_misfit_and_it_is_all_of_that() -> None:
+    def drawn(size_m: float) -> MarkerNaming:
+        return seen(travelling(lambda u: size_m * np.stack([u**2, 0 * u], axis=1)), 1, body=2)
+
+    faint, fainter = drawn(0.88e-4), drawn(0.85e-4)
+    assert faint.p_before < 0.003 < faint.p_after and places(faint) == {("moving_centre", None)}
+    assert markers.SEEN <= faint.found[0].evidence < markers.EVIDENCE_LEAST
+    assert fainter.p_before > 0.003 and not fainter.found  # as likely by chance
+
+
 def test_a_centre_that_travels_and_a_joint_that_tilts_are_both_told() -> None:
     travel = travelling(lambda u: 0.3e-3 * np.stack([np.sin(np.pi * u), 1 - np.cos(np.pi * u)], axis=1))
     tilt = tilting(lambda u, way: 0.02 * np.sin(6 * np.pi * u))

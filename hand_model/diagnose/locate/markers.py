@@ -25,6 +25,7 @@ from .wobble import possible
 Array = NDArray[np.float64]
 
 EVIDENCE_LEAST = 15.0  # log evidence of a marker effect, beyond its parameters and the search over moments
+SEEN = 9.0  # of a joint's, where the test sees that something is missing, and it leaves nothing of that
 MOST = 10  # a slip that is put right between recordings is one a recording
 SKIP_P = 0.3  # lack of fit above which no candidate is tried
 ALPHA = 0.003  # false alarms per finger
@@ -152,10 +153,18 @@ def _selected(search: Stepwise, begin: Sequence[MarkerEffect] = ()) -> tuple[lis
         # what stays correlated beside the best candidate weighs all of them down
         best = replace(best, evidence=_borne(search, [*found, best], best.gain, best))
         if best.evidence < EVIDENCE_LEAST:
+            if not found and _all_that_is_seen(search, best):
+                return [best], None
             larger = found if _within_noise(search, found) else _ahead(search, found)
             return larger, best if larger is found else None
         found = search.settled([*found, best])
     return found, None
+
+
+def _all_that_is_seen(search: Stepwise, effect: MarkerEffect) -> bool:
+    """Whether a joint that is no hinge is all that is missing, plainly enough where the test says that something is."""
+    seen = not _within_noise(search, []) and _within_noise(search, [effect])
+    return seen and effect.effect in HINGE and effect.evidence >= SEEN
 
 
 def _within_noise(search: Stepwise, found: list[MarkerEffect]) -> bool:
