@@ -57,9 +57,9 @@ READINGS: Mapping[str, Mapping[str | None, Mapping[str, Read]]] = {
     "load_dependent_friction": {"transmitted": {"load_coefficient": _same("share")}},
     "marker_slip": {EVERY: {"distance": _same("distance_m")}},
     "moving_centre": {
-        "ellipse": {"travel": _same("travel_m", 1.2)},
+        "ellipse": {"travel": _same("travel_m", 1.2)},  # its radius is 0.6 of the figure
         EVERY: {"travel": _same("travel_m")},
-    },  # 0.6 of a diameter
+    },
     "nonlinear_spring": {"knee": {"knee": _same("knee_percent")}},
     "palm_marker_slip": {EVERY: {"distance": _same("distance_m")}},
     "position_dependent_friction": {

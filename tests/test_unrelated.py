@@ -10,7 +10,7 @@ from test_kinematic_stations import joint
 
 from hand_model.diagnose.name.judgement import judged
 from hand_model.diagnose.name.station import Station
-from hand_model.diagnose.unrelated import Heard, left_of_seen, less_foretold, together
+from hand_model.diagnose.unrelated import Regression, left_of_seen, less_foretold, together
 from hand_model.effects import catalogue
 from hand_model.effects.base import DriveState
 
@@ -51,16 +51,16 @@ def two_joints(seed: int, first=None, second=None, alike: float = ALIKE) -> tupl
     return tuple(out[0]), tuple(out[1])
 
 
-def heard(states: States, kind: str) -> Heard:
+def heard(states: States, kind: str) -> Regression:
     signal = "encoder" if kind == "encoder" else "markers"
 
     def judge(told: States) -> Station:
         return judged(signal, "index", "index", "proximal", told, catalogue(kind))
 
-    return Heard(judge(states), states, judge)
+    return Regression(judge(states), states, judge)
 
 
-def both(first: States, second: States) -> tuple[Heard, Heard, tuple[Station, Station]]:
+def both(first: States, second: States) -> tuple[Regression, Regression, tuple[Station, Station]]:
     driver, follows = heard(first, "encoder"), heard(second, "linkage")
     return driver, follows, together(driver, follows, lambda _: second)
 

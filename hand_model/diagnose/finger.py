@@ -34,7 +34,7 @@ from .name.interval import declared_sd
 from .name.judgement import judged
 from .name.station import Station
 from .prove.markers import OWN, marker_fit, of_chain
-from .unrelated import Heard, together
+from .unrelated import Regression, together
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ def _follower(
     return states, turned
 
 
-def _heard(signal: str, finger: Finger, joint: int, states: tuple[DriveState, ...]) -> Heard:
+def _regression(signal: str, finger: Finger, joint: int, states: tuple[DriveState, ...]) -> Regression:
     """A station of a finger's angles, judged among the effects of its kind."""
     kind = "encoder" if signal == "encoder" else "linkage"
     effects = [*catalogue(kind), *outsiders(kind)]
@@ -128,7 +128,7 @@ def _heard(signal: str, finger: Finger, joint: int, states: tuple[DriveState, ..
     def judge(told: tuple[DriveState, ...]) -> Station:
         return judged(signal, finger.name, finger.actuator, finger.segments[joint].name, told, effects)
 
-    return Heard(judge(states), states, judge)
+    return Regression(judge(states), states, judge)
 
 
 def _told(station: Station) -> dict[str, tuple[float, float]]:
@@ -172,11 +172,11 @@ def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, f
     names = ", ".join(f.effect for _, f in found) or "consistent"
     lines = [f"{finger.name} markers: {names} (p {markers.p_before:.2g} -> {markers.p_after:.2g})"]
     angles, moments = corrected_angles(seen, markers), steps(markers)
-    heard: list[Heard] = []
+    regressions: list[Regression] = []
     states = encoder_states(angles, *counts[finger.actuator], moments) if finger.actuator in counts else ()
     if states:
-        heard.append(_heard("encoder", finger, 0, states))
-    encoder = heard[0].station if heard else None
+        regressions.append(_regression("encoder", finger, 0, states))
+    encoder = regressions[0].station if regressions else None
     logged = finger.actuator in counts and not _parted(encoder)
     turns: list[tuple[float, Finding]] = []
     for joint in range(1, len(finger.segments)):
@@ -184,10 +184,10 @@ def _judged(finger: Finger, seen: FingerAngles, counts: dict[str, tuple[float, f
         if turned is not None:
             turns.append(turned_finding(turned, finger.name, finger.segments[joint].name))
         if states:
-            heard.append(_heard("markers", finger, joint, states))
-    stations = [h.station for h in heard]
-    if encoder is not None and len(heard) == 2:
-        stations = list(together(*heard, lambda driver: _follower(angles, 1, moments, driver, logged)[0]))
+            regressions.append(_regression("markers", finger, joint, states))
+    stations = [r.station for r in regressions]
+    if encoder is not None and len(regressions) == 2:
+        stations = list(together(*regressions, lambda driver: _follower(angles, 1, moments, driver, logged)[0]))
     tilt_deg = tilt(markers)
     for station in stations:
         station.tilt, station.swaying = tilt_deg, long_means(drift)

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..effects.base import DriveState
-from .name.naming import ALPHA, Naming
+from .name.balance import Balance, Fit
+from .name.naming import ALPHA
 from .name.station import Station
 
 Array = NDArray[np.float64]
@@ -29,8 +30,8 @@ PLACES = 3  # powers of the place in the range
 
 
 @dataclass(frozen=True)
-class Heard:
-    """A station, the recordings that it was made of, and how it is heard of others."""
+class Regression:
+    """A station, the recordings that it was made of, and how it is judged of others."""
 
     station: Station
     states: tuple[DriveState, ...]
@@ -39,27 +40,22 @@ class Heard:
     @property
     def left(self) -> Left:
         """What the station leaves of the angles as they were recorded."""
-        return left_of(self.states, self.station.naming)
+        return left_of(self.states, self.station.naming.balance, self.station.naming.fit)
 
 
 def together(
-    driver: Heard, follower: Heard, anew: Callable[[Station], tuple[DriveState, ...]]
+    driver: Regression, follower: Regression, anew: Callable[[Station], tuple[DriveState, ...]]
 ) -> tuple[Station, Station]:
     """The stations of a finger's first angle against its encoder and of its next one against the first, each heard
     beside the errors of the other. anew: the follower's recordings, given the driver's station."""
-    before = names_at(driver.station)
+    before = driver.station.naming.names
     driver = _beside(driver, follower, left_of_seen(follower, driver))
-    if names_at(driver.station) != before and (states := anew(driver.station)):
-        follower = Heard(follower.judge(states), states, follower.judge)
+    if driver.station.naming.names != before and (states := anew(driver.station)):
+        follower = Regression(follower.judge(states), states, follower.judge)
     return driver.station, _beside(follower, driver, driver.left).station
 
 
-def names_at(station: Station) -> set[str]:
-    """The effects that were named at a station, whether they stand or not."""
-    return {f.term.effect.name for f in station.naming.found}
-
-
-def _beside(mine: Heard, other: Heard, theirs: Left) -> Heard:
+def _beside(mine: Regression, other: Regression, theirs: Left) -> Regression:
     """The same with its station heard less what errors of the other foretell; as it is where these hold more than
     noise, or a new name is the other's."""
     if other.station.naming.after.p < ALPHA:
@@ -68,74 +64,73 @@ def _beside(mine: Heard, other: Heard, theirs: Left) -> Heard:
     if states is None:
         return mine
     again = mine.judge(states)
-    if not names_at(again) <= names_at(mine.station) and not _borne_out(mine, again, theirs):
+    if not again.naming.names <= mine.station.naming.names and not _borne_out(mine, again, theirs):
         return mine
     return replace(mine, station=again)
 
 
-def left_of(states: Sequence[DriveState], naming: Naming) -> Left:
-    """What a naming leaves of the angles of its recordings. states: as they were recorded."""
-    out, start = {}, 0
-    for state, mask in zip(states, naming.balance.masks, strict=True):
-        stop = start + int(mask.sum())
-        out[state.trial] = state.time_s[mask], state.effort[mask] - naming.fit.prediction[start:stop]
-        start = stop
-    return out
+def left_of(states: Sequence[DriveState], balance: Balance, fit: Fit) -> Left:
+    """What a fit of a balance leaves of the angles of its recordings. states: as they were recorded."""
+    return balance.by_recording(_gathered(states, balance, lambda s: s.effort) - fit.prediction)
 
 
-def left_of_seen(follower: Heard, driver: Heard) -> Left:
+def _gathered(states: Sequence[DriveState], balance: Balance, value: Callable[[DriveState], Array]) -> Array:
+    """Stack `value(state)` (n, ...) over the samples that a balance compares, of its recordings as they were: its own have
+    been remapped to what was named, or are less what was foretold."""
+    return np.concatenate([value(s)[mask] for s, mask in zip(states, balance.masks, strict=True)])
+
+
+def left_of_seen(follower: Regression, driver: Regression) -> Left:
     """What a follower's angle is off from where its driver was seen in the same frame, by the follower's slope: the
     balance itself reckons with a smoother driver, whose errors last."""
+    balance, left = follower.station.naming.balance, follower.left
     seen = {s.trial: (s.time_s, s.effort) for s in driver.states}
+    course = _gathered(follower.states, balance, lambda s: np.stack([s.position, s.extra["slope"]], axis=1))
+    reckoned = balance.by_recording(course)
     out = {}
-    for state, mask in zip(follower.states, follower.station.naming.balance.masks, strict=True):
-        if state.trial not in seen:
-            continue
-        time_s, left = follower.left[state.trial]
-        _, at, place = np.intersect1d(time_s, seen[state.trial][0], assume_unique=True, return_indices=True)
-        smoother, slope = state.position[mask][at], state.extra["slope"][mask][at]
-        off = left[at] - slope * (seen[state.trial][1][place] - smoother)
+    for trial, (time_s, _) in left.items():
+        at, own, angle = _paired(left, seen, trial)
+        smoother, slope = reckoned[trial][1][at].T
+        off = own - slope * (angle - smoother)
         told = np.isfinite(off)
-        out[state.trial] = time_s[at][told], off[told]
+        out[trial] = time_s[at][told], off[told]
     return out
 
 
 def less_foretold(states: Sequence[DriveState], own: Left, other: Left) -> tuple[DriveState, ...] | None:
     """Recordings whose efforts are less what the errors `other` foretell of the errors `own`, frame by frame; None where
     they foretell next to nothing."""
-    pairs = {state.trial: _paired(own, other, state.trial) for state in states if state.trial in own}
-    parts = {t: _by_place(s, own[t][0][pairs[t][0]], pairs[t][3]) for s in states if (t := s.trial) in pairs}
-    mine, theirs = (np.concatenate(v) for v in ([p[2] for p in pairs.values()], list(parts.values())))
-    if len(mine) < FEWEST:
+    rows, columns, errors = [], [], []
+    for state in states:
+        at, mine, theirs = _paired(own, other, state.trial)
+        rows.append(np.searchsorted(state.time_s, own[state.trial][0][at]))
+        columns.append(_by_place(state, rows[-1], theirs))
+        errors.append(mine)
+    if sum(len(mine) for mine in errors) < FEWEST:
         return None
-    gain, foretold = _foretelling(mine, theirs)
+    gain, foretold = _foretelling(np.concatenate(errors), np.concatenate(columns))
     if foretold < FORETOLD_LEAST:
         return None
     out = []
-    for state in states:
+    for state, at, theirs in zip(states, rows, columns, strict=True):
         effort = state.effort.copy()
-        if state.trial in pairs:
-            rows = np.flatnonzero(np.isin(state.time_s, own[state.trial][0][pairs[state.trial][0]]))
-            effort[rows] -= parts[state.trial] @ gain
+        effort[at] -= theirs @ gain
         out.append(replace(state, effort=effort))
     return tuple(out)
 
 
-def _by_place(state: DriveState, time_s: Array, errors: Array) -> Array:
-    """Errors (k,) at times [s] as columns (k, PLACES): what they foretell changes with the finger's posture."""
-    position = np.interp(time_s, state.time_s, state.position)
-    share = 2 * (position - state.position.min()) / max(float(np.ptp(state.position)), 1e-9) - 1
+def _by_place(state: DriveState, rows: NDArray[np.intp], errors: Array) -> Array:
+    """Errors (k,) at rows of a recording as columns (k, PLACES): what they foretell changes with the finger's posture."""
+    low, span = state.position.min(), max(float(np.ptp(state.position)), 1e-9)
+    share = 2 * (state.position[rows] - low) / span - 1
     return errors[:, None] * share[:, None] ** np.arange(PLACES)
 
 
-def _paired(own: Left, other: Left, trial: str) -> tuple[NDArray[np.intp], NDArray[np.intp], Array, Array]:
-    """Places of the frames (k,) of a recording that both have, in either, and the errors of both."""
-    if trial not in other:
-        none = np.zeros(0, np.intp)
-        return none, none, np.zeros(0), np.zeros(0)
-    (time_s, mine), (other_s, theirs) = own[trial], other[trial]
+def _paired(own: Left, other: Left, trial: str) -> tuple[NDArray[np.intp], Array, Array]:
+    """Frames (k,) of a recording's own that the other has, too, and the values of both there."""
+    (time_s, mine), (other_s, theirs) = own[trial], other.get(trial, (np.zeros(0), np.zeros(0)))
     _, at, place = np.intersect1d(time_s, other_s, assume_unique=True, return_indices=True)
-    return at, place, mine[at], theirs[place]
+    return at, mine[at], theirs[place]
 
 
 def _foretelling(mine: Array, theirs: Array) -> tuple[Array, float]:
@@ -149,25 +144,18 @@ def _foretelling(mine: Array, theirs: Array) -> tuple[Array, float]:
     return gain, 1.0 - float(np.var(left[near]) / max(np.var(mine[near]), 1e-300))
 
 
-def _borne_out(mine: Heard, again: Station, theirs: Left) -> bool:
+def _borne_out(mine: Regression, again: Station, theirs: Left) -> bool:
     """Whether what new names do is told by the angle that they are of, and not better by the other, whose errors were
     taken off: of both together, with their covariance."""
     balance, fit = again.naming.balance, again.naming.fit
-    known = names_at(mine.station)
-    without = balance.fit(tuple(t for t in fit.terms if t.effect.name in known))
-    does = left_of(tuple(replace(s, effort=np.zeros(len(s.time_s))) for s in mine.states), _with(again.naming, without))
-    done = left_of(tuple(replace(s, effort=np.zeros(len(s.time_s))) for s in mine.states), again.naming)
-    before = left_of(mine.states, _with(again.naming, without))
-    rows, columns = [], []
-    matrix = balance.gather(lambda s: s.declared)
-    start = 0
-    for trial, (time_s, _) in before.items():
-        at, _, own, other = _paired(before, theirs, trial)
-        shape = does[trial][1][at] - done[trial][1][at]
-        rows.append(np.stack([own, other, shape], axis=1))
-        columns.append(matrix[start : start + len(time_s)][at])
-        start += len(time_s)
-    stacked, design = np.concatenate(rows), np.concatenate(columns)
+    without = balance.fit(tuple(t for t in fit.terms if t.effect.name in mine.station.naming.names))
+    before = left_of(mine.states, balance, without)
+    does, declared = (
+        balance.by_recording(v) for v in (fit.prediction - without.prediction, balance.gather(lambda s: s.declared))
+    )
+    paired = {trial: _paired(before, theirs, trial) for trial in before}
+    stacked = np.concatenate([np.stack([a, b, does[t][1][at]], axis=1) for t, (at, a, b) in paired.items()])
+    design = np.concatenate([declared[t][1][at] for t, (at, _, _) in paired.items()])
     size = np.abs(design).max(0, initial=0.0)
     design = design[:, size > 0] / size[size > 0]
     own, other, shape = (stacked - design @ np.linalg.lstsq(design, stacked, rcond=1e-10)[0]).T
@@ -175,7 +163,3 @@ def _borne_out(mine: Heard, again: Station, theirs: Left) -> bool:
     here = (precision[0, 0] * (shape @ own) + precision[0, 1] * (shape @ other)) ** 2 / precision[0, 0]
     there = (precision[1, 1] * (shape @ other) + precision[0, 1] * (shape @ own)) ** 2 / precision[1, 1]
     return bool(here > there)
-
-
-def _with(naming: Naming, fit: object) -> Naming:
-    return replace(naming, fit=fit)

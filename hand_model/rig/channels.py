@@ -21,7 +21,7 @@ from .declared import DeclaredFit
 from .model import RigModel, RigTrial
 from .planned import planned
 from .states import fill_gaps
-from .unloaded import unloaded
+from .unloaded import left_beside_declared, unloaded
 
 Array = NDArray[np.float64]
 STRANGE = 0.7  # share of an effort that may stay unexplained before it is said to explain nothing
@@ -29,7 +29,6 @@ UNSIGNED = "has no sign: it follows the size of the expected effort"
 BOTH_LIMITS, ONE_LIMIT = "stands on its limits, the same both ways", "stands on a limit, one way alone"
 REPEATS = "repeats the channel"
 DEAD = "never changes: dead"
-UNLOADED = "does not carry the loads that the recordings are told to carry"
 SINUSOID = "is a sinusoid of time"
 LEAST_TURNS = 4  # changes of sign that must be seen before a channel is said to have none
 EXACTLY = 0.5  # of SAME: the law of a controller tells a true torque as closely as its sensor is quiet
@@ -172,10 +171,7 @@ def check_balance(rig: RigModel, fit: DeclaredFit) -> tuple[ChannelIssue, ...]:
     channels = {r.joint: force[d.name] for r in fit.rows if (d := rig.drive(r.joint)) and d.name in force}
     looks += _asked_for(trials, fit, channels)
     looks += _planned(rig, fit, channels)
-    for joint, name in channels.items():
-        measured = [r for r in fit.rows if r.joint == joint and joint in trials[r.trial].effort]
-        if measured and (share := unloaded(measured)) is not None:
-            looks += [(name, r, UNLOADED, share) for r in measured]
+    looks += _unloaded(trials, fit, channels)
     lacking = {row.joint: (name, share) for name, row, reason, share in looks if reason == UNSIGNED}
     known = {(row.trial, row.joint) for _, row, _, _ in looks}
     # A column that has no sign has none in recordings either whose efforts all go one way.
@@ -234,6 +230,20 @@ def _planned(rig: RigModel, fit: DeclaredFit, channels: Mapping[str, str]) -> li
     return out
 
 
+def _unloaded(
+    trials: Mapping[str, RigTrial], fit: DeclaredFit, channels: Mapping[str, str]
+) -> list[tuple[str, Rows, str, float]]:
+    """Efforts (channels: joint -> column) that do not show the loads of the recordings' own bodies."""
+    out = []
+    for joint, name in channels.items():
+        rows = [r for r in fit.rows if r.joint == joint and joint in trials[r.trial].effort]
+        if rows and (share := unloaded(rows)) is not None:
+            out += [
+                (name, row, "does not carry the loads that the recordings are told to carry", share) for row in rows
+            ]
+    return out
+
+
 def _unsigned(trial: RigTrial, row: Rows, start: Array) -> float | None:
     """Share of an effort without sign that the size of the one that the declared start (P,) expects leaves (moving
     samples of both), where that is far less than its value, or where the effort turns back at zero; None where it has a
@@ -271,10 +281,8 @@ def _stranger(fit: DeclaredFit, row: Rows) -> bool:
 
 def _own_fit(fit: DeclaredFit, row: Rows) -> float:
     """Share of the effort that the declared columns leave when fitted to this recording alone, offset included."""
-    x = np.concatenate([row.columns, np.ones((len(row.effort), 1))], 1)[row.moving]
     y = row.effort[row.moving]
-    x = x / (np.abs(x).max(0) + 1e-300)
-    return rms(y - x @ np.linalg.lstsq(x, y, rcond=1e-9)[0]) / max(rms(y), 1e-300)
+    return rms(left_beside_declared([row], y)) / max(rms(y), 1e-300)
 
 
 def _static(row: Rows, x: Array, start: Array) -> float | None:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .balance import Rows
 from .declared import CORRELATED
 
+Array = NDArray[np.float64]
 CARRIED = 0.1  # of the told loads: a channel that shows less is no effort of this machine, in no unit of it
 SURE = 3.0  # standard deviations
 
@@ -21,13 +23,12 @@ def unloaded(rows: Sequence[Rows]) -> float | None:
     A weight that somebody hung up is the surest thing that is known of a recording: friction, gears and levers may be
     others than declared, but what drives the joint has to carry it.
     """
-    carried = np.concatenate([_carried(r) for r in rows])
+    # effort of the trials' own bodies beyond the declared ones
+    carried = np.concatenate([-r.filtered(r.load_known)[r.moving] for r in rows])
+    if not carried.any():
+        return None
     effort = np.concatenate([r.effort[r.moving] for r in rows])
-    columns = np.concatenate([np.column_stack([r.columns, np.ones(len(r.effort))])[r.moving] for r in rows])
-    size = np.abs(columns).max(0, initial=0.0)
-    columns = columns[:, size > 0] / size[size > 0]
-    both = np.stack([carried, effort], axis=1)
-    left_carried, left = (both - columns @ np.linalg.lstsq(columns, both, rcond=1e-9)[0]).T
+    left_carried, left = left_beside_declared(rows, np.stack([carried, effort], axis=1)).T
     power = float(left_carried @ left_carried)
     if power <= 1e-9 * float(carried @ carried):
         return None
@@ -38,6 +39,9 @@ def unloaded(rows: Sequence[Rows]) -> float | None:
     return share if abs(share) + SURE * sd < CARRIED else None
 
 
-def _carried(row: Rows) -> np.ndarray:
-    """Effort (m,) of a trial's own bodies beyond the declared ones, at the moving samples."""
-    return -row.filtered(row.load_known)[row.moving]
+def left_beside_declared(rows: Sequence[Rows], values: Array) -> Array:
+    """What declared columns, of whatever coefficients, and an offset leave of values (m,) or (m, k) at the moving samples
+    of rows of one joint."""
+    x = np.concatenate([np.concatenate([r.columns, np.ones((len(r.effort), 1))], 1)[r.moving] for r in rows])
+    x = x / (np.abs(x).max(0) + 1e-300)
+    return values - x @ np.linalg.lstsq(x, values, rcond=1e-9)[0]

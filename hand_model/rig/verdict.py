@@ -34,8 +34,13 @@ def verdict(found: Sequence[Finding], lack: Mapping[str, Any], well_known: Colle
     if lack.get("before") is None:
         return "unexplained"
     joints = lack.get("joints", {"": lack})
-    beyond = any(p["after"] > FITS * (p.get("noise_floor") or 0.0) for j, p in joints.items() if j not in well_known)
+    beyond = any(_beyond_noise(p) for j, p in joints.items() if j not in well_known)
     return "unexplained" if beyond else "consistent"
+
+
+def _beyond_noise(lack: Mapping[str, Any]) -> bool:
+    """Whether the error left (at one joint, or of all) is more than its noise."""
+    return lack["after"] > FITS * (lack.get("noise_floor") or 0.0)
 
 
 def limit(lack: Mapping[str, Any]) -> float | None:
@@ -57,7 +62,7 @@ def unexplained(
             continue
         floor = p.get("noise_floor") or 0.0
         excess, whole = p["after"] ** 2 - floor**2, p["before"] ** 2 - floor**2
-        if whole > 0 and excess > 0.02 * whole and p["after"] > FITS * floor:
+        if whole > 0 and excess > 0.02 * whole and _beyond_noise(p):
             signal = "position" if lack.get("metric") == "position_rmse" else "effort"
             out.append(
                 {
@@ -78,5 +83,5 @@ def accuracy_notes(
         f"{joint}: the declared model leaves {100 * share:.1f} % of the effort, which is more than noise and less than "
         "machines are known to"
         for joint, share in well_known.items()
-        if not found and joint in joints and joints[joint]["after"] > FITS * (joints[joint].get("noise_floor") or 0.0)
+        if not found and joint in joints and _beyond_noise(joints[joint])
     )

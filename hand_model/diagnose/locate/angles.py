@@ -291,11 +291,7 @@ def _at_frames(record: FlexionAngles, time_s: Array, drifting: bool = True) -> L
 
 def expected_angles(naming: Naming) -> dict[str, tuple[Array, Array]]:
     """Trial -> times [s] and angles [deg] that an encoder station's final model predicts, named effects included."""
-    out, start = {}, 0
-    for state, mask in zip(naming.balance.states, naming.balance.masks, strict=True):
-        out[state.trial] = state.time_s[mask], naming.fit.prediction[start : start + mask.sum()]
-        start += int(mask.sum())
-    return out
+    return naming.balance.by_recording(naming.fit.prediction)
 
 
 def _stepped(record: int, time_s: Array, steps: Sequence[Step]) -> tuple[Array, tuple[str, ...]]:

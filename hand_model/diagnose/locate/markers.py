@@ -153,9 +153,11 @@ def _selected(search: Stepwise, begin: Sequence[MarkerEffect] = ()) -> tuple[lis
         # what stays correlated beside the best candidate weighs all of them down
         best = replace(best, evidence=_borne(search, [*found, best], best.gain, best))
         if best.evidence < EVIDENCE_LEAST:
+            if _within_noise(search, found):
+                return found, best
             if not found and _all_that_is_seen(search, best):
                 return [best], None
-            larger = found if _within_noise(search, found) else _ahead(search, found)
+            larger = _ahead(search, found)
             return larger, best if larger is found else None
         found = search.settled([*found, best])
     return found, None
@@ -163,8 +165,7 @@ def _selected(search: Stepwise, begin: Sequence[MarkerEffect] = ()) -> tuple[lis
 
 def _all_that_is_seen(search: Stepwise, effect: MarkerEffect) -> bool:
     """Whether a joint that is no hinge is all that is missing, plainly enough where the test says that something is."""
-    seen = not _within_noise(search, []) and _within_noise(search, [effect])
-    return seen and effect.effect in HINGE and effect.evidence >= SEEN
+    return effect.effect in HINGE and effect.evidence >= SEEN and _within_noise(search, [effect])
 
 
 def _within_noise(search: Stepwise, found: list[MarkerEffect]) -> bool:

@@ -108,7 +108,7 @@ def standing_at_turns(motion: Motion, time_s: Array) -> Motion:
     """The same where samples (n,) [s] between which a drive turns round are at rest: it stands in between, however
     short, and when is not known."""
     turns = motion.velocity[1:] * motion.velocity[:-1] < 0
-    moving = _drop_short(motion.moving & ~(np.r_[turns, False] | np.r_[False, turns]), 3)
+    moving = _drop_short(motion.moving & ~_on_either_side(turns), 3)
     since, until = since_rest(time_s, moving)
     return replace(motion, moving=moving, since_start_s=since, until_stop_s=until)
 
@@ -120,8 +120,12 @@ def _apart(position: Array) -> Array:
 
 def _beside_lost_rows(time_s: Array) -> NDArray[np.bool_]:
     """Samples (n,) beside which rows were lost: the drive may have stopped between them."""
-    lost = rows_lost(time_s)
-    return np.r_[lost, False] | np.r_[False, lost]
+    return _on_either_side(rows_lost(time_s))
+
+
+def _on_either_side(between: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Samples (n,) before or after which something is between two of them (n - 1,)."""
+    return np.r_[between, False] | np.r_[False, between]
 
 
 def _sure_enough(

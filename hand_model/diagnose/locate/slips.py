@@ -128,7 +128,7 @@ def _finding(
     blocks = naming.blocks
     joint = angles.finger.segments[body - 1].name if body > 0 else None
     main = max(members, key=lambda e: e.gain)
-    size = displacement(members, main)
+    others = [e for e in members if e is not main]
     parameters: dict[str, dict[str, Any]] = {}
     trials = [r.trial.name for r in angles.records]
     if main.begin is not None:
@@ -136,10 +136,11 @@ def _finding(
         at = float(blocks.time_s[main.begin])
         trials = [record.trial.name]
         if name == "support_slip":
-            seen, interval = _likely(lambda own: turn(blocks, [*_beside(members, main), own], own), main)
+            size = displacement(members, main)
+            seen, interval = _likely(lambda own: turn(blocks, [*others, own], own), main)
             parameters["turn"] = {"value": seen, "unit": "rad", "ci95": interval}
         else:
-            size, interval = _likely(lambda own: displacement([*_beside(members, main), own], own), main)
+            size, interval = _likely(lambda own: displacement([*others, own], own), main)
             parameters["distance"] = {"value": size, "unit": "m", "ci95": interval}
         parameters["moment"] = {"value": at, "unit": "s"}
         text = f"{label or f'{angles.finger.name} {joint}'}: {name.replace('_', ' ')} of {1e3 * size:.2f} mm at {at:.1f} s of {record.trial.name}."
@@ -270,10 +271,6 @@ def _likely(amount: Callable[[MarkerEffect], float], effect: MarkerEffect) -> tu
     drawn = rng.multivariate_normal(effect.coefficients, effect.covariance, DRAWS, method="eigh")
     value, sd = amount(effect), float(np.std([amount(replace(effect, coefficients=c)) for c in drawn]))
     return value, [value - 1.96 * sd, value + 1.96 * sd]
-
-
-def _beside(members: Sequence[MarkerEffect], main: MarkerEffect) -> list[MarkerEffect]:
-    return [e for e in members if e is not main]
 
 
 def _proof(naming: MarkerNaming) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -184,9 +185,8 @@ class Stepwise:
                     found, swapped = other, True
             if found is before:
                 break
-        if (parted := self._parted(found)) is not found:
-            return self._ordered(parted)
-        return self._ordered(found) if swapped else found
+        parted = self._parted(found)
+        return self._ordered(parted) if swapped or parted is not found else found
 
     def _parted(self, found: list[MarkerEffect]) -> list[MarkerEffect]:
         """A step that lasts beyond its recording ends with that, where something else beside it says more: what is put
@@ -352,16 +352,13 @@ def _or_centre(wobble: _Trial, tried: Sequence[_Trial]) -> _Trial:
     the joint, that axis or the joint's travelling centre, whichever explains more, if they explain as much between them:
     the other comes after it."""
     mine = [t for t in tried if t.candidate.body == wobble.candidate.body]
+    evidence = attrgetter("evidence")
     through, centre = (
-        max((t for t in mine if t.candidate.effect == name and any(t.candidate.shifts) == shifts), key=_evidence)
+        max((t for t in mine if t.candidate.effect == name and any(t.candidate.shifts) == shifts), key=evidence)
         for name, shifts in (("joint_wobble", False), ("moving_centre", True))
     )
     parted = through.gain < MOSTLY * wobble.gain < through.gain + centre.gain
-    return max(through, centre, key=_evidence) if parted else wobble
-
-
-def _evidence(trial: _Trial) -> float:
-    return trial.evidence
+    return max(through, centre, key=evidence) if parted else wobble
 
 
 def _flat(columns: Array) -> Array:

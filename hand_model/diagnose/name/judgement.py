@@ -20,7 +20,7 @@ SECOND_HEARINGS, DISPLACING = 2, 0.1
 WORSE = 1.5  # times the mean square of training recordings
 
 
-def _as_likely(other: Naming, naming: Naming, fallen: set[str]) -> bool:
+def _as_likely(other: Naming, naming: Naming, fallen: frozenset[str]) -> bool:
     """Whether another naming explains the training recordings as well as the names that did not fall: a search without
     those that fell may end with a worse one in the place of one of them."""
     rest = tuple(t for t in naming.fit.terms if t.effect.name not in fallen)
@@ -70,11 +70,10 @@ def _foretold(
     """The station where no recording is kept out: events of one recording foretell nothing of others, so theirs are
     learned from all, where not all that they have in common need be in each. None where that brings other names."""
     told = tuple(replace(s, validate=False) for s in states)
-    known = {f.term.effect.name for f in station.naming.found}
     for among in (effects, tuple(e.apart() for e in effects)):
         naming = name_effects(told, among, typical=typical)
         other = station.renamed(naming)
-        if other.believed and {f.term.effect.name for f in other.kept} <= known:
+        if other.believed and {f.term.effect.name for f in other.kept} <= station.naming.names:
             return other
     return None
 
@@ -115,7 +114,7 @@ def judged(
     station = Station(signal, finger, actuator, joint, name_effects(states, left, typical=typical))
     elsewhere = _elsewhere(station.naming)
     for _ in range(1 if station.many else SECOND_HEARINGS):
-        fallen = {f.term.effect.name for f in station.naming.found} - {f.term.effect.name for f in station.proven}
+        fallen = station.naming.names - {f.term.effect.name for f in station.proven}
         lost = sum(
             f.share for f in station.naming.found if f.term.effect.name in fallen and f.evidence >= EVIDENCE_LEAST
         )

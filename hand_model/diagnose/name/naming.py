@@ -73,6 +73,11 @@ class Naming:
     rejected: tuple[tuple[str, float], ...]
 
     @property
+    def names(self) -> frozenset[str]:
+        """The effects that were named, whether they stand or not."""
+        return frozenset(f.term.effect.name for f in self.found)
+
+    @property
     def consistent(self) -> bool:
         """True where nothing is missing beyond the noise."""
         return self.before.p >= ALPHA and not self.found

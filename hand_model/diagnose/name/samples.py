@@ -126,6 +126,12 @@ class Samples:
             ]
         )
 
+    def by_recording(self, values: Array) -> dict[str, tuple[Array, Array]]:
+        """Recording -> times [s] and values (m, ...) of its compared samples, of values (n, ...) of all."""
+        ends = np.cumsum([len(rows) for rows in self._rows])[:-1]
+        parts = np.split(values, ends)
+        return {s.trial: (s.time_s[rows], v) for s, rows, v in zip(self.states, self._rows, parts, strict=True)}
+
     def _strokes(self) -> NDArray[np.int64]:
         out, count = [], 0
         for state in self.states:

@@ -93,9 +93,8 @@ class Station:
 
     def names(self, finding: Finding) -> bool:
         """Whether a finding was named here."""
-        named = {f.term.effect.name for f in self.naming.found}
         return (
-            finding.effect in named
+            finding.effect in self.naming.names
             and finding.where.get("finger") == self.finger
             and (self.signal != "markers" or finding.where.get("joint") == self.joint)
         )
