@@ -180,6 +180,13 @@ def test_a_trifle_beside_a_large_effect_is_no_finding_but_is_said() -> None:
     ]
 
 
+@pytest.mark.parametrize(("rate", "verdict"), [(0.9e-4, "consistent"), (-0.9e-4, "consistent"), (-2e-4, "mismatch")])
+def test_clocks_that_part_as_two_healthy_crystals_do_are_no_fault(rate: float, verdict: str) -> None:
+    found = assemble([], [(1.0, finding("clock_drift", "index", "log", rate_minus_one=rate))], [])
+    assert found.verdict == verdict
+    assert [r["effect"] for r in found.rejected] == (["clock_drift"] if verdict == "consistent" else [])
+
+
 def test_exchanged_labels_make_no_trifle_of_what_a_current_shows() -> None:
     main, small = (
         finding("marker_swap", "index", "markers", lasting=4.0),

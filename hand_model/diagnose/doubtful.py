@@ -1,9 +1,11 @@
-"""What is named and stands on little: small beside something else, or by a comparison of drives alone."""
+"""What is named and stands on little: small beside something else, by a comparison of drives alone, or no more than two
+healthy clocks differ by."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from ..effects.clock_drift import CRYSTALS
 from .findings import Finding
 from .locate.preload import COMPARISON
 from .magnitude import SLIGHT
@@ -12,6 +14,7 @@ REFUSED = "command_as_measurement"  # a channel that tells nothing: no other fin
 TRIFLE = 0.01  # of the square of the heaviest weight
 SURE = 0.99  # probability of what a comparison alone says
 DOUBT = "only the hand's other motors speak for it, and it may be chance"
+HEALTHY = "the clocks of two healthy crystals differ by as much"  # and by how much
 
 
 def trifles(ranked: list[tuple[float, Finding]], magnitudes: Mapping[int, float]) -> list[tuple[Finding, str]]:
@@ -51,6 +54,8 @@ def compared(finding: Finding) -> bool:
 
 
 def doubted(found: Sequence[Finding]) -> list[tuple[Finding, str]]:
-    """What a comparison alone says, and not surely, each with the reason: there are more healthy drives than drives of
-    which nothing else would show what they have."""
-    return [(f, DOUBT) for f in found if compared(f) and f.probability < SURE]
+    """What is no fault for sure, each with the reason: what a comparison alone says, and not surely, for there are more
+    healthy drives than drives of which nothing else would show what they have; clocks that part as healthy ones do."""
+    alone = [(f, DOUBT) for f in found if compared(f) and f.probability < SURE]
+    rates = [(f, f.parameters["rate_minus_one"]["value"]) for f in found if f.effect == "clock_drift"]
+    return alone + [(f, f"{HEALTHY}: {1e6 * rate:.0f} ppm") for f, rate in rates if abs(rate) <= CRYSTALS]

@@ -9,6 +9,8 @@ import numpy as np
 
 from .base import Amplitude, Array, DriveState, Effect
 
+CRYSTALS = 1e-4  # by which the rates of two healthy clocks may differ: 50 ppm each
+
 
 class ClockDrift(Effect):
     """angle(t) = map(encoder(t + drift (t - middle))): a column of velocity times time from the middle of the

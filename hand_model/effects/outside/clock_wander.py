@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from ..base import Amplitude, Array, DriveState
+from ..clock_drift import CRYSTALS
 from .outsider import Outsider, of_its_record
 
 RECORDS, WHILES = 4, 8  # recordings that may be looked at, and pieces of each
-CRYSTALS = 1e-4  # by which two healthy clocks' rates may differ
 
 
 class ClockWander(Outsider):
