@@ -27,6 +27,8 @@ def joint(seed: int, added: str = "none", noise_deg: float = 0.25) -> DriveState
         "late": STEP_DEG * (share > (SHARE if seed == 2 else 2 if seed < 2 else -1)),
         "while": STEP_DEG * ((share > SHARE) & (share < 0.7)),
         "drift": 2 * STEP_DEG * share,
+        "obstacle": 6 * STEP_DEG * np.maximum(x - 0.5, 0.0) * (share < 0.65) * (seed == 1),
+        "obstacle of each": 6 * STEP_DEG * np.maximum(x - 0.4, 0.0) * (share > 0.3),
     }[added]
     powers = np.stack([x**k for k in range(5)], 1)
     clocks = np.zeros((len(x), 3))
@@ -59,7 +61,7 @@ def test_a_step_that_stays_is_a_turned_support(added: str, begins: list[int]) ->
     assert weight > 0
 
 
-@pytest.mark.parametrize("added", ["none", "while", "drift"])
+@pytest.mark.parametrize("added", ["none", "while", "drift", "obstacle", "obstacle of each"])
 def test_nothing_else_is(added: str) -> None:
     assert turned_support([joint(k, added) for k in (1, 2, 3)]) is None
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...effects.base import DriveState
+from ...effects.base import DriveState, position_range
 from ...effects.path import strokes
 from ..findings import Finding, weighed
 from .angles import Step
@@ -20,6 +20,7 @@ BEYOND_CHANCE = 12.0  # log likelihood that a step must bring over none: for its
 PLAINER = 3.0  # that it must bring over a drift, and a while that ends may bring over it
 MOMENTS = np.linspace(0.04, 0.96, 72)  # shares of a recording that are tried
 WHILES = np.linspace(0.04, 0.9, 12)  # and those between which a while is
+PLACES = np.linspace(0.1, 0.8, 8)  # shares of the range, from which on an obstacle is met
 NEVER = 1.1  # of a recording
 FEWEST = 8  # strokes
 SAMPLES = 500  # of a recording
@@ -29,10 +30,11 @@ CORRECTION = "the step of the angle is taken out of the map between the joints"
 
 @dataclass(frozen=True)
 class _Record:
-    """Thinned samples of a recording. share (n,): of its length; known (n, P): declared columns and the way of the
-    motion; angle (n,) [deg]; stroke (n,): number, counted on through all recordings."""
+    """Thinned samples of a recording. share (n,): of its length; place (n,): of the range; known (n, P): declared columns
+    and the way of the motion; angle (n,) [deg]; stroke (n,): number, counted on through all recordings."""
 
     share: Array
+    place: Array
     known: Array
     angle: Array
     stroke: NDArray[np.int64]
@@ -77,7 +79,7 @@ def turned_support(states: Sequence[DriveState], before: Sequence[DriveState] = 
     tried = {begins: _scatter(records, _acting(records, begins)) for begins in _moments(records)}
     best = min(tried, key=lambda begins: tried[begins])
     gain, drift = (_likelier(count, none, x) for x in (tried[best], _scatter(records, [r.share for r in records])))
-    if gain - np.log(len(tried)) < BEYOND_CHANCE or gain < drift + PLAINER or _ends(records, tried[best]):
+    if gain - np.log(len(tried)) < BEYOND_CHANCE or gain < drift + PLAINER or _ends(records, best, tried[best]):
         return None
     if _steps_too(_records(before), best):
         return None
@@ -87,6 +89,7 @@ def turned_support(states: Sequence[DriveState], before: Sequence[DriveState] = 
 
 def _records(states: Sequence[DriveState]) -> list[_Record]:
     out, first = [], 0
+    low, high = position_range(states) if states else (0.0, 1.0)
     for state in states:
         good = np.flatnonzero(np.isfinite(state.effort))
         good = good[:: max(1, len(good) // SAMPLES)]
@@ -98,7 +101,8 @@ def _records(states: Sequence[DriveState]) -> list[_Record]:
         _, number = np.unique(number[good], return_inverse=True)
         known = np.concatenate([state.declared, np.sign(state.velocity)[:, None]], axis=1)
         share = (state.time_s - state.time_s[0]) / (state.time_s[-1] - state.time_s[0])
-        out.append(_Record(share[good], known[good], state.effort[good], first + number, state))
+        place = (state.position - low) / (high - low)
+        out.append(_Record(share[good], place[good], known[good], state.effort[good], first + number, state))
         first = out[-1].stroke[-1] + 1
     return out
 
@@ -143,14 +147,29 @@ def _scatter(records: Sequence[_Record], column: Sequence[Array] | None) -> floa
     return float(np.sum((np.bincount(stroke, left) / np.maximum(counts, 1)) ** 2)) + 1e-12
 
 
-def _ends(records: Sequence[_Record], stays: float) -> bool:
-    """Whether it is over before the recordings are, rather: an obstacle, a while."""
-    least = min(
-        _scatter(records, [((r.share >= a) & (r.share < b)).astype(float) for r in records])
-        for i, a in enumerate(WHILES)
-        for b in WHILES[i + 1 :]
-    )
+def _ends(records: Sequence[_Record], begins: tuple[float, ...], stays: float) -> bool:
+    """Whether it is over before the recordings are, rather (a while), or an obstacle pushes that was there for a while.
+    begins: of the step that stays, and what that leaves."""
+    least = min(_scatter(records, column) for column in _passing(records, begins))
     return _likelier(_strokes_of(records), stays, least) > PLAINER
+
+
+def _passing(records: Sequence[_Record], begins: tuple[float, ...]) -> Iterator[list[Array]]:
+    """Columns of a while, the same of each recording, and of obstacles met from a place on: in such a while, or in one of
+    a single recording. What stays begins or ends one, too."""
+    for i, a in enumerate(WHILES):
+        for b in WHILES[i + 1 :]:
+            yield [((r.share >= a) & (r.share < b)).astype(float) for r in records]
+    edges = sorted({0.0, *WHILES, *(s for s in begins if 0 < s < 1), 1.0})
+    met = [[np.maximum(r.place - place, 0.0) for r in records] for place in PLACES]
+    for i, a in enumerate(edges):
+        for b in edges[i + 1 :] if a > 0 else edges[1:-1]:
+            inside = [(r.share >= a) & (r.share <= b) for r in records]
+            for depth in met:
+                pushed = [d * there for d, there in zip(depth, inside, strict=True)]
+                yield pushed
+                if len(records) > 1:
+                    yield from ([p * (k == one) for k, p in enumerate(pushed)] for one in range(len(records)))
 
 
 def _steps_too(records: Sequence[_Record], begins: tuple[float, ...]) -> bool:
