@@ -187,6 +187,14 @@ def test_clocks_that_part_as_two_healthy_crystals_do_are_no_fault(rate: float, v
     assert [r["effect"] for r in found.rejected] == (["clock_drift"] if verdict == "consistent" else [])
 
 
+def test_what_one_recording_had_is_no_form_of_what_a_hand_always_has() -> None:
+    main = finding("elastoplastic_hysteresis", "index", "current", yield_load=30.0)
+    small = {"begin": 90.0, "stiffness": 0.01}
+    passing, lasting = (finding(name, "index", "current", **small) for name in ("external_contact", "end_stop_contact"))
+    assert names((1.0, main), (0.01, passing)) == ["elastoplastic_hysteresis", "external_contact"]
+    assert names((1.0, main), (0.01, lasting)) == ["elastoplastic_hysteresis"]
+
+
 def test_exchanged_labels_make_no_trifle_of_what_a_current_shows() -> None:
     main, small = (
         finding("marker_swap", "index", "markers", lasting=4.0),

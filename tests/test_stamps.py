@@ -34,6 +34,17 @@ def test_stamps_that_the_motion_does_not_follow_are_evened(wrong_s: float) -> No
     assert "spread evenly" in log.notes[-1]
 
 
+def test_packets_that_wait_for_each_other_lose_no_rows() -> None:
+    read = STEP_S * np.delete(np.arange(3000), [700, 1500])
+    stamped = read + 0.04 * (np.arange(len(read)) // 12 % 3)
+    for i in range(1, len(stamped)):  # what waited comes at once
+        stamped[i] = max(stamped[i], stamped[i - 1] + 1e-5)
+    log = evened(log_read_at(read, stamped))
+    error = (log.time_s - read)[60:-60]
+    assert np.std(error) < 0.25 * np.std((stamped - read)[60:-60])
+    assert abs(np.polyfit(read[60:-60], error, 1)[0]) < 5e-5  # and make no drift
+
+
 def test_what_the_motion_follows_stays_in_the_times_and_what_is_left_is_told() -> None:
     rng = np.random.default_rng(2)
     read = np.cumsum(rng.uniform(0.6, 1.4, 3000)) * STEP_S

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from ..effects import effect
 from ..effects.clock_drift import CRYSTALS
 from .findings import Finding
 from .locate.preload import COMPARISON
@@ -19,7 +20,8 @@ HEALTHY = "the clocks of two healthy crystals differ by as much"  # and by how m
 
 def trifles(ranked: list[tuple[float, Finding]], magnitudes: Mapping[int, float]) -> list[tuple[Finding, str]]:
     """Findings that are small for their kind and hardly show beside the heaviest one, each with the reason. Of the same
-    finger they may be no more than its form being another; what markers alone show shapes no current. Of another finger
+    finger they may be no more than its form being another; what markers alone show shapes no current, and the form of
+    what a hand always has none of what one recording had. Of another finger
     they are what is left of all that could have been missing of a healthy one: of a thousand hands with one or two
     effects none had a second one as small."""
 
@@ -37,7 +39,7 @@ def trifles(ranked: list[tuple[float, Finding]], magnitudes: Mapping[int, float]
         )
         heaviest, main = next(beside, (0.0, finding))
         first, most = next(iter(others), (0.0, finding))
-        if small(weight, finding, heaviest):
+        if small(weight, finding, heaviest) and not _passed(finding):
             out.append(
                 (finding, f"a trifle beside {main.effect.replace('_', ' ')}, whose form may be slightly another")
             )
@@ -46,6 +48,12 @@ def trifles(ranked: list[tuple[float, Finding]], magnitudes: Mapping[int, float]
                 (finding, f"a trifle beside {most.effect.replace('_', ' ')} of the {most.where['finger']} finger")
             )
     return out
+
+
+def _passed(finding: Finding) -> bool:
+    """Whether it was there in a recording, and is no part of the hand."""
+    kind = effect(finding.effect)
+    return kind.recorded and not kind.of_the_hand
 
 
 def compared(finding: Finding) -> bool:

@@ -24,7 +24,7 @@ from .declared import DeclaredFit, fit_declared
 from .findings import NOT_TAKEN, CouplingResidual, Finding, RigFindings, measured, whereabouts, within_a_sample
 from .horizon import open_loop
 from .model import RigModel, load_rig
-from .name.beside import Score, score
+from .name.beside import Beside, Score
 from .name.candidates import Candidate, candidates
 from .name.compete import LEAST_SHARE, Step, judge
 from .name.joint_search import as_term, offsets_first, offsets_of_chain, search_joints
@@ -321,10 +321,13 @@ def _off_axis(bench: Bench, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple[
 
 def _better_alone(rig: RigModel, fit: DeclaredFit, terms: Sequence[Term], error: float) -> bool:
     """Whether any effect at one joint leaves less held-out error than `error` of a change to the whole chain."""
-    problem = pose(fit)
-    parts = normal(problem, terms)
-    every = (c for j in dict.fromkeys(r.joint for r in fit.rows) for c in candidates(rig, fit, j))
-    return any(score(problem, terms, c, parts).error.sum() < error for c in every)
+    problem, beside = pose(fit), tuple(terms)
+    parts = normal(problem, beside)
+    for joint in dict.fromkeys(r.joint for r in fit.rows):
+        with Beside(problem, beside, parts, candidates(rig, fit, joint), len(beside)) as rivals:
+            if any(s.error.sum() < error for s in rivals.scores()):
+                return True
+    return False
 
 
 # --- couplings -------------------------------------------------------------------------------------------------------

@@ -136,12 +136,27 @@ def _turns(time_s: Array, usual_s: float) -> Array:
     stay so."""
     early = time_s - usual_s * np.arange(len(time_s))
     lost = np.zeros(len(time_s))
-    far = np.flatnonzero(np.diff(time_s) > 1.5 * usual_s) + 1
+    far = _not_made_up(np.diff(time_s) - usual_s, usual_s) + 1
     for i, next_far in zip(far, np.append(far, len(time_s))[1:], strict=True):
         after, before = early[i : min(i + BESIDE, next_far)], early[max(i - BESIDE, 0) : i]
         lost[i] = max(round(float(np.median(after) - np.median(before)) / usual_s), 0)
         early[i:] -= lost[i] * usual_s
     return np.arange(len(time_s)) + np.cumsum(lost)
+
+
+def _not_made_up(late_s: Array, usual_s: float) -> NDArray[np.intp]:
+    """Steps between rows that are longer than usual by more than half (late_s (n,): by how much [s]), but for those whose
+    delay rows that follow close upon each other make up for: packets come late, and nothing is lost."""
+    out, made_up = [], 0.0
+    for i in range(len(late_s) - 1, -1, -1):
+        if late_s[i] < -0.5 * usual_s:
+            made_up -= late_s[i]
+        elif late_s[i] > 0.5 * usual_s:
+            if late_s[i] > made_up + 0.5 * usual_s:
+                out.append(i)
+            else:
+                made_up = max(made_up - late_s[i], 0.0)
+    return np.array(out[::-1], dtype=np.intp)
 
 
 def _line(at: Array, values: Array, width: float) -> Array:

@@ -13,6 +13,7 @@ from ..motor import DriveNow, DriveTerms, Motion
 from ..schedule import TrialPlan
 
 Array = NDArray[np.float64]
+CLOSE_S = 1e-5  # between rows that were stamped at once
 
 
 @effect("rhythmic_disturbance", "outside", "current", ("load", "pickup"))
@@ -119,6 +120,9 @@ def buffered_log(draw: Draw) -> Influence:
         edges = np.arange(0, len(time_s), size)
         late = np.interp(np.arange(len(time_s)), edges, time_s[edges])
         lag = 0.04 * (np.arange(len(time_s)) // size % 3)
-        return columns | {"time": np.maximum.accumulate(late + lag) + 1e-5 * np.arange(len(time_s))}
+        stamped = late + lag
+        for i in range(1, len(stamped)):  # what waited comes at once, row after row
+            stamped[i] = max(stamped[i], stamped[i - 1] + CLOSE_S)
+        return columns | {"time": stamped}
 
     return Influence(log=log)

@@ -1,12 +1,14 @@
-"""Messy sessions whose main effect was not among the first three: information that is missing, or method?
+"""Sessions whose main effect was not named: information that is missing, or method?
 
-    python scripts/messy_oracle.py FOLDER [FOLDER ...]
+    python scripts/missed_oracle.py FOLDER [FOLDER ...] [--kind messy]
 
-FOLDER: as `second_trial.py` left it. Where the main effect belongs to a balance (a motor's current, an angle against
-another), the search of that balance is begun with it, and it is kept there until no other effect comes or goes. Printed:
-the log evidence [nats] of that whole model over the one that was named, coefficients unlike the hand's other motors paid
-for. Below zero, what was named is likelier than the truth: the recordings do not tell. Above three, the search was at
-fault. A marker's effect has no balance, and is passed over.
+FOLDER: as `second_trial.py` or `hand-model blind-trial` left it. Missed is a messy session whose main effect is not
+among the first three, and one of another kind (single, weak, pair) of which an effect is not named. Where it belongs to a balance
+(a motor's current, an angle against another), the search of that balance is begun with it, and it is kept there until
+no other effect comes or goes. Printed: the log evidence [nats] of that whole model over the one that was named,
+coefficients unlike the hand's other motors paid for. Below zero, what was named is likelier than the truth: the
+recordings do not tell. Of what was taken for healthy the truth must bring nine to be told from chance. A marker's effect
+has no balance, and is passed over.
 """
 
 from __future__ import annotations
@@ -46,17 +48,18 @@ def forced(station: Station, name: str) -> tuple[float, tuple[str, ...]]:
     return favour(balance, best, named), tuple(t.effect.name for t in best.terms)
 
 
-def missed(folder: Path) -> list[tuple[str, dict[str, Any], list[str]]]:
-    """Messy sessions of a set whose main effect is not among the first three: case, main effect, what was named."""
+def missed(folder: Path, kind: str) -> list[tuple[str, dict[str, Any], list[str]]]:
+    """Effects of sessions of a kind in a set that are not named (messy: the main one, among the first three): case, effect,
+    what was named."""
     out = []
     for case, hidden in sorted(json.loads((folder / "answers.json").read_text()).items()):
         path = folder / "findings" / case / "findings.json"
-        if hidden["case"] != "messy" or not path.exists():
+        if hidden["case"] != kind or not path.exists():
             continue
-        main, findings = hidden["effects"][0], json.loads(path.read_text())["findings"]
+        findings = json.loads(path.read_text())["findings"]
         named = [(f["effect"], f["where"]["finger"]) for f in findings]
-        if (main["effect"], main["finger"]) not in named[:3]:
-            out.append((case, main, [name for name, _ in named]))
+        asked, told = (hidden["effects"][:1], named[:3]) if kind == "messy" else (hidden["effects"], named)
+        out += [(case, e, [n for n, _ in named]) for e in asked if (e["effect"], e["finger"]) not in told]
     return out
 
 
@@ -64,8 +67,10 @@ def main() -> None:
     """Print a line per missed session."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("folders", nargs="+", type=Path, metavar="FOLDER")
-    for folder in parser.parse_args().folders:
-        for case, effect, named in missed(folder):
+    parser.add_argument("--kind", default="messy", choices=("messy", "weak", "single", "pair"))
+    given = parser.parse_args()
+    for folder in given.folders:
+        for case, effect, named in missed(folder, given.kind):
             name, own = effect["effect"], {e.name: s for s, k in SIGNALS.items() for e in catalogue(k)}
             line = f"{folder.name} {case}: {name}, named {', '.join(named[:4]) or 'nothing'}"
             if name not in own:
