@@ -193,6 +193,8 @@ def test_what_one_recording_had_is_no_form_of_what_a_hand_always_has() -> None:
     passing, lasting = (finding(name, "index", "current", **small) for name in ("external_contact", "end_stop_contact"))
     assert names((1.0, main), (0.01, passing)) == ["elastoplastic_hysteresis", "external_contact"]
     assert names((1.0, main), (0.01, lasting)) == ["elastoplastic_hysteresis"]
+    swapped = finding("marker_swap", "index", "markers", lasting=0.04)  # which no file of `effects` describes
+    assert names((1.0, main), (0.01, swapped)) == ["elastoplastic_hysteresis"]
 
 
 def test_exchanged_labels_make_no_trifle_of_what_a_current_shows() -> None:

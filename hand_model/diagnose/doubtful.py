@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from ..effects import effect
+from ..effects import catalogue
 from ..effects.clock_drift import CRYSTALS
 from .findings import Finding
 from .locate.preload import COMPARISON
@@ -15,6 +15,8 @@ REFUSED = "command_as_measurement"  # a channel that tells nothing: no other fin
 TRIFLE = 0.01  # of the square of the heaviest weight
 SURE = 0.99  # probability of what a comparison alone says
 DOUBT = "only the hand's other motors speak for it, and it may be chance"
+# what was there in a recording, and is no part of the hand
+PASSING = frozenset(e.name for e in catalogue() if e.recorded and not e.of_the_hand)
 HEALTHY = "the clocks of two healthy crystals differ by as much"  # and by how much
 
 
@@ -39,7 +41,7 @@ def trifles(ranked: list[tuple[float, Finding]], magnitudes: Mapping[int, float]
         )
         heaviest, main = next(beside, (0.0, finding))
         first, most = next(iter(others), (0.0, finding))
-        if small(weight, finding, heaviest) and not _passed(finding):
+        if small(weight, finding, heaviest) and finding.effect not in PASSING:
             out.append(
                 (finding, f"a trifle beside {main.effect.replace('_', ' ')}, whose form may be slightly another")
             )
@@ -48,12 +50,6 @@ def trifles(ranked: list[tuple[float, Finding]], magnitudes: Mapping[int, float]
                 (finding, f"a trifle beside {most.effect.replace('_', ' ')} of the {most.where['finger']} finger")
             )
     return out
-
-
-def _passed(finding: Finding) -> bool:
-    """Whether it was there in a recording, and is no part of the hand."""
-    kind = effect(finding.effect)
-    return kind.recorded and not kind.of_the_hand
 
 
 def compared(finding: Finding) -> bool:
