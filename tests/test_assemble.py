@@ -23,6 +23,7 @@ from hand_model.diagnose.assemble import (
     _without_shadows,
     assemble,
 )
+from hand_model.diagnose.doubtful import refuted, without_refuted
 from hand_model.diagnose.findings import Finding, of_one_whole, weighed
 from hand_model.diagnose.hearing import _without_settled_sags
 from hand_model.diagnose.locate.answers import Answers
@@ -195,6 +196,27 @@ def test_what_one_recording_had_is_no_form_of_what_a_hand_always_has() -> None:
     assert names((1.0, main), (0.01, lasting)) == ["elastoplastic_hysteresis"]
     swapped = finding("marker_swap", "index", "markers", lasting=0.04)  # which no file of `effects` describes
     assert names((1.0, main), (0.01, swapped)) == ["elastoplastic_hysteresis"]
+
+
+def told(after: float, fall: list[float]) -> Finding:
+    """A give after whose compiled files an error of 0.12 is another, by the noise of 0.1."""
+    fit = {"before": 0.12, "after": after, "ci95_reduction": fall, "noise_floor": 0.1, "held_out": ["log/b.csv"]}
+    return replace(finding("series_elasticity", "index", "encoder", form=0.0, compliance=0.01), fit={**FIT, **fit})
+
+
+def test_what_recordings_kept_out_refute_is_unexplained() -> None:
+    drag, worse = finding("quadratic_damping", "ring", "current", drag=0.01), told(0.46, [-0.62, -0.03])
+    found = assemble([], [(1.0, drag)], [])
+    rest = without_refuted(replace(found, findings=(drag, told(0.1, [0.01, 0.03]))))
+    assert [f.effect for f in rest.findings] == ["quadratic_damping", "series_elasticity"] and not rest.unexplained
+    for fit_of in (told(0.13, [-0.03, 0.01]), told(0.104, [-0.03, -0.01])):  # not for sure, or within the noise
+        assert not refuted(fit_of)
+    both = without_refuted(replace(rest, findings=(drag, worse)))
+    assert [f.effect for f in both.findings] == ["quadratic_damping"] and both.verdict == "mismatch"
+    alone = without_refuted(replace(rest, findings=(worse,)))
+    assert alone.verdict == "unexplained" and "series elasticity" in alone.unexplained[0]["shape"]
+    assert alone.rejected[-1]["effect"] == "series_elasticity"
+    assert names((1.0, drag), (0.5, worse)) == ["quadratic_damping"]  # nor does it stand among others before
 
 
 def test_exchanged_labels_make_no_trifle_of_what_a_current_shows() -> None:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from shutil import rmtree
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from ..hand import Hand
 from ..output import replacing
 from ..session import Session, read_session
 from .assemble import assemble
+from .doubtful import refuted, without_refuted
 from .findings import FILES, FOLDERS, Findings
 from .hearing import Heard
 from .locate.drive import drive_trials
@@ -157,9 +159,13 @@ def _modelled(
         if isinstance(hand, HandModelError):
             raise hand
         heard.tell(f"writing {output / 'model'}")
-        named, replays = write_improved(
-            hand, findings.findings, stations, ranges_of_counts(session), output, heard.courses
-        )
+        counts, courses = ranges_of_counts(session), heard.courses
+        named, replays = write_improved(hand, findings.findings, stations, counts, output, courses)
+        if any(refuted(f) for f in named):
+            findings = without_refuted(replace(findings, findings=named))
+            for folder in FOLDERS[:2]:
+                rmtree(output / folder)
+            named, replays = write_improved(hand, findings.findings, stations, counts, output, courses)
     except HandModelError as error:
         return replace(findings, notes=(*findings.notes, f"no model was written: {error}")), ()
     known = {f.name for f in hand.fingers}

@@ -1,13 +1,14 @@
-"""What is named and stands on little: small beside something else, by a comparison of drives alone, or no more than two
-healthy clocks differ by."""
+"""What is named and stands on little: small beside something else, by a comparison of drives alone, no more than two
+healthy clocks differ by, or against what recordings kept out say."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from ..effects import catalogue
 from ..effects.clock_drift import CRYSTALS
-from .findings import Finding
+from .findings import Finding, Findings, of_one_whole
 from .locate.preload import COMPARISON
 from .magnitude import SLIGHT
 
@@ -15,6 +16,8 @@ REFUSED = "command_as_measurement"  # a channel that tells nothing: no other fin
 TRIFLE = 0.01  # of the square of the heaviest weight
 SURE = 0.99  # probability of what a comparison alone says
 DOUBT = "only the hand's other motors speak for it, and it may be chance"
+WITHIN = 1.05  # times the noise: an error within it is none
+REFUTED = "with it recordings kept out are told worse"
 # what was there in a recording, and is no part of the hand
 PASSING = frozenset(e.name for e in catalogue() if e.recorded and not e.of_the_hand)
 HEALTHY = "the clocks of two healthy crystals differ by as much"  # and by how much
@@ -59,7 +62,39 @@ def compared(finding: Finding) -> bool:
 
 def doubted(found: Sequence[Finding]) -> list[tuple[Finding, str]]:
     """What is no fault for sure, each with the reason: what a comparison alone says, and not surely, for there are more
-    healthy drives than drives of which nothing else would show what they have; clocks that part as healthy ones do."""
+    healthy drives than drives of which nothing else would show what they have; clocks that part as healthy ones do; what
+    is refuted."""
     alone = [(f, DOUBT) for f in found if compared(f) and f.probability < SURE]
     rates = [(f, f.parameters["rate_minus_one"]["value"]) for f in found if f.effect == "clock_drift"]
-    return alone + [(f, f"{HEALTHY}: {1e6 * rate:.0f} ppm") for f, rate in rates if abs(rate) <= CRYSTALS]
+    healthy = [(f, f"{HEALTHY}: {1e6 * rate:.0f} ppm") for f, rate in rates if abs(rate) <= CRYSTALS]
+    return [*alone, *healthy, *((f, REFUTED) for f in found if refuted(f))]
+
+
+def refuted(finding: Finding) -> bool:
+    """Whether the error of recordings kept out surely rises with a finding, and beyond their noise."""
+    before, after, fall, floor = (finding.fit.get(k) for k in ("before", "after", "ci95_reduction", "noise_floor"))
+    if before is None or after is None or fall is None or None in fall or not finding.fit.get("held_out"):
+        return False
+    return after > before and fall[1] < 0 and after > WITHIN * (floor or 0.0)
+
+
+def without_refuted(findings: Findings) -> Findings:
+    """The findings without those that their own compiled files refute: what they were to explain is unexplained."""
+    wrong = [f for f in findings.findings if refuted(f)]
+    left = [
+        {
+            "where": {k: f.where.get(k) for k in ("finger", "joint", "actuator", "signal")},
+            "share_of_mismatch": f.where["share_of_mismatch"],
+            "shape": f"no known effect, though much like {f.effect.replace('_', ' ')}: {REFUTED}",
+        }
+        for f in wrong
+    ]
+    said = [{"effect": f.effect, "where": str(f.where["finger"]), "reason": REFUTED} for f in wrong]
+    kept, unexplained = of_one_whole([f for f in findings.findings if f not in wrong], [*findings.unexplained, *left])
+    return replace(
+        findings,
+        verdict="mismatch" if kept else "unexplained",
+        findings=kept,
+        unexplained=unexplained,
+        rejected=(*findings.rejected, *said),
+    )

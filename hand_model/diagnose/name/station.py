@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -224,10 +223,7 @@ class Station:
     def kept(self) -> tuple[Named, ...]:
         """The effects that stand beside each other: one of a small share may be no more than the form of the large one
         being another, and is left to the unexplained part; so is what is smaller than something that no table names, or,
-        where no test sees anything, holds less of it; of what one recording alone has, where it is not told apart. None
-        where they stand beside a stranger alone."""
-        if self._leaning:
-            return ()
+        where no test sees anything, holds less of it; of what one recording alone has, where it is not told apart."""
         strange = max((f.size for f in self._unlisted), default=0.0)
         lasting = max((f.size for f in self._unlisted if f.term.effect.of_the_hand), default=0.0)
         unseen = self.naming.before.p >= ALPHA
@@ -243,16 +239,6 @@ class Station:
             and f.term.effect.name not in covered
             and (f.size >= restless or not f.term.effect.drifting)
         )
-
-    @property
-    def _leaning(self) -> bool:
-        """Whether the effects of the table, without what no table names beside them, make recordings kept out worse than
-        the declared model: they make up for what that does."""
-        naming = self.naming
-        whiches = [naming.fit.terms.index(f.term) for f in self._unlisted]
-        strange: Any = sum(naming.fit.prediction - naming.balance.removed(naming.fit, which) for which in whiches)
-        alone = replace(naming.fit, prediction=naming.fit.prediction - strange)
-        return bool(whiches) and variance_ratio(naming, alone) > max(self._kept_out[0], self._noisy)
 
     def steadily(self, named: Named) -> bool:
         """Whether steady motion holds the better part of what a name brings: else how starts and stops are read may."""
