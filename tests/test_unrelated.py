@@ -10,7 +10,7 @@ from test_kinematic_stations import joint
 
 from hand_model.diagnose.name.judgement import judged
 from hand_model.diagnose.name.station import Station
-from hand_model.diagnose.unrelated import Regression, left_of_seen, less_foretold, together
+from hand_model.diagnose.unrelated import Regression, _of_markers, left_of_seen, less_foretold, together
 from hand_model.effects import catalogue
 from hand_model.effects.base import DriveState
 
@@ -103,3 +103,21 @@ def test_a_follower_that_tells_nothing_of_its_driver_leaves_it_as_it_is() -> Non
     driver, follows, stations = both(*two_joints(4, alike=SLOPE))  # what is seen of both is then none of the first's
     assert less_foretold(driver.states, driver.left, left_of_seen(follows, driver)) is None
     assert stations[0] is driver.station
+
+
+def test_what_the_log_s_clock_does_is_none_of_the_markers_errors() -> None:
+    def recorded(noise: float, drift: float = 0.003) -> States:
+        told = joint(2, noise=noise, drift=drift)
+        return tuple(replace(s, acceleration=np.gradient(s.velocity, s.time_s)) for s in told)
+
+    driver, clean = heard(recorded(NOISE), "encoder"), {s.trial: s for s in recorded(0.0)}
+    assert names(driver.station) == ["clock_drift"]
+    errors = {s.trial: s.effort - clean[s.trial].effort for s in driver.states}
+
+    def beyond(left) -> float:
+        rest = [v - errors[k][np.searchsorted(clean[k].time_s, t)] for k, (t, v) in left.items()]
+        return float(np.std(np.concatenate(rest)))
+
+    assert beyond(_of_markers(driver)) < 0.9 * beyond(driver.left)
+    healthy = heard(recorded(NOISE, drift=0.0), "encoder")
+    assert all(np.array_equal(v, healthy.left[k][1]) for k, (_, v) in _of_markers(healthy).items())

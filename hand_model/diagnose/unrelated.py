@@ -52,7 +52,23 @@ def together(
     driver = _beside(driver, follower, left_of_seen(follower, driver))
     if driver.station.naming.names != before and (states := anew(driver.station)):
         follower = Regression(follower.judge(states), states, follower.judge)
-    return driver.station, _beside(follower, driver, driver.left).station
+    return driver.station, _beside(follower, driver, _of_markers(driver)).station
+
+
+def _of_markers(driver: Regression) -> Left:
+    """What a driver's station leaves, less what its log's clock does to it, to the second order of how far that is off,
+    where it drifts: the markers know nothing of it, and a drift is named to the first."""
+    balance, left = driver.station.naming.balance, driver.left
+    if not any(t.effect.signal == "log" for t in driver.station.naming.fit.terms):
+        return left
+    moved = _gathered(driver.states, balance, lambda s: s.slope[:, None] * np.stack([s.velocity, s.acceleration], 1))
+    out = {}
+    for trial, (time_s, motion) in balance.by_recording(moved).items():
+        since = (time_s - time_s[0]) / max(float(np.ptp(time_s)), 1e-9)
+        columns = (motion[:, :, None] * since[:, None, None] ** np.arange(PLACES)).reshape(len(time_s), -1)
+        own = left[trial][1]
+        out[trial] = time_s, own - columns @ np.linalg.lstsq(columns, own, rcond=None)[0]
+    return out
 
 
 def _beside(mine: Regression, other: Regression, theirs: Left) -> Regression:
