@@ -12,7 +12,7 @@ import numpy as np
 from ..effects import catalogue
 from ..effects.base import sample_interval
 from .doubtful import REFUSED, compared, doubted, trifles
-from .findings import Finding, Findings, of_one_whole
+from .findings import Finding, Findings, of_one_whole, rejection
 from .locate.displacement import NO_HINGE, NOT_RIGID
 from .locate.markers import HINGE, SLIPS
 from .locate.preload import usual_spring
@@ -86,13 +86,8 @@ def assemble(
             for merged in _merged(names or ()):
                 weight, finding = finding_of(station, *merged)
                 if _magnitude(finding, stations) < _beneath(station, merged[0]):
-                    rejected.append(
-                        {
-                            "effect": finding.effect,
-                            "where": str(station.finger),
-                            "reason": "no test sees it beside the noise, and it is minute for one of its kind",
-                        }
-                    )
+                    minute = "no test sees it beside the noise, and it is minute for one of its kind"
+                    rejected.append(rejection(finding.effect, station.finger, minute))
                 else:
                     ranked.append((weight, finding))
         elif station.missing:
@@ -100,7 +95,7 @@ def assemble(
         if stands and station.naming.after.p < ALPHA and station.explained < NEARLY_ALL:
             unexplained.append(unexplained_of(station, 1 - station.explained))
         rejected += [
-            {"effect": name, "where": str(station.finger), "reason": _reason(value)}
+            rejection(name, station.finger, _reason(value))
             for name, value in station.naming.rejected[:4]
             if name in NAMES
         ]
@@ -273,7 +268,7 @@ def _without(
     ranked: list[tuple[float, Finding]], left_out: list[tuple[Finding, str]]
 ) -> tuple[list[tuple[float, Finding]], list[dict[str, str]]]:
     """The others, and what is left out with its reason, as it is told."""
-    told = [{"effect": f.effect, "where": str(f.where["finger"]), "reason": reason} for f, reason in left_out]
+    told = [rejection(f.effect, f.where["finger"], reason) for f, reason in left_out]
     return [(w, f) for w, f in ranked if all(f is not other for other, _ in left_out)], told
 
 

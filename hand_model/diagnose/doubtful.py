@@ -8,15 +8,15 @@ from dataclasses import replace
 
 from ..effects import catalogue
 from ..effects.clock_drift import CRYSTALS
-from .findings import Finding, Findings, of_one_whole
+from .findings import Finding, Findings, of_one_whole, rejection
 from .locate.preload import COMPARISON
 from .magnitude import SLIGHT
+from .name.station import KEPT_OUT
 
 REFUSED = "command_as_measurement"  # a channel that tells nothing: no other finding is small beside it
 TRIFLE = 0.01  # of the square of the heaviest weight
 SURE = 0.99  # probability of what a comparison alone says
 DOUBT = "only the hand's other motors speak for it, and it may be chance"
-WITHIN = 1.05  # times the noise: an error within it is none
 REFUTED = "with it recordings kept out are told worse"
 # what was there in a recording, and is no part of the hand
 PASSING = frozenset(e.name for e in catalogue() if e.recorded and not e.of_the_hand)
@@ -26,9 +26,8 @@ HEALTHY = "the clocks of two healthy crystals differ by as much"  # and by how m
 def trifles(ranked: list[tuple[float, Finding]], magnitudes: Mapping[int, float]) -> list[tuple[Finding, str]]:
     """Findings that are small for their kind and hardly show beside the heaviest one, each with the reason. Of the same
     finger they may be no more than its form being another; what markers alone show shapes no current, and the form of
-    what a hand always has none of what one recording had. Of another finger
-    they are what is left of all that could have been missing of a healthy one: of a thousand hands with one or two
-    effects none had a second one as small."""
+    what a hand always has none of what one recording had. Of another finger they are what is left of all that could have
+    been missing of a healthy one: of a thousand hands with one or two effects none had a second one as small."""
 
     def small(weight: float, finding: Finding, heaviest: float) -> bool:
         return weight**2 < TRIFLE * heaviest**2 and magnitudes[id(finding)] < SLIGHT
@@ -75,7 +74,7 @@ def refuted(finding: Finding) -> bool:
     before, after, fall, floor = (finding.fit.get(k) for k in ("before", "after", "ci95_reduction", "noise_floor"))
     if before is None or after is None or fall is None or None in fall or not finding.fit.get("held_out"):
         return False
-    return after > before and fall[1] < 0 and after > WITHIN * (floor or 0.0)
+    return after > before and fall[1] < 0 and after > KEPT_OUT * (floor or 0.0)
 
 
 def without_refuted(findings: Findings) -> Findings:
@@ -89,8 +88,9 @@ def without_refuted(findings: Findings) -> Findings:
         }
         for f in wrong
     ]
-    said = [{"effect": f.effect, "where": str(f.where["finger"]), "reason": REFUTED} for f in wrong]
-    kept, unexplained = of_one_whole([f for f in findings.findings if f not in wrong], [*findings.unexplained, *left])
+    said = (rejection(f.effect, f.where["finger"], REFUTED) for f in wrong)
+    right = [f for f in findings.findings if not refuted(f)]
+    kept, unexplained = of_one_whole(right, [*findings.unexplained, *left])
     return replace(
         findings,
         verdict="mismatch" if kept else "unexplained",

@@ -99,6 +99,11 @@ class Findings:
         return target
 
 
+def rejection(effect: str, finger: str | None, reason: str) -> dict[str, str]:
+    """What was considered at a finger (None: at none in particular) and is no finding, as it is told."""
+    return {"effect": effect, "where": str(finger), "reason": reason}
+
+
 def of_one_whole(
     found: Sequence[Finding], unexplained: Sequence[Mapping[str, Any]]
 ) -> tuple[tuple[Finding, ...], tuple[Mapping[str, Any], ...]]:

@@ -27,6 +27,7 @@ FORETOLD_LEAST = 0.1  # of the variance: less is not worth another hearing
 FAR = 4.0  # standard deviations, beyond which an error is no measure of the others
 FEWEST = 200  # frames
 PLACES = 3  # powers of the place in the range
+ORDERS = 3  # powers of the time for which a clock has drifted
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ def _of_markers(driver: Regression) -> Left:
     out = {}
     for trial, (time_s, motion) in balance.by_recording(moved).items():
         since = (time_s - time_s[0]) / max(float(np.ptp(time_s)), 1e-9)
-        columns = (motion[:, :, None] * since[:, None, None] ** np.arange(PLACES)).reshape(len(time_s), -1)
+        columns = (motion[:, :, None] * since[:, None, None] ** np.arange(ORDERS)).reshape(len(time_s), -1)
         own = left[trial][1]
         out[trial] = time_s, own - columns @ np.linalg.lstsq(columns, own, rcond=None)[0]
     return out

@@ -148,14 +148,13 @@ def _not_made_up(late_s: Array, usual_s: float) -> NDArray[np.intp]:
     """Steps between rows that are longer than usual by more than half (late_s (n,): by how much [s]), but for those whose
     delay rows that follow close upon each other make up for: packets come late, and nothing is lost."""
     out, made_up = [], 0.0
-    for i in range(len(late_s) - 1, -1, -1):
+    for i in reversed(range(len(late_s))):
         if late_s[i] < -0.5 * usual_s:
             made_up -= late_s[i]
+        elif late_s[i] > made_up + 0.5 * usual_s:
+            out.append(i)
         elif late_s[i] > 0.5 * usual_s:
-            if late_s[i] > made_up + 0.5 * usual_s:
-                out.append(i)
-            else:
-                made_up = max(made_up - late_s[i], 0.0)
+            made_up = max(made_up - late_s[i], 0.0)
     return np.array(out[::-1], dtype=np.intp)
 
 

@@ -79,17 +79,19 @@ def turned_support(states: Sequence[DriveState], before: Sequence[DriveState] = 
     tried = {begins: _scatter(records, _acting(records, begins)) for begins in _moments(records)}
     best = min(tried, key=lambda begins: tried[begins])
     gain, drift = (_likelier(count, none, x) for x in (tried[best], _scatter(records, [r.share for r in records])))
-    if gain - np.log(len(tried)) < BEYOND_CHANCE or gain < drift + PLAINER or _ends(records, best, tried[best]):
+    if gain - np.log(len(tried)) < BEYOND_CHANCE or gain < drift + PLAINER or _steps_too(_records(before), best):
         return None
-    if _steps_too(_records(before), best):
+    if _ends(records, best, tried[best]):
         return None
     best = _refined(records, best)
     return Turned(float(_fit(records, _acting(records, best))[0][-1]), gain, tuple(records), best)
 
 
 def _records(states: Sequence[DriveState]) -> list[_Record]:
+    if not states:
+        return []
     out, first = [], 0
-    low, high = position_range(states) if states else (0.0, 1.0)
+    low, high = position_range(states)
     for state in states:
         good = np.flatnonzero(np.isfinite(state.effort))
         good = good[:: max(1, len(good) // SAMPLES)]
@@ -150,8 +152,8 @@ def _scatter(records: Sequence[_Record], column: Sequence[Array] | None) -> floa
 def _ends(records: Sequence[_Record], begins: tuple[float, ...], stays: float) -> bool:
     """Whether it is over before the recordings are, rather (a while), or an obstacle pushes that was there for a while.
     begins: of the step that stays, and what that leaves."""
-    least = min(_scatter(records, column) for column in _passing(records, begins))
-    return _likelier(_strokes_of(records), stays, least) > PLAINER
+    count = _strokes_of(records)
+    return any(_likelier(count, stays, _scatter(records, c)) > PLAINER for c in _passing(records, begins))
 
 
 def _passing(records: Sequence[_Record], begins: tuple[float, ...]) -> Iterator[list[Array]]:
