@@ -10,10 +10,10 @@ from rig_pendulum import LEVER, MASS, planted
 
 from hand_model.rig import fit_declared, load_rig
 from hand_model.rig.balance import Column
-from hand_model.rig.consistent import BASIS, consistent, is_physical, pseudo_inertia
+from hand_model.rig.consistent import BASIS, _Barrier, consistent, is_physical, pseudo_inertia
 from hand_model.rig.dynamics import INERTIAL, inertial_columns, inertial_parameters
 from hand_model.rig.physical import physical
-from hand_model.rig.solve import solve_bounded
+from hand_model.rig.solve import Nested, solve_bounded
 from hand_model.session import read_session
 
 TREE = """<mujoco><compiler angle="radian"/><option gravity="0.3 -1 -9.81"/><worldbody>
@@ -53,6 +53,50 @@ def test_bounded_solution_meets_the_optimality_conditions() -> None:
         free = theta > low + 1e-9
         assert np.all(np.abs(slope[free]) < 1e-6 * np.abs(x.T @ y).max())
         assert np.all(slope[~free] > -1e-6)
+
+
+def test_columns_beside_others_get_the_bounded_solution_of_all() -> None:
+    """Nested in what stands, one or two columns more give what all give at once, whichever bounds they move, be they new
+    or all but known already."""
+    random, quick = np.random.default_rng(0), 0
+    for k in range(200):
+        x, y, many = random.normal(size=(40, 8)), random.normal(size=40) * 3, 1 + k % 2
+        x[:, 6] += random.choice([0.0, 3.0, 1e7]) * x[:, 0]
+        low = np.where(random.random(8) < 0.5, 0.0, -np.inf)
+        few, more = x[:, : 8 - many], x[:, 8 - many :]
+        box = low, np.full(8, np.inf), np.r_[random.normal(size=8 - many), np.zeros(many)], np.full(8, 1e-3)
+        nested = Nested(few.T @ few, few.T @ y, *(b[: 8 - many] for b in box))
+        sums = few.T @ more, more.T @ more, more.T @ y
+        theta = nested.solve(*sums, *(box[i][8 - many :] for i in (0, 1, 3)))
+        everything = solve_bounded(x.T @ x, x.T @ y, *box)
+
+        def cost(at: np.ndarray, x: np.ndarray = x, y: np.ndarray = y, box: tuple = box) -> float:
+            return float(np.sum((y - x @ at) ** 2) + np.sum(box[3] * (at - box[2]) ** 2))
+
+        assert np.all(theta >= low - 1e-12) and cost(theta) == pytest.approx(cost(everything), rel=1e-9)
+        quick += (
+            nested._quick(sums[0], sums[1] + 1e-3 * np.eye(many), sums[2], *(b[8 - many :] for b in box[:2]))
+            is not None
+        )
+    assert 60 < quick < 200  # both ways were gone
+
+
+def test_slopes_of_the_barrier_are_those_of_its_value() -> None:
+    """Gradient and Hessian by finite differences, of two bodies of which one has parameters that stay as declared, and
+    an edge."""
+    body = np.array([1.2, 0.1, -0.2, 0.3, 0.9, 1.0, 1.1, 0.05, -0.04, 0.03])
+    own = np.array([[0, 1, 2, 3, 4, 5, 6, 7, 8, 9], [11, -1, 12, -1, 13, 14, 15, -1, -1, -1]])
+    x = np.zeros(16)
+    for places in own:
+        x[places[places >= 0]] = body[places >= 0]
+    x[10], unit = 0.7, np.linspace(0.5, 2.0, 16)
+    barrier = _Barrier(own, np.array([body, body]), unit, np.array([10]), np.array([1.0]), np.array([0.2]))
+    x, step = x / unit, 1e-5
+    slope, bend = barrier.slopes(x)
+    for i, e in enumerate(step * np.eye(16)):
+        assert slope[i] == pytest.approx((barrier.value(x + e) - barrier.value(x - e)) / (2 * step), rel=1e-5, abs=1e-6)
+        turned = (barrier.slopes(x + e)[0] - barrier.slopes(x - e)[0]) / (2 * step)
+        np.testing.assert_allclose(bend[i], turned, rtol=1e-5, atol=1e-5 * np.abs(bend).max())
 
 
 def test_physical_keeps_what_is_physical_and_mends_what_is_not() -> None:

@@ -12,10 +12,11 @@ from hand_model.effects.path import jenkins
 from hand_model.rig import diagnose_rig, load_rig
 from hand_model.rig.diagnose import trusted_fit
 from hand_model.rig.laws import TURNING
+from hand_model.rig.name.added import Added
 from hand_model.rig.name.beside import score
 from hand_model.rig.name.candidates import candidates
 from hand_model.rig.name.compete import _settled_down, borne_out, compete, splits
-from hand_model.rig.name.problem import Term, extended, normal, pose
+from hand_model.rig.name.problem import Term, extended, normal, pose, training_error
 from hand_model.session import read_session
 
 
@@ -92,6 +93,22 @@ def test_a_column_beside_a_delay_is_late_as_all_others_are(tmp_path: Path) -> No
         extended(problem, [late], drag, normal(problem, [late])), normal(problem, [late, drag]), strict=True
     ):
         np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9 * np.abs(other).max())
+
+
+def test_a_term_added_leaves_what_the_fit_of_all_leaves(tmp_path: Path) -> None:
+    """Training errors of every starting shape of every candidate, beside nothing, a turning friction and a delay."""
+    rig = load_rig(read_session(bench(tmp_path / "s", 0.3, 0.01, late=0.02)))
+    fit = trusted_fit(rig)[0]
+    every, problem = candidates(rig, fit, "hinge"), pose(fit, "hinge")
+    known = {c.effect: c for c in every}
+    late = Term(known["current_channel_delay"], {"delay": 0.02})
+    turning = Term(known["elastoplastic_hysteresis"], {"form": 1.0, "reach": 0.1})
+    for terms in ((), (turning,), (late,)):
+        parts = normal(problem, terms)
+        for c in every:
+            several = [*terms, Term(c, c.grid[-1])]
+            left = training_error(problem, several, normal(problem, several))
+            assert Added(problem, terms, c, parts).errors(c.grid)[-1] == pytest.approx(left, rel=1e-7)
 
 
 def test_a_recording_with_a_level_of_its_own_is_not_left_out_whole(tmp_path: Path) -> None:

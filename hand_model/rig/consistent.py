@@ -131,15 +131,16 @@ class _Barrier:
 
     def slopes(self, x: Array) -> tuple[Array, Array]:
         """Gradient (n,) and Hessian (n, n) at x (n,), inside."""
-        slope, bend, at, room = np.zeros(len(x)), np.zeros((len(x), len(x))), self.at.astype(int), self._room(x)
+        n, at, room = len(x), self.at.astype(int), self._room(x)
+        slope, bend = np.zeros(n + 1), np.zeros((n + 1, n + 1))  # one more for what is not in x
         np.add.at(slope, at, -self.sign / room)
         np.add.at(bend, (at, at), room**-2)
-        for i, inv in zip(self.own, np.linalg.inv(self._pseudo(x)), strict=True):
-            free = i[i >= 0]
-            part = (inv @ BASIS)[i >= 0] * self.unit[free][:, None, None]
-            slope[free] -= np.trace(part, axis1=1, axis2=2)
-            bend[np.ix_(free, free)] += np.einsum("kij,lji->kl", part, part)
-        return slope, bend
+        part = np.linalg.inv(self._pseudo(x))[:, None] @ BASIS * self.unit[self.own][:, :, None, None]
+        flat = part.reshape(*self.own.shape, 16)
+        turned = np.swapaxes(part, 2, 3).reshape(*self.own.shape, 16)
+        slope[self.own] -= np.trace(part, axis1=2, axis2=3)
+        bend[self.own[:, :, None], self.own[:, None, :]] += flat @ np.swapaxes(turned, 1, 2)
+        return slope[:n], bend[:n, :n]
 
     def _room(self, x: Array) -> Array:
         return self.sign * (x[self.at.astype(int)] - self.end)

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...background import Pair
+from .added import Added
 from .candidates import Candidate
-from .problem import Problem, Term, extended, held_out, normal, training_error, uncut
+from .problem import Problem, Term, extended, held_out, normal
 from .refit import moves, refined, refit
 
 Array = NDArray[np.float64]
@@ -83,12 +84,8 @@ class Beside:
 def score(problem: Problem, terms: Sequence[Term], candidate: Candidate, parts: tuple) -> Score:
     """The candidate at the best of its starting shapes, by the training error, beside terms with these normal
     equations."""
-    whole, sums = uncut(problem, parts)
-
-    def train(term: Term) -> float:
-        return training_error(whole, [*terms, term], extended(whole, terms, term, sums))
-
-    best = min((Term(candidate, shape) for shape in candidate.grid), key=train)
+    errors = Added(problem, terms, candidate, parts).errors(candidate.grid)
+    best = Term(candidate, candidate.grid[int(np.argmin(errors))])
     more = extended(problem, terms, best, parts)
     return Score(best, held_out(problem, [*terms, best], more), more)
 

@@ -116,7 +116,7 @@ def normal(problem: Problem, terms: Sequence[Term]) -> tuple[Array, Array, Array
     count, width = len(problem.fold), len(problem.fit.columns) + sum(len(t.candidate.amplitudes) for t in terms)
     parts = np.zeros((count, width, width)), np.zeros((count, width)), np.zeros(count), np.zeros(count)
     for row, block in zip(problem.rows, problem.block, strict=True):
-        (x, y, used), unit = _moving_design(problem, row, terms), problem.fit.scale[row.joint] ** 2
+        (x, y, used), unit = moving_design(problem, row, terms), problem.fit.scale[row.joint] ** 2
         for b, s in _pieces(block[row.moving]):
             *sums, number = sums_of(x[s], y[s], used, width)
             for part, of_block in zip(parts, (*(v / unit for v in sums), number), strict=True):
@@ -136,7 +136,7 @@ def extended(problem: Problem, terms: Sequence[Term], new: Term, parts: tuple) -
     for row, block in zip(problem.rows, problem.block, strict=True):
         if row.joint != new.candidate.joint:
             continue
-        (x, y, used), unit = _moving_design(problem, row, terms), problem.fit.scale[row.joint] ** 2
+        (x, y, used), unit = moving_design(problem, row, terms), problem.fit.scale[row.joint] ** 2
         c = term_columns(row, new, delay_of(row, terms))[row.moving]
         for b, s in _pieces(block[row.moving]):
             cross = x[s].T @ c[s] / unit
@@ -147,14 +147,7 @@ def extended(problem: Problem, terms: Sequence[Term], new: Term, parts: tuple) -
     return g, m, square, count
 
 
-def uncut(problem: Problem, parts: tuple) -> tuple[Problem, tuple]:
-    """The problem in one block, and its normal equations from those by block: all that a training error asks for."""
-    one = np.zeros(1, int)
-    block = tuple(np.zeros_like(b) for b in problem.block)
-    return replace(problem, block=block, fold=one, group=one), tuple(p.sum(0, keepdims=True) for p in parts)
-
-
-def _moving_design(problem: Problem, row: Rows, terms: Sequence[Term]) -> tuple[Array, Array, NDArray[np.int64]]:
+def moving_design(problem: Problem, row: Rows, terms: Sequence[Term]) -> tuple[Array, Array, NDArray[np.int64]]:
     """The design (m, k) and effort (m,) of a row's moving samples, and which of all columns (k,) these are: those that
     are not zero throughout. Kept with the problem."""
     key = (row.trial, row.joint, tuple((id(t.candidate), *t.shape.items()) for t in terms))
@@ -203,7 +196,7 @@ def rescaled(problem: Problem, terms: Sequence[Term]) -> Problem:
     known the recordings would say less than what was declared, and other joints would have to make up for it."""
     box, sums = limits(problem, terms), []
     for row in problem.rows:
-        sums.append((row.joint, *sums_of(*_moving_design(problem, row, terms), len(box[0]))))
+        sums.append((row.joint, *sums_of(*moving_design(problem, row, terms), len(box[0]))))
     scale = dict(problem.fit.scale)
     for _ in range(MOST_WEIGHINGS):
         gram, moment = (sum(s[k] / scale[s[0]] ** 2 for s in sums) for k in (1, 2))

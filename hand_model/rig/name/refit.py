@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...diagnose.name.term import DISCRETE
+from .added import Added
 from .candidates import Candidate
-from .problem import Problem, Term, extended, normal, training_error, uncut
+from .problem import Problem, Term, normal
 
 Array = NDArray[np.float64]
 ROUNDS = 2  # of all terms in turn
@@ -19,11 +20,13 @@ ROUNDS = 2  # of all terms in turn
 def refined(problem: Problem, terms: Sequence[Term], term: Term, parts: tuple) -> Term:
     """The term beside others (with their normal equations) in the best of its forms, its continuous shapes moved
     together."""
-    train = _error_beside(problem, terms, term, parts)
+    added = Added(problem, terms, term.candidate, parts)
+    train = added.error
     forms: dict[tuple, list[dict[str, float]]] = {}
     for shape in term.candidate.grid:
         forms.setdefault(_form(shape), []).append(shape)
-    starts = [dict(term.shape), *(min(grid, key=train) for form, grid in forms.items() if form != _form(term.shape))]
+    others = [grid for form, grid in forms.items() if form != _form(term.shape)]
+    starts = [dict(term.shape), *(grid[int(np.argmin(added.errors(grid)))] for grid in others)]
     ends = [_descended(train, term.candidate, shape) for shape in starts]
     return Term(term.candidate, min(ends, key=train))
 
@@ -54,20 +57,6 @@ def _continuous(shapes: Sequence[Mapping[str, float]]) -> dict[str, Array]:
     """Values of every continuous shape that a grid varies."""
     grid = {n: np.unique([g[n] for g in shapes]) for n in shapes[0] if n not in DISCRETE}
     return {n: values for n, values in grid.items() if len(values) > 1}
-
-
-def _error_beside(
-    problem: Problem, terms: Sequence[Term], term: Term, parts: tuple
-) -> Callable[[Mapping[str, float]], float]:
-    """Training error of the terms (with their normal equations) and one more, as a function of its shape."""
-
-    whole, sums = uncut(problem, parts)
-
-    def train(shape: Mapping[str, float]) -> float:
-        moved = Term(term.candidate, shape)
-        return training_error(whole, [*terms, moved], extended(whole, terms, moved, sums))
-
-    return train
 
 
 def _descended(
