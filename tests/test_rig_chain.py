@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from hand_model.rig import diagnose_rig
+from hand_model.rig import diagnose_rig, fit_declared, load_rig
+from hand_model.rig.balance import declared_columns
+from hand_model.rig.diagnose import trusted_fit
 from hand_model.rig.dynamics import inertial_columns, inertial_parameters
+from hand_model.rig.inverse import effort_residuals, with_bodies
+from hand_model.rig.name.candidates import candidates
+from hand_model.rig.name.problem import Term
+from hand_model.rig.proof import Bench
 from hand_model.session import read_session
 
 mujoco = pytest.importorskip("mujoco")
@@ -68,3 +75,21 @@ def test_an_offset_beside_weights_off_their_axes_is_that_of_its_joint(tmp_path: 
     assert weights.effect == "gravity_load"
     assert weights.parameters["inertial:lower:hx"]["value"] == pytest.approx(1.5 * 0.06, rel=0.05)
     assert offset.parameters["offset"]["value"] == pytest.approx(OFFSET, rel=0.05)
+
+
+def test_balances_made_before_say_the_loads_of_a_file_with_weights_off_their_axes(tmp_path: Path) -> None:
+    """Products of inertia that only the file has come into the load as they do where the balances are made anew."""
+    rig = load_rig(read_session(arm(tmp_path / "s")))
+    fit = trusted_fit(rig)[0]
+    freed = fit_declared(rig, cutoff_hz=fit.cutoff_hz, off_axis=True)
+    by_load = candidates(rig, freed, "shoulder", only={"load_dependent_friction"})[0]
+    terms = [Term(by_load, by_load.grid[0])]
+    theta = np.append(freed.theta, 0.2)
+    file = replace(rig, xml=Bench(rig).file(freed, terms, theta))
+    lacks = {c.label for c in declared_columns(file)} - {c.label for c in fit.columns}
+    assert any(label.endswith(("xy", "xz")) for label in lacks)
+    sides = effort_residuals(file), effort_residuals(file, with_bodies(rig, fit.rows))
+    for anew, before in zip(*sides, strict=True):
+        np.testing.assert_allclose(before.error, anew.error, atol=1e-9 * np.abs(anew.expected).max())
+    lame = effort_residuals(file, fit.rows)
+    assert max(np.abs(a.error - b.error).max() for a, b in zip(sides[0], lame, strict=True)) > 1e-3

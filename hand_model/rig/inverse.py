@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..errors import DescriptionError
 from .balance import Column, Rows, back_emf, declared_columns, trial_rows
 from .declared import DeclaredFit
+from .dynamics import INERTIAL, inertial_columns
 from .mjcf import read_effects
 from .model import RigModel, RigTrial
 from .name.candidates import TURNS, Candidate, beside, candidates
@@ -45,15 +46,14 @@ def effort_residuals(
 ) -> tuple[EffortResidual, ...]:
     """Effort residuals of every balance of the rig, whose xml may be patched.
 
-    rows: balances of the same recordings made before (else made here, at the cut-off that the file keeps); keep:
-    (trial, joint) to look at. An effect is evaluated at the load of the file's own parameters.
+    rows: balances of the same recordings made before (else made here, at the cut-off that the file keeps), with all that
+    the file declares (`with_bodies`) where it has effects; keep: (trial, joint) to look at. An effect is evaluated at
+    the load of the file's own parameters.
     """
     records = read_effects(rig.xml)
     columns = declared_columns(rig)
     levels = {(r["joint"], k): v for r in records for k, v in r.get("frictionloss_levels", {}).items()}
     theta = np.array([levels.get((c.name, c.part), c.value) for c in columns])
-    if rows is not None and not {c.label for c in columns} <= {c.label for r in rows[:1] for c in r.declared}:
-        rows = None  # the file declares more than the balances were made for
     if rows is None:
         how = next((r for r in records if "cutoff_hz" in r), {})
         rows = tuple(
@@ -123,6 +123,41 @@ def level_records(columns: Sequence[Column], theta: Array) -> list[dict[str, Any
         if c.kind == "frictionloss" and c.part:
             levels.setdefault(c.name, {})[c.part] = float(value)
     return [{"joint": joint, "frictionloss_levels": each} for joint, each in levels.items()]
+
+
+def with_bodies(rig: RigModel, rows: Sequence[Rows]) -> tuple[Rows, ...]:
+    """The rows with a full-rate column for every inertial parameter of every body, beside those that they have: a file
+    with a centre of mass off its axis has products of inertia that the declared one has not."""
+    every = [Column("inertial", name, part, 0.0) for name in _bodies(rig) for part in INERTIAL]
+    trials, out = {t.name: t for t in rig.trials}, []
+    for trial in dict.fromkeys(r.trial for r in rows):
+        mine = [r for r in rows if r.trial == trial]
+        model, (q, v, a) = compile_model(rig, trials[trial]), mine[0].states
+        moved, still = (
+            inertial_columns(model, q, v, x, np.array(model.opt.gravity)).reshape(*q.shape, -1)
+            for x in (a, np.zeros_like(a))
+        )
+        for row in mine:
+            other = [i for i, c in enumerate(row.declared) if c.kind != "inertial"]
+            own, own_still = (
+                sum(c[:, rig.joints.index(j)] * w[:, None] for j, w in row.jacobian.items()) for c in (moved, still)
+            )
+            out.append(
+                replace(
+                    row,
+                    full_columns=np.concatenate([own, row.full_columns[:, other]], 1),
+                    still_columns=np.concatenate([own_still, row.still_columns[:, other]], 1),
+                    carried=np.append(np.ones(len(every), bool), row.carried[other]),
+                    declared=(*every, *(row.declared[i] for i in other)),
+                )
+            )
+    return tuple(out)
+
+
+def _bodies(rig: RigModel) -> list[str]:
+    """Bodies by name, without the world, in the order of their inertial columns."""
+    model = compile_model(rig)
+    return [model.body(b).name for b in range(1, model.nbody)]
 
 
 def _recolumned(rows: Sequence[Rows], columns: Sequence[Column]) -> tuple[Rows, ...]:

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .balance import Rows, declared_columns
 from .declared import DeclaredFit
-from .inverse import EffortResidual, effort_residuals, level_records
+from .inverse import EffortResidual, effort_residuals, level_records, with_bodies
 from .mjcf import write_effects
 from .model import RigModel
 from .name.problem import Term, design
@@ -30,13 +31,14 @@ PARTS = 24  # blocks that the held-out recordings of a joint are cut into
 class Bench:
     """Measures fits. mujoco: efforts by inverse dynamics of the file that holds them (each file once); else angles of a
     coupling by the columns. floor: joint -> noise in its residual, where that is known; moved: what `open_loop` keeps
-    of files."""
+    of files; whole: rows by their id, which they keep while they are here, and the same with every column of bodies."""
 
     rig: RigModel
     mujoco: bool = True
     floor: Mapping[str, float] = field(default_factory=dict)
     known: dict[bytes, tuple[EffortResidual, ...]] = field(default_factory=dict, repr=False)
     moved: dict[tuple[bytes, float, bool], Array] = field(default_factory=dict, repr=False)
+    whole: dict[int, tuple[tuple[Rows, ...], tuple[Rows, ...]]] = field(default_factory=dict, repr=False)
 
     @property
     def engine(self) -> str:
@@ -62,7 +64,7 @@ class Bench:
             xml = self.file(fit, terms, theta)
             if xml not in self.known:
                 keep = frozenset((r.trial, r.joint) for r in fit.rows)
-                self.known[xml] = effort_residuals(replace(self.rig, xml=xml), fit.rows, keep)
+                self.known[xml] = effort_residuals(replace(self.rig, xml=xml), self._rows(fit, xml), keep)
             rows = [(r.trial, r.validate, r.error) for r in self.known[xml] if r.joint == joint and len(r.error) > 10]
         else:
             rows = [
@@ -72,6 +74,15 @@ class Bench:
             ]
         chosen = [r for r in rows if r[1]] or rows
         return [(trial, error) for trial, _, error in chosen]
+
+    def _rows(self, fit: DeclaredFit, xml: bytes) -> tuple[Rows, ...]:
+        """Balances of a fit with all columns that a file declares."""
+        asked = {c.label for c in declared_columns(replace(self.rig, xml=xml))}
+        if asked <= {c.label for r in fit.rows[:1] for c in r.declared}:
+            return fit.rows
+        if id(fit.rows) not in self.whole:
+            self.whole[id(fit.rows)] = fit.rows, with_bodies(self.rig, fit.rows)
+        return self.whole[id(fit.rows)][1]
 
     def proof(
         self,
