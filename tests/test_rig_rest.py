@@ -10,13 +10,14 @@ import pytest
 from rig_bench import HEAD, written
 
 from hand_model.rig import diagnose_rig
-from hand_model.rig.balance import declared_columns, trial_rows
+from hand_model.rig.balance import declared_columns
 from hand_model.rig.declared import fit_declared
 from hand_model.rig.model import load_rig
 from hand_model.rig.name.candidates import candidates
 from hand_model.rig.name.problem import Term, pose, solution
 from hand_model.rig.rest import Creep, moving_weight, stands
 from hand_model.rig.rest_known import known_at_rest
+from hand_model.rig.trial_balance import trial_rows
 from hand_model.session import read_session
 
 SLIDE = """<mujoco><option timestep="0.001" gravity="0 0 -9.81"/>

@@ -9,8 +9,9 @@ import pytest
 from rig_bench import ARM, HEAD
 
 from hand_model.rig import load_rig
-from hand_model.rig.balance import declared_columns, trial_rows
+from hand_model.rig.balance import declared_columns
 from hand_model.rig.declared import fit_declared
+from hand_model.rig.trial_balance import trial_rows
 from hand_model.session import read_session
 
 

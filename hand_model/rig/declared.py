@@ -8,11 +8,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .balance import MOMENTS, STATE_CUTOFF, Column, Rows, declared_columns, trial_rows
+from .balance import MOMENTS, STATE_CUTOFF, Column, Rows, declared_columns
 from .dynamics import inertial_parameters
 from .model import RigModel, RigTrial
 from .overrides import compile_model
 from .solve import solve_bounded, squared_error
+from .trial_balance import rows_with_rests, trial_rows
 
 Array = NDArray[np.float64]
 
@@ -173,13 +174,12 @@ def _bands(
     where nothing rests), and the share of samples in which joints are seen to move; None where none do, or none is wide
     enough. The same samples for all cut-offs: what a low one spoils near the ends counts against it."""
 
-    def rows(held: Collection[str]) -> tuple[Rows, ...]:
-        trials = _sample(rig)
-        found = (r for t in trials for r in trial_rows(rig, t, columns, cutoff, END_S, kept=held))
-        return tuple(r for r in found if (r.trial, r.joint) not in refused)
-
-    moving = rows(kept)
-    resting = rows(rig.joints) if any(len(r.weight) for r in moving) else moving
+    pairs = [rows_with_rests(rig, t, columns, cutoff, END_S, kept) for t in _sample(rig)]
+    moving, resting = (
+        tuple(r for rows in side for r in rows if (r.trial, r.joint) not in refused)
+        for side in zip(*pairs, strict=True)
+    )
+    resting = resting if any(len(r.weight) for r in moving) else moving
     if not any(r.moving.sum() > 10 for r in moving) or cutoff > 0.3 * min(r.rate_hz for r in resting):
         return moving, resting, None
     return moving, resting, float(np.mean([r.moving.mean() for r in resting]))

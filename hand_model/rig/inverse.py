@@ -15,13 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DescriptionError
-from .balance import Column, Rows, back_emf, declared_columns, trial_rows
+from .balance import Column, Rows, back_emf, declared_columns
 from .declared import DeclaredFit
 from .dynamics import INERTIAL, inertial_columns
 from .mjcf import read_effects
 from .model import RigModel, RigTrial
 from .name.candidates import TURNS, Candidate, beside, candidates
 from .overrides import compile_model
+from .trial_balance import trial_rows
 
 Array = NDArray[np.float64]
 

@@ -13,10 +13,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .balance import trial_rows
 from .declared import DeclaredFit
 from .model import RigModel, RigTrial
 from .states import fill_gaps, noise_std
+from .trial_balance import trial_rows
 
 Array = NDArray[np.float64]
 MOST_TRIALS = 5
