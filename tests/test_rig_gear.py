@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from rig_bench import RIG, two_sines, written
 
-from hand_model.rig import load_rig
+from hand_model.rig import diagnose_rig, load_rig
 from hand_model.rig.couplings import coupling_terms
+from hand_model.rig.mjcf import read_couplings, read_effects
+from hand_model.rig.transmission import coupling_candidates
 from hand_model.session import read_session
 
 mujoco = pytest.importorskip("mujoco")
@@ -78,3 +80,27 @@ def test_what_goes_through_a_gear_without_a_sensor_is_what_its_bodies_ask_for(tm
     q = row.position / RATIO
     assert np.corrcoef(column, np.sin(q))[0, 1] > 0.9  # mostly weight
     assert np.max(np.abs(column)) < 2 * ARM * 9.81
+
+
+def test_the_file_keeps_what_a_coupling_lacks(tmp_path: Path) -> None:
+    """Angle by the file's polynomial and its records: what is left of the recording held out is what is told; and effects
+    at joints are read without it."""
+    folder = geared(tmp_path / "s")
+    found = diagnose_rig(read_session(folder), tmp_path / "out")
+    told = found.lack_of_fit["couplings"]["gear"]
+    assert told["after"] < 0.5 * told["before"]
+    xml = (tmp_path / "out" / "rig.xml").read_bytes()
+    records = read_couplings(xml)
+    assert [r["effect"] for r in records] == [f.effect for f in found.findings if f.where.get("coupling") == "gear"]
+    assert not {r["effect"] for r in records} & {r.get("effect") for r in read_effects(xml)}
+    rig = load_rig(read_session(folder), xml)
+    fit, *_ = coupling_terms(rig, rig.couplings[0])
+    known = {(c.effect, c.variant): c for c in coupling_candidates(fit, rig.couplings[0])}
+    left = []
+    for row in (r for r in fit.rows if r.validate):
+        angle = np.polynomial.polynomial.polyval(row.position, rig.couplings[0].polycoef)
+        for r in records:
+            columns = row.filtered(known[r["effect"], r["variant"]].columns(row, r["shape"]))
+            angle = angle + columns @ list(r["amplitude"].values())
+        left.append((row.effort - angle)[row.moving])
+    assert np.sqrt(np.mean(np.concatenate(left) ** 2)) == pytest.approx(told["after"], rel=0.02)

@@ -111,6 +111,17 @@ def test_a_term_added_leaves_what_the_fit_of_all_leaves(tmp_path: Path) -> None:
             assert Added(problem, terms, c, parts).errors(c.grid)[-1] == pytest.approx(left, rel=1e-7)
 
 
+def test_shapes_may_move_where_they_begin(tmp_path: Path) -> None:
+    """Every starting shape of every candidate lies within the bounds that it may move in: one beyond would stay."""
+    rig = load_rig(read_session(bench(tmp_path / "s", 0.3, 0.01)))
+    every = candidates(rig, trusted_fit(rig)[0], "hinge")
+    for c in every:
+        for name, shape in c.shapes.items():
+            starts, slack = [g[name] for g in c.grid if name in g], 1e-9 * (shape.high - shape.low)
+            assert all(shape.low - slack <= start <= shape.high + slack for start in starts), (c.key, name)
+    assert sum("reach" in c.shapes for c in every) >= 3
+
+
 def test_a_recording_with_a_level_of_its_own_is_not_left_out_whole(tmp_path: Path) -> None:
     """Two recordings: each is left out alone where they share all parameters, in halves and thirds where each sets its
     own friction."""

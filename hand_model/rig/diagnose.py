@@ -19,28 +19,32 @@ from ..session import Session
 from .channel_findings import channel_findings
 from .channels import ChannelIssue, check_balance, check_channels
 from .clipping import unclipped
-from .couplings import coupling_terms, with_couplings
+from .couplings import diagnose_coupling, with_couplings
 from .declared import DeclaredFit, fit_declared
-from .findings import NOT_TAKEN, CouplingResidual, Finding, RigFindings, measured, whereabouts, within_a_sample
+from .findings import NOT_TAKEN, Finding, RigFindings, measured, whereabouts, within_a_sample
 from .horizon import open_loop
+from .mjcf import keep_couplings
 from .model import RigModel, load_rig
 from .name.beside import Beside, Score
 from .name.candidates import Candidate, candidates
 from .name.compete import LEAST_SHARE, Step, judge
-from .name.joint_search import as_term, offsets_first, offsets_of_chain, search_joints
+from .name.joint_search import Won, as_term, offsets_first, offsets_of_chain, search_joints
 from .name.problem import Term, held_out, normal, pose, solution
 from .noise import effort_noise
+from .patch import write_couplings
 from .proof import Bench
 from .rest_known import known_at_rest
 from .same_path import one_load_each, repeated_trajectory
-from .standing import first_of, proved, solved
+from .standing import first_of, in_the_end, proved, solved
 from .swing.build import can_swing
 from .swing.diagnose import diagnose_swing
-from .transmission import angle_residual
 from .verdict import accuracy_notes, accurate, limit, unexplained, verdict
 from .words import rejection, shares, told_on
 
 Array = NDArray[np.float64]
+OFFSET = "asymmetric_friction"
+# loads that a weight elsewhere gives at the postures of one recording or another
+BY_PLACE = frozenset({OFFSET, "detent_load", "nonlinear_spring", "torque_ripple"})
 PROBABILITY = (
     "that anything is there: share of resampled blocks of the training recordings, each left out of the fit, on which "
     "the effect lowers the error against nothing; shared out among it and its alternatives by how often each is the best"
@@ -81,13 +85,15 @@ def diagnose_rig(
         result[2]["open_loop"] = open_loop(rig, result[4], result[3], refused)
     parts, rejected, lack, xml, declared_xml = result
     found += parts
-    angles = []
-    for coupling in rig.couplings:
-        more, said, residual = _diagnose_coupling(rig, coupling)
-        found += more
-        angles += [residual] if residual is not None else []
-        rejected = [*rejected, *said]
-        say(f"{rig.name}: coupling {coupling.name}")
+    fitted = replace(rig, xml=xml)  # what goes through a coupling without a sensor is what its bodies ask for
+    couplings = [c for c in (diagnose_coupling(fitted, c, say) for c in rig.couplings) if c is not None]
+    for coupling in couplings:
+        found += coupling.findings
+        rejected = [*rejected, *coupling.rejected]
+    if couplings:
+        lack = {**lack, "couplings": {c.residual.coupling: c.lack for c in couplings}}
+        xml = write_couplings(xml, {c.residual.coupling: c.polycoef for c in couplings})
+        xml = keep_couplings(xml, [record for c in couplings for record in c.records])
     found, within = within_a_sample(found, 1.0 / _rate(rig))
     lack, well_known = {**lack, "limit": limit(lack)}, accurate(fit)
     declared = lack.pop("declared", {c.label: float(t) for c, t in zip(fit.columns, fit.theta, strict=True)})
@@ -116,7 +122,7 @@ def diagnose_rig(
         declared=declared,
         xml=xml,
         declared_xml=declared_xml,
-        couplings=tuple(angles),
+        couplings=tuple(c.residual for c in couplings),
         notes=(
             *rig.notes,
             *_silence(rig, fit, found),
@@ -222,21 +228,36 @@ def _refused(rig: RigModel, fit: DeclaredFit) -> set[tuple[str, str]]:
 
 def _searched(rig: RigModel, fit: DeclaredFit, say: Callable[[str], None]) -> _Search:
     """The competition at every joint, on training recordings."""
-    stories: list[tuple[Step, Term]] = []
-    rejected: list[str] = []
     joints, floor, base = _balanced(rig, fit), effort_noise(rig, fit), fit
+    bench = Bench(rig, floor=floor)
     first = offsets_first(rig, fit, joints)  # a sensor's zero is the recording's error: before physics
     offsets = [(w.step, as_term(rig, fit, w)) for w in first.values() if w is not None]
-    off_axis = _off_axis(Bench(rig, floor=floor), fit, [t for _, t in offsets])
-    fit, finding = (fit, None) if off_axis is None else off_axis
-    if off_axis is not None:  # beside weights where they are declared, offsets stood for what these do elsewhere
-        first, offsets = offsets_of_chain(rig, fit, joints), []
-        stories += [(w.step, as_term(rig, fit, w)) for w in first.values() if w is not None]
-    for joint, (won, left) in zip(joints, search_joints(rig, fit, first), strict=True):
+    off_axis = _off_axis(bench, fit, [t for _, t in offsets])
+    if off_axis is None:
+        found = _at_joints(rig, fit, first, say)
+        off_axis = _off_axis(bench, fit, [t for _, t in (*offsets, *found[0])]) if found[0] else None
+        if off_axis is None:
+            return _Search(base, fit, None, offsets, *found, floor)
+        say(f"{rig.name}: centres of mass off their axes: once more beside them")
+    # beside weights where they are declared, offsets and loads by place stood for what these do elsewhere
+    fit, finding = off_axis
+    first = offsets_of_chain(rig, fit, joints)
+    stories, left = _at_joints(rig, fit, first, say)
+    chain = [(w.step, as_term(rig, fit, w)) for w in first.values() if w is not None]
+    return _Search(base, fit, finding, [], [*chain, *stories], left, floor)
+
+
+def _at_joints(
+    rig: RigModel, fit: DeclaredFit, first: Mapping[str, Won | None], say: Callable[[str], None]
+) -> tuple[list[tuple[Step, Term]], list[str]]:
+    """What is won at every joint beside its offset, and the keys of what is not."""
+    stories: list[tuple[Step, Term]] = []
+    rejected: list[str] = []
+    for (joint, offset), (won, left) in zip(first.items(), search_joints(rig, fit, first), strict=True):
         stories += [(w.step, as_term(rig, fit, w)) for w in won]
         rejected += left
-        say(f"{rig.name}: {joint}: {', '.join(w.key for w in (first[joint], *won) if w) or 'nothing'}")
-    return _Search(base, fit, finding, offsets, stories, rejected, floor)
+        say(f"{rig.name}: {joint}: {', '.join(w.key for w in (offset, *won) if w) or 'nothing'}")
+    return stories, rejected
 
 
 def _balanced(rig: RigModel, fit: DeclaredFit) -> list[str]:
@@ -249,11 +270,12 @@ def _held_out(rig: RigModel, search: _Search) -> tuple[tuple, tuple[str, ...]]:
     base_fit, fit, bench = search.base, search.fit, Bench(rig, floor=search.floor)
     rejected: list[dict[str, Any]] = [{"effect": key, "reason": NOT_TAKEN} for key in search.left]
     plain = (base_fit, (), solution(pose(base_fit), []))
-    found, kept = proved(bench, base_fit, search.offsets, [], rejected)
-    if search.freed is not None:
-        found.append(search.freed)
+    proofs, kept = proved(bench, base_fit, search.offsets, [], rejected)
+    offsets = len(proofs)
     later, kept = proved(bench, fit, search.stories, kept, rejected)
-    found += later
+    found, kept = in_the_end(bench, (base_fit, fit), kept, [*proofs, *later], rejected)
+    if search.freed is not None:
+        found.insert(min(offsets, len(found)), search.freed)
     one, two, every = ((fit, *solved(bench, fit, first_of(fit, kept, k))) for k in (1, 2, len(kept)))
     lack = {
         "metric": "effort_rmse",
@@ -270,24 +292,26 @@ def _held_out(rig: RigModel, search: _Search) -> tuple[tuple, tuple[str, ...]]:
     )
 
 
-def _off_axis(bench: Bench, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple[DeclaredFit, Finding] | None:
-    """Centres of mass off their declared axes: one change to the whole chain, tried before anything at a joint."""
+def _off_axis(bench: Bench, fit: DeclaredFit, terms: Sequence[Term]) -> tuple[DeclaredFit, Finding] | None:
+    """Centres of mass off their declared axes, one change to the whole chain, beside terms; instead of those of them
+    that are loads by place, which may stand in for it, where the others are left so."""
     rig = bench.rig
     freed = fit_declared(rig, _refused(rig, fit), fit.cutoff_hz, off_axis=True, kept=fit.kept)
     if len(freed.columns) == len(fit.columns):
         return None
     freed = replace(freed, scale=fit.scale)
-    sides = pose(fit), pose(freed)
-    errors = [held_out(p, offsets, normal(p, offsets)) for p in sides]
+    kept = [t for t in terms if t.candidate.effect not in BY_PLACE] if any(_not_offset(t) for t in terms) else terms
+    sides = (pose(fit), terms), (pose(freed), kept)
+    errors = [held_out(p, t, normal(p, t)) for p, t in sides]
     shape = Candidate(
         "gravity_load", "centres of mass off their axes", "*", (), ({},), lambda r, s: np.zeros((len(r.time_s), 0))
     )
-    found = judge(errors[0], [Score(Term(shape, {}), errors[1])], sides[0])
-    if found is None or _better_alone(rig, fit, offsets, errors[1].sum()):
+    found = judge(errors[0], [Score(Term(shape, {}), errors[1])], sides[0][0])
+    if found is None or _better_alone(rig, fit, terms, errors[1].sum()):
         return None
-    before, after = (solution(p, offsets) for p in sides)
+    before, after = (solution(p, t) for p, t in sides)
     joints = sorted({r.joint for r in fit.rows})
-    proofs = {j: bench.proof(j, (fit, offsets, before), (freed, offsets, after)) for j in joints}
+    proofs = {j: bench.proof(j, (fit, terms, before), (freed, kept, after)) for j in joints}
     best = max(joints, key=lambda j: 1 - proofs[j]["after"] / max(proofs[j]["before"], 1e-300))
     ratio = float(np.sqrt(np.mean([(p["after"] / p["before"]) ** 2 for p in proofs.values()])))
     if ratio >= 1 or proofs[best]["ci95_reduction"][0] <= 0:
@@ -319,6 +343,10 @@ def _off_axis(bench: Bench, fit: DeclaredFit, offsets: Sequence[Term]) -> tuple[
     )
 
 
+def _not_offset(term: Term) -> bool:
+    return term.candidate.effect != OFFSET
+
+
 def _better_alone(rig: RigModel, fit: DeclaredFit, terms: Sequence[Term], error: float) -> bool:
     """Whether any effect at one joint leaves less held-out error than `error` of a change to the whole chain."""
     problem, beside = pose(fit), tuple(terms)
@@ -328,29 +356,6 @@ def _better_alone(rig: RigModel, fit: DeclaredFit, terms: Sequence[Term], error:
             if any(s.error.sum() < error for s in rivals.scores()):
                 return True
     return False
-
-
-# --- couplings -------------------------------------------------------------------------------------------------------
-
-
-def _diagnose_coupling(
-    rig: RigModel, coupling: Any
-) -> tuple[list[Finding], list[dict[str, Any]], CouplingResidual | None]:
-    known = coupling_terms(rig, coupling)
-    if known is None:
-        return [], [], None
-    fit, taken, steps, scores, moved = known
-    rejected = [{"effect": s.term.candidate.key, "reason": NOT_TAKEN} for s in scores]
-    found, kept = proved(Bench(rig, mujoco=False), fit, list(zip(steps, taken, strict=True)), [], rejected)
-    named = []
-    for f in found:
-        where = {**f.where, "actuator": None, "signal": "position", "coupling": coupling.name}
-        zero = (
-            " The zero between the two encoders differs between recordings and was taken out of each." if moved else ""
-        )
-        named.append(replace(f, where=where, statement=f.statement + zero))
-    declared = {f.where["joint"]: f.fit for f in reversed(named)}  # the first was held to nothing else
-    return shares(named, declared), rejected, angle_residual(rig, coupling, fit, kept)
 
 
 def _next(found: Sequence[Finding], issues: Sequence[ChannelIssue], again: bool) -> str:

@@ -195,7 +195,7 @@ def _acting(
     for _ in range(turns):
         at = replace(fit, beside=beside(fit.rows, acting))
         found = [(_rebuilt(rig, at, r), r) for r in records]
-        acting = [(c, r["shape"], np.array([r["amplitude"][a[0]] for a in c.amplitudes])) for c, r in found]
+        acting = [(c, r["shape"], np.array([r["amplitude"].get(a[0], 0.0) for a in c.amplitudes])) for c, r in found]
     return acting
 
 

@@ -20,7 +20,8 @@ MOTOR, GEAR, TURNING = "motor side", "both sides of the gear", "turning round ov
 LOW, MOTOR_LOW, GEAR_LOW = "low speed", f"{MOTOR}, low speed", f"{GEAR}, low speed"
 # At every speed, and more of it below a Stribeck speed (M5 of the ladder of Duclusaud et al. 2024).
 MORE, MOTOR_MORE, GEAR_MORE = (f"{side}more at low speed" for side in ("", f"{MOTOR}, ", f"{GEAR}, "))
-LINE = "linear_stiffness"  # of a spring where none is declared
+# of a spring where none is declared: its stiffness, and what it gives at the joint's zero
+LINE, PRELOAD = "linear_stiffness", "preload"
 OF_STATE = FRICTION | {"nonlinear_spring", "end_stop_contact", "detent_load", "torque_ripple"}
 
 
@@ -69,7 +70,8 @@ def _of_state(record: Mapping[str, Any]) -> Law:
     """The catalogue's own columns at one sample; friction as the bound that it is while the joint moves forwards."""
     named, shape = effect(record["effect"]), record.get("shape", {})
     size = np.array([record["amplitude"][a[0]] for a in named.amplitudes()])
-    one, friction, line = np.ones(1), record["effect"] in FRICTION, record["amplitude"].get(LINE, 0.0)
+    one, friction = np.ones(1), record["effect"] in FRICTION
+    line, preload = (record["amplitude"].get(name, 0.0) for name in (LINE, PRELOAD))
 
     def act(now: Now) -> tuple[float, float]:
         state = DriveState(
@@ -84,7 +86,7 @@ def _of_state(record: Mapping[str, Any]) -> Law:
             declared_names=("coulomb",),
         )
         value = float((named.columns(state, shape) @ size)[0])
-        return (0.0, value) if friction else (value + line * now.position, 0.0)
+        return (0.0, value) if friction else (value + preload + line * now.position, 0.0)
 
     return act
 

@@ -58,7 +58,22 @@ def write_effects(xml: bytes, effects: Sequence[Mapping[str, Any]]) -> bytes:
 
 
 def read_effects(xml: bytes) -> list[dict[str, Any]]:
-    """Effects that `write_effects` kept in an MJCF."""
+    """Effects at joints that `write_effects` kept in an MJCF."""
+    return [record for record in _records(xml) if "coupling" not in record]
+
+
+def keep_couplings(xml: bytes, records: Sequence[Mapping[str, Any]]) -> bytes:
+    """The MJCF with what its couplings lack, each record with the name of its "coupling", beside its effects at
+    joints."""
+    return write_effects(xml, [*read_effects(xml), *records])
+
+
+def read_couplings(xml: bytes) -> list[dict[str, Any]]:
+    """What `keep_couplings` kept in an MJCF."""
+    return [record for record in _records(xml) if "coupling" in record]
+
+
+def _records(xml: bytes) -> list[dict[str, Any]]:
     for text in parse(xml).iter("text"):
         if text.get("name") == TEXT:
             return json.loads(text.get("data"))

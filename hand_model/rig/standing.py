@@ -28,7 +28,11 @@ END = 0.99  # of the longest delay that is tried
 # What two effects leave at a joint may be the form of their laws, which no catalogue has to better than 7 % of its
 # amplitude: share of the mismatch.
 FORMED, FORM = 2, 0.07**2
+HARMFUL = "beside all others it leaves its joint worse off than the declared model does"
 OF_FORM = "it takes no more than the forms of the effects before it may be off by"
+
+
+Proof = tuple[Step, dict[str, Any]]
 
 
 def proved(
@@ -37,11 +41,11 @@ def proved(
     stories: Sequence[tuple[Step, Term]],
     kept: Sequence[Term],
     rejected: list[dict[str, Any]],
-) -> tuple[list[Finding], list[Term]]:
-    """Findings that hold on the validation recordings, one after the other beside `kept`, all in the shapes that are
-    best without the later ones; the rest goes to rejected. Returns them and the terms that hold."""
+) -> tuple[list[Proof], list[Term]]:
+    """What holds on the validation recordings, one after the other beside `kept`, all in the shapes that are best
+    without the later ones; the rest goes to rejected. Returns rounds and proofs, and all terms that hold, in order."""
     terms, found = list(kept), list(kept)
-    proofs: list[tuple[Step, dict[str, Any]]] = []
+    proofs: list[Proof] = []
     whole = Counter(t.candidate.joint for t in [*kept, *(t for _, t in stories)])
     plain, few = (fit, *solved(bench, fit, [])), solved(bench, fit, kept)
     for step, term in stories:
@@ -56,7 +60,29 @@ def proved(
             continue
         found, terms, few = [*found, term], more, many
         proofs.append((step, proof))
-    return _told(bench, fit, _in_order(terms, found), proofs), terms
+    return proofs, _in_order(terms, found)
+
+
+def in_the_end(
+    bench: Bench,
+    fits: tuple[DeclaredFit, DeclaredFit],
+    terms: Sequence[Term],
+    proofs: Sequence[Proof],
+    rejected: list[dict[str, Any]],
+) -> tuple[list[Finding], list[Term]]:
+    """Findings of all terms, sized as they are beside each other, and these; without those of a joint that all of them
+    together leave worse off than the declared model does (fits: the declared one, and that of the terms), last first:
+    these go to rejected."""
+    (declared, fit), terms, proofs = fits, list(terms), list(proofs)
+    plain = declared, *solved(bench, declared, [])
+    while True:
+        told, theta = solved(bench, fit, terms)
+        ends = {j: bench.proof(j, plain, (fit, told, theta)) for j in dict.fromkeys(t.candidate.joint for t in terms)}
+        worse = [k for k, t in enumerate(terms) if ends[t.candidate.joint]["after"] > ends[t.candidate.joint]["before"]]
+        if not worse:
+            return _named(bench, fit, told, theta, proofs, ends), terms
+        rejected.append({"effect": terms[worse[-1]].candidate.key, "reason": HARMFUL})
+        del terms[worse[-1]], proofs[worse[-1]]
 
 
 def _shaped(fit: DeclaredFit, standing: Sequence[Term], found: Sequence[Term], whole: Mapping[str, int]) -> list[Term]:
@@ -75,21 +101,23 @@ def _in_order(terms: Sequence[Term], found: Sequence[Term]) -> list[Term]:
     return [next(left[t.candidate.joint]) for t in found]
 
 
-def _told(
-    bench: Bench, fit: DeclaredFit, terms: Sequence[Term], proofs: Sequence[tuple[Step, dict[str, Any]]]
+def _named(
+    bench: Bench,
+    fit: DeclaredFit,
+    terms: Sequence[Term],
+    theta: Array,
+    proofs: Sequence[Proof],
+    ends: Mapping[str, Mapping[str, Any]],
 ) -> list[Finding]:
-    """Findings of the last terms, one for each proof: the size of each beside those before it, in the shapes that stand
-    in the end."""
-    found, first = [], len(terms) - len(proofs)
-    for k, (step, proof) in enumerate(proofs, first + 1):
-        told, theta = solved(bench, fit, terms[:k])
-        term = terms[k - 1]
-        last = slice(len(theta) - len(term.candidate.amplitudes), None)
-        spread = None
-        # beside what does not fit, an interval would promise too much
-        if proof["after"] <= FITS * proof["noise_floor"]:
-            spread = resampled(pose(fit), told)[:, last]
-        found.append(_joint_finding(bench.rig, fit, step, term, theta[last], proof, spread))
+    """Findings of terms with their solution theta (P + J,); ends: joint -> proof of all of them together."""
+    places = len(fit.columns) + np.cumsum([0, *(len(t.candidate.amplitudes) for t in terms)])
+    # beside what does not fit, an interval would promise too much
+    close = {j for j, end in ends.items() if end["after"] <= FITS * end["noise_floor"]}
+    spread = resampled(pose(fit), terms) if close else None
+    found = []
+    for term, (step, proof), first, last in zip(terms, proofs, places[:-1], places[1:], strict=True):
+        own = None if spread is None or term.candidate.joint not in close else spread[:, first:last]
+        found.append(_joint_finding(bench.rig, fit, step, term, theta[first:last], proof, own))
     return found
 
 

@@ -13,7 +13,7 @@ from ...effects import DriveState, catalogue, effect
 from ...effects.base import Shape
 from ..balance import Rows
 from ..declared import DeclaredFit
-from ..laws import GEAR, GEAR_LOW, GEAR_MORE, LINE, LOW, MORE, MOTOR, MOTOR_LOW, MOTOR_MORE, TURNING
+from ..laws import GEAR, GEAR_LOW, GEAR_MORE, LINE, LOW, MORE, MOTOR, MOTOR_LOW, MOTOR_MORE, PRELOAD, TURNING
 from ..model import RigModel
 from ..warming import WARMS, warmth
 from .ripple import fine_periods
@@ -46,9 +46,10 @@ DELAYS = (0.125, 0.25, 0.5, 1, 2, 3, 5, 8)
 TURNS = 4
 SAME = 0.05  # of a column's variance
 DRAG, DRY_AND_DRAG = "viscous", "dry and viscous"
-UNDECLARED = "no spring is declared"
+UNDECLARED, PRELOADED = "no spring is declared", "no spring is declared, at rest anywhere"
 BY_LEVEL = "a level for each that trials declare"
 REACHES = tuple(np.geomspace(0.004, 0.5, 8))  # of the range, over which friction turns round
+SHORTEST = 0.25  # of the shortest of these
 # what has one of these can be there twice: two springs, two tight spots
 PLACED = frozenset({"reach", "period", "centre"})
 Bound = tuple[str, str, float, float]
@@ -139,11 +140,12 @@ def candidates(
     asked = [e for e in catalogue("drive") if _usable(e) and (only is None or e.name in only)]
     found = [_from_catalogue(e, joint, train, states) for e in asked]
     found = [_with_fine(c, fit, rows) if c.effect == RIPPLE and not every else c for c in found]
-    bends = [c for c in found if c.effect in SMOOTH]
+    bends, drive = [c for c in found if c.effect in SMOOTH], rig.drive(joint)
+    preloaded = drive is None or not drive.offset
     if every:
-        found += [_with_line(c) for c in bends]
+        found += [x for c in bends for x in _with_line(c, preloaded)]
     elif bends and not _is_declared([r.filtered(r.position) for r in rows], rows):
-        found = [c for c in found if c not in bends] + [_with_line(c) for c in bends]
+        found = [c for c in found if c not in bends] + [x for c in bends for x in _with_line(c, preloaded)]
     found += [_thinning(c, variant) for c in found if c.effect == WARMS for variant in (DRAG, DRY_AND_DRAG)]
     if only is None or not NOT_FOR_RIGS.isdisjoint(only):
         found += _own(rig, fit, joint, rows)
@@ -208,14 +210,25 @@ def _is_declared(columns: Sequence[Array], rows: Sequence[Rows]) -> bool:
     return bool(np.var(y - x @ np.linalg.lstsq(x, y)[0]) < SAME * np.var(y))
 
 
-def _with_line(bend: Candidate) -> Candidate:
-    """A spring's bend with the line that it bends from: no spring is declared, nor what could pass for one."""
-    return replace(
+def _with_line(bend: Candidate, preloaded: bool) -> list[Candidate]:
+    """A spring's bend with the line that it bends from: no spring is declared, nor what could pass for one. preloaded:
+    also one that is at rest anywhere, where no offset of the drive is declared, which would say so."""
+    line = (LINE, "effort/position", -np.inf, np.inf)
+    plain = replace(
         bend,
         variant=UNDECLARED,
-        amplitudes=((LINE, "effort/position", -np.inf, np.inf), *bend.amplitudes),
+        amplitudes=(line, *bend.amplitudes),
         columns=lambda r, s: np.column_stack([r.position, bend.columns(r, s)]),
     )
+    if not preloaded:
+        return [plain]
+    anywhere = replace(
+        plain,
+        variant=PRELOADED,
+        amplitudes=((PRELOAD, "effort", -np.inf, np.inf), *plain.amplitudes),
+        columns=lambda r, s: np.column_stack([np.ones(len(r.position)), plain.columns(r, s)]),
+    )
+    return [plain, anywhere]
 
 
 def _turning_round(
@@ -231,8 +244,11 @@ def _turning_round(
     declare Coulomb levels, one for each."""
     stop = _from_catalogue(effect("elastoplastic_hysteresis"), joint, train, states)
     span = max(float(np.ptp(state.position)) for state in train)
+    wider = replace(stop.shapes["reach"], low=SHORTEST * REACHES[0] * span)
     stop = replace(
-        stop, grid=tuple({"form": form, "reach": float(share * span)} for form in (0.0, 1.0) for share in REACHES)
+        stop,
+        grid=tuple({"form": form, "reach": float(share * span)} for form in (0.0, 1.0) for share in REACHES),
+        shapes={**stop.shapes, "reach": wider},
     )
     load = {r.trial: np.abs(r.load(fit.theta))[:, None] for r in fit.rows if r.joint == joint}
     found = [

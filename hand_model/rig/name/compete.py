@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ...diagnose.name.term import DISCRETE
 from ..evidence import BEYOND_DOUBT, weigh
 from .beside import Beside, Score
-from .candidates import Candidate
+from .candidates import PRELOADED, Candidate
 from .problem import (
     Problem,
     Term,
@@ -109,7 +109,8 @@ def _round(
     its terms, normal equations and errors (B,)). first: from which on shapes of terms move."""
     standing, its_parts, none = plain
     parts, taken = its_parts if terms is standing else normal(problem, terms), {t.candidate.key for t in terms}
-    with Beside(problem, terms, parts, [c for c in rivals if c.repeats or c.key not in taken], first) as beside:
+    rivals = [c for c in rivals if (c.repeats or c.key not in taken) and not _said(c, terms)]
+    with Beside(problem, terms, parts, rivals, first) as beside:
         scores = _met(problem, terms, beside)
         stand = (
             scores
@@ -124,6 +125,16 @@ def _round(
     again = judge(none, last, problem) if len(last) > 1 else None
     won, step = (0, found[1]) if again is None else again
     return scores, (last[won].beside(terms), step)
+
+
+def _said(candidate: Candidate, terms: Sequence[Term]) -> bool:
+    """Whether a constant effort that a candidate has is a term's at its joint already."""
+    constant = {c.joint for t in terms if _constant(c := t.candidate)}
+    return _constant(candidate) and candidate.joint in constant
+
+
+def _constant(candidate: Candidate) -> bool:
+    return candidate.effect == "asymmetric_friction" or candidate.variant == PRELOADED
 
 
 def _met(problem: Problem, terms: tuple[Term, ...], beside: Beside) -> list[Score]:

@@ -9,7 +9,7 @@ from typing import Any
 from ...background import Background
 from ..declared import DeclaredFit
 from ..model import RigModel
-from .candidates import Candidate, candidates
+from .candidates import PRELOADED, Candidate, candidates
 from .compete import Step, compete
 from .problem import Term, pose
 from .settled import settled
@@ -72,7 +72,7 @@ def _offset_first(rig: RigModel, fit: DeclaredFit, joint: str) -> Won | None:
     offset = [c for c in everything if c.effect == "asymmetric_friction"]
     if not compete(problem, offset, most=1)[0]:
         return None
-    taken, steps, _ = compete(problem, everything, most=1)
+    taken, steps, _ = compete(problem, [c for c in everything if c.variant != PRELOADED], most=1)
     if taken and taken[0].candidate.effect == "asymmetric_friction":
         return _won(steps[0], taken[0])
     return None
