@@ -28,6 +28,7 @@ END = 0.99  # of the longest delay that is tried
 # What two effects leave at a joint may be the form of their laws, which no catalogue has to better than 7 % of its
 # amplitude: share of the mismatch.
 FORMED, FORM = 2, 0.07**2
+AT_OTHERS = "what it takes off at its joint it adds at others"
 HARMFUL = "beside all others it leaves its joint worse off than the declared model does"
 OF_FORM = "it takes no more than the forms of the effects before it may be off by"
 
@@ -48,18 +49,26 @@ def proved(
     proofs: list[Proof] = []
     whole = Counter(t.candidate.joint for t in [*kept, *(t for _, t in stories)])
     plain, few = (fit, *solved(bench, fit, [])), solved(bench, fit, kept)
-    for step, term in stories:
-        more = _shaped(fit, terms, [*found, term], whole)
-        many = solved(bench, fit, more)
-        proof = bench.proof(term.candidate.joint, (fit, *few), (fit, *many))
-        reason = _withdrawn(bench, proof, plain, (fit, *few), (fit, *many)) or _of_form(
-            bench, term, found, proof, plain
-        )
-        if reason is not None:
-            rejected.append({"effect": term.candidate.key, "reason": reason})
-            continue
-        found, terms, few = [*found, term], more, many
-        proofs.append((step, proof))
+    todo, reasons = list(stories), {}
+    while todo:
+        again = []
+        for step, term in todo:
+            more = _shaped(fit, terms, [*found, term], whole)
+            many = solved(bench, fit, more)
+            proof = bench.proof(term.candidate.joint, (fit, *few), (fit, *many))
+            reason = _withdrawn(bench, proof, plain, (fit, *few), (fit, *many)) or _of_form(
+                bench, term, found, proof, plain
+            )
+            if reason is None:
+                found, terms, few = [*found, term], more, many
+                proofs.append((step, proof))
+                continue
+            reasons[id(term)] = term.candidate.key, reason
+            again += [(step, term)] if reason == AT_OTHERS else []
+        # what it adds at others may be what these lacked themselves then
+        todo = again if len(again) < len(todo) else []
+    stand = {id(t) for t in found}
+    rejected += [{"effect": key, "reason": reason} for at, (key, reason) in reasons.items() if at not in stand]
     return proofs, _in_order(terms, found)
 
 
@@ -70,19 +79,21 @@ def in_the_end(
     proofs: Sequence[Proof],
     rejected: list[dict[str, Any]],
 ) -> tuple[list[Finding], list[Term]]:
-    """Findings of all terms, sized as they are beside each other, and these; without those of a joint that all of them
-    together leave worse off than the declared model does (fits: the declared one, and that of the terms), last first:
-    these go to rejected."""
+    """Findings of all terms, sized as they are beside each other, and these (fits: the declared one, and that of the
+    terms). Where all of them together leave a joint worse off than the declared model does, those of its terms go,
+    last first, without which the error over all joints is less: to rejected."""
     (declared, fit), terms, proofs = fits, list(terms), list(proofs)
-    plain = declared, *solved(bench, declared, [])
-    while True:
-        told, theta = solved(bench, fit, terms)
-        ends = {j: bench.proof(j, plain, (fit, told, theta)) for j in dict.fromkeys(t.candidate.joint for t in terms)}
-        worse = [k for k, t in enumerate(terms) if ends[t.candidate.joint]["after"] > ends[t.candidate.joint]["before"]]
-        if not worse:
-            return _named(bench, fit, told, theta, proofs, ends), terms
-        rejected.append({"effect": terms[worse[-1]].candidate.key, "reason": HARMFUL})
-        del terms[worse[-1]], proofs[worse[-1]]
+    plain, every = (declared, *solved(bench, declared, [])), (fit, *solved(bench, fit, terms))
+    ends = {j: bench.proof(j, plain, every) for j in dict.fromkeys(t.candidate.joint for t in terms)}
+    worse = {j for j, end in ends.items() if end["after"] > end["before"]}
+    for k in reversed([k for k, t in enumerate(terms) if t.candidate.joint in worse]):
+        without = fit, *solved(bench, fit, [*terms[:k], *terms[k + 1 :]])
+        if bench.ratio(plain, without) < bench.ratio(plain, every):
+            rejected.append({"effect": terms[k].candidate.key, "reason": HARMFUL})
+            every = without
+            del terms[k], proofs[k]
+    ends = {j: bench.proof(j, plain, every) for j in dict.fromkeys(t.candidate.joint for t in terms)}
+    return _named(bench, fit, every[1], every[2], proofs, ends), terms
 
 
 def _shaped(fit: DeclaredFit, standing: Sequence[Term], found: Sequence[Term], whole: Mapping[str, int]) -> list[Term]:
@@ -109,7 +120,8 @@ def _named(
     proofs: Sequence[Proof],
     ends: Mapping[str, Mapping[str, Any]],
 ) -> list[Finding]:
-    """Findings of terms with their solution theta (P + J,); ends: joint -> proof of all of them together."""
+    """Findings of terms with their solution theta (P + J,); ends: joint -> proof of all of them together. One of a
+    name that its joint has once more later on is sized without that, which would share its size."""
     places = len(fit.columns) + np.cumsum([0, *(len(t.candidate.amplitudes) for t in terms)])
     # beside what does not fit, an interval would promise too much
     close = {j for j, end in ends.items() if end["after"] <= FITS * end["noise_floor"]}
@@ -117,8 +129,26 @@ def _named(
     found = []
     for term, (step, proof), first, last in zip(terms, proofs, places[:-1], places[1:], strict=True):
         own = None if spread is None or term.candidate.joint not in close else spread[:, first:last]
-        found.append(_joint_finding(bench.rig, fit, step, term, theta[first:last], proof, own))
+        size = theta[first:last]
+        if again := _again(terms, term):
+            own, size = None, _sized(bench, fit, [t for t in terms if t not in again], term)
+        found.append(_joint_finding(bench.rig, fit, step, term, size, proof, own))
     return found
+
+
+def _again(terms: Sequence[Term], term: Term) -> list[Term]:
+    """Later terms of the same name at the same joint."""
+    said = [
+        t for t in terms if (t.candidate.effect, t.candidate.joint) == (term.candidate.effect, term.candidate.joint)
+    ]
+    return said[said.index(term) + 1 :]
+
+
+def _sized(bench: Bench, fit: DeclaredFit, terms: Sequence[Term], term: Term) -> Array:
+    """Amplitudes (j,) of one of the terms."""
+    told, theta = solved(bench, fit, terms)
+    first = len(fit.columns) + sum(len(t.candidate.amplitudes) for t in told[: terms.index(term)])
+    return theta[first : first + len(term.candidate.amplitudes)]
 
 
 def _withdrawn(bench: Bench, proof: Mapping[str, Any], plain: tuple, before: tuple, after: tuple) -> str | None:
@@ -131,7 +161,7 @@ def _withdrawn(bench: Bench, proof: Mapping[str, Any], plain: tuple, before: tup
     if proof["after"] ** 2 > (1 - LEAST_SHARE) * proof["before"] ** 2:
         return NOT_BORNE_OUT
     if bench.mujoco and bench.ratio(plain, after) >= bench.ratio(plain, before):
-        return "what it takes off at its joint it adds at others"
+        return AT_OTHERS
     return _motion_says(bench, before, after) if bench.mujoco else None
 
 
