@@ -71,20 +71,58 @@ def test_an_effect_is_held_to_what_stands_at_its_best_without_it(
     """Two effects of one joint, found with shapes 1 and 2 beside each other; the first alone has shape 5."""
     _table_alone(monkeypatch)
     stories = [(None, term("elbow", "a", 1.0)), (None, term("elbow", "b", 2.0))]
-    found, kept = standing.proved(Bench(errors, whole), None, stories, [], rejected := [])
-    assert [t.shape["reach"] for t in kept] == holds and found == list(zip("ab", holds))
+    proofs, kept = standing.proved(Bench(errors, whole), None, stories, [], rejected := [])
+    assert [(t.candidate.effect, t.shape["reach"]) for t in kept] == list(zip("ab", holds)) and len(proofs) == len(kept)
     assert [r["effect"] for r in rejected] == ["b@elbow"][: 2 - len(holds)]
 
 
 def test_what_stands_at_a_joint_keeps_its_shape_when_another_joint_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The elbow's first effect, found with shape 1 beside one that is withdrawn, stands with its own, 5: in the file
-    and as it is told."""
+    """The elbow's first effect, found with shape 1 beside one that is withdrawn, stands with its own, 5."""
     _table_alone(monkeypatch)
     errors = {(): 1.0, (5.0,): 0.5, (5.0, 3.0): 0.4, (1.0, 2.0): 0.6}
     stories = [(None, term(*t)) for t in (("elbow", "a", 1.0), ("elbow", "b", 2.0), ("wrist", "c", 3.0))]
-    found, kept = standing.proved(Bench(errors, errors), None, stories, [], rejected := [])
-    assert [t.shape["reach"] for t in kept] == [5.0, 3.0] and found == [("a", 5.0), ("c", 3.0)]
+    _, kept = standing.proved(Bench(errors, errors), None, stories, [], rejected := [])
+    assert [(t.candidate.effect, t.shape["reach"]) for t in kept] == [("a", 5.0), ("c", 3.0)]
     assert [r["effect"] for r in rejected] == ["b@elbow"]
+
+
+def test_what_adds_error_elsewhere_is_asked_again_once_these_have_what_they_lacked(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The elbow's effect makes the wrist worse as long as this lacks its own."""
+    _table_alone(monkeypatch)
+    joint = {(): 1.0, (1.0,): 0.5, (2.0,): 0.5, (2.0, 1.0): 0.3}
+    stories = [(None, term("elbow", "a", 1.0)), (None, term("wrist", "b", 2.0))]
+    _, kept = standing.proved(Bench(joint, {**joint, (1.0,): 1.2}), None, stories, [], rejected := [])
+    assert [t.candidate.effect for t in kept] == ["b", "a"] and not rejected
+    _, kept = standing.proved(Bench(joint, {**joint, (1.0,): 1.2, (2.0, 1.0): 0.6}), None, stories, [], rejected)
+    assert [t.candidate.effect for t in kept] == ["b"]
+    assert [(r["effect"], r["reason"]) for r in rejected] == [("a@elbow", standing.AT_OTHERS)]
+
+
+@pytest.mark.parametrize(("alone", "stays"), [(0.7, False), (0.9, True)])
+def test_what_leaves_its_joint_worse_off_in_the_end_stays_only_where_all_joints_are_better_with_it(
+    monkeypatch: pytest.MonkeyPatch, alone: float, stays: bool
+) -> None:
+    """The second of two effects, of a joint at which all of them leave more than the declared model does; alone: what
+    the first leaves of all joints, both 0.8."""
+    _table_alone(monkeypatch)
+    errors = {(): 1.0, (1.0,): 0.5, (1.0, 2.0): 1.1}
+    terms = [term("elbow", "a", 1.0), term("wrist", "b", 2.0)]
+    monkeypatch.setattr(Bench, "proof", _proof_by_joint({"elbow": {**errors, (1.0, 2.0): 0.4}, "wrist": errors}))
+    bench = Bench({}, {(): 1.0, (1.0,): alone, (1.0, 2.0): 0.8})
+    fit = SimpleNamespace(columns=())
+    found, kept = standing.in_the_end(bench, (fit, fit), terms, [(None, {}), (None, {})], rejected := [])
+    assert [t.candidate.effect for t in kept] == ["a", "b"][: 1 + stays] == [name for name, _ in found]
+    assert [r["reason"] for r in rejected] == [standing.HARMFUL] * (not stays)
+
+
+def _proof_by_joint(errors: dict[str, dict[tuple[float, ...], float]]) -> Any:
+    def proof(self: Bench, joint: str, before: tuple, after: tuple) -> dict[str, Any]:
+        table = errors[joint]
+        return {"before": table[_reaches(before)], "after": table[_reaches(after)], "noise_floor": 0.0}
+
+    return proof
 
 
 @pytest.mark.parametrize(
