@@ -42,9 +42,9 @@ from .verdict import accuracy_notes, accurate, limit, unexplained, verdict
 from .words import rejection, shares, told_on
 
 Array = NDArray[np.float64]
-OFFSET = "asymmetric_friction"
+OFFSET, RIPPLE = "asymmetric_friction", "torque_ripple"
 # loads that a weight elsewhere gives at the postures of one recording or another
-BY_PLACE = frozenset({OFFSET, "detent_load", "nonlinear_spring", "torque_ripple"})
+BY_PLACE = frozenset({OFFSET, RIPPLE, "detent_load", "nonlinear_spring"})
 PROBABILITY = (
     "that anything is there: share of resampled blocks of the training recordings, each left out of the fit, on which "
     "the effect lowers the error against nothing; shared out among it and its alternatives by how often each is the best"
@@ -293,22 +293,25 @@ def _held_out(rig: RigModel, search: _Search) -> tuple[tuple, tuple[str, ...]]:
 
 
 def _off_axis(bench: Bench, fit: DeclaredFit, terms: Sequence[Term]) -> tuple[DeclaredFit, Finding] | None:
-    """Centres of mass off their declared axes, one change to the whole chain, beside terms; instead of those of them
-    that are loads by place, which may stand in for it, where the others are left so."""
+    """Centres of mass off their declared axes, one change to the whole chain, beside terms, or instead of those of them
+    that are loads by place where it leaves no more than these do: they may stand in for it."""
     rig = bench.rig
     freed = fit_declared(rig, _refused(rig, fit), fit.cutoff_hz, off_axis=True, kept=fit.kept)
     if len(freed.columns) == len(fit.columns):
         return None
     freed = replace(freed, scale=fit.scale)
-    kept = [t for t in terms if t.candidate.effect not in BY_PLACE] if any(_not_offset(t) for t in terms) else terms
-    sides = (pose(fit), terms), (pose(freed), kept)
-    errors = [held_out(p, t, normal(p, t)) for p, t in sides]
+    problem, other = pose(fit), pose(freed)
+    errors = [(kept, held_out(other, kept, normal(other, kept))) for kept in _without_stand_ins(terms)]
+    kept, error = min(errors, key=lambda side: side[1].sum())
     shape = Candidate(
         "gravity_load", "centres of mass off their axes", "*", (), ({},), lambda r, s: np.zeros((len(r.time_s), 0))
     )
-    found = judge(errors[0], [Score(Term(shape, {}), errors[1])], sides[0][0])
-    if found is None or _better_alone(rig, fit, terms, errors[1].sum()):
+    found = judge(held_out(problem, kept, normal(problem, kept)), [Score(Term(shape, {}), error)], problem)
+    if found is None or error.sum() > held_out(problem, terms, normal(problem, terms)).sum():
         return None
+    if _better_alone(rig, fit, kept, error.sum()):
+        return None
+    sides = (problem, terms), (other, kept)
     before, after = (solution(p, t) for p, t in sides)
     joints = sorted({r.joint for r in fit.rows})
     proofs = {j: bench.proof(j, (fit, terms, before), (freed, kept, after)) for j in joints}
@@ -343,8 +346,12 @@ def _off_axis(bench: Bench, fit: DeclaredFit, terms: Sequence[Term]) -> tuple[De
     )
 
 
-def _not_offset(term: Term) -> bool:
-    return term.candidate.effect != OFFSET
+def _without_stand_ins(terms: Sequence[Term]) -> list[list[Term]]:
+    """Terms without those that may stand in for weights elsewhere: none where there are offsets alone, which may be as
+    well; all loads by place, or all but ripples."""
+    if all(t.candidate.effect == OFFSET for t in terms):
+        return [list(terms)]
+    return [[t for t in terms if t.candidate.effect not in some] for some in (BY_PLACE, BY_PLACE - {RIPPLE})]
 
 
 def _better_alone(rig: RigModel, fit: DeclaredFit, terms: Sequence[Term], error: float) -> bool:
