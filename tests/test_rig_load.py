@@ -12,7 +12,20 @@ from rig_bench import ARM, HEAD, Motion, recorded
 
 from hand_model.rig import diagnose_rig, load_rig
 from hand_model.rig.diagnose import trusted_fit
-from hand_model.rig.laws import GEAR, GEAR_LOW, GEAR_MORE, LOW, MORE, MOTOR, MOTOR_LOW, MOTOR_MORE, TURNING, Now, law
+from hand_model.rig.laws import (
+    ALL_TURNING,
+    GEAR,
+    GEAR_LOW,
+    GEAR_MORE,
+    LOW,
+    MORE,
+    MOTOR,
+    MOTOR_LOW,
+    MOTOR_MORE,
+    TURNING,
+    Now,
+    law,
+)
 from hand_model.rig.name.candidates import UNDECLARED, Candidate, _knees, candidates
 from hand_model.rig.name.compete import _resettled
 from hand_model.rig.name.problem import Term, pose, rescaled, solution
@@ -74,7 +87,7 @@ def test_every_friction_by_load_is_in_open_loop_what_it_is_in_the_balance(tmp_pa
     for candidate in (
         c
         for c in candidates(rig, fit, "hinge")
-        if c.effect == "load_dependent_friction" and c.variant not in ("", TURNING)
+        if c.effect == "load_dependent_friction" and c.variant not in ("", TURNING, ALL_TURNING)
     ):
         shape, sizes = candidate.grid[-1], dict(zip((a[0] for a in candidate.amplitudes), (0.2, 0.3), strict=False))
         act = law({"effect": candidate.effect, "variant": candidate.variant, "shape": shape, "amplitude": sizes})
@@ -85,6 +98,21 @@ def test_every_friction_by_load_is_in_open_loop_what_it_is_in_the_balance(tmp_pa
         np.testing.assert_allclose(np.abs(column)[moving], np.abs(size)[moving], rtol=1e-6)
         variants.add(candidate.variant)
     assert variants == {LOW, MORE, MOTOR, MOTOR_LOW, MOTOR_MORE, GEAR, GEAR_LOW, GEAR_MORE, "with speed"}
+
+
+def test_friction_by_load_and_a_constant_turn_round_together_in_open_loop_as_in_the_balance(tmp_path: Path) -> None:
+    rig = load_rig(read_session(bench(tmp_path / "s", MOTOR)))
+    fit = trusted_fit(rig)[0]
+    (both,) = (c for c in candidates(rig, fit, "hinge") if c.variant == ALL_TURNING)
+    row = fit.rows[0]
+    for form in (0.0, 1.0):
+        shape, sizes = {"form": form, "reach": 0.05}, {"per_load": 0.2, "yield_load": 0.3}
+        act = law({"effect": both.effect, "variant": both.variant, "shape": shape, "amplitude": sizes})
+        assert act is not None
+        states = zip(row.position, row.velocity, row.load(fit.theta), strict=True)
+        size = np.array([act(Now(q, v, load, 0.0)) for q, v, load in states])
+        np.testing.assert_allclose(both.columns(row, shape) @ [0.2, 0.3], size[:, 0], atol=1e-7)
+        assert not size[:, 1].any()
 
 
 def test_a_spring_that_nobody_declared(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ FRICTION = frozenset({"stribeck_friction", "position_dependent_friction"})
 # Variants of friction by load: by what the joint carries where nothing else is said.
 MOTOR, GEAR, TURNING = "motor side", "both sides of the gear", "turning round over a distance"
 LOW, MOTOR_LOW, GEAR_LOW = "low speed", f"{MOTOR}, low speed", f"{GEAR}, low speed"
+ALL_TURNING = f"{TURNING}, with what does not grow with it"
 # At every speed, and more of it below a Stribeck speed (M5 of the ladder of Duclusaud et al. 2024).
 MORE, MOTOR_MORE, GEAR_MORE = (f"{side}more at low speed" for side in ("", f"{MOTOR}, ", f"{GEAR}, "))
 # of a spring where none is declared: its stiffness, and what it gives at the joint's zero
@@ -47,6 +48,8 @@ def law(record: Mapping[str, Any]) -> Law | None:
     loop."""
     name, variant = record["effect"], record.get("variant", "")
     shape, size = record.get("shape", {}), tuple(record.get("amplitude", {}).values())
+    if variant == ALL_TURNING:
+        return _Stop(shape, size[0], by_load=True, base=size[1])
     if variant == TURNING:
         return _Stop(shape, size[0], by_load=name == "load_dependent_friction")
     if name == "thermal_friction_drift":
@@ -127,10 +130,11 @@ _SIDES = {
 
 
 class _Stop:
-    """Stop operator (form 0) or exponential build-up (form 1) along the path, step by step; by_load: times the load;
-    slower than a Stribeck speed where the shape has one."""
+    """Stop operator (form 0) or exponential build-up (form 1) along the path, step by step; by_load: times the load,
+    and a base besides; slower than a Stribeck speed where the shape has one."""
 
-    def __init__(self, shape: Mapping[str, float], size: float, by_load: bool = False) -> None:
+    def __init__(self, shape: Mapping[str, float], size: float, by_load: bool = False, base: float = 0.0) -> None:
+        self.base = base
         self.reach, self.abrupt, self.size, self.by_load = (
             max(shape["reach"], 1e-12),
             shape["form"] < 0.5,
@@ -149,7 +153,7 @@ class _Stop:
             way = math.copysign(1.0, moved)
             self.state = way + (self.state - way) * math.exp(-abs(moved) / self.reach)
         by = math.exp(-((now.velocity / self.slow) ** 2)) * (abs(now.load) if self.by_load else 1.0)
-        return self.size * self.state * by, 0.0
+        return (self.base + self.size * by) * self.state, 0.0
 
 
 class Warming:

@@ -13,7 +13,20 @@ from ...effects import DriveState, catalogue, effect
 from ...effects.base import Shape
 from ..balance import Rows
 from ..declared import DeclaredFit
-from ..laws import GEAR, GEAR_LOW, GEAR_MORE, LINE, LOW, MORE, MOTOR, MOTOR_LOW, MOTOR_MORE, PRELOAD, TURNING
+from ..laws import (
+    ALL_TURNING,
+    GEAR,
+    GEAR_LOW,
+    GEAR_MORE,
+    LINE,
+    LOW,
+    MORE,
+    MOTOR,
+    MOTOR_LOW,
+    MOTOR_MORE,
+    PRELOAD,
+    TURNING,
+)
 from ..model import RigModel
 from ..warming import WARMS, warmth
 from .ripple import fine_periods
@@ -239,7 +252,8 @@ def _turning_round(
     states: Mapping[str, DriveState],
     rows: list[Rows],
 ) -> list[Candidate]:
-    """Friction that needs a distance to turn round: a constant one, one in proportion to the load, one that falls with
+    """Friction that needs a distance to turn round: a constant one, one in proportion to the load, both together (the
+    declared dry friction is then none that turns at once), one that falls with
     speed (the bristles of a LuGre model, Canudas de Wit et al. 1995, slow against their own state), and where trials
     declare Coulomb levels, one for each."""
     stop = _from_catalogue(effect("elastoplastic_hysteresis"), joint, train, states)
@@ -259,6 +273,13 @@ def _turning_round(
             variant=TURNING,
             amplitudes=(("per_load", "1", 0.0, np.inf),),
             columns=lambda r, s: load[r.trial] * stop.columns(r, s),
+        ),
+        replace(
+            stop,
+            effect="load_dependent_friction",
+            variant=ALL_TURNING,
+            amplitudes=(("per_load", "1", 0.0, np.inf), ("yield_load", rig.effort_unit(joint), 0.0, np.inf)),
+            columns=lambda r, s: np.column_stack([load[r.trial], np.ones(len(r.position))]) * stop.columns(r, s),
         ),
         replace(
             stop,
