@@ -3,6 +3,7 @@ motion."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 
 from hand_model.rig import standing
 from hand_model.rig.findings import Finding
+from hand_model.rig.laws import ALL_TURNING, TURNING
 from hand_model.rig.name.candidates import Candidate
 from hand_model.rig.name.problem import Term
 from hand_model.rig.same_path import one_load_each
@@ -115,6 +117,31 @@ def test_what_leaves_its_joint_worse_off_in_the_end_stays_only_where_all_joints_
     found, kept = standing.in_the_end(bench, (fit, fit), terms, [(None, {}), (None, {})], rejected := [])
     assert [t.candidate.effect for t in kept] == ["a", "b"][: 1 + stays] == [name for name, _ in found]
     assert [r["reason"] for r in rejected] == [standing.HARMFUL] * (not stays)
+
+
+@pytest.mark.parametrize(
+    ("size", "told"),
+    [
+        ((0.2, 0.5), ("load_dependent_friction", ALL_TURNING)),
+        ((0.2, 1e-4), ("load_dependent_friction", TURNING)),
+        ((1e-4, 0.5), ("elastoplastic_hysteresis", "")),
+    ],
+)
+def test_of_two_frictions_that_turn_round_together_the_one_that_is_there_is_told(
+    monkeypatch: pytest.MonkeyPatch, size: tuple[float, float], told: tuple[str, str]
+) -> None:
+    """At a load of 3 N m."""
+
+    def known(rig: Any, fit: Any, joint: str, only: set[str]) -> tuple[Candidate, ...]:
+        pairs = [("load_dependent_friction", v) for v in (ALL_TURNING, TURNING)] + [("elastoplastic_hysteresis", "")]
+        return tuple(replace(term(joint, e, 0.1).candidate, variant=v) for e, v in pairs if e in only)
+
+    monkeypatch.setattr(standing, "candidates", known)
+    row = SimpleNamespace(joint="elbow", load=lambda theta: np.full(5, -3.0))
+    fit = SimpleNamespace(columns=(), rows=(row,), theta=np.zeros(0))
+    both = replace(known(None, None, "elbow", {"load_dependent_friction"})[0], amplitudes=(("a",), ("b",)))
+    (out,) = standing._told_apart(Bench({}, {}), (fit, [Term(both, {"reach": 0.1})], np.array(size)))
+    assert (out.candidate.effect, out.candidate.variant) == told and out.shape == {"reach": 0.1}
 
 
 def _proof_by_joint(errors: dict[str, dict[tuple[float, ...], float]]) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,9 +14,10 @@ from numpy.typing import NDArray
 from .declared import DeclaredFit
 from .findings import NOT_BORNE_OUT, Finding, measured, whereabouts
 from .horizon import NO_LAW, open_loop
+from .laws import ALL_TURNING, TURNING
 from .model import RigModel
-from .name.candidates import WHOLE
-from .name.compete import LEAST_SHARE, Step
+from .name.candidates import WHOLE, candidates
+from .name.compete import CONSTANT, LEAST_SHARE, Step
 from .name.problem import Term, pose, resampled, solution
 from .name.refit import refit
 from .name.settled import settled
@@ -23,6 +25,7 @@ from .proof import Bench
 from .words import alternatives, joint_unit, shape_unit, statement
 
 Array = NDArray[np.float64]
+PART = 0.05  # of a friction: less of it is no part
 FITS = 1.6**0.5  # an error within so many noise floors is taken to be noise: a variance 1.6 times as large
 END = 0.99  # of the longest delay that is tried
 # What two effects leave at a joint may be the form of their laws, which no catalogue has to better than 7 % of its
@@ -93,7 +96,28 @@ def in_the_end(
             every = without
             del terms[k], proofs[k]
     ends = {j: bench.proof(j, plain, every) for j in dict.fromkeys(t.candidate.joint for t in terms)}
-    return _named(bench, fit, every[1], every[2], proofs, ends), terms
+    told = _told_apart(bench, every)
+    size = every[2] if told == every[1] else solved(bench, fit, told)[1]
+    return _named(bench, fit, told, size, proofs, ends), terms
+
+
+def _told_apart(bench: Bench, side: tuple[DeclaredFit, Sequence[Term], Array]) -> list[Term]:
+    """Terms, in which a friction by load and a constant one that turn round together is one of them where hardly
+    anything of the other is left in the end."""
+    fit, terms, theta = side
+    out, first = [], len(fit.columns)
+    for term in terms:
+        c, size = term.candidate, theta[first : first + len(term.candidate.amplitudes)]
+        first += len(size)
+        if c.variant == ALL_TURNING:
+            loads = np.concatenate([r.load(fit.theta) for r in fit.rows if r.joint == c.joint])
+            by_load, constant = size * [np.sqrt(np.mean(loads**2)), 1.0]
+            effect, variant = (CONSTANT, "") if by_load < PART * constant else (c.effect, TURNING)
+            if min(by_load, constant) < PART * max(by_load, constant):
+                every = candidates(bench.rig, fit, c.joint, only={effect})
+                term = replace(term, candidate=next(o for o in every if (o.effect, o.variant) == (effect, variant)))
+        out.append(term)
+    return out
 
 
 def _shaped(fit: DeclaredFit, standing: Sequence[Term], found: Sequence[Term], whole: Mapping[str, int]) -> list[Term]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ...diagnose.name.term import DISCRETE
 from ..evidence import BEYOND_DOUBT, weigh
+from ..laws import ALL_TURNING
 from .beside import Beside, Score
 from .candidates import PRELOADED, Candidate
 from .problem import (
@@ -31,7 +32,7 @@ from .refit import refit
 
 Array = NDArray[np.float64]
 LEAST_SHARE = 0.05  # of the held-out residual variance: less is not worth a name
-LOADED = "load_dependent_friction"
+LOADED, CONSTANT = "load_dependent_friction", "elastoplastic_hysteresis"
 MOST_TERMS, MOST_OF_FEW = 4, 3  # of few recordings what is left after so many goes by many names
 TOGETHER = 3  # rivals that meet in their best shapes, beside those of what stands
 
@@ -229,9 +230,11 @@ def judge(none: Array, scores: Sequence[Score], problem: Problem) -> tuple[int, 
 
 def _as_good(simple: Score, rich: Score) -> bool:
     """Whether a form of the same effect with fewer parameters leaves so little more that the rest would be worth no
-    name of its own."""
+    name of its own; of friction by load with a constant one that turns round with it, also the constant one alone."""
+    one, other = simple.term.candidate, rich.term.candidate
+    part = other.variant == ALL_TURNING and one.effect == CONSTANT
     return (
-        simple.term.candidate.effect == rich.term.candidate.effect
+        (one.effect == other.effect or part)
         and _size(simple.term) < _size(rich.term)
         and (1 - LEAST_SHARE) * simple.error.sum() <= rich.error.sum()
     )
