@@ -26,10 +26,11 @@ from hand_model.rig.laws import (
     Now,
     law,
 )
-from hand_model.rig.name.candidates import UNDECLARED, Candidate, _knees, candidates
+from hand_model.rig.name.candidates import UNDECLARED, Candidate, candidates
 from hand_model.rig.name.compete import _resettled
 from hand_model.rig.name.problem import Term, pose, rescaled, solution
 from hand_model.rig.name.settled import settled
+from hand_model.rig.name.turning import knees
 from hand_model.session import read_session
 
 SIZE = 0.25
@@ -237,4 +238,4 @@ def test_no_stribeck_speed_lies_where_the_joint_stands(tmp_path: Path) -> None:
 @pytest.mark.parametrize("speed", [0.0, 1e-4])
 def test_a_joint_that_is_held_throughout_has_stribeck_speeds_to_try(speed: float) -> None:
     held = SimpleNamespace(velocity=np.full(50, speed), rest_speed=1e-3)
-    assert all(0 < knee["stribeck_speed"] <= 1e-3 for knee in _knees([held]))
+    assert all(0 < knee["stribeck_speed"] <= 1e-3 for knee in knees([held]))

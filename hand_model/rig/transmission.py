@@ -14,7 +14,7 @@ from .declared import DeclaredFit, _robust_fit
 from .dynamics import inertial_columns, inertial_parameters
 from .findings import CouplingResidual
 from .model import Coupling, RigModel, RigTrial
-from .name.candidates import Candidate
+from .name.candidate import Candidate
 from .name.problem import Term, design, pose, solution
 from .overrides import compile_model
 from .states import choose_cutoff, differentiate, fill_gaps, low_pass, uniform_time, velocity_noise

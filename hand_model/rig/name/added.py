@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..solve import Nested
-from .candidates import Candidate
+from .candidate import Candidate
 from .problem import Problem, Term, delay_of, limits, moving_design, normal, training_error
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...background import Pair
 from .added import Added
-from .candidates import Candidate
+from .candidate import Candidate
 from .problem import Problem, Term, extended, held_out, normal
 from .refit import moves, refined, refit
 

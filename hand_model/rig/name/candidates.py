@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...effects import DriveState, catalogue, effect
-from ...effects.base import Shape
 from ..balance import Rows
 from ..declared import DeclaredFit
 from ..laws import (
-    ALL_TURNING,
     GEAR,
     GEAR_LOW,
     GEAR_MORE,
@@ -25,11 +23,12 @@ from ..laws import (
     MOTOR_LOW,
     MOTOR_MORE,
     PRELOAD,
-    TURNING,
 )
 from ..model import RigModel
 from ..warming import WARMS, warmth
+from .candidate import Bound, Candidate
 from .ripple import fine_periods
+from .turning import knees, turning_round
 
 Array = NDArray[np.float64]
 # Those that rigs have in a form of their own, or that need a hand.
@@ -47,7 +46,8 @@ NOT_FOR_RIGS = frozenset(
     }
 )
 RIPPLE = "torque_ripple"
-TURN_ROUND = frozenset({"elastoplastic_hysteresis", "load_dependent_friction", "stribeck_friction"})
+STOP = "elastoplastic_hysteresis"
+TURN_ROUND = frozenset({STOP, "load_dependent_friction", "stribeck_friction"})
 SMOOTH = ("nonlinear_spring",)  # its knee belongs to fingers with a return spring; a joint has stops and detents
 # what it damps at one end of a range is hardly told there from friction that differs by speed and way
 UNDAMPED = ("end_stop_contact",)
@@ -60,44 +60,7 @@ TURNS = 4
 SAME = 0.05  # of a column's variance
 DRAG, DRY_AND_DRAG = "viscous", "dry and viscous"
 UNDECLARED, PRELOADED = "no spring is declared", "no spring is declared, at rest anywhere"
-BY_LEVEL = "a level for each that trials declare"
-REACHES = tuple(np.geomspace(0.004, 0.5, 8))  # of the range, over which friction turns round
-SHORTEST = 0.25  # of the shortest of these
-# what has one of these can be there twice: two springs, two tight spots
-PLACED = frozenset({"reach", "period", "centre"})
-Bound = tuple[str, str, float, float]
 WHOLE: Bound = ("whole", "1", 0.99, 1.01)  # of an effect that has no size beside its shape
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """One effect at one joint. columns(row, shape) -> (n, j) at full rate; grid: starting shapes; warp: shape -> delay
-    [s] by which every column comes later (None: no delay); variant says in words which one this is; shapes: by
-    name, those of the catalogue's effect, which may leave their grid within their bounds."""
-
-    effect: str
-    variant: str
-    joint: str
-    amplitudes: tuple[Bound, ...]
-    grid: tuple[dict[str, float], ...]
-    columns: Callable[[Rows, Mapping[str, float]], Array]
-    delays: bool = False
-    shapes: Mapping[str, Shape] = field(default_factory=dict)
-
-    def told(self, shape: Mapping[str, float]) -> dict[str, float]:
-        """What of a shape says something in its form."""
-        told = effect(self.effect).told(shape)
-        return {k: float(v) for k, v in told.items() if k not in self.shapes or self.shapes[k].matters(shape)}
-
-    @property
-    def repeats(self) -> bool:
-        """Whether it can act at a joint more than once, at different places."""
-        return bool(PLACED & self.grid[0].keys())
-
-    @property
-    def key(self) -> str:
-        """effect@joint, with the variant where there is one."""
-        return f"{self.effect}{'/' + self.variant if self.variant else ''}@{self.joint}"
 
 
 def beside(
@@ -163,7 +126,7 @@ def candidates(
     if only is None or not NOT_FOR_RIGS.isdisjoint(only):
         found += _own(rig, fit, joint, rows)
     if only is None or not TURN_ROUND.isdisjoint(only):
-        found += _turning_round(rig, fit, joint, train, states, rows)
+        found += turning_round(_from_catalogue(effect(STOP), joint, train, states), rig, fit, joint, train, rows)
     return tuple(c for c in found if c.grid and (only is None or c.effect in only))
 
 
@@ -244,85 +207,12 @@ def _with_line(bend: Candidate, preloaded: bool) -> list[Candidate]:
     return [plain, anywhere]
 
 
-def _turning_round(
-    rig: RigModel,
-    fit: DeclaredFit,
-    joint: str,
-    train: tuple[DriveState, ...],
-    states: Mapping[str, DriveState],
-    rows: list[Rows],
-) -> list[Candidate]:
-    """Friction that needs a distance to turn round: a constant one, one in proportion to the load, both together (the
-    declared dry friction is then none that turns at once), one that falls with
-    speed (the bristles of a LuGre model, Canudas de Wit et al. 1995, slow against their own state), and where trials
-    declare Coulomb levels, one for each."""
-    stop = _from_catalogue(effect("elastoplastic_hysteresis"), joint, train, states)
-    span = max(float(np.ptp(state.position)) for state in train)
-    wider = replace(stop.shapes["reach"], low=SHORTEST * REACHES[0] * span)
-    stop = replace(
-        stop,
-        grid=tuple({"form": form, "reach": float(share * span)} for form in (0.0, 1.0) for share in REACHES),
-        shapes={**stop.shapes, "reach": wider},
-    )
-    load = {r.trial: np.abs(r.load(fit.theta))[:, None] for r in fit.rows if r.joint == joint}
-    found = [
-        stop,
-        replace(
-            stop,
-            effect="load_dependent_friction",
-            variant=TURNING,
-            amplitudes=(("per_load", "1", 0.0, np.inf),),
-            columns=lambda r, s: load[r.trial] * stop.columns(r, s),
-        ),
-        replace(
-            stop,
-            effect="load_dependent_friction",
-            variant=ALL_TURNING,
-            amplitudes=(("per_load", "1", 0.0, np.inf), ("yield_load", rig.effort_unit(joint), 0.0, np.inf)),
-            columns=lambda r, s: np.column_stack([load[r.trial], np.ones(len(r.position))]) * stop.columns(r, s),
-        ),
-        replace(
-            stop,
-            effect="stribeck_friction",
-            variant=TURNING,
-            amplitudes=(("static_excess", rig.effort_unit(joint), 0.0, np.inf),),
-            grid=tuple(
-                {"form": 0.0, "reach": float(share * span), **knee} for share in REACHES[::2] for knee in _knees(rows)
-            ),
-            columns=lambda r, s: stop.columns(r, s) * np.exp(-((r.velocity / s["stribeck_speed"]) ** 2))[:, None],
-        ),
-    ]
-    key = f"joint:{joint}:frictionloss"
-    level = {t.name: float(np.atleast_1d(t.set[key])[0]) for t in rig.trials if key in t.set}
-    levels = np.unique(list(level.values()))
-    if len(levels) > 1 and all(t.name in level for t in rig.trials):
-        found.append(
-            replace(
-                stop,
-                variant=BY_LEVEL,
-                amplitudes=tuple((f"yield_load_{k:g}", "effort", 0.0, np.inf) for k in levels),
-                columns=lambda r, s: (levels == level[r.trial]) * stop.columns(r, s),
-            )
-        )
-    return found
-
-
-def _knees(rows: list[Rows], count: int = 4) -> tuple[dict[str, float], ...]:
-    """Stribeck speeds between the slow and the fast ones of what moves: at rest friction is unknown, and one that acts
-    there alone would be named for what holds the joint while it stands."""
-    speeds = np.concatenate([np.abs(r.velocity) for r in rows])
-    moving = speeds > np.concatenate([np.full(len(r.velocity), r.rest_speed) for r in rows])
-    # of a joint that is held throughout all there is
-    speeds = speeds[moving] if moving.any() else np.maximum(speeds, 1e-12)
-    return tuple({"stribeck_speed": float(s)} for s in np.geomspace(*np.percentile(speeds, [10, 90]), count))
-
-
 def _by_load(fit: DeclaredFit, joint: str, rows: list[Rows], driven: bool) -> list[Candidate]:
     """Friction by what the joint carries, by what its drive puts in, or by both sides of a gear at once: the mean of
     the drive's effort and of the bias that it works against (Duclusaud et al. 2024, model M3)."""
     mine = [r for r in fit.rows if r.joint == joint]
     load = {r.trial: np.abs(r.load(fit.theta)) for r in mine}
-    knees = _knees(rows, 6)
+    slow = knees(rows, 6)
 
     def friction(variant: str, amplitude: str, by: Mapping[str, Array]) -> Candidate:
         return Candidate(
@@ -340,16 +230,16 @@ def _by_load(fit: DeclaredFit, joint: str, rows: list[Rows], driven: bool) -> li
             variant,
             joint,
             (("per_load", "1", 0.0, np.inf),),
-            knees,
+            slow,
             lambda r, s: (r.direction * by[r.trial] * np.exp(-((r.velocity / s["stribeck_speed"]) ** 2)))[:, None],
         )
 
     def more(variant: str, by: Mapping[str, Array]) -> Candidate:
-        slow = at_low_speed(variant, by)
+        low = at_low_speed(variant, by)
         return replace(
-            slow,
-            amplitudes=(*slow.amplitudes, ("per_load_low", "1", 0.0, np.inf)),
-            columns=lambda r, s: np.column_stack([r.direction * by[r.trial], slow.columns(r, s)]),
+            low,
+            amplitudes=(*low.amplitudes, ("per_load_low", "1", 0.0, np.inf)),
+            columns=lambda r, s: np.column_stack([r.direction * by[r.trial], low.columns(r, s)]),
         )
 
     found = [

@@ -18,7 +18,7 @@ from ..balance import Rows
 from ..consistent import consistent
 from ..declared import DeclaredFit, bounds, prior
 from ..solve import solve_bounded, squared_error, sums_of
-from .candidates import Candidate
+from .candidate import Candidate
 
 Array = NDArray[np.float64]
 FOLDS = 6

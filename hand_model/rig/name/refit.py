@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...diagnose.name.term import DISCRETE
 from .added import Added
-from .candidates import Candidate
+from .candidate import Candidate
 from .problem import Problem, Term, normal
 
 Array = NDArray[np.float64]

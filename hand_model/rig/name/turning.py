@@ -1,0 +1,90 @@
+"""Frictions that need a distance to turn round, as candidates at a joint."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...effects import DriveState
+from ..balance import Rows
+from ..declared import DeclaredFit
+from ..laws import ALL_TURNING, TURNING
+from ..model import RigModel
+from .candidate import Candidate
+
+BY_LEVEL = "a level for each that trials declare"
+REACHES = tuple(np.geomspace(0.004, 0.5, 8))  # of the range, over which friction turns round
+SHORTEST = 0.25  # of the shortest of these
+
+
+def turning_round(
+    stop: Candidate,
+    rig: RigModel,
+    fit: DeclaredFit,
+    joint: str,
+    train: tuple[DriveState, ...],
+    rows: list[Rows],
+) -> list[Candidate]:
+    """Friction that needs a distance to turn round: a constant one, one in proportion to the load, both together (the
+    declared dry friction is then none that turns at once), one that falls with speed (the bristles of a LuGre model,
+    Canudas de Wit et al. 1995, slow against their own state), and where trials declare Coulomb levels, one for each.
+    stop: the constant one as the catalogue has it."""
+    span = max(float(np.ptp(state.position)) for state in train)
+    wider = replace(stop.shapes["reach"], low=SHORTEST * REACHES[0] * span)
+    stop = replace(
+        stop,
+        grid=tuple({"form": form, "reach": float(share * span)} for form in (0.0, 1.0) for share in REACHES),
+        shapes={**stop.shapes, "reach": wider},
+    )
+    load = {r.trial: np.abs(r.load(fit.theta))[:, None] for r in fit.rows if r.joint == joint}
+    found = [
+        stop,
+        replace(
+            stop,
+            effect="load_dependent_friction",
+            variant=TURNING,
+            amplitudes=(("per_load", "1", 0.0, np.inf),),
+            columns=lambda r, s: load[r.trial] * stop.columns(r, s),
+        ),
+        replace(
+            stop,
+            effect="load_dependent_friction",
+            variant=ALL_TURNING,
+            amplitudes=(("per_load", "1", 0.0, np.inf), ("yield_load", rig.effort_unit(joint), 0.0, np.inf)),
+            columns=lambda r, s: np.column_stack([load[r.trial], np.ones(len(r.position))]) * stop.columns(r, s),
+        ),
+        replace(
+            stop,
+            effect="stribeck_friction",
+            variant=TURNING,
+            amplitudes=(("static_excess", rig.effort_unit(joint), 0.0, np.inf),),
+            grid=tuple(
+                {"form": 0.0, "reach": float(share * span), **knee} for share in REACHES[::2] for knee in knees(rows)
+            ),
+            columns=lambda r, s: stop.columns(r, s) * np.exp(-((r.velocity / s["stribeck_speed"]) ** 2))[:, None],
+        ),
+    ]
+    key = f"joint:{joint}:frictionloss"
+    level = {t.name: float(np.atleast_1d(t.set[key])[0]) for t in rig.trials if key in t.set}
+    levels = np.unique(list(level.values()))
+    if len(levels) > 1 and all(t.name in level for t in rig.trials):
+        found.append(
+            replace(
+                stop,
+                variant=BY_LEVEL,
+                amplitudes=tuple((f"yield_load_{k:g}", "effort", 0.0, np.inf) for k in levels),
+                columns=lambda r, s: (levels == level[r.trial]) * stop.columns(r, s),
+            )
+        )
+    return found
+
+
+def knees(rows: list[Rows], count: int = 4) -> tuple[dict[str, float], ...]:
+    """Stribeck speeds between the slow and the fast ones of what moves: at rest friction is unknown, and one that acts
+    there alone would be named for what holds the joint while it stands."""
+    speeds = np.concatenate([np.abs(r.velocity) for r in rows])
+    moving = speeds > np.concatenate([np.full(len(r.velocity), r.rest_speed) for r in rows])
+    # of a joint that is held throughout all there is
+    speeds = speeds[moving] if moving.any() else np.maximum(speeds, 1e-12)
+    return tuple({"stribeck_speed": float(s)} for s in np.geomspace(*np.percentile(speeds, [10, 90]), count))
