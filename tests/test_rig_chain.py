@@ -10,11 +10,12 @@ import pytest
 
 from hand_model.rig import diagnose_rig, fit_declared, load_rig
 from hand_model.rig.balance import declared_columns
-from hand_model.rig.diagnose import trusted_fit
+from hand_model.rig.diagnose import _off_axis, _without_stand_ins, trusted_fit
 from hand_model.rig.dynamics import inertial_columns, inertial_parameters
 from hand_model.rig.inverse import effort_residuals, with_bodies
+from hand_model.rig.name.beside import score
 from hand_model.rig.name.candidates import candidates
-from hand_model.rig.name.problem import Term
+from hand_model.rig.name.problem import Term, normal, pose
 from hand_model.rig.proof import Bench
 from hand_model.session import read_session
 
@@ -93,3 +94,20 @@ def test_balances_made_before_say_the_loads_of_a_file_with_weights_off_their_axe
         np.testing.assert_allclose(before.error, anew.error, atol=1e-9 * np.abs(anew.expected).max())
     lame = effort_residuals(file, fit.rows)
     assert max(np.abs(a.error - b.error).max() for a, b in zip(sides[0], lame, strict=True)) > 1e-3
+
+
+def test_weights_off_their_axes_take_the_place_of_loads_by_place(tmp_path: Path) -> None:
+    """A detent that stands at the elbow for the weight off its axis goes, an offset that is there is asked beside it; with
+    every weight declared there is nothing to ask."""
+    rig = load_rig(read_session(arm(tmp_path / "s")))
+    fit = trusted_fit(rig)[0]
+    every = {j: {c.key: c for c in candidates(rig, fit, j)} for j in rig.joints}
+    detent, drag = every["elbow"]["detent_load@elbow"], every["elbow"]["quadratic_damping@elbow"]
+    parts = normal(pose(fit), [])
+    stands = [score(pose(fit), [], c, parts).term for c in (detent, drag)]
+    offset = Term(every["shoulder"]["asymmetric_friction@shoulder"], {})
+    assert _without_stand_ins([offset]) == [[offset]]
+    assert _without_stand_ins([*stands, offset]) == [stands[1:], stands[1:]]
+    freed, finding = _off_axis(Bench(rig), fit, [stands[0]])
+    assert len(freed.columns) > len(fit.columns) and finding.effect == "gravity_load"
+    assert finding.parameters["inertial:lower:hx"]["value"] == pytest.approx(1.5 * 0.06, rel=0.25)

@@ -3,6 +3,7 @@ declared."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -26,8 +27,8 @@ from hand_model.rig.laws import (
     Now,
     law,
 )
-from hand_model.rig.name.candidates import UNDECLARED, Candidate, candidates
-from hand_model.rig.name.compete import _resettled
+from hand_model.rig.name.candidates import PRELOADED, UNDECLARED, Candidate, candidates
+from hand_model.rig.name.compete import _resettled, _said
 from hand_model.rig.name.problem import Term, pose, rescaled, solution
 from hand_model.rig.name.settled import settled
 from hand_model.rig.name.turning import knees
@@ -132,6 +133,26 @@ def test_a_spring_that_nobody_declared(tmp_path: Path) -> None:
     act = law({"effect": spring.effect, "variant": spring.variant, "shape": {}, "amplitude": fitted})
     assert act is not None
     assert act(Now(at, 0.0, 0.0, 0.0))[0] == pytest.approx(0.5 * at, rel=0.03)
+
+
+def test_a_spring_may_be_at_rest_anywhere(tmp_path: Path) -> None:
+    """One that is at rest 0.4 rad from the joint's zero is read with what it gives there, in open loop too; beside an
+    offset, which says the same, it is not asked."""
+    rig = load_rig(read_session(bench(tmp_path / "s", stiffness=0.5, weight=0.0)))
+    fit = trusted_fit(rig)[0]
+    fit = replace(
+        fit, rows=tuple(replace(r, effort=r.effort + r.filtered(np.full(len(r.position), 0.2))) for r in fit.rows)
+    )
+    every = candidates(rig, fit, "hinge")
+    spring = next(c for c in every if c.variant == PRELOADED)
+    theta = solution(pose(fit), [Term(spring, {})])
+    fitted = dict(zip([a[0] for a in spring.amplitudes], theta[len(fit.columns) :], strict=True))
+    act = law({"effect": spring.effect, "variant": spring.variant, "shape": {}, "amplitude": fitted})
+    assert act is not None and fitted["preload"] == pytest.approx(0.2, rel=0.05)
+    for at in (-0.4, 0.6):
+        assert act(Now(at, 0.0, 0.0, 0.0))[0] == pytest.approx(0.5 * (at + 0.4), abs=0.02)
+    offset = Term(next(c for c in every if c.effect == "asymmetric_friction"), {})
+    assert _said(spring, [offset]) and not _said(spring, [])
 
 
 def test_a_large_effect_does_not_hold_the_declared_parameters_back(tmp_path: Path) -> None:

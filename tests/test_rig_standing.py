@@ -144,6 +144,24 @@ def test_of_two_frictions_that_turn_round_together_the_one_that_is_there_is_told
     assert (out.candidate.effect, out.candidate.variant) == told and out.shape == {"reach": 0.1}
 
 
+def test_effects_are_sized_beside_all_others_but_without_a_later_one_of_their_name(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of three at a joint the first and the last have one name: the first has its size without the last, the others as
+    all are."""
+    monkeypatch.setattr(standing, "_joint_finding", lambda rig, fit, step, term, size, proof, spread: float(size[0]))
+    without = np.array([9.0, 5.0, 2.5])
+    monkeypatch.setattr(standing, "solved", lambda bench, fit, terms: (list(terms), without[: 1 + len(terms)]))
+    terms = [
+        Term(replace(term("elbow", name, reach).candidate, amplitudes=(("a",),)), {"reach": reach})
+        for name, reach in (("a", 1.0), ("b", 2.0), ("a", 3.0))
+    ]
+    fit, proofs = SimpleNamespace(columns=(None,)), [(None, {})] * 3
+    ends = {"elbow": {"after": 1.0, "noise_floor": 0.0}}
+    sizes = standing._named(Bench({}, {}), fit, terms, np.array([9.0, 1.0, 2.0, 3.0]), proofs, ends)
+    assert sizes == [5.0, 2.0, 3.0]
+
+
 def _proof_by_joint(errors: dict[str, dict[tuple[float, ...], float]]) -> Any:
     def proof(self: Bench, joint: str, before: tuple, after: tuple) -> dict[str, Any]:
         table = errors[joint]
