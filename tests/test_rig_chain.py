@@ -10,7 +10,7 @@ import pytest
 
 from hand_model.rig import diagnose_rig, fit_declared, load_rig
 from hand_model.rig.balance import declared_columns
-from hand_model.rig.diagnose import _off_axis, _without_stand_ins, trusted_fit
+from hand_model.rig.diagnose import _freed, _off_axis, _without_stand_ins, trusted_fit
 from hand_model.rig.dynamics import inertial_columns, inertial_parameters
 from hand_model.rig.inverse import effort_residuals, with_bodies
 from hand_model.rig.name.beside import score
@@ -108,6 +108,6 @@ def test_weights_off_their_axes_take_the_place_of_loads_by_place(tmp_path: Path)
     offset = Term(every["shoulder"]["asymmetric_friction@shoulder"], {})
     assert _without_stand_ins([offset]) == [[offset]]
     assert _without_stand_ins([*stands, offset]) == [stands[1:], stands[1:]]
-    freed, finding = _off_axis(Bench(rig), fit, [stands[0]])
+    freed, finding = _off_axis(Bench(rig), fit, _freed(rig, fit), [stands[0]])
     assert len(freed.columns) > len(fit.columns) and finding.effect == "gravity_load"
     assert finding.parameters["inertial:lower:hx"]["value"] == pytest.approx(1.5 * 0.06, rel=0.25)

@@ -26,7 +26,7 @@ from .horizon import open_loop
 from .mjcf import keep_couplings
 from .model import RigModel, load_rig
 from .name.beside import Beside, Score
-from .name.candidates import Candidate, candidates
+from .name.candidates import OFFSET, RIPPLE, Candidate, candidates
 from .name.compete import LEAST_SHARE, Step, judge
 from .name.joint_search import Won, as_term, offsets_first, offsets_of_chain, search_joints
 from .name.problem import Term, held_out, normal, pose, solution
@@ -42,7 +42,6 @@ from .verdict import accuracy_notes, accurate, limit, unexplained, verdict
 from .words import rejection, shares, told_on
 
 Array = NDArray[np.float64]
-OFFSET, RIPPLE = "asymmetric_friction", "torque_ripple"
 # loads that a weight elsewhere gives at the postures of one recording or another
 BY_PLACE = frozenset({OFFSET, RIPPLE, "detent_load", "nonlinear_spring"})
 PROBABILITY = (
@@ -232,10 +231,11 @@ def _searched(rig: RigModel, fit: DeclaredFit, say: Callable[[str], None]) -> _S
     bench = Bench(rig, floor=floor)
     first = offsets_first(rig, fit, joints)  # a sensor's zero is the recording's error: before physics
     offsets = [(w.step, as_term(rig, fit, w)) for w in first.values() if w is not None]
-    off_axis = _off_axis(bench, fit, [t for _, t in offsets])
+    freed = _freed(rig, fit)
+    off_axis = _off_axis(bench, fit, freed, [t for _, t in offsets])
     if off_axis is None:
         found = _at_joints(rig, fit, first, say)
-        off_axis = _off_axis(bench, fit, [t for _, t in (*offsets, *found[0])]) if found[0] else None
+        off_axis = _off_axis(bench, fit, freed, [t for _, t in (*offsets, *found[0])]) if found[0] else None
         if off_axis is None:
             return _Search(base, fit, None, offsets, *found, floor)
         say(f"{rig.name}: centres of mass off their axes: once more beside them")
@@ -292,14 +292,20 @@ def _held_out(rig: RigModel, search: _Search) -> tuple[tuple, tuple[str, ...]]:
     )
 
 
-def _off_axis(bench: Bench, fit: DeclaredFit, terms: Sequence[Term]) -> tuple[DeclaredFit, Finding] | None:
+def _freed(rig: RigModel, fit: DeclaredFit) -> DeclaredFit | None:
+    """The declared fit with centres of mass free to lie off their axes; None where all are."""
+    freed = fit_declared(rig, _refused(rig, fit), fit.cutoff_hz, off_axis=True, kept=fit.kept)
+    return None if len(freed.columns) == len(fit.columns) else replace(freed, scale=fit.scale)
+
+
+def _off_axis(
+    bench: Bench, fit: DeclaredFit, freed: DeclaredFit | None, terms: Sequence[Term]
+) -> tuple[DeclaredFit, Finding] | None:
     """Centres of mass off their declared axes, one change to the whole chain, beside terms, or instead of those of them
     that are loads by place where it leaves no more than these do: they may stand in for it."""
-    rig = bench.rig
-    freed = fit_declared(rig, _refused(rig, fit), fit.cutoff_hz, off_axis=True, kept=fit.kept)
-    if len(freed.columns) == len(fit.columns):
+    if freed is None:
         return None
-    freed = replace(freed, scale=fit.scale)
+    rig = bench.rig
     problem, other = pose(fit), pose(freed)
     errors = [(kept, held_out(other, kept, normal(other, kept))) for kept in _without_stand_ins(terms)]
     kept, error = min(errors, key=lambda side: side[1].sum())

@@ -16,9 +16,9 @@ from .findings import NOT_BORNE_OUT, Finding, measured, whereabouts
 from .horizon import NO_LAW, open_loop
 from .laws import ALL_TURNING, TURNING
 from .model import RigModel
-from .name.candidates import WHOLE, candidates
-from .name.compete import CONSTANT, LEAST_SHARE, Step
-from .name.problem import Term, pose, resampled, solution
+from .name.candidates import STOP, WHOLE, candidates
+from .name.compete import LEAST_SHARE, Step
+from .name.problem import Term, amplitudes, pose, resampled, solution
 from .name.refit import refit
 from .name.settled import settled
 from .proof import Bench
@@ -105,14 +105,13 @@ def _told_apart(bench: Bench, side: tuple[DeclaredFit, Sequence[Term], Array]) -
     """Terms, in which a friction by load and a constant one that turn round together is one of them where hardly
     anything of the other is left in the end."""
     fit, terms, theta = side
-    out, first = [], len(fit.columns)
-    for term in terms:
-        c, size = term.candidate, theta[first : first + len(term.candidate.amplitudes)]
-        first += len(size)
+    out = []
+    for term, size in zip(terms, amplitudes(fit, terms, theta), strict=True):
+        c = term.candidate
         if c.variant == ALL_TURNING:
             loads = np.concatenate([r.load(fit.theta) for r in fit.rows if r.joint == c.joint])
             by_load, constant = size * [np.sqrt(np.mean(loads**2)), 1.0]
-            effect, variant = (CONSTANT, "") if by_load < PART * constant else (c.effect, TURNING)
+            effect, variant = (STOP, "") if by_load < PART * constant else (c.effect, TURNING)
             if min(by_load, constant) < PART * max(by_load, constant):
                 every = candidates(bench.rig, fit, c.joint, only={effect})
                 term = replace(term, candidate=next(o for o in every if (o.effect, o.variant) == (effect, variant)))
@@ -146,14 +145,12 @@ def _named(
 ) -> list[Finding]:
     """Findings of terms with their solution theta (P + J,); ends: joint -> proof of all of them together. One of a
     name that its joint has once more later on is sized without that, which would share its size."""
-    places = len(fit.columns) + np.cumsum([0, *(len(t.candidate.amplitudes) for t in terms)])
     # beside what does not fit, an interval would promise too much
     close = {j for j, end in ends.items() if end["after"] <= FITS * end["noise_floor"]}
-    spread = resampled(pose(fit), terms) if close else None
+    spread = amplitudes(fit, terms, resampled(pose(fit), terms)) if close else [None] * len(terms)
     found = []
-    for term, (step, proof), first, last in zip(terms, proofs, places[:-1], places[1:], strict=True):
-        own = None if spread is None or term.candidate.joint not in close else spread[:, first:last]
-        size = theta[first:last]
+    for term, (step, proof), size, draws in zip(terms, proofs, amplitudes(fit, terms, theta), spread, strict=True):
+        own = draws if term.candidate.joint in close else None
         if again := _again(terms, term):
             own, size = None, _sized(bench, fit, [t for t in terms if t not in again], term)
         found.append(_joint_finding(bench.rig, fit, step, term, size, proof, own))
@@ -171,8 +168,7 @@ def _again(terms: Sequence[Term], term: Term) -> list[Term]:
 def _sized(bench: Bench, fit: DeclaredFit, terms: Sequence[Term], term: Term) -> Array:
     """Amplitudes (j,) of one of the terms."""
     told, theta = solved(bench, fit, terms)
-    first = len(fit.columns) + sum(len(t.candidate.amplitudes) for t in told[: terms.index(term)])
-    return theta[first : first + len(term.candidate.amplitudes)]
+    return amplitudes(fit, told, theta)[terms.index(term)]
 
 
 def _withdrawn(bench: Bench, proof: Mapping[str, Any], plain: tuple, before: tuple, after: tuple) -> str | None:

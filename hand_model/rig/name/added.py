@@ -33,8 +33,8 @@ class Added:
         for x, y, used in designs:
             self._x[first : first + len(y), np.searchsorted(self._used, used)] = x
             first += len(y)
-        low, high = (np.array([a[k] for a in candidate.amplitudes]) for k in (2, 3))
-        self._box = low, high, np.full(len(low), 1e-12)
+        low, high, _, weight = limits(problem, [*terms, Term(candidate, {})])
+        self._box = tuple(side[len(self._moment) :] for side in (low, high, weight))
 
     def error(self, shape: Mapping[str, float]) -> float:
         """Squared error of the fit of all to all blocks, the candidate having this shape."""

@@ -46,7 +46,7 @@ NOT_FOR_RIGS = frozenset(
     }
 )
 RIPPLE = "torque_ripple"
-STOP = "elastoplastic_hysteresis"
+STOP, OFFSET = "elastoplastic_hysteresis", "asymmetric_friction"
 TURN_ROUND = frozenset({STOP, "load_dependent_friction", "stribeck_friction"})
 SMOOTH = ("nonlinear_spring",)  # its knee belongs to fingers with a return spring; a joint has stops and detents
 # what it damps at one end of a range is hardly told there from friction that differs by speed and way
@@ -310,7 +310,7 @@ def _own(rig: RigModel, fit: DeclaredFit, joint: str, rows: list[Rows]) -> list[
     if drive is None or not drive.offset:
         own.append(
             Candidate(
-                "asymmetric_friction",
+                OFFSET,
                 "",
                 joint,
                 (("offset", rig.effort_unit(joint), *free),),

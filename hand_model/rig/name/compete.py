@@ -16,7 +16,7 @@ from ...diagnose.name.term import DISCRETE
 from ..evidence import BEYOND_DOUBT, weigh
 from ..laws import ALL_TURNING
 from .beside import Beside, Score
-from .candidates import PRELOADED, Candidate
+from .candidates import OFFSET, PRELOADED, STOP, Candidate
 from .problem import (
     Problem,
     Term,
@@ -32,7 +32,7 @@ from .refit import refit
 
 Array = NDArray[np.float64]
 LEAST_SHARE = 0.05  # of the held-out residual variance: less is not worth a name
-LOADED, CONSTANT = "load_dependent_friction", "elastoplastic_hysteresis"
+LOADED = "load_dependent_friction"
 MOST_TERMS, MOST_OF_FEW = 4, 3  # of few recordings what is left after so many goes by many names
 TOGETHER = 3  # rivals that meet in their best shapes, beside those of what stands
 
@@ -135,7 +135,7 @@ def _said(candidate: Candidate, terms: Sequence[Term]) -> bool:
 
 
 def _constant(candidate: Candidate) -> bool:
-    return candidate.effect == "asymmetric_friction" or candidate.variant == PRELOADED
+    return candidate.effect == OFFSET or candidate.variant == PRELOADED
 
 
 def _met(problem: Problem, terms: tuple[Term, ...], beside: Beside) -> list[Score]:
@@ -232,7 +232,7 @@ def _as_good(simple: Score, rich: Score) -> bool:
     """Whether a form of the same effect with fewer parameters leaves so little more that the rest would be worth no
     name of its own; of friction by load with a constant one that turns round with it, also the constant one alone."""
     one, other = simple.term.candidate, rich.term.candidate
-    part = other.variant == ALL_TURNING and one.effect == CONSTANT
+    part = other.variant == ALL_TURNING and one.effect == STOP
     return (
         (one.effect == other.effect or part)
         and _size(simple.term) < _size(rich.term)

@@ -9,7 +9,7 @@ from typing import Any
 from ...background import Background
 from ..declared import DeclaredFit
 from ..model import RigModel
-from .candidates import PRELOADED, Candidate, candidates
+from .candidates import OFFSET, PRELOADED, Candidate, candidates
 from .compete import Step, compete
 from .problem import Term, pose
 from .settled import settled
@@ -35,7 +35,7 @@ def offsets_of_chain(rig: RigModel, fit: DeclaredFit, joints: Sequence[str]) -> 
     """Of every joint, a constant offset of its effort where it wins a round among those of all joints, all declared
     parameters of the chain free beside them: a weight off its axis is shared by joints, and what it does at one posture
     an offset does, too."""
-    offsets = [c for j in joints for c in candidates(rig, fit, j, only={"asymmetric_friction"})]
+    offsets = [c for j in joints for c in candidates(rig, fit, j, only={OFFSET})]
     taken, steps, _ = compete(pose(fit), offsets, most=len(joints))
     won = {t.candidate.joint: _won(s, t) for t, s in zip(taken, steps, strict=True)}
     return {joint: won.get(joint) for joint in joints}
@@ -69,11 +69,11 @@ def _own(fit: DeclaredFit, joint: str) -> DeclaredFit:
 
 def _offset_first(rig: RigModel, fit: DeclaredFit, joint: str) -> Won | None:
     everything, problem = candidates(rig, fit, joint), pose(fit, joint)
-    offset = [c for c in everything if c.effect == "asymmetric_friction"]
+    offset = [c for c in everything if c.effect == OFFSET]
     if not compete(problem, offset, most=1)[0]:
         return None
     taken, steps, _ = compete(problem, [c for c in everything if c.variant != PRELOADED], most=1)
-    if taken and taken[0].candidate.effect == "asymmetric_friction":
+    if taken and taken[0].candidate.effect == OFFSET:
         return _won(steps[0], taken[0])
     return None
 

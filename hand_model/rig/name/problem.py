@@ -111,6 +111,12 @@ def limits(problem: Problem, terms: Sequence[Term]) -> tuple[Array, Array, Array
     )
 
 
+def amplitudes(fit: DeclaredFit, terms: Sequence[Term], theta: Array) -> list[Array]:
+    """Of a solution theta (P + J,), or of many (..., P + J), what is each term's."""
+    ends = len(fit.columns) + np.cumsum([0, *(len(t.candidate.amplitudes) for t in terms)])
+    return [theta[..., a:b] for a, b in pairwise(ends)]
+
+
 def normal(problem: Problem, terms: Sequence[Term]) -> tuple[Array, Array, Array, Array]:
     """Normal equations by block: gram (B, P, P), moment (B, P), square (B,), count (B,)."""
     count, width = len(problem.fold), len(problem.fit.columns) + sum(len(t.candidate.amplitudes) for t in terms)

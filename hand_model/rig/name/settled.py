@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..declared import DeclaredFit
 from ..model import RigModel
 from .candidates import TURNS, beside, candidates
-from .problem import Term, pose, solution
+from .problem import Term, amplitudes, pose, solution
 
 Array = NDArray[np.float64]
 
@@ -35,6 +35,6 @@ def settled(rig: RigModel, fit: DeclaredFit, terms: Sequence[Term]) -> tuple[lis
 def at_loads(fit: DeclaredFit, terms: Sequence[Term], theta: Array) -> DeclaredFit:
     """The fit with the declared parameters of a solution theta (P + J,) and, beside them, the efforts of its terms."""
     count = len(fit.columns)
-    ends = np.cumsum([count, *(len(t.candidate.amplitudes) for t in terms)])
-    acting = [(t.candidate, t.shape, theta[a:b]) for t, a, b in zip(terms, ends[:-1], ends[1:], strict=True)]
+    sizes = amplitudes(fit, terms, theta)
+    acting = [(t.candidate, t.shape, size) for t, size in zip(terms, sizes, strict=True)]
     return replace(fit, theta=theta[:count], beside=beside(fit.rows, acting))
