@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from .mjcf import read_effects
 from .model import RigModel, RigTrial
 from .overrides import compile_model
-from .replay import EffectStepper, States, can_simulate, recorded_states, simulate_trial
+from .replay import States, can_simulate, recorded_states, simulate_trial
 from .states import fill_gaps
+from .stepper import EffectStepper
 
 Array = NDArray[np.float64]
 HORIZONS_S = (np.inf, 4.0, 2.0, 1.0, 0.5, 0.25, 0.1)

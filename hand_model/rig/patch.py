@@ -1,7 +1,7 @@
 """Fitted numbers and named effects written into the rig's MJCF.
 
 What MuJoCo has an attribute for goes there. The rest is kept in the same file, as JSON in
-`custom/text[@name="hand_model"]`. Records with "swing" are applied by `replay.EffectStepper` while MuJoCo steps;
+`custom/text[@name="hand_model"]`. Records with "swing" are applied by `stepper.EffectStepper` while MuJoCo steps;
 records with "effect" and "amplitude" are columns at the recorded motion, added by `inverse.effort_residuals` to what
 mj_inverse says, and in open loop laws that the stepper applies, where `laws.law` has one; "cutoff_hz" is the filter of
 that balance;

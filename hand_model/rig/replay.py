@@ -10,16 +10,14 @@ from numpy.typing import NDArray
 
 from ..engines.mujoco import divergence
 from ..session import Session
-from .carried import CarriedLoad, bodies_inertia
 from .inverse import apply_levels, effort_residuals
-from .laws import Now, Warming, law
 from .mjcf import read_effects
 from .model import RigModel, RigTrial, load_rig
 from .overrides import compile_model
 from .states import fill_gaps
 from .states import recorded_states as joint_states
+from .stepper import EffectStepper
 from .supply import supply_deviation
-from .warming import still_to_come
 
 Array = NDArray[np.float64]
 States = tuple[Array, Array, Array]  # times [s], positions, velocities
@@ -71,104 +69,6 @@ class RigResiduals:
             return float("nan")
         power = 1 if metric.endswith("mae") else 2
         return float((np.sum(weight[good] * values[good] ** power) / weight[good].sum()) ** (1 / power))
-
-
-class EffectStepper:
-    """Applies the effects that a file keeps in custom/text, between mj_step1 and mj_step2.
-
-    Dry friction enters as the bound of MuJoCo's friction constraint, everything else as passive force: what the
-    passive callback (mjcb_passive) can do too, and `passive` is that callback.
-    """
-
-    def __init__(self, model: Any, effects: list[dict[str, Any]]) -> None:
-        self.model = model
-        self.coulomb = np.array(model.dof_frictionloss)
-        self.entries = [(model.joint(e["joint"]).id, e["swing"]) for e in effects if "swing" in e]
-        self.restart()
-        records = [e for e in effects if "effect" in e]
-        self.unknown = tuple(r["effect"] for r in records if law(r) is None)
-        self.laws = [(model.joint(r["joint"]).id, act) for r in records if (act := law(r)) is not None]
-        self.late = {r["joint"]: r["shape"]["delay"] for r in records if "delay" in r.get("shape", {})}
-
-    def follow(self, rig: RigModel, trial: RigTrial) -> None:
-        """Be as warm as the joints are in a recording."""
-        for joint, act in self.laws:
-            if isinstance(act, Warming):
-                act.follow(trial.time_s, still_to_come(rig, trial, self.model.joint(joint).name, act.shape))
-
-    def delay_s(self, joint: str) -> float:
-        """By how much the drive of a joint acts later than its channel says [s]."""
-        named = [e.get("delay", 0.0) for j, e in self.entries if j == self.model.joint(joint).id]
-        return max(named, default=0.0) - self.late.get(joint, 0.0)  # a balance's delay is that of the motion
-
-    def control(self, drive: Array, supply: Array) -> Array:
-        """The recorded control (n,) less sag and scaled with the supply; drive in the unit of effort per gain."""
-        out = drive
-        for joint, e in self.entries:
-            gain = self._gain(joint)
-            out = out * (1.0 + e.get("supply", 0.0) * supply)
-            out = out * (1.0 - e.get("sag", 0.0) * np.abs(gain * out))
-        return out
-
-    def _gain(self, joint: int) -> float:
-        for a in range(self.model.nu):
-            if self.model.actuator_trnid[a, 0] == joint:
-                resistance, constant = self.model.actuator_gainprm[a, :2]
-                return float(constant / resistance)
-        return 0.0
-
-    def restart(self) -> None:
-        """Forget how the joints moved: they are put elsewhere."""
-        self.carried = [CarriedLoad(bodies_inertia(self.model, joint)) for joint, _ in self.entries]
-
-    def passive(self, model: Any, data: Any) -> None:
-        """Add the effects to qfrc_passive and to the bound of dry friction, at the state in `data`."""
-        for (joint, e), load in zip(self.entries, self.carried, strict=True):
-            get = e.get
-            q, v = float(data.qpos[joint]), float(data.qvel[joint])
-            external = -float(data.qfrc_bias[joint]) + get("offset", 0.0)
-            data.qfrc_passive[joint] += get("offset", 0.0) - get("lateral", 0.0) * np.cos(q) - get("stiffness", 0.0) * q
-            external += -get("lateral", 0.0) * np.cos(q) - get("stiffness", 0.0) * q - get("offset", 0.0)
-            shaft = float(data.qfrc_actuator[joint])
-            carried = abs(load(float(data.time), v, external))
-            damping = get("load_speed", 0.0) * abs(external) + get("damping_asymmetry", 0.0) * np.sign(v)
-            data.qfrc_passive[joint] -= damping * v
-            more = (
-                get("load_gear", 0.0) * abs(external - shaft)
-                + get("asymmetry", 0.0) * np.sign(v)
-                + abs(get("load_external", 0.0) * external - get("load_motor", 0.0) * shaft)
-                + get("load_carried", 0.0) * carried
-                + _low_speed(e, v, external, shaft, carried)
-            )
-            # the bound takes effect in the next step: the constraint of this one stands already
-            model.dof_frictionloss[joint] = max(self.coulomb[joint] + more, 1e-9)
-        bound: dict[int, float] = {}
-        for joint, act in self.laws:
-            drive = float(data.qfrc_actuator[joint])
-            load = drive + float(data.qfrc_passive[joint] + data.qfrc_constraint[joint])
-            bias = float(data.qfrc_bias[joint] - data.qfrc_spring[joint])
-            place, speed = float(data.qpos[joint]), float(data.qvel[joint])
-            effort, friction = act(Now(place, speed, load, drive, bias, float(data.time)))
-            data.qfrc_passive[joint] -= effort
-            bound[joint] = bound.get(joint, self.coulomb[joint]) + friction
-        for joint, value in bound.items():
-            model.dof_frictionloss[joint] = max(value, 1e-9)
-
-
-def _low_speed(e: dict[str, float], v: float, external: float, shaft: float, carried: float) -> float:
-    """Dry friction that standing still adds, by load, at joint velocity v under external and shaft effort; carried: size
-    of the load with the inertia that moves."""
-    get = e.get
-    level = (
-        get("static_excess", 0.0)
-        + get("load_gear_low", 0.0) * abs(external - shaft)
-        + abs(get("load_external_low", 0.0) * external - get("load_motor_low", 0.0) * shaft)
-        + get("load_carried_low", 0.0) * carried
-    )
-    if external * shaft < 0:
-        drives = abs(shaft) > abs(external)
-        level += get("external_squared", 0.0) * external**2 if drives else get("motor_squared", 0.0) * shaft**2
-    return level * np.exp(-(abs(v / get("stribeck_speed", 1.0)) ** get("stribeck_exponent", 2.0)))
 
 
 def simulate_trial(

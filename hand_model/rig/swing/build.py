@@ -12,7 +12,7 @@ from ..declared import DeclaredFit
 from ..dynamics import inertial_columns, inertial_parameters
 from ..model import RigModel, RigTrial
 from ..overrides import compile_model
-from ..states import fill_gaps, recorded_states
+from ..states import fill_gaps, noise_std, recorded_states
 from ..supply import supply_deviation
 from .free import swings_free
 from .simulation import STEP_S, Lane, Swing
@@ -39,6 +39,12 @@ def windows_s(rig: RigModel) -> tuple[float, ...]:
     longest = sum(float(t.time_s[-1]) for t in rig.select(False)) / LEAST_STRETCHES
     periods = DRIVEN_PERIODS if rig.drive(rig.joints[0]) is not None else FREE_PERIODS
     return tuple(min(k * free_period_s(rig), longest) for k in periods)
+
+
+def encoder_noise(rig: RigModel) -> float:
+    """Noise [rad or m] of the joint's encoder, of the usual recording."""
+    some = [(t.position[rig.joints[0]], t.time_s) for t in rig.trials if rig.joints[0] in t.position]
+    return float(np.median([noise_std(fill_gaps(t, q), t) for q, t in some])) if some else 0.0
 
 
 def search_step_s(rig: RigModel) -> float:
@@ -104,7 +110,8 @@ def build_swing(rig: RigModel, fit: DeclaredFit, step_s: float = STEP_S, longest
 
     def built(step_s: float, sampled: bool) -> Swing:
         lanes = tuple(lane for t in rig.trials for lane in _stretches(rig, t, step_s, longest_s, sampled))
-        return Swing(lanes, sine, cosine, initial, drive is not None, step_s, free_period_s(rig), leapfrog_s, inertia)
+        return Swing(lanes, sine, cosine, initial, drive is not None, step_s, free_period_s(rig), leapfrog_s, inertia,
+                     encoder_noise(rig))  # fmt: skip
 
     if drive is None:
         swing = built(step_s, True)

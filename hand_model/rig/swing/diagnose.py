@@ -303,7 +303,7 @@ def _swing_finding(rig: RigModel, variant: Variant, round_: Round, ends: Ends, l
     members = (variant.effect, *(e for e in round_.equals if e != variant.effect))
     return Finding(
         variant.effect, members, *alternatives(round_.rivals, variant.effect, round_.probability, len(members)), where,
-        statement(variant.effect, variant.name, joint, parameters, proof), parameters, proof,
+        statement(variant.effect, variant.form, joint, parameters, proof), parameters, proof,
         {"native": native, "mjcf": f"joint[@name='{joint}']/@damping" if native else 'custom/text[@name="hand_model"]',
          "urdf": "not expressible: kept in rig.xml"},
     )  # fmt: skip

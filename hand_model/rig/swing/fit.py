@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .free import swings_free
 from .free_fit import Task, descend, linearised, profiled, without_starts
-from .simulation import INDEX, PARAMETERS, Swing, errors, vector
+from .simulation import INDEX, PARAMETERS, Swing, errors, usual_range, vector
 
 Array = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ def typical(swing: Swing) -> Array:
     """A natural size of every parameter: the unit in which steps are taken and differences made."""
     i = swing.initial
     weight = max(abs(swing.sine), abs(swing.cosine), i.get("coulomb", 0.0), 1e-12)
-    speed = 3.0 * max(np.ptp(lane.position) for lane in swing.lanes)
+    speed = 3.0 * usual_range(swing)
     dry = max(i.get("coulomb", 0.0), 1e-4 * weight)
     wet = max(i.get("damping", 0.0), 0.1 * dry / speed)
     share = dry / weight
@@ -48,18 +48,23 @@ def typical(swing: Swing) -> Array:
             "coulomb": dry, "static_excess": dry, "stribeck_speed": 0.1 * speed, "stribeck_exponent": 0.5, "motor_squared": share / weight,
             "external_squared": share / weight, "load_speed": wet / weight, "asymmetry": dry, "drag": wet / speed,
             "damping_asymmetry": wet, "offset": dry, "lateral": dry, "stiffness": dry,
-            "sag": 0.1 / weight, "supply": 0.5, "delay": 0.01}  # fmt: skip
+            "sag": 0.1 / weight, "supply": 0.5, "delay": 0.01, "reach": 1e-3 * usual_range(swing)}  # fmt: skip
     size = {k: v or 1.0 for k, v in size.items()} | {
         k: share for k in PARAMETERS if k.startswith("load_") and k not in size
     }
     return vector(size)
 
 
+def lowest(swing: Swing) -> Array:
+    """Lower bound of every parameter. What happens within a reach that the encoder cannot resolve is no give."""
+    return np.array([{**LOW, "reach": swing.resolution}.get(name, 0.0) for name in PARAMETERS])
+
+
 def fit_together(swing: Swing, tasks: Sequence[Task], iterations: int = 14) -> list[Fitted]:
     """Levenberg-Marquardt on all tasks at once: every Jacobian column of every task is a lane of one simulation. Where
     the lanes are few, they cost little: then the Jacobian of every damped step is simulated with the step itself."""
     unit = typical(swing)
-    low = np.array([LOW.get(name, 0.0) for name in PARAMETERS])
+    low = lowest(swing)
     size = [sum(swing.lanes[i].used.sum() for i in t.stretches) for t in tasks]
     if swings_free(swing):
         wide = [t.wide and "stribeck_speed" in t.free for t in tasks]
@@ -156,7 +161,7 @@ def jacobian(swing: Swing, task: Task, theta: Array) -> tuple[Array, Array]:
     if swings_free(swing):
         own = np.array([swing.lanes[i].start for i in task.stretches])
         return without_starts(*linearised(swing, [(task.free, task.stretches, theta, own)], typical(swing))[0])[:2]
-    low = np.array([LOW.get(name, 0.0) for name in PARAMETERS])
+    low = lowest(swing)
     return _jacobians(swing, [(task, theta)], typical(swing), low)[0][:2]
 
 

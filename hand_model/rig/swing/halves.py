@@ -12,10 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..bristles import SHORTEST
 from .friction import dry_friction, wet_friction
 
 Array = NDArray[np.float64]
@@ -24,7 +26,10 @@ NODES = 32  # amplitudes in the table
 FARTHEST = 2.9  # rad from rest: beyond, a swing may go over the top, and has no reversal there
 MARGIN = 1.1  # of the largest amplitude in the table over the largest one that is asked for
 SMALLEST = 3e-3  # of the amplitudes in the table, over the largest
+SMALLEST_BENT = 5e-4  # the same where friction turns round over a way: a swing comes to rest within it
 SIDED = ("offset", "asymmetry", "damping_asymmetry")  # what tells one way from the other
+SETTLES = 30
+STIFF, LARGE = 3.0, 6.0  # bristles over weight, amplitude over what friction holds
 LEAST_TURN = 0.02  # of the harmonic swing's: slower, the swing stands
 MOST = 3.0  # times the usual number of half swings: what goes faster is no swing that was recorded
 
@@ -55,18 +60,21 @@ class Forces:
     parameters: Mapping[str, Array]
     has: Mapping[str, bool]
 
-    def acceleration(self, q: Array, v: Array, sign: Array) -> Array:
-        """rad/s2 at angle q and velocity v; sign: of the velocity, where it has just begun too.
+    def acceleration(self, q: Array, v: Array, sign: Array, far: Array) -> Array:
+        """rad/s2 at angle q and velocity v; sign: of the velocity, where it has just begun too; far [rad]: from rest to
+        the reversal before.
 
         A leapfrog of step h moves as the law does under a weight that is stronger by h^2 / 12 times its second
         derivative in time (modified equation; Hairer, Lubich & Wanner 2006, ch. IX), up to h^4. Damping takes the
         velocity half a step later where MuJoCo knows it (implicit), half a step earlier where an effect adds it; the
-        bound of dry friction that an effect moves is one step older still (`replay.EffectStepper`).
+        bound of dry friction that an effect moves is one step older still (`stepper.EffectStepper`).
         """
         p, sine, h = self.parameters, np.sin(q + self.phase), self.step_s
         external = -self.weight * sine
         drift = h * external / self.inertia
         dry = dry_friction(p, self.has, v - 1.5 * drift, external, None) if self.has["dry"] else p["coulomb"]
+        if self.has["reach"]:
+            dry = dry * self._bristle(np.abs(q - self.rest + sign * far), far)
         late, early = v + 0.5 * drift, v - 0.5 * drift
         wet = (p["wet"] + p["drag"] * np.abs(late)) * late
         if self.has["wet"] and (self.has["load_speed"] or self.has["damping_asymmetry"]):
@@ -78,9 +86,33 @@ class Forces:
             out = out - (h * h / 12.0) * square * sine * (v * v + square * np.cos(q + self.phase))
         return out
 
-    def balance(self, sign: Array) -> Array:
-        """Angle [rad] about which it swings while it moves with that sign."""
-        return self.rest - sign * self.still
+    def _bristle(self, moved: Array, far: Array) -> Array:
+        """Share of its bound that dry friction has after a way from a reversal so far [rad] from rest: Dahl's state,
+        which at the reversals of a swing that hardly dies away is as large on both sides."""
+        reach = np.maximum(self.parameters["reach"], SHORTEST)
+        return 1.0 - (1.0 + np.tanh(far / reach)) * np.exp(-moved / reach)
+
+    def balance(self, sign: Array, far: Array) -> Array:
+        """Angle [rad] about which it swings while it moves with that sign, after a reversal so far [rad] from rest."""
+        return self.rest - sign * self.held(far)
+
+    def held(self, far: Array) -> Array:
+        """What dry friction pulls the middle of a half swing off rest by [rad] that begins so far from rest. Bristles that
+        are hardly stiffer than the weight let a small swing go on about its rest; stiffer ones hold it as dry friction
+        does."""
+        if not self.has["reach"]:
+            return self.still + 0.0 * far
+        reach, far = np.maximum(self.parameters["reach"], SHORTEST), np.maximum(far, 0.0)
+        holds = 1.0 / (1.0 + (STIFF * reach / np.maximum(self.still, SHORTEST)) ** 8)
+        large = far**2 / (far**2 + np.maximum(LARGE * self.still, SHORTEST) ** 2)
+        return self.still * np.tanh(far / reach) * (holds + (1.0 - holds) * large)
+
+    def reversal(self, radius: Array) -> Array:
+        """How far [rad] from rest a half swing begins that has such a radius [rad] about where it balances."""
+        far = radius + self.still
+        for _ in range(SETTLES if self.has["reach"] else 1):
+            far = radius + self.held(far)
+        return far
 
     def shaped(self, index: Array | slice, *more: int) -> Forces:
         """Those of some runs, with axes of length one appended."""
@@ -93,23 +125,26 @@ class Forces:
                                         self.rate)), self.step_s, own, self.has)  # fmt: skip
 
 
-def fly(forces: Forces, sign: Array, radius: Array, begin: Array | float, steps: int = STEPS) -> tuple[Array, Array]:
-    """Radius (steps + 1, ...) [rad] in the phase plane and rate x time (steps + 1, ...) from alpha = begin to pi, even
-    in alpha: q = balance - sign radius cos alpha, v = sign rate radius sin alpha."""
-    h = (np.pi - begin) / steps
+def fly(
+    forces: Forces, sign: Array, radius: Array, far: Array, begin: Array | float, steps: int = STEPS
+) -> tuple[Array, Array]:
+    """Radius (steps + 1, ...) [rad] in the phase plane and rate x time (steps + 1, ...) from alpha = begin to pi at
+    `angles`: q = balance - sign radius cos alpha, v = sign rate radius sin alpha; far [rad]: from rest to the reversal
+    before."""
+    at = angles(forces, begin, steps)
     radii, times = [radius], [np.zeros_like(radius)]
-    centre, square = forces.balance(sign), forces.rate**2
+    centre, square = forces.balance(sign, far), forces.rate**2
 
     def slopes(alpha: Array | float, r: Array) -> tuple[Array, Array]:
         c, s = np.cos(alpha), np.sin(alpha)
         q = centre - sign * (r * c)
         v = sign * np.maximum(forces.rate * r * s, 1e-300)
-        beyond = (square * (r * c) - sign * forces.acceleration(q, v, sign)) / (square * np.maximum(r, 1e-300))
+        beyond = (square * (r * c) - sign * forces.acceleration(q, v, sign, far)) / (square * np.maximum(r, 1e-300))
         turn = np.maximum(1.0 - beyond * c, LEAST_TURN)
         return -r * beyond * s / turn, 1.0 / turn
 
-    for k in range(steps):
-        alpha, r = begin + k * h, radii[-1]
+    for alpha, following in pairwise(at):
+        h, r = following - alpha, radii[-1]
         a = slopes(alpha, r)
         b = slopes(alpha + 0.5 * h, r + 0.5 * h * a[0])
         c = slopes(alpha + 0.5 * h, r + 0.5 * h * b[0])
@@ -117,6 +152,13 @@ def fly(forces: Forces, sign: Array, radius: Array, begin: Array | float, steps:
         radii.append(r + h / 6.0 * (a[0] + 2 * b[0] + 2 * c[0] + d[0]))
         times.append(times[-1] + h / 6.0 * (a[1] + 2 * b[1] + 2 * c[1] + d[1]))
     return np.stack(radii), np.stack(times)
+
+
+def angles(forces: Forces, begin: Array | float, steps: int = STEPS) -> Array:
+    """alpha (steps + 1, ...) from begin to pi: even, or, where friction turns round over a way, close together after
+    the reversal."""
+    share = np.linspace(0.0, 1.0, steps + 1) ** (2 if forces.has["reach"] else 1)
+    return begin + np.multiply.outer(share, np.pi - np.asarray(begin))
 
 
 @dataclass(frozen=True)
@@ -144,13 +186,13 @@ def amplitude(forces: Forces, q: Array, v: Array) -> Array:
 def tabulated(forces: Forces, largest: float) -> Table:
     """The half swings of U laws (arrays (U,)), up to the amplitude `largest` [rad]."""
     largest = min(MARGIN * largest, FARTHEST)
-    low, high = np.log(SMALLEST * largest), np.log(largest)
+    low, high = np.log((SMALLEST_BENT if forces.has["reach"] else SMALLEST) * largest), np.log(largest)
     radius = np.exp(0.5 * (low + high) + 0.5 * (high - low) * _POINTS)
     alike = not any(forces.has[name] for name in SIDED)  # both ways: one is enough
     sign = np.array([-1.0] if alike else [-1.0, 1.0])[:, None]
     start = np.broadcast_to(radius, (len(forces.rate), len(sign), NODES)).copy()
     own = forces.shaped(slice(None), 1, 1)
-    radii, times = fly(own, sign, start, 0.0)
+    radii, times = fly(own, sign, start, own.reversal(start), 0.0)
     # a leapfrog's dry friction turns round half a step early, and for so long helps the motion on
     times = times + np.minimum(own.step_s * own.rate * own.still / start, 0.5 * np.pi / STEPS)
     values = np.stack([radii / start, times])  # (2, steps + 1, U, 2, NODES)
@@ -166,24 +208,27 @@ def motion(
     own, (q, v) = forces.shaped(law), start
     sign = np.where(v != 0.0, np.sign(v), -np.sign(q - own.rest))
     sign = np.where(sign == 0.0, 1.0, sign)
-    ahead, across = -sign * (q - own.balance(sign)), np.abs(v) / own.rate
+    across = np.abs(v) / own.rate
+    far = np.hypot(q - own.rest, across)
+    centre, held = own.balance(sign, far), own.held(far)
+    ahead = -sign * (q - centre)
     radius, begin = np.hypot(ahead, across), np.arctan2(across, ahead)
-    radii, turned = fly(own, sign, radius, begin)
-    alpha = begin + (np.pi - begin) * np.linspace(0.0, 1.0, STEPS + 1)[:, None]
-    knots = [
-        (turned / own.rate, own.balance(sign) - sign * radii * np.cos(alpha), sign * own.rate * radii * np.sin(alpha))
-    ]
+    radii, turned = fly(own, sign, radius, far, begin)
+    alpha = angles(own, begin)
+    knots = [(turned / own.rate, centre - sign * radii * np.cos(alpha), sign * own.rate * radii * np.sin(alpha))]
     # half swing after half swing: its amplitude, centre, sign and begin
     end = np.array([t[-1] for t in times])
     sides = [table.shape[..., -1][law, (s > 0).astype(int)] for s in (-sign, sign)]  # (L, NODES, 2) each
-    at, centre, radius, now = knots[0][0][-1], own.balance(sign), radii[-1], sign
+    at, radius, now = knots[0][0][-1], radii[-1], sign
     halves = []
     while np.any(at < end) and len(halves) < most:
         landed, now = centre + now * radius, -now
-        radius = radius - 2.0 * own.still
+        far = radius - held
+        held = own.held(far)
+        radius = far - held
         stands = radius <= 0.0  # within dry friction's bound at rest
         radius = np.where(stands, 0.0, radius)
-        centre = np.where(stands, landed, own.balance(now))
+        centre = np.where(stands, landed, own.balance(now, far))
         basis = table.basis(radius)
         share, turn = np.einsum("lm,lmf->fl", basis, sides[len(halves) % 2])
         halves.append((at, centre, radius, now, basis))
@@ -205,7 +250,7 @@ def _filled(own: Forces, law: Array, table: Table, halves: list) -> list[tuple[A
             shape = table.shape[law, (sign[parity] > 0).astype(int)].reshape(len(law), NODES, -1)
             out = (basis[:, parity::2] @ shape).reshape(len(law), -1, 2, STEPS + 1)
             share[:, parity::2], turned[:, parity::2] = out.transpose(2, 3, 1, 0)
-    alpha = np.linspace(0.0, np.pi, STEPS + 1)[:, None, None]
+    alpha = angles(own, 0.0)[:, None, None]
     r = radius * share
     turned = np.where(radius > 0.0, turned, alpha)
     knots = at + turned / own.rate, centre - sign * r * np.cos(alpha), sign * own.rate * r * np.sin(alpha)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .fit import LOW, Task, jacobian, typical
+from .fit import Task, jacobian, lowest, typical
 from .simulation import INDEX, Swing
 
 Array = NDArray[np.float64]
@@ -24,7 +24,8 @@ def intervals(swing: Swing, free: tuple[str, ...], theta: Array) -> dict[str, tu
     per = slopes.reshape(len(stretches), -1, len(free))
     gradient = np.einsum("snp,sn->sp", per, residual.reshape(len(stretches), -1))
     # what a bound holds does not move with the data, and the others do not make up for it
-    loose = np.array([theta[INDEX[n]] > LOW.get(n, 0.0) for n in free])
+    low = lowest(swing)
+    loose = np.array([theta[INDEX[n]] > low[INDEX[n]] for n in free])
     bread = np.zeros((len(free), len(free)))
     own = slopes[:, loose]
     bread[np.ix_(loose, loose)] = np.linalg.pinv(own.T @ own, hermitian=True, rcond=1e-10)
@@ -34,7 +35,7 @@ def intervals(swing: Swing, free: tuple[str, ...], theta: Array) -> dict[str, tu
     out = {}
     for name, s in zip(free, spread, strict=True):
         value, half = theta[INDEX[name]], QUANTILE * s * unit[INDEX[name]]
-        out[name] = (float(max(value - half, LOW.get(name, 0.0))), float(value + half))
+        out[name] = (float(max(value - half, low[INDEX[name]])), float(value + half))
     return out
 
 

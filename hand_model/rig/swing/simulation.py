@@ -13,6 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ..bristles import SHORTEST, begun, bent, slowed
 from ..carried import followed
 from .friction import dry_friction, wet_friction
 
@@ -28,6 +29,7 @@ PARAMETERS = (
     "motor_squared", "external_squared",  # + k tau^2 of the larger of opposed efforts, times exp(-|v / vs|^a)
     "load_carried", "load_carried_low",  # + k |tau_external - inertia acceleration|, the same times exp(-|v / vs|^a)
     "load_speed",  # damping that grows with |tau_external|
+    "reach",  # over which dry friction turns round after a reversal
     "asymmetry", "damping_asymmetry", "drag", "offset", "lateral", "stiffness",
     "sag", "supply", "delay",
 )  # fmt: skip
@@ -54,7 +56,7 @@ def parameter_units(angle: str, effort: str) -> dict[str, str]:
     units |= dict.fromkeys(("damping", "back_emf", "damping_asymmetry"), wet) | dict.fromkeys(
         ("sag", "motor_squared", "external_squared"), f"1/({effort})"
     )
-    return units | {"stribeck_speed": f"{angle}/s", "stiffness": f"{effort}/{angle}", "load_speed": f"s/{angle}",
+    return units | {"stribeck_speed": f"{angle}/s", "reach": angle, "stiffness": f"{effort}/{angle}", "load_speed": f"s/{angle}",
                     "drag": f"{effort} s^2/{angle}^2", "delay": "s"}  # fmt: skip
 
 
@@ -89,8 +91,9 @@ class Lane:
 @dataclass(frozen=True, eq=False)
 class Swing:
     """All stretches of a session, the joint's weight: gravity effort = sine sin q + cosine cos q (what holds it), and
-    the period period_s [s] of its small swings; bodies: inertia [kg m2 or kg] of what the joint carries. leapfrog_s: step [s] of the leapfrog that has to move as recorded (of a
-    free swing under its weight; zero: the law itself has to)."""
+    the period period_s [s] of its small swings; bodies: inertia [kg m2 or kg] of what the joint carries; resolution
+    [rad or m]: noise of its encoder. leapfrog_s: step [s] of the leapfrog that has to move as recorded (of a free swing
+    under its weight; zero: the law itself has to)."""
 
     lanes: tuple[Lane, ...]
     sine: float
@@ -101,6 +104,7 @@ class Swing:
     period_s: float = 1.0
     leapfrog_s: float = 0.0
     bodies: float = 0.0
+    resolution: float = 0.0
 
     def train(self) -> Array:
         """Indices of stretches that may be fitted."""
@@ -116,6 +120,11 @@ def usual_speed(swing: Swing) -> float:
     """Speed [rad/s or m/s] that is hardly ever exceeded."""
     speeds = [np.abs(np.diff(lane.position)) / np.diff(instants(swing, lane)) for lane in swing.lanes]
     return float(np.percentile(np.concatenate(speeds), 97))
+
+
+def usual_range(swing: Swing) -> float:
+    """How far [rad or m] the recordings go from end to end, the widest of them."""
+    return max(float(np.ptp(lane.position)) for lane in swing.lanes)
 
 
 def vector(values: Mapping[str, float]) -> Array:
@@ -182,6 +191,9 @@ def _run(swing: Swing, theta: Array, lanes: Array, steps: int, residual: bool) -
     h = swing.step_s
     p["acceleration"] = np.zeros(len(lanes))
     drive = _drive(swing, theta, lanes, has, steps) if swing.driven else None
+    if has["reach"]:
+        acts = p["weight"] * np.sin(q + p["phase"]) + (0.0 if drive is None else drive[0])
+        p["bristle"] = begun(v, acts, p["coulomb"], h / p["hi"], p["reach"])
     # Semi-implicit Euler is leapfrog when the velocity starts half a step early: second order instead of first.
     if not swing.driven:
         v = v - 0.5 * p["hi"] * p["weight"] * np.sin(q + p["phase"])
@@ -193,6 +205,8 @@ def _run(swing: Swing, theta: Array, lanes: Array, steps: int, residual: bool) -
             if has["stiffness"]:
                 external -= p["stiffness"] * q
             before, v = v, _next_speed(p, has, v, external, None if drive is None else drive[k])
+            if has["reach"]:
+                p["bristle"] = bent(p["bristle"], h * v, p["reach"])
             if has["carried"]:
                 p["acceleration"] = followed(p["acceleration"], v - before, h)
             q = q + h * v
@@ -233,6 +247,7 @@ def constants(swing: Swing, theta: Array, lanes: Array) -> tuple[dict[str, Array
     p["share"] = 1.0 / (1.0 + p["hi"] * p["wet"])
     p["shove"] = p["hi"] * p["share"]
     p["stop"] = p["shove"] * p["coulomb"]
+    p["give"] = swing.step_s / np.maximum(p["reach"], SHORTEST)
     return p, has
 
 
@@ -253,6 +268,8 @@ def _next_speed(
     elif has["wet"]:
         stop = shove * p["coulomb"]
     free = v * share + shove * effort
+    if has["reach"]:
+        return slowed(free, stop, p["bristle"], p["give"])
     return free - np.minimum(np.maximum(free, -stop), stop)
 
 

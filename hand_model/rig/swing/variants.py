@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .free import swings_free
-from .simulation import DECLARED, INDEX, NEUTRAL, Swing, usual_speed
+from .simulation import DECLARED, INDEX, NEUTRAL, Swing, usual_range, usual_speed
 
 Array = NDArray[np.float64]
 
@@ -27,7 +27,13 @@ class Variant:
         """effect, with the variant where there is one."""
         return self.effect + (f"/{self.name}" if self.name else "")
 
+    @property
+    def form(self) -> str:
+        """Its name where that says how the effect acts, not where the search begins."""
+        return "" if self.name.replace(".", "").isdigit() else self.name
 
+
+REACHES = (1e-3, 1e-2)  # of the range: where the search for the way begins over which friction turns round
 # Of a free swing the same as an encoder's zero that is off.
 ZERO = Variant("gravity_load", "centre of mass off its axis", {"lateral": 0.0})
 
@@ -44,6 +50,8 @@ def variants(swing: Swing) -> tuple[Variant, ...]:
         Variant("asymmetric_viscous_friction", "", {"damping_asymmetry": 0.0}),
         Variant("quadratic_damping", "", {"drag": 0.0}),
     ]
+    reaches = [max(k * usual_range(swing), 2.0 * swing.resolution) for k in REACHES]
+    out += [Variant("presliding_friction", f"{k:g}", {"reach": r}) for k, r in zip(REACHES, reaches, strict=True)]
     if not swing.sine and not swing.cosine:  # beside a weight of unknown scale a spring cannot be told
         out.append(Variant("nonlinear_spring", "", {"stiffness": 0.0}))
     if swing.sine or swing.cosine:
