@@ -20,7 +20,7 @@ from .declared import DeclaredFit
 from .dynamics import INERTIAL, inertial_columns
 from .mjcf import read_effects
 from .model import RigModel, RigTrial
-from .name.candidates import TURNS, Candidate, beside, candidates
+from .name.candidates import LOADED, TURNS, Candidate, beside, candidates
 from .overrides import compile_model
 from .trial_balance import trial_rows
 
@@ -190,12 +190,17 @@ def _acting(
 ) -> list[tuple[Candidate, Mapping, Array]]:
     """Candidates that the file's records name, with shapes and amplitudes, at the loads of the file's parameters and,
     by turns, of the effects themselves."""
-    turns = TURNS if any(r["effect"] == "load_dependent_friction" for r in records) else 1
+    turns = TURNS if any(r["effect"] == LOADED for r in records) else 1
     acting: list[tuple[Candidate, Mapping, Array]] = []
-    for _ in range(turns):
+    for turn in range(turns):
         at = replace(fit, beside=beside(fit.rows, acting))
-        found = [(_rebuilt(rig, at, r), r) for r in records]
-        acting = [(c, r["shape"], np.array([r["amplitude"].get(a[0], 0.0) for a in c.amplitudes])) for c, r in found]
+        found = [
+            _rebuilt(rig, at, r) if turn == 0 or r["effect"] == LOADED else acting[k][0] for k, r in enumerate(records)
+        ]
+        acting = [
+            (c, r["shape"], np.array([r["amplitude"].get(a[0], 0.0) for a in c.amplitudes]))
+            for c, r in zip(found, records, strict=True)
+        ]
     return acting
 
 

@@ -31,7 +31,8 @@ PARTS = 24  # blocks that the held-out recordings of a joint are cut into
 class Bench:
     """Measures fits. mujoco: efforts by inverse dynamics of the file that holds them (each file once); else angles of a
     coupling by the columns. floor: joint -> noise in its residual, where that is known; moved: what `open_loop` keeps
-    of files; whole: rows by their id, which they keep while they are here, and the same with every column of bodies."""
+    of files; whole: rows by their id, which they keep while they are here, and the same with every column of bodies;
+    written: files by the ids of what they were made of, and that."""
 
     rig: RigModel
     mujoco: bool = True
@@ -39,6 +40,7 @@ class Bench:
     known: dict[bytes, tuple[EffortResidual, ...]] = field(default_factory=dict, repr=False)
     moved: dict[tuple[bytes, float, bool], Array] = field(default_factory=dict, repr=False)
     whole: dict[int, tuple[tuple[Rows, ...], tuple[Rows, ...]]] = field(default_factory=dict, repr=False)
+    written: dict[tuple, tuple[tuple, bytes]] = field(default_factory=dict, repr=False)
 
     @property
     def engine(self) -> str:
@@ -47,6 +49,12 @@ class Bench:
 
     def file(self, fit: DeclaredFit, terms: Sequence[Term], theta: Array) -> bytes:
         """The rig's MJCF with parameters theta (P + J,) of the declared columns and of the terms."""
+        key = id(fit), tuple(id(t) for t in terms), theta.tobytes()
+        if key not in self.written:
+            self.written[key] = (fit, *terms), self._file(fit, terms, theta)
+        return self.written[key][1]
+
+    def _file(self, fit: DeclaredFit, terms: Sequence[Term], theta: Array) -> bytes:
         p = len(fit.columns)
         cutoffs = {r.cutoff_hz for r in fit.rows}
         analysis = [{"cutoff_hz": cutoffs.pop(), "rests": list(fit.kept)}] if len(cutoffs) == 1 else []

@@ -46,8 +46,8 @@ NOT_FOR_RIGS = frozenset(
     }
 )
 RIPPLE = "torque_ripple"
-STOP, OFFSET = "elastoplastic_hysteresis", "asymmetric_friction"
-TURN_ROUND = frozenset({STOP, "load_dependent_friction", "stribeck_friction"})
+STOP, OFFSET, LOADED = "elastoplastic_hysteresis", "asymmetric_friction", "load_dependent_friction"
+TURN_ROUND = frozenset({STOP, LOADED, "stribeck_friction"})
 SMOOTH = ("nonlinear_spring",)  # its knee belongs to fingers with a return spring; a joint has stops and detents
 # what it damps at one end of a range is hardly told there from friction that differs by speed and way
 UNDAMPED = ("end_stop_contact",)
@@ -124,7 +124,7 @@ def candidates(
         found = [c for c in found if c not in bends] + [x for c in bends for x in _with_line(c, preloaded)]
     found += [_thinning(c, variant) for c in found if c.effect == WARMS for variant in (DRAG, DRY_AND_DRAG)]
     if only is None or not NOT_FOR_RIGS.isdisjoint(only):
-        found += _own(rig, fit, joint, rows)
+        found += _own(rig, fit, joint, rows, only)
     if only is None or not TURN_ROUND.isdisjoint(only):
         found += turning_round(_from_catalogue(effect(STOP), joint, train, states), rig, fit, joint, train, rows)
     return tuple(c for c in found if c.grid and (only is None or c.effect in only))
@@ -292,13 +292,15 @@ def _late_target(rig: RigModel, joint: str, delays: tuple[dict[str, float], ...]
     return Candidate("command_delay", "its target alone", joint, (WHOLE,), delays, columns)
 
 
-def _own(rig: RigModel, fit: DeclaredFit, joint: str, rows: list[Rows]) -> list[Candidate]:
+def _own(
+    rig: RigModel, fit: DeclaredFit, joint: str, rows: list[Rows], only: Collection[str] | None
+) -> list[Candidate]:
     """Friction by load of several kinds, offset, delay between the channels."""
     free = (-np.inf, np.inf)
     drive = rig.drive(joint)
     sample = max(float(np.median(np.diff(t.time_s))) for t in rig.trials)
     driven = drive is not None and any(np.any(r.effort) for r in rows)  # connected somewhere, its channel not refused
-    own = _by_load(fit, joint, rows, driven)
+    own = _by_load(fit, joint, rows, driven) if only is None or LOADED in only else []
     if driven and drive.kind == "position" and not any(joint in t.effort for t in rig.trials):
         own.append(_late_target(rig, joint, _delays(sample, LONGEST_TARGET_S, (-1.0,))))
     if driven:

@@ -16,7 +16,7 @@ from ...diagnose.name.term import DISCRETE
 from ..evidence import BEYOND_DOUBT, weigh
 from ..laws import ALL_TURNING
 from .beside import Beside, Score
-from .candidates import OFFSET, PRELOADED, STOP, Candidate
+from .candidates import LOADED, OFFSET, PRELOADED, STOP, Candidate
 from .problem import (
     Problem,
     Term,
@@ -32,7 +32,6 @@ from .refit import refit
 
 Array = NDArray[np.float64]
 LEAST_SHARE = 0.05  # of the held-out residual variance: less is not worth a name
-LOADED = "load_dependent_friction"
 MOST_TERMS, MOST_OF_FEW = 4, 3  # of few recordings what is left after so many goes by many names
 TOGETHER = 3  # rivals that meet in their best shapes, beside those of what stands
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..declared import DeclaredFit
 from ..model import RigModel
-from .candidates import TURNS, beside, candidates
+from .candidates import LOADED, TURNS, beside, candidates
 from .problem import Term, amplitudes, pose, solution
 
 Array = NDArray[np.float64]
@@ -21,13 +21,11 @@ def settled(rig: RigModel, fit: DeclaredFit, terms: Sequence[Term]) -> tuple[lis
     them."""
     terms, problem, at = list(terms), pose(fit), fit
     theta = solution(problem, terms)
-    for _ in range(TURNS if any(t.candidate.effect == "load_dependent_friction" for t in terms) else 0):
+    loaded = {t.candidate.joint for t in terms if t.candidate.effect == LOADED}
+    for _ in range(TURNS if loaded else 0):
         at = at_loads(fit, terms, theta)
-        named = {
-            j: {t.candidate.effect for t in terms if t.candidate.joint == j} for j in {t.candidate.joint for t in terms}
-        }
-        known = {c.key: c for j, effects in named.items() for c in candidates(rig, at, j, only=effects)}
-        terms = [replace(t, candidate=known[t.candidate.key]) for t in terms]
+        known = {c.key: c for j in loaded for c in candidates(rig, at, j, only={LOADED})}
+        terms = [replace(t, candidate=known.get(t.candidate.key, t.candidate)) for t in terms]
         theta = solution(problem, terms)
     return terms, theta, at
 
