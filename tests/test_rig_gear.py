@@ -3,16 +3,19 @@ carries."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 from rig_bench import RIG, two_sines, written
 
+from hand_model.cli import main
+from hand_model.errors import DescriptionError
 from hand_model.rig import diagnose_rig, load_rig
+from hand_model.rig.coupling_angles import coupling_angles
 from hand_model.rig.couplings import coupling_terms
-from hand_model.rig.mjcf import read_couplings, read_effects
-from hand_model.rig.transmission import coupling_candidates
+from hand_model.rig.mjcf import keep_couplings, read_couplings, read_effects
 from hand_model.session import read_session
 
 mujoco = pytest.importorskip("mujoco")
@@ -93,14 +96,27 @@ def test_the_file_keeps_what_a_coupling_lacks(tmp_path: Path) -> None:
     records = read_couplings(xml)
     assert [r["effect"] for r in records] == [f.effect for f in found.findings if f.where.get("coupling") == "gear"]
     assert not {r["effect"] for r in records} & {r.get("effect") for r in read_effects(xml)}
-    rig = load_rig(read_session(folder), xml)
-    fit, *_ = coupling_terms(rig, rig.couplings[0])
-    known = {(c.effect, c.variant): c for c in coupling_candidates(fit, rig.couplings[0])}
-    left = []
-    for row in (r for r in fit.rows if r.validate):
-        angle = np.polynomial.polynomial.polyval(row.position, rig.couplings[0].polycoef)
-        for r in records:
-            columns = row.filtered(known[r["effect"], r["variant"]].columns(row, r["shape"]))
-            angle = angle + columns @ list(r["amplitude"].values())
-        left.append((row.effort - angle)[row.moving])
-    assert np.sqrt(np.mean(np.concatenate(left) ** 2)) == pytest.approx(told["after"], rel=0.02)
+    angles = coupling_angles(load_rig(read_session(folder), xml))
+    held = [(a.angle_rmse, a.samples) for a in angles if a.validate]
+    assert held
+    assert {a.coupling for a in angles} == {"gear"}
+    left = np.sqrt(np.average([e**2 for e, _ in held], weights=[n for _, n in held]))
+    assert left == pytest.approx(told["after"], rel=0.06)  # its zero was taken out before the last fit
+    assert all(a.angle_rmse < 0.6 * a.plain_rmse for a in angles)
+
+
+def test_a_record_that_names_no_effect_of_its_coupling_is_refused(tmp_path: Path) -> None:
+    folder = geared(tmp_path / "s")
+    record = {"coupling": "gear", "effect": "drive_backlash", "variant": "of jelly", "joint": "link", "shape": {}}
+    xml = keep_couplings((folder / "rig.xml").read_bytes(), [{**record, "amplitude": {}}])
+    with pytest.raises(DescriptionError, match=r'"drive_backlash" \(of jelly\) at coupling "gear"'):
+        coupling_angles(load_rig(read_session(folder), xml))
+
+
+def test_replay_shows_what_a_coupling_leaves(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    folder = geared(tmp_path / "s")
+    assert main(["replay", str(folder), "--output", str(tmp_path / "out")]) == 0
+    assert "polynomial alone" in capsys.readouterr().out
+    told = json.loads((tmp_path / "out" / "figures.json").read_text())["couplings"]
+    assert {row["coupling"] for row in told} == {"gear"}
+    assert all(row["angle_rmse"] == row["angle_rmse_polynomial"] > 0 for row in told)

@@ -53,7 +53,7 @@ def _rig(session: Session, output: str) -> int:
     from ..report.rig import rig_text, write_rig_report
     from ..rig.replay import replay_rig
 
-    residuals = replay_rig(session)
+    residuals = replay_rig(session, couplings=True)
     page = write_rig_report(session, residuals, output)
     print(rig_text(session, residuals))
     print(f"\n{page}")

@@ -22,6 +22,7 @@ from .words import count, number
 Array = NDArray[np.float64]
 
 HEAD = ("trial", "joint", "", "position rmse", "of range [%]", "effort rmse", "samples")
+COUPLED = ("trial", "coupling", "", "angle rmse", "polynomial alone", "samples")
 # Simulations shown; the first of each joint say what the rest say.
 PICTURES = 6
 
@@ -42,7 +43,20 @@ def write_rig_report(session: Session, residuals: RigResiduals, folder: str | Pa
             }
             for r in residuals.joints
         ]
-        text = json.dumps({"format": FORMAT, "rig": session.hand, "joints": rows}, indent=1, allow_nan=False)
+        held = [
+            {
+                "trial": a.trial,
+                "coupling": a.coupling,
+                "held_out": a.validate,
+                "unit": a.unit,
+                "angle_rmse": a.angle_rmse,
+                "angle_rmse_polynomial": a.plain_rmse,
+                "samples": a.samples,
+            }
+            for a in residuals.couplings
+        ]
+        whole = {"format": FORMAT, "rig": session.hand, "joints": rows, "couplings": held}
+        text = json.dumps(whole, indent=1, allow_nan=False)
         (staging / FIGURES).write_text(text + "\n")
     return Path(folder) / PAGE
 
@@ -50,6 +64,9 @@ def write_rig_report(session: Session, residuals: RigResiduals, folder: str | Pa
 def rig_page(session: Session, residuals: RigResiduals) -> bytes:
     """The page as bytes."""
     body = [table(HEAD, rows(session, residuals), "Position in rad or m, effort in N m or N", text_columns=3)]
+    if residuals.couplings:
+        caption = "Angle of the dependent joint, by the polynomial with what the file keeps besides, and by it alone"
+        body.append(table(COUPLED, coupled(residuals), caption, text_columns=3))
     drawn = [(f"{r.trial}, {r.joint}", _simulation(r, session)) for r in residuals.joints if r.followed]
     if drawn:
         body += [key(("c1", "recorded"), ("ink", "simulated in open loop")), figures(*drawn[:PICTURES])]
@@ -87,7 +104,25 @@ def rig_words(session: Session, residuals: RigResiduals) -> str:
 
 def rig_text(session: Session, residuals: RigResiduals) -> str:
     """The table and the sentence for a terminal."""
-    return f"{columns(HEAD, rows(session, residuals), 3)}\n\n{rig_words(session, residuals)}"
+    tables = [columns(HEAD, rows(session, residuals), 3)]
+    if residuals.couplings:
+        tables.append(columns(COUPLED, coupled(residuals), 3))
+    return "\n\n".join([*tables, rig_words(session, residuals)])
+
+
+def coupled(residuals: RigResiduals) -> Sequence[Sequence[str]]:
+    """One row per trial and coupling."""
+    return [
+        [
+            a.trial,
+            a.coupling,
+            "validation" if a.validate else "",
+            f"{a.angle_rmse:.4g} {a.unit}",
+            f"{a.plain_rmse:.4g} {a.unit}",
+            str(a.samples),
+        ]
+        for a in residuals.couplings
+    ]
 
 
 def rows(session: Session, residuals: RigResiduals) -> Sequence[Sequence[str | Cell]]:

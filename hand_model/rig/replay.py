@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..engines.mujoco import divergence
 from ..session import Session
+from .coupling_angles import CouplingAngle, coupling_angles
 from .inverse import apply_levels, effort_residuals
 from .mjcf import read_effects
 from .model import RigModel, RigTrial, load_rig
@@ -55,9 +56,10 @@ class JointResidual:
 
 @dataclass(frozen=True)
 class RigResiduals:
-    """All residuals of a session, and figures over several trials."""
+    """All residuals of a session, and figures over several trials; of couplings where both ends have an encoder."""
 
     joints: tuple[JointResidual, ...]
+    couplings: tuple[CouplingAngle, ...] = ()
 
     def figure(self, metric: str, validate: bool, joint: str | None = None) -> float:
         """Root mean square (or mean, of position_mae) over trials, weighted by samples; nan where there is none."""
@@ -216,14 +218,16 @@ def replay_rig(
     simulate: bool = True,
     efforts: bool = True,
     validate: bool | None = None,
+    couplings: bool = False,
 ) -> RigResiduals:
     """Replay the trials of a rig session on its own file, or on `model` (MJCF bytes, or a RigModel).
 
-    simulate, efforts: which of the two comparisons to make; validate: only trials that do, or do not (None: all).
+    simulate, efforts, couplings: which comparisons to make; validate: only trials that do, or do not (None: all).
     Raises SessionError and DescriptionError as `load_rig` does.
     """
     rig = model if isinstance(model, RigModel) else load_rig(session, model)
     known = {(r.trial, r.joint): r.error for r in effort_residuals(rig)} if efforts else {}
+    angles = coupling_angles(rig) if couplings else ()
     out: list[JointResidual] = []
     for trial in rig.trials:
         if validate not in (None, trial.validate) or not all(j in trial.position for j in rig.joints):
@@ -233,7 +237,7 @@ def replay_rig(
         for i, joint in enumerate(rig.joints):
             motion = None if simulated is None else simulated[:, i]
             out.append(_residual(trial, joint, time_s, motion, known.get((trial.name, joint))))
-    return RigResiduals(tuple(out))
+    return RigResiduals(tuple(out), tuple(a for a in angles if validate in (None, a.validate)))
 
 
 def position_error(simulated: Array, recorded: Array) -> tuple[Array, bool]:

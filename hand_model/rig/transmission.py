@@ -210,19 +210,22 @@ def last_pushed(load: Array, turns_at: float) -> Array:
 
 
 def zero_shift(fit: DeclaredFit, theta: Array, terms: Sequence[Term]) -> DeclaredFit | None:
-    """The coupling with each recording's own zero taken out, where zeros differ between recordings; else None.
-
-    An incremental encoder starts anywhere: what remains after all effects then differs from recording to recording far
-    more than within one (by five times in variance).
-    """
-    left = [(r.effort - design(r, terms) @ theta)[r.moving] for r in fit.rows]
-    between, within = np.var([e.mean() for e in left]), np.mean([e.var() for e in left])
-    if between < 5 * within:
+    """The coupling with each recording's own zero taken out, where zeros differ between recordings; else None."""
+    zeros = own_zeros([(r.effort - design(r, terms) @ theta)[r.moving] for r in fit.rows])
+    if zeros is None:
         return None
-    rows = []
-    for r, e in zip(fit.rows, left, strict=True):
-        rows.append(replace(r, effort=r.effort - e.mean(), extra={**r.extra, "effort": r.extra["effort"] - e.mean()}))
+    rows = [
+        replace(r, effort=r.effort - zero, extra={**r.extra, "effort": r.extra["effort"] - zero})
+        for r, zero in zip(fit.rows, zeros, strict=True)
+    ]
     return _robust_fit(fit.columns, tuple(rows), fit.cutoff_hz)
+
+
+def own_zeros(left: Sequence[Array]) -> list[float] | None:
+    """Mean of what is left of each recording, where they differ. An incremental encoder starts anywhere: what remains
+    after all effects then differs from recording to recording far more than within one (by five times in variance)."""
+    between, within = np.var([e.mean() for e in left]), np.mean([e.var() for e in left])
+    return None if between < 5 * within else [float(e.mean()) for e in left]
 
 
 def angle_residual(rig: RigModel, coupling: Coupling, fit: DeclaredFit, terms: Sequence[Term]) -> CouplingResidual:
@@ -256,4 +259,4 @@ def _load(row: Rows, channel: str) -> Array:
     return row.extra.get(channel, np.zeros(len(row.time_s)))
 
 
-__all__ = ["angle_residual", "coupling_candidates", "coupling_columns", "fit_coupling", "zero_shift"]
+__all__ = ["angle_residual", "coupling_candidates", "coupling_columns", "fit_coupling", "own_zeros", "zero_shift"]
