@@ -79,8 +79,9 @@ class EffectStepper:
             get = e.get
             q, v = float(data.qpos[joint]), float(data.qvel[joint])
             external = -float(data.qfrc_bias[joint]) + get("offset", 0.0)
-            data.qfrc_passive[joint] += get("offset", 0.0) - get("lateral", 0.0) * np.cos(q) - get("stiffness", 0.0) * q
-            external += -get("lateral", 0.0) * np.cos(q) - get("stiffness", 0.0) * q - get("offset", 0.0)
+            placed = -get("lateral", 0.0) * np.cos(q) - get("stiffness", 0.0) * q - _ripple(e, q)
+            data.qfrc_passive[joint] += get("offset", 0.0) + placed
+            external += placed - get("offset", 0.0)
             shaft = float(data.qfrc_actuator[joint])
             carried = abs(load(float(data.time), v, external))
             damping = get("load_speed", 0.0) * abs(external) + get("damping_asymmetry", 0.0) * np.sign(v)
@@ -109,6 +110,14 @@ class EffectStepper:
             bounds[joint] = bounds.get(joint, self.coulomb[joint]) + friction
         for joint, value in bounds.items():
             model.dof_frictionloss[joint] = max(value, LEAST_FRICTION)
+
+
+def _ripple(e: dict[str, float], q: float) -> float:
+    """Effort that a ripple asks for at position q."""
+    if "ripple_period" not in e:
+        return 0.0
+    turn = 2.0 * np.pi * q / e["ripple_period"]
+    return e.get("ripple_sine", 0.0) * np.sin(turn) + e.get("ripple_cosine", 0.0) * np.cos(turn)
 
 
 def _low_speed(e: dict[str, float], v: float, external: float, shaft: float, carried: float) -> float:

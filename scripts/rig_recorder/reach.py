@@ -24,6 +24,7 @@ Log = dict[str, Array]
 WIDE = 3.0  # states are filtered so much wider than the balance
 # orders of the filters of states and of the balance: what they let through is part of what is attainable
 STATES, WEIGHED = 4, 2
+FRICTIONS = 3  # columns of declared friction at most: viscous, and dry of two levels; then constants
 SLOW = 0.01  # of the greatest speed: below, friction is not known
 
 
@@ -184,14 +185,27 @@ def _error(rows: list, machine: str, law: Law, answer: Mapping[str, Any], effect
                 )
             )
         x, y = (np.concatenate([p[i] for p in parts if not p[2]]) for i in (0, 1))
-        size = np.abs(x).max(0) + 1e-300
-        theta = np.linalg.lstsq(x / size, y, rcond=1e-9)[0] / size
+        theta = _fitted(x, y, count, _declared(rows[0][0], machine, rows[0][2], levels)[0].shape[1])
         load_theta, full = (
             theta[:count],
             [p[3] @ theta - s["load"] * 0.9 for p, (s, _, _) in zip(parts, rows, strict=True)],
         )
     left = np.concatenate([y - x @ theta for x, y, held, _ in parts if held])
     return float(np.sqrt(np.mean(left**2)))
+
+
+def _fitted(x: Array, y: Array, loads: int, declared: int) -> Array:
+    """Least squares with friction that is none below zero, nor an inertia alone at its joint (loads: so many columns
+    first; declared: with those of declared friction)."""
+    from scipy.optimize import lsq_linear
+
+    size = np.abs(x).max(0) + 1e-300
+    least = np.full(x.shape[1], -np.inf)
+    least[loads : min(declared, loads + FRICTIONS)] = 0.0
+    if loads <= 2:
+        least[0] = 0.0
+    root = np.linalg.qr(np.column_stack([x / size, y]), "r")
+    return lsq_linear(root[:, :-1], root[:, -1], (least, np.inf), "bvls").x / size
 
 
 def motion(folder: Path, answer: Mapping[str, Any]) -> float:

@@ -11,9 +11,11 @@ import numpy as np
 from ..declared import DeclaredFit
 from ..dynamics import inertial_columns, inertial_parameters
 from ..model import RigModel, RigTrial
+from ..name.ripple import fine_periods
 from ..overrides import compile_model
 from ..states import fill_gaps, noise_std, recorded_states
 from ..supply import supply_deviation
+from .fit import WAVES
 from .free import swings_free
 from .simulation import STEP_S, Lane, Swing
 
@@ -23,6 +25,7 @@ DRIVEN_PERIODS, FREE_PERIODS = (1.3,), (2.5, 10.0)
 DRIVEN_STEP_S, SAMPLES_A_PERIOD, MOST_SAMPLES = 4e-3, 100, 400
 RUNGE_KUTTA = 1  # of MuJoCo's integrators; the others are leapfrogs
 LEAST_STRETCHES = 4  # some to fit, some to leave out
+PERIODS = 2  # of ripples that are tried
 ENOUGH_STEPS = 12_500  # simulated at once: with more, effects are chosen on some of the stretches and fitted to all
 
 
@@ -45,6 +48,14 @@ def encoder_noise(rig: RigModel) -> float:
     """Noise [rad or m] of the joint's encoder, of the usual recording."""
     some = [(t.position[rig.joints[0]], t.time_s) for t in rig.trials if rig.joints[0] in t.position]
     return float(np.median([noise_std(fill_gaps(t, q), t) for q, t in some])) if some else 0.0
+
+
+def ripple_periods(fit: DeclaredFit) -> tuple[float, ...]:
+    """Periods [rad or m] of ripples that show most in the balance of what the drive is reckoned to give: centres of its
+    peaks, of `fine_periods` the middle of three each."""
+    rows = [r for r in fit.rows if not r.validate]
+    longest = max((float(np.ptp(r.position)) for r in rows), default=0.0) / WAVES
+    return tuple(fine_periods(fit, rows, longest)[1::3][:PERIODS]) if longest else ()
 
 
 def search_step_s(rig: RigModel) -> float:
@@ -106,12 +117,13 @@ def build_swing(rig: RigModel, fit: DeclaredFit, step_s: float = STEP_S, longest
     if drive is not None:
         initial["gain"] = drive.gain
         initial["back_emf"] = next((c.value for c in fit.columns if c.kind == "back_emf"), 0.0)
+    periods = () if drive is None else ripple_periods(fit)
     leapfrog_s = 0.0 if model.opt.integrator == RUNGE_KUTTA else float(model.opt.timestep)
 
     def built(step_s: float, sampled: bool) -> Swing:
         lanes = tuple(lane for t in rig.trials for lane in _stretches(rig, t, step_s, longest_s, sampled))
         return Swing(lanes, sine, cosine, initial, drive is not None, step_s, free_period_s(rig), leapfrog_s, inertia,
-                     encoder_noise(rig))  # fmt: skip
+                     encoder_noise(rig), periods)  # fmt: skip
 
     if drive is None:
         swing = built(step_s, True)

@@ -31,9 +31,10 @@ class Fitted:
 
 
 FEW_LANES = 1000
+WAVES = 2.0  # of a ripple, over the range
 THINNED = 3
 LOW = {"inertia": 1e-9, "stribeck_speed": 1e-3, "stribeck_exponent": 0.3, "asymmetry": -np.inf, "damping_asymmetry": -np.inf, "offset": -np.inf,
-       "lateral": -np.inf, "stiffness": -np.inf, "supply": 0.0, "delay": 0.0, "load_speed": 0.0}  # fmt: skip
+       "lateral": -np.inf, "stiffness": -np.inf, "supply": 0.0, "delay": 0.0, "ripple_sine": -np.inf, "ripple_cosine": -np.inf, "ripple_period": 1e-3, "load_speed": 0.0}  # fmt: skip
 
 
 def typical(swing: Swing) -> Array:
@@ -47,7 +48,7 @@ def typical(swing: Swing) -> Array:
     size = {"inertia": i["inertia"], "gain": i.get("gain", 1.0), "back_emf": i.get("back_emf", 1.0), "damping": wet,
             "coulomb": dry, "static_excess": dry, "stribeck_speed": 0.1 * speed, "stribeck_exponent": 0.5, "motor_squared": share / weight,
             "external_squared": share / weight, "load_speed": wet / weight, "asymmetry": dry, "drag": wet / speed,
-            "damping_asymmetry": wet, "offset": dry, "lateral": dry, "stiffness": dry,
+            "damping_asymmetry": wet, "offset": dry, "lateral": dry, "ripple_sine": dry, "ripple_cosine": dry, "ripple_period": 0.01 * usual_range(swing), "stiffness": dry,
             "sag": 0.1 / weight, "supply": 0.5, "delay": 0.01, "reach": 1e-3 * usual_range(swing)}  # fmt: skip
     size = {k: v or 1.0 for k, v in size.items()} | {
         k: share for k in PARAMETERS if k.startswith("load_") and k not in size
@@ -60,11 +61,18 @@ def lowest(swing: Swing) -> Array:
     return np.array([{**LOW, "reach": swing.resolution}.get(name, 0.0) for name in PARAMETERS])
 
 
+def highest(swing: Swing) -> Array:
+    """Upper bound of every parameter: a drive passes on all of its supply at most, and what does not come again and
+    again within the range is no ripple."""
+    high = {"supply": 1.0, "ripple_period": usual_range(swing) / WAVES}
+    return np.array([high.get(name, np.inf) for name in PARAMETERS])
+
+
 def fit_together(swing: Swing, tasks: Sequence[Task], iterations: int = 14) -> list[Fitted]:
     """Levenberg-Marquardt on all tasks at once: every Jacobian column of every task is a lane of one simulation. Where
     the lanes are few, they cost little: then the Jacobian of every damped step is simulated with the step itself."""
     unit = typical(swing)
-    low = lowest(swing)
+    low, high = lowest(swing), highest(swing)
     size = [sum(swing.lanes[i].used.sum() for i in t.stretches) for t in tasks]
     if swings_free(swing):
         wide = [t.wide and "stribeck_speed" in t.free for t in tasks]
@@ -93,7 +101,7 @@ def fit_together(swing: Swing, tasks: Sequence[Task], iterations: int = 14) -> l
             count[k] += len(tasks[k].free) + 1
         for k in todo:
             cost[k] = float(known[k][0] @ known[k][0])
-        trials = {k: [_moved(tasks[k], theta[k], *known[k], damping[k] * f, unit, low) for f in (0.1, 1.0, 10.0, 100.0)]
+        trials = {k: [_moved(tasks[k], theta[k], *known[k], damping[k] * f, unit, low, high) for f in (0.1, 1.0, 10.0, 100.0)]
                   for k in todo}  # fmt: skip
         pairs = [(tasks[k], t) for k in todo for t in trials[k]]
         ahead = sum(len(t.stretches) * (len(t.free) + 1) for t, _ in pairs) < FEW_LANES
@@ -116,7 +124,9 @@ def fit_together(swing: Swing, tasks: Sequence[Task], iterations: int = 14) -> l
     ]
 
 
-def _moved(task: Task, theta: Array, r: Array, jac: Array, damping: float, unit: Array, low: Array) -> Array:
+def _moved(
+    task: Task, theta: Array, r: Array, jac: Array, damping: float, unit: Array, low: Array, high: Array
+) -> Array:
     """Parameters after a damped step; those that it would push through a bound are held there and the step redone."""
     free = np.array([INDEX[n] for n in task.free])
     gram, slope = jac.T @ jac, jac.T @ r
@@ -135,7 +145,7 @@ def _moved(task: Task, theta: Array, r: Array, jac: Array, damping: float, unit:
         held |= beyond
     out = theta.copy()
     out[free] = np.maximum(theta[free] + np.clip(step, -5, 5) * unit[free], low[free])
-    out[INDEX["supply"]] = min(out[INDEX["supply"]], 1.0)  # a drive passes on all of its supply at most
+    out[free] = np.minimum(out[free], high[free])
     return out
 
 

@@ -13,7 +13,7 @@ from ..mjcf import find, number, parse, serialise, write_effects
 from ..model import RigModel
 from ..overrides import body_records, compile_model
 from ..patch import _actuator
-from .simulation import DECLARED, INDEX, LOW_SPEED, NEUTRAL, PARAMETERS, Swing
+from .simulation import DECLARED, INDEX, LOW_SPEED, NEUTRAL, PARAMETERS, RIPPLE, Swing
 
 Array = NDArray[np.float64]
 # Dry friction is a soft constraint in MuJoCo; left at its defaults a joint creeps while it should stick.
@@ -55,7 +55,7 @@ def write_swing(rig: RigModel, swing: Swing, theta: Array) -> bytes:
 
 def _matters(name: str, value: float, all_values: dict[str, float]) -> bool:
     if name in NEUTRAL:
-        return any(all_values[k] for k in LOW_SPEED)
+        return any(all_values[k] for k in (RIPPLE if name == "ripple_period" else LOW_SPEED))
     return value != 0.0
 
 

@@ -30,14 +30,20 @@ PARAMETERS = (
     "load_carried", "load_carried_low",  # + k |tau_external - inertia acceleration|, the same times exp(-|v / vs|^a)
     "load_speed",  # damping that grows with |tau_external|
     "reach",  # over which dry friction turns round after a reversal
+    "ripple_sine", "ripple_cosine", "ripple_period",  # + s sin(2 pi q / period) + c cos(2 pi q / period)
     "asymmetry", "damping_asymmetry", "drag", "offset", "lateral", "stiffness",
     "sag", "supply", "delay",
 )  # fmt: skip
 INDEX = {name: i for i, name in enumerate(PARAMETERS)}
 DECLARED = PARAMETERS[:5]
-NEUTRAL = {"stribeck_speed": 1.0, "stribeck_exponent": 2.0}  # what is not zero where an effect is absent
+NEUTRAL = {
+    "stribeck_speed": 1.0,
+    "stribeck_exponent": 2.0,
+    "ripple_period": 1.0,
+}  # what is not zero where an effect is absent
 BY_LOAD = ("load_gear", "load_motor", "load_external", "load_carried")
 CARRIED = ("load_carried", "load_carried_low")
+RIPPLE = ("ripple_sine", "ripple_cosine")
 LOW_SPEED = (
     "static_excess",
     "load_gear_low",
@@ -52,11 +58,13 @@ LOW_SPEED = (
 def parameter_units(angle: str, effort: str) -> dict[str, str]:
     """Unit of every parameter that is no pure number; angle: "rad" or "m", effort: "N m" or "N"."""
     wet = f"{effort} s/{angle}"
-    units = dict.fromkeys(("coulomb", "static_excess", "asymmetry", "offset", "lateral"), effort)
+    units = dict.fromkeys(
+        ("coulomb", "static_excess", "asymmetry", "offset", "lateral", "ripple_sine", "ripple_cosine"), effort
+    )
     units |= dict.fromkeys(("damping", "back_emf", "damping_asymmetry"), wet) | dict.fromkeys(
         ("sag", "motor_squared", "external_squared"), f"1/({effort})"
     )
-    return units | {"stribeck_speed": f"{angle}/s", "reach": angle, "stiffness": f"{effort}/{angle}", "load_speed": f"s/{angle}",
+    return units | {"stribeck_speed": f"{angle}/s", "reach": angle, "ripple_period": angle, "stiffness": f"{effort}/{angle}", "load_speed": f"s/{angle}",
                     "drag": f"{effort} s^2/{angle}^2", "delay": "s"}  # fmt: skip
 
 
@@ -92,7 +100,7 @@ class Lane:
 class Swing:
     """All stretches of a session, the joint's weight: gravity effort = sine sin q + cosine cos q (what holds it), and
     the period period_s [s] of its small swings; bodies: inertia [kg m2 or kg] of what the joint carries; resolution
-    [rad or m]: noise of its encoder. leapfrog_s: step [s] of the leapfrog that has to move as recorded (of a free swing
+    [rad or m]: noise of its encoder; periods [rad or m]: of ripples that its drive may have. leapfrog_s: step [s] of the leapfrog that has to move as recorded (of a free swing
     under its weight; zero: the law itself has to)."""
 
     lanes: tuple[Lane, ...]
@@ -105,6 +113,7 @@ class Swing:
     leapfrog_s: float = 0.0
     bodies: float = 0.0
     resolution: float = 0.0
+    periods: tuple[float, ...] = ()
 
     def train(self) -> Array:
         """Indices of stretches that may be fitted."""
@@ -204,6 +213,9 @@ def _run(swing: Swing, theta: Array, lanes: Array, steps: int, residual: bool) -
             external = p["weight"] * np.sin(q + p["phase"] if has["phase"] else q)
             if has["stiffness"]:
                 external -= p["stiffness"] * q
+            if has["ripple"]:
+                turn = p["waves"] * q
+                external -= p["ripple_sine"] * np.sin(turn) + p["ripple_cosine"] * np.cos(turn)
             before, v = v, _next_speed(p, has, v, external, None if drive is None else drive[k])
             if has["reach"]:
                 p["bristle"] = bent(p["bristle"], h * v, p["reach"])
@@ -230,6 +242,7 @@ def constants(swing: Swing, theta: Array, lanes: Array) -> tuple[dict[str, Array
     has["carried"] = any(has[k] for k in CARRIED)
     has["exponent"] = bool(np.any(p["stribeck_exponent"] != NEUTRAL["stribeck_exponent"]))
     has["dry"] = has["low"] or any(has[k] for k in (*BY_LOAD, "asymmetry"))
+    has["ripple"] = has["ripple_sine"] or has["ripple_cosine"]
     has["wet"] = any(has[k] for k in ("load_speed", "drag", "damping_asymmetry"))
     chosen = [swing.lanes[i] for i in lanes]
     live = np.array([c.live for c in chosen])
@@ -242,7 +255,7 @@ def constants(swing: Swing, theta: Array, lanes: Array) -> tuple[dict[str, Array
     p["bodies"] = np.minimum(swing.bodies, p["inertia"]) + more
     p["coulomb"] = p["coulomb"] * np.array([c.coulomb_scale for c in chosen])
     p["emf"] = p["back_emf"] * live**2
-    p["inverse"] = 1.0 / p["stribeck_speed"]
+    p["inverse"], p["waves"] = 1.0 / p["stribeck_speed"], 2.0 * np.pi / p["ripple_period"]
     p["wet"] = p["damping"] + p["emf"] if swing.driven else p["damping"]
     p["share"] = 1.0 / (1.0 + p["hi"] * p["wet"])
     p["shove"] = p["hi"] * p["share"]

@@ -90,6 +90,11 @@ def variants(swing: Swing) -> tuple[Variant, ...]:
             Variant("drive_sag", "", {"sag": 0.0}),
             Variant("command_delay", "", {"delay": 0.005}),
         ]
+        ripple = {"ripple_sine": 0.0, "ripple_cosine": 0.0}
+        out += [
+            Variant("torque_ripple", f"{k}", {**ripple, "ripple_period": period})
+            for k, period in enumerate(swing.periods)
+        ]
         if any(np.any(lane.supply) for lane in swing.lanes):
             out.append(Variant("drive_sag", "supply", {"supply": 0.0}))
     return tuple(out)
