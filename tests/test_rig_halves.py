@@ -128,3 +128,23 @@ def test_what_goes_over_the_top_is_stepped() -> None:
     assert not swings_free(swing((3.0, 0.0), 2.0))
     assert not swings_free(replace(swing((1.0, 0.0), 2.0), sine=0.0))
     assert not swings_free(swing((0.0, 2.5 * RATE), 2.0))
+
+
+@pytest.mark.parametrize("law", [{"stiffness": 0.25}, {"stiffness": -0.1, "offset": 5e-3}])
+def test_a_spring_beside_the_weight_takes_part_in_half_swings(law: dict[str, float]) -> None:
+    """Small swings have the period of weight and spring together; a wide one is as another integrator has it."""
+    pull = WEIGHT + law["stiffness"]
+    small = run(swing((0.02 + law.get("offset", 0.0) / pull, 0.0), 20.0), {**law, "coulomb": 0.0})
+    rises = np.flatnonzero(np.diff(np.sign(small - np.mean(small))) > 0)
+    period = (rises[-1] - rises[0]) / (len(rises) - 1) / 150
+    assert period == pytest.approx(2 * np.pi * np.sqrt(INERTIA / pull), rel=1e-3)
+
+    def slope(_: float, state: np.ndarray) -> list[float]:
+        q, v = state
+        dry = SMALL["coulomb"] * np.tanh(v / 1e-4)
+        pulls = law.get("offset", 0.0) - WEIGHT * np.sin(q) - law["stiffness"] * q
+        return [v, (pulls - SMALL["damping"] * v - dry) / INERTIA]
+
+    times = np.arange(1500) / 150
+    other = solve_ivp(slope, (0, 10.0), [1.3, 2.0], t_eval=times, rtol=1e-9, atol=1e-11, max_step=5e-3).y[0]
+    assert np.sqrt(np.mean((run(swing((1.3, 2.0), 10.0), law) - other) ** 2)) < 5e-4

@@ -23,6 +23,7 @@ ALL_TURNING = f"{TURNING}, with what does not grow with it"
 MORE, MOTOR_MORE, GEAR_MORE = (f"{side}more at low speed" for side in ("", f"{MOTOR}, ", f"{GEAR}, "))
 # of a spring where none is declared: its stiffness, and what it gives at the joint's zero
 LINE, PRELOAD = "linear_stiffness", "preload"
+UNDECLARED, PRELOADED = "no spring is declared", "no spring is declared, at rest anywhere"
 OF_STATE = FRICTION | {"nonlinear_spring", "end_stop_contact", "detent_load", "torque_ripple"}
 
 

@@ -23,6 +23,8 @@ from ..laws import (
     MOTOR_LOW,
     MOTOR_MORE,
     PRELOAD,
+    PRELOADED,
+    UNDECLARED,
 )
 from ..model import RigModel
 from ..warming import WARMS, warmth
@@ -59,7 +61,6 @@ DELAYS = (0.125, 0.25, 0.5, 1, 2, 3, 5, 8)
 TURNS = 4
 SAME = 0.05  # of a column's variance
 DRAG, DRY_AND_DRAG = "viscous", "dry and viscous"
-UNDECLARED, PRELOADED = "no spring is declared", "no spring is declared, at rest anywhere"
 WHOLE: Bound = ("whole", "1", 0.99, 1.01)  # of an effect that has no size beside its shape
 
 

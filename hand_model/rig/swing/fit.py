@@ -48,7 +48,7 @@ def typical(swing: Swing) -> Array:
     size = {"inertia": i["inertia"], "gain": i.get("gain", 1.0), "back_emf": i.get("back_emf", 1.0), "damping": wet,
             "coulomb": dry, "static_excess": dry, "stribeck_speed": 0.1 * speed, "stribeck_exponent": 0.5, "motor_squared": share / weight,
             "external_squared": share / weight, "load_speed": wet / weight, "asymmetry": dry, "drag": wet / speed,
-            "damping_asymmetry": wet, "offset": dry, "lateral": dry, "ripple_sine": dry, "ripple_cosine": dry, "ripple_period": 0.01 * usual_range(swing), "stiffness": dry,
+            "damping_asymmetry": wet, "offset": dry, "lateral": dry, "ripple_sine": dry, "ripple_cosine": dry, "ripple_period": 0.01 * usual_range(swing), "stiffness": max(dry, 0.05 * weight),
             "sag": 0.1 / weight, "supply": 0.5, "delay": 0.01, "reach": 1e-3 * usual_range(swing)}  # fmt: skip
     size = {k: v or 1.0 for k, v in size.items()} | {
         k: share for k in PARAMETERS if k.startswith("load_") and k not in size

@@ -13,6 +13,7 @@ from .simulation import Swing, constants, instants, vector
 
 Array = NDArray[np.float64]
 SAMPLES_AT_ONCE = 300_000
+NEWTON_STEPS, LEAST_PULL = 8, 1e-2  # to where a swing rests; of its weight
 
 
 @lru_cache(maxsize=64)
@@ -66,9 +67,22 @@ def _forces(swing: Swing, theta: Array, lanes: Array) -> Forces:
     still = dry_friction(p, has, none, none, None) if has["dry"] else p["coulomb"]
     rest = np.arcsin(np.clip(offset / weight, -0.9, 0.9)) - p["phase"]
     usual = np.array([np.mean(swing.lanes[i].position) for i in lanes])
-    rest = rest + 2 * np.pi * np.round((usual - rest) / (2 * np.pi))
-    rate = np.sqrt(weight / inertia)
-    return Forces(weight, p["phase"], offset, inertia, rest, still / weight, rate, swing.leapfrog_s, p, has)
+    rest, slope = rest + 2 * np.pi * np.round((usual - rest) / (2 * np.pi)), weight
+    if has["stiffness"]:
+        rest, slope = _beside_spring(weight, p["phase"], p["stiffness"], offset, rest)
+    rate = np.sqrt(slope / inertia)
+    return Forces(weight, p["phase"], offset, inertia, rest, still / slope, rate, swing.leapfrog_s, p, has)
+
+
+def _beside_spring(weight: Array, phase: Array, stiffness: Array, offset: Array, rest: Array) -> tuple[Array, Array]:
+    """Where weight, spring and offset balance (L,) [rad], by Newton's steps from rest (L,), and what pulls back there (L,)
+    [N m/rad]: a step of a fit may ask for a spring that pushes harder than the weight pulls, and swings nowhere."""
+    least = LEAST_PULL * weight
+    for _ in range(NEWTON_STEPS):
+        slope = np.maximum(weight * np.cos(rest + phase) + stiffness, least)
+        left = offset - weight * np.sin(rest + phase) - stiffness * rest
+        rest = rest + np.clip(left / slope, -0.5, 0.5)
+    return rest, np.maximum(weight * np.cos(rest + phase) + stiffness, least)
 
 
 __all__ = ["free_errors", "swings_free"]

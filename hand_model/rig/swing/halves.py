@@ -43,9 +43,9 @@ _TO_POLYNOMIALS = (2.0 / NODES) * np.cos(np.outer(_ORDER, np.arccos(_POINTS))) *
 class Forces:
     """What acts on runs side by side, arrays that broadcast against each other.
 
-    weight, phase: weight(q) = -weight sin(q + phase) [N m]; offset [N m]; inertia [kg m2]; rest: where weight and
-    offset balance [rad]; still: dry friction's bound at rest over weight [rad]; rate [rad/s] of small swings without
-    friction; step_s: of the leapfrog that this stands for (0: of the law itself); wet(v, external), dry(v, external):
+    weight, phase: weight(q) = -weight sin(q + phase) [N m], a spring's stiffness [N m/rad] besides; offset [N m]; inertia
+    [kg m2]; rest: where these balance [rad]; still: dry friction's bound at rest over their slope there [rad]; rate
+    [rad/s] of small swings without friction; step_s: of the leapfrog that this stands for (0: of the law itself); wet(v, external), dry(v, external):
     damping [N m s/rad] and dry friction [N m].
     """
 
@@ -64,13 +64,15 @@ class Forces:
         """rad/s2 at angle q and velocity v; sign: of the velocity, where it has just begun too; far [rad]: from rest to
         the reversal before.
 
-        A leapfrog of step h moves as the law does under a weight that is stronger by h^2 / 12 times its second
+        A leapfrog of step h moves as the law does under a pull to rest that is stronger by h^2 / 12 times its second
         derivative in time (modified equation; Hairer, Lubich & Wanner 2006, ch. IX), up to h^4. Damping takes the
         velocity half a step later where MuJoCo knows it (implicit), half a step earlier where an effect adds it; the
         bound of dry friction that an effect moves is one step older still (`stepper.EffectStepper`).
         """
         p, sine, h = self.parameters, np.sin(q + self.phase), self.step_s
         external = -self.weight * sine
+        if self.has["stiffness"]:
+            external = external - p["stiffness"] * q
         drift = h * external / self.inertia
         dry = dry_friction(p, self.has, v - 1.5 * drift, external, None) if self.has["dry"] else p["coulomb"]
         if self.has["reach"]:
@@ -83,7 +85,10 @@ class Forces:
         out = (external + self.offset - wet - sign * dry) / self.inertia
         if h:
             square = self.weight / self.inertia
-            out = out - (h * h / 12.0) * square * sine * (v * v + square * np.cos(q + self.phase))
+            bend, slope = square * sine * v * v, square * np.cos(q + self.phase)
+            if self.has["stiffness"]:
+                slope = slope + p["stiffness"] / self.inertia
+            out = out - (h * h / 12.0) * (bend - slope * (external + self.offset) / self.inertia)
         return out
 
     def _bristle(self, moved: Array, far: Array) -> Array:

@@ -35,7 +35,7 @@ def write_swing(rig: RigModel, swing: Swing, theta: Array) -> bytes:
         element.set("armature", number(value["inertia"] - bodies))
     else:
         element.set("armature", number(0.0))
-        _scale_inertia(root, value["inertia"] - bodies)
+        _scale_bodies(root, rig, value["inertia"] / bodies)
     effects = {k: v for k, v in value.items() if k not in DECLARED and _matters(k, v, value)}
     drag = effects.pop("drag", 0.0)
     element.set("damping", number(value["damping"], drag) if drag else number(value["damping"]))
@@ -65,23 +65,26 @@ def _body_inertia(rig: RigModel) -> float:
     return float(np.sum(inertial_columns(model, zero, zero, zero + 1, np.zeros(3))[0, 0] * inertial_parameters(model)))
 
 
-def _scale_inertia(root: Any, missing: float) -> None:
-    """Less inertia (missing < 0) at the same weight: out of the body's own about its centre as far as that goes, then
-    by a shorter lever of a larger mass."""
-    for inertial in root.iter("inertial"):
-        own = np.array([float(x) for x in inertial.get("diaginertia", "").split()])
-        if len(own) != 3:
-            return
-        least = np.maximum(own + missing, 1e-3 * own)
-        inertial.set("diaginertia", number(*least))
-        missing -= float(np.mean(least - own))
-        mass, lever = float(inertial.get("mass")), np.array([float(x) for x in inertial.get("pos", "0 0 0").split()])
-        whole = mass * float(lever @ lever)
-        share = (whole + missing) / whole if whole else 1.0
-        if 0 < share < 1 - 1e-9:
-            inertial.set("mass", number(mass / share))
-            inertial.set("pos", number(*(share * lever)))
-        return
+def _scale_bodies(root: Any, rig: RigModel, share: float) -> None:
+    """Bodies with a share of their inertia about the joint, and the same weight: of a hinge as much larger masses on
+    shorter levers (the first moments stay, the second ones shrink: a congruence of the pseudo-inertia, so that such
+    bodies exist where the declared ones do), of a slide, which lies level, smaller masses."""
+    import mujoco
+
+    model = compile_model(rig)
+    data, j = mujoco.MjData(model), model.joint(rig.joints[0]).id
+    mujoco.mj_forward(model, data)
+    slides = model.jnt_type[j] == mujoco.mjtJoint.mjJNT_SLIDE
+    for b in range(int(model.jnt_bodyid[j]), model.nbody):
+        inertial = find(root, "body", model.body(b).name).find("inertial")
+        if inertial is None or model.body_weldid[b] != model.jnt_bodyid[j]:
+            continue
+        for attribute in {"diaginertia", "fullinertia"} & set(inertial.attrib):
+            inertial.set(attribute, number(*(share * float(x) for x in inertial.get(attribute).split())))
+        inertial.set("mass", number(float(model.body_mass[b]) * (share if slides else 1.0 / share)))
+        if not slides:
+            centre = data.xanchor[j] + share * (data.xipos[b] - data.xanchor[j]) - data.xpos[b]
+            inertial.set("pos", number(*(data.xmat[b].reshape(3, 3).T @ centre)))
 
 
 def _levels(rig: RigModel, coulomb: float) -> list[dict[str, Any]]:

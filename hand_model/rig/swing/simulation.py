@@ -205,7 +205,7 @@ def _run(swing: Swing, theta: Array, lanes: Array, steps: int, residual: bool) -
         p["bristle"] = begun(v, acts, p["coulomb"], h / p["hi"], p["reach"])
     # Semi-implicit Euler is leapfrog when the velocity starts half a step early: second order instead of first.
     if not swing.driven:
-        v = v - 0.5 * p["hi"] * p["weight"] * np.sin(q + p["phase"])
+        v = v - 0.5 * p["hi"] * (p["weight"] * np.sin(q + p["phase"]) - p["stiffness"] * q)
     out = np.empty((steps, len(lanes)))
     with np.errstate(all="ignore"):
         for k in range(steps):

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..laws import PRELOADED, UNDECLARED
 from .free import swings_free
 from .simulation import DECLARED, INDEX, NEUTRAL, Swing, usual_range, usual_speed
 
@@ -52,10 +53,12 @@ def variants(swing: Swing) -> tuple[Variant, ...]:
     ]
     reaches = [max(k * usual_range(swing), 2.0 * swing.resolution) for k in REACHES]
     out += [Variant("presliding_friction", f"{k:g}", {"reach": r}) for k, r in zip(REACHES, reaches, strict=True)]
-    if not swing.sine and not swing.cosine:  # beside a weight of unknown scale a spring cannot be told
+    if not swing.sine and not swing.cosine:
         out.append(Variant("nonlinear_spring", "", {"stiffness": 0.0}))
-    if swing.sine or swing.cosine:
+    else:  # whose arc tells it from a spring
         out += [
+            Variant("nonlinear_spring", UNDECLARED, {"stiffness": 0.0}),
+            Variant("nonlinear_spring", PRELOADED, {"stiffness": 0.0, "offset": 0.0}),
             Variant("load_dependent_friction", "external", {"load_external": 0.0}),
             Variant("load_dependent_friction", "low speed", {"load_external_low": 0.0, "stribeck_speed": 0.2 * speed}),
             ZERO,
