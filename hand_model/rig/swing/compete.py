@@ -24,7 +24,8 @@ Array = NDArray[np.float64]
 FOLDS, MOST_FOLDS, SHORTLIST, ALIKE = 4, 10, 6, 3
 LEAST_GAIN, MOST_TERMS, MOST_OF_FEW = 0.025, 5, 3  # of few recordings what is left after so many goes by many names
 BETTER = 1.01  # an exchange of variants has to pay
-FEW_RUNS = 500
+FEW_RUNS, FEW_FREE = 500, 60  # a run of half swings costs more than one that is stepped beside others
+PROFILED = 5  # times the runs of another fit, of one that looks for a low speed everywhere
 PARTS = 4  # a recording's error is resampled in so many parts
 
 
@@ -66,13 +67,16 @@ def _blocks(swing: Swing, theta: Array, lanes: Sequence[int]) -> Array:
 
 def fit_apart(swing: Swing, tasks: Sequence[Task], iterations: int = 14) -> list[Fitted]:
     """`fit_together` in two halves, one a core: tasks that need low-speed friction together, since all runs of a batch
-    pay for what one of them has. Few runs stay together: a step costs them hardly less than many."""
+    pay for what one of them has (of free swings none does). Few runs stay together: a step costs them hardly less than
+    many."""
     cost = [len(t.stretches) * (len(t.free) + 1) for t in tasks]
-    if sum(cost) < FEW_RUNS:
+    if swings_free(swing):
+        cost = [c * (PROFILED if t.wide and "stribeck_speed" in t.free else 1) for c, t in zip(cost, tasks, strict=True)]
+    if sum(cost) < (FEW_FREE if swings_free(swing) else FEW_RUNS) or len(tasks) < 2:
         return fit_together(swing, tasks, iterations)
     order = sorted(range(len(tasks)), key=lambda k: bool(set(LOW_SPEED) & set(tasks[k].free)))
     done = np.cumsum([cost[k] for k in order])
-    half = int(np.searchsorted(done, 0.5 * done[-1])) + 1
+    half = min(int(np.searchsorted(done, 0.5 * done[-1])) + 1, len(order) - 1)
     halves = [h for h in (order[:half], order[half:]) if h]
     calls = Background(fit_together, [(swing, [tasks[k] for k in h], iterations) for h in halves])
     fits = {k: f for h, result in zip(halves, calls.results(), strict=True) for k, f in zip(h, result, strict=True)}
