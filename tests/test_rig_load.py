@@ -15,6 +15,7 @@ from hand_model.rig import diagnose_rig, load_rig
 from hand_model.rig.diagnose import trusted_fit
 from hand_model.rig.laws import (
     ALL_TURNING,
+    BRISTLES,
     GEAR,
     GEAR_LOW,
     GEAR_MORE,
@@ -183,6 +184,35 @@ def test_bristles_that_slacken_with_speed_are_in_open_loop_what_they_are_in_the_
     stepped = np.array([np.sum(act(Now(q, v, 0.0, 0.0))) for q, v in zip(row.position, row.velocity, strict=True)])
     np.testing.assert_allclose(column[50:], stepped[50:], atol=1e-9)
     assert np.ptp(column) > 0.1
+
+
+def test_bristles_that_hold_more_while_slow_are_a_lugre_model_beside_those_that_do_not(tmp_path: Path) -> None:
+    """Both together are the model integrated in small steps; in open loop they are what they are in the balance."""
+    rig = load_rig(read_session(bench(tmp_path / "s")))
+    fit = trusted_fit(rig)[0]
+    row = fit.rows[0]
+    every = {(c.effect, c.variant): c for c in candidates(rig, fit, "hinge")}
+    more, plain = every["stribeck_friction", BRISTLES], every["elastoplastic_hysteresis", ""]
+    reach, slow, ratio = 0.05, 0.6, 0.8
+    shape = {"reach": reach, "stribeck_speed": slow, "static_ratio": ratio}
+    column = ratio * more.columns(row, shape)[:, 0]
+    both = plain.columns(row, {"form": 1.0, "reach": reach})[:, 0] + column
+    fine = np.arange(0, row.time_s[-1] - row.time_s[0], 1e-4)
+    time_s = row.time_s - row.time_s[0]
+    q, v = np.interp(fine, time_s, row.position), np.interp(fine, time_s, row.velocity)
+    z, state = 0.0, np.zeros(len(fine))
+    for k in range(1, len(fine)):
+        level = 1.0 + ratio * np.exp(-((v[k] / slow) ** 2))
+        step = q[k] - q[k - 1]
+        z += (step - abs(step) * z / level) / reach
+        state[k] = z
+    assert np.abs(both - np.interp(time_s, fine, state))[200:].max() < 0.05
+    assert column[200:].max() > 0.3
+    record = {"effect": more.effect, "variant": more.variant, "shape": shape, "amplitude": {"static_excess": ratio}}
+    act = law(record)
+    assert act is not None
+    stepped = np.array([np.sum(act(Now(q, v, 0.0, 0.0))) for q, v in zip(row.position, row.velocity, strict=True)])
+    assert np.abs(column - stepped)[200:].max() < 0.05
 
 
 @pytest.mark.slow

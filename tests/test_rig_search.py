@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 from rig_bench import ARM, Motion, recorded
 
-from hand_model.effects.path import jenkins
+from hand_model.effects.path import jenkins, lugre
 from hand_model.rig import diagnose_rig, load_rig
 from hand_model.rig.diagnose import trusted_fit
-from hand_model.rig.laws import TURNING
+from hand_model.rig.laws import BRISTLES, TURNING
 from hand_model.rig.name.added import Added
 from hand_model.rig.name.beside import score
 from hand_model.rig.name.candidates import candidates
 from hand_model.rig.name.compete import _settled_down, borne_out, compete, splits
 from hand_model.rig.name.problem import Term, extended, normal, pose, training_error
+from hand_model.rig.name.refit import in_other_forms
 from hand_model.session import read_session
 
 
@@ -63,6 +64,30 @@ def test_a_torque_that_acts_a_fraction_of_a_sample_late_is_a_delay_and_no_spring
         terms = compete(pose(fit), candidates(rig, fit, "hinge"))[0]
         assert [t.candidate.effect for t in terms] == ["current_channel_delay"] * (late > 0)
         assert not late or terms[0].shape["delay"] == pytest.approx(-late, rel=0.1)
+
+
+def test_a_form_that_made_up_for_a_later_effect_is_asked_again_beside_it(tmp_path: Path) -> None:
+    """Bristles of a LuGre model: an abrupt yield stood before what they hold while slow came, and a gradual one is
+    right beside it."""
+    slow, ratio = 0.5, 0.6
+
+    def torque(motion: Motion) -> np.ndarray:
+        _, q, v, a = motion
+        bristles = lugre(q, 0.06, 1.0 + ratio * np.exp(-((v / slow) ** 2)))
+        return (0.6 * 0.04 + 0.002) * a + 0.6 * 0.2 * 9.81 * np.sin(q) + 0.03 * v + 0.2 * bristles
+
+    rig = load_rig(read_session(recorded(tmp_path / "s", ARM, 6, torque, 1e-3)))
+    fit = trusted_fit(rig)[0]
+    known = {c.key: c for c in candidates(rig, fit, "hinge")}
+    problem = pose(fit, "hinge")
+    abrupt = Term(known["elastoplastic_hysteresis@hinge"], {"form": 0.0, "reach": 0.06})
+    more = Term(
+        known[f"stribeck_friction/{BRISTLES}@hinge"], {"reach": 0.06, "stribeck_speed": slow, "static_ratio": 1.0}
+    )
+    first, second = in_other_forms(problem, (abrupt, more))
+    assert first.shape["form"] == 1.0
+    assert [first.shape["reach"], second.shape["stribeck_speed"]] == pytest.approx([0.06, slow], rel=0.1)
+    assert in_other_forms(problem, (first, second))[0].shape["form"] == 1.0
 
 
 def test_terms_are_fitted_beside_each_other_and_leave_where_they_do_not_pay(tmp_path: Path) -> None:

@@ -93,6 +93,15 @@ def dahl(position: Array, length: float, start: float = 0.0, threshold: float | 
     return _along_strokes(position, lambda z, d, path: d + (z - d) * np.exp(-path / reach), start, threshold)
 
 
+def lugre(position: Array, length: float, level: Array, threshold: float | None = None) -> Array:
+    """State (n,) of the bristles of a LuGre model (Canudas de Wit et al. 1995) that hold level (n,) while they slide:
+    dz/ds = (level sign(ds) - z) / (length level); of level one, `dahl`."""
+    way, direction, _, _ = _ways(np.asarray(position, float).tobytes(), threshold)
+    moved = np.diff(way, prepend=0.0)  # less than zero from one stroke to the next
+    decay = np.exp(-np.maximum(moved, 0.0) / (max(length, 1e-12) * level))
+    return _recurrence(decay, (1.0 - decay) * direction * level)
+
+
 def jenkins(position: Array, length: float, start: float = 0.0, threshold: float | None = None) -> Array:
     """Jenkins element state (n,) in [-1, 1]: an elastic element of reach `length` [position unit] that yields (stop
     operator)."""
@@ -130,16 +139,16 @@ def _ways(
 
 
 def lowpass(time_s: Array, values: Array, time_constant_s: float) -> Array:
-    """First-order low pass (n,) on irregular samples (exact for a held input), started at rest on the first value.
-
-    state[i] = decay[i] state[i - 1] + brought[i], of which ever longer runs are joined (Hillis & Steele 1986).
-    """
+    """First-order low pass (n,) on irregular samples (exact for a held input), started at rest on the first value."""
     v = np.asarray(values, float)
     step = np.diff(time_s) / max(time_constant_s, 1e-9)
-    decay = np.r_[0.0, np.exp(-step)]
-    state = np.r_[v[:1], -np.expm1(-step) * 0.5 * (v[1:] + v[:-1])]
-    run = 1
-    while run < len(v) and decay.any():
+    return _recurrence(np.r_[0.0, np.exp(-step)], np.r_[v[:1], -np.expm1(-step) * 0.5 * (v[1:] + v[:-1])])
+
+
+def _recurrence(decay: Array, brought: Array) -> Array:
+    """state[i] = decay[i] state[i - 1] + brought[i] (n,), of which ever longer runs are joined (Hillis & Steele 1986)."""
+    decay, state, run = decay.copy(), brought.copy(), 1
+    while run < len(state) and decay.any():
         state[run:] += decay[run:] * state[:-run]
         decay[run:] = decay[run:] * decay[:-run]
         run *= 2

@@ -21,6 +21,9 @@ LOW, MOTOR_LOW, GEAR_LOW = "low speed", f"{MOTOR}, low speed", f"{GEAR}, low spe
 ALL_TURNING = f"{TURNING}, with what does not grow with it"
 # At every speed, and more of it below a Stribeck speed (M5 of the ladder of Duclusaud et al. 2024).
 MORE, MOTOR_MORE, GEAR_MORE = (f"{side}more at low speed" for side in ("", f"{MOTOR}, ", f"{GEAR}, "))
+BRISTLES = "bristles that hold more while it is slow"
+# Of recordings that declare Coulomb levels of their own.
+BY_LEVEL, WITH_LEVEL = "a level for each that trials declare", "in proportion to the levels that trials declare"
 # of a spring where none is declared: its stiffness, and what it gives at the joint's zero
 LINE, PRELOAD = "linear_stiffness", "preload"
 UNDECLARED, PRELOADED = "no spring is declared", "no spring is declared, at rest anywhere"
@@ -51,14 +54,18 @@ def law(record: Mapping[str, Any]) -> Law | None:
     shape, size = record.get("shape", {}), tuple(record.get("amplitude", {}).values())
     if variant == ALL_TURNING:
         return _Stop(shape, size[0], by_load=True, base=size[1])
+    if variant == BRISTLES:
+        return _Bristles(shape, size[0])
     if variant == TURNING:
         return _Stop(shape, size[0], by_load=name == "load_dependent_friction")
     if name == "thermal_friction_drift":
         return Warming(shape, record.get("amplitude", {}))
     if name == "load_dependent_friction":
         return _by_load(variant, shape, *size)
+    if BY_LEVEL in variant or WITH_LEVEL in variant:
+        return None  # a trial's own level is not known here
     if name == "elastoplastic_hysteresis":
-        return None if variant else _Stop(shape, size[0])  # a trial's own level is not known here
+        return _Stop(shape, size[0])
     simple: dict[str, Law] = {
         "asymmetric_friction": lambda n: (size[0], 0.0),
         "asymmetric_viscous_friction": lambda n: (size[0] * abs(n.velocity), 0.0),
@@ -155,6 +162,26 @@ class _Stop:
             self.state = way + (self.state - way) * math.exp(-abs(moved) / self.reach)
         by = math.exp(-((now.velocity / self.slow) ** 2)) * (abs(now.load) if self.by_load else 1.0)
         return (self.base + self.size * by) * self.state, 0.0
+
+
+class _Bristles:
+    """What bristles that hold more while the joint is slow hold beyond those that do not (`effects.path.lugre`, `dahl`),
+    step by step."""
+
+    def __init__(self, shape: Mapping[str, float], size: float) -> None:
+        self.reach, self.slow, self.ratio = max(shape["reach"], 1e-12), shape["stribeck_speed"], shape["static_ratio"]
+        self.size, self.more, self.plain, self.last = size / self.ratio, 0.0, 0.0, math.nan
+
+    def __call__(self, now: Now) -> tuple[float, float]:
+        """Effort of the present state, no further friction."""
+        moved = 0.0 if math.isnan(self.last) else now.position - self.last
+        self.last = now.position
+        if moved:
+            level = 1.0 + self.ratio * math.exp(-((now.velocity / self.slow) ** 2))
+            holds, way = math.copysign(level, moved), math.copysign(1.0, moved)
+            self.more = holds + (self.more - holds) * math.exp(-abs(moved) / (self.reach * level))
+            self.plain = way + (self.plain - way) * math.exp(-abs(moved) / self.reach)
+        return self.size * (self.more - self.plain), 0.0
 
 
 class Warming:

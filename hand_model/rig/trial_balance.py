@@ -33,6 +33,7 @@ MAX_RATE_HZ = 250.0  # faster recordings are thinned to this: joints move below 
 MOST_ENDS = 0.05  # of a recording are left out at most at each end
 RINGING = 1e-2  # of a joint's mean speed [rms]: what a filter leaves of it in a pause, which is no motion
 GAP = 0.25  # of what the filter reaches: a shorter stretch without samples is bridged
+PER_PERIOD, ENOUGH_SAMPLES = (12.0, 48.0), 20_000
 MAX_SAMPLES = 4000  # per trial: residuals are correlated over far longer than this spacing
 
 
@@ -120,7 +121,7 @@ def _motion(
     noise = [3 * velocity_noise(raw[j], rate, min(wide, PASSED * rate)) for j in rig.joints]
     slow = np.maximum(noise, ringing)
     sign = np.clip(v / slow, -1.0, 1.0)
-    thin = max(1, int(rate / max(12 * cutoff, 24.0)))
+    thin = max(1, int(rate / max(_samples_a_period(rig, cutoff) * cutoff, 24.0)))
     rest = {}
     for j in (j for j in rig.independent if rests and j not in kept):
         i = rig.joints.index(j)
@@ -145,6 +146,13 @@ def _motion(
         _own_bodies(rig, trial, model, q, v, a),
         max(1, int(np.ceil(len(grid) / MAX_SAMPLES)), int(rate / (6 * cutoff))),
     )
+
+
+def _samples_a_period(rig: RigModel, cutoff_hz: float) -> float:
+    """Of the balance's cut-off: friction turns round within less than one, and is smeared over a coarse grid, but many
+    joints for a long time are many samples."""
+    seconds = sum(float(t.time_s[-1] - t.time_s[0]) for t in rig.trials)
+    return float(np.clip(ENOUGH_SAMPLES / (seconds * len(rig.independent) * cutoff_hz), *PER_PERIOD))
 
 
 def _rows(rig: RigModel, motion: _Motion, trim_s: float | None, weights: Mapping[str, Array]) -> tuple[Rows, ...]:

@@ -28,7 +28,7 @@ from .problem import (
     rescaled,
     training_error,
 )
-from .refit import refit
+from .refit import in_other_forms, refit
 
 Array = NDArray[np.float64]
 LEAST_SHARE = 0.05  # of the held-out residual variance: less is not worth a name
@@ -153,9 +153,10 @@ def _settled_down(
     """Terms in their best shapes beside each other, without those from `first` on that no longer pay, and which of
     these stay. been:
     sets of names that stood before, to which there is no way back."""
-    stays = [True] * (len(terms) - first)
+    stays, whole = [True] * (len(terms) - first), terms
     while len(terms) - first > 1:
         terms = refit(problem, terms, first)
+        terms = in_other_forms(problem, terms, first) if len(terms) == len(whole) else terms
         weak = _superfluous(problem, terms, first)
         if weak is None or _names(rest := terms[:weak] + terms[weak + 1 :]) in been:
             break

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from ...diagnose.name.term import DISCRETE
 from .added import Added
 from .candidate import Candidate
-from .problem import Problem, Term, normal
+from .problem import Problem, Term, normal, training_error
 
 Array = NDArray[np.float64]
 ROUNDS = 2  # of all terms in turn
+BETTER = 0.999  # of the squared error: no more than rounding would be another form's
 
 
 def refined(problem: Problem, terms: Sequence[Term], term: Term, parts: tuple) -> Term:
@@ -46,6 +47,21 @@ def refit(problem: Problem, terms: Sequence[Term], first: int = 0) -> tuple[Term
         if terms == before:
             break
     return terms
+
+
+def in_other_forms(problem: Problem, terms: Sequence[Term], first: int = 0) -> tuple[Term, ...]:
+    """Terms that stand in their best shapes, with one of them in another of its forms where all, moved for that, fit
+    better: in the form that suited it before the others came, these make up for the form."""
+    best, least = tuple(terms), training_error(problem, terms, normal(problem, terms))
+    for k, term in list(enumerate(terms))[first:]:
+        forms = {_form(s): s for s in term.candidate.grid if _form(s) != _form(term.shape)}
+        for form in forms.values():
+            begun = Term(term.candidate, {n: form[n] if n in DISCRETE else v for n, v in term.shape.items()})
+            others = refit(problem, (*terms[:k], begun, *terms[k + 1 :]), first)
+            error = training_error(problem, others, normal(problem, others))
+            if error < BETTER * least:
+                best, least = others, error
+    return best
 
 
 def moves(term: Term) -> bool:

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from ...effects import DriveState
+from ...effects.base import Shape
+from ...effects.path import dahl, lugre
 from ..balance import Rows
 from ..declared import DeclaredFit
-from ..laws import ALL_TURNING, TURNING
+from ..laws import ALL_TURNING, BRISTLES, BY_LEVEL, TURNING, WITH_LEVEL
 from ..model import RigModel
 from .candidate import Candidate
 
-BY_LEVEL = "a level for each that trials declare"
 REACHES = tuple(np.geomspace(0.004, 0.5, 8))  # of the range, over which friction turns round
 SHORTEST = 0.25  # of the shortest of these
+STATIC_RATIOS, ENDS = (0.3, 1.0), (0.05, 4.0)  # what bristles hold besides while slow, over what they hold
 
 
 def turning_round(
@@ -65,6 +68,8 @@ def turning_round(
             columns=lambda r, s: stop.columns(r, s) * np.exp(-((r.velocity / s["stribeck_speed"]) ** 2))[:, None],
         ),
     ]
+    slack = _bristles(stop, span, rows)
+    found.append(slack)
     key = f"joint:{joint}:frictionloss"
     level = {t.name: float(np.atleast_1d(t.set[key])[0]) for t in rig.trials if key in t.set}
     levels = np.unique(list(level.values()))
@@ -77,7 +82,40 @@ def turning_round(
                 columns=lambda r, s: (levels == level[r.trial]) * stop.columns(r, s),
             )
         )
+        # of one recording a level more than one of these would say anything
+        found.append(
+            replace(
+                slack,
+                variant=f"{BRISTLES}, {WITH_LEVEL}",
+                columns=lambda r, s: level[r.trial] / levels.mean() * slack.columns(r, s),
+            )
+        )
     return found
+
+
+def _bristles(stop: Candidate, span: float, rows: list[Rows]) -> Candidate:
+    """What the bristles of a LuGre model hold while slow beyond those that always hold the same: beside friction that
+    turns round over the same way, the whole model (Canudas de Wit et al. 1995)."""
+
+    def columns(row: Rows, shape: Mapping[str, float]) -> np.ndarray:
+        level = 1.0 + shape["static_ratio"] * np.exp(-((row.velocity / shape["stribeck_speed"]) ** 2))
+        more = lugre(row.position, shape["reach"], level) - dahl(row.position, shape["reach"])
+        return more[:, None] / shape["static_ratio"]
+
+    return replace(
+        stop,
+        effect="stribeck_friction",
+        variant=BRISTLES,
+        amplitudes=(("static_excess", stop.amplitudes[0][1], 0.0, np.inf),),
+        grid=tuple(
+            {"reach": float(share * span), **knee, "static_ratio": ratio}
+            for share in REACHES[::2]
+            for knee in knees(rows)
+            for ratio in STATIC_RATIOS
+        ),
+        shapes={"reach": stop.shapes["reach"], "static_ratio": Shape("static_ratio", "1", *ENDS, STATIC_RATIOS)},
+        columns=columns,
+    )
 
 
 def knees(rows: list[Rows], count: int = 4) -> tuple[dict[str, float], ...]:

@@ -71,7 +71,9 @@ def fit_apart(swing: Swing, tasks: Sequence[Task], iterations: int = 14) -> list
     many."""
     cost = [len(t.stretches) * (len(t.free) + 1) for t in tasks]
     if swings_free(swing):
-        cost = [c * (PROFILED if t.wide and "stribeck_speed" in t.free else 1) for c, t in zip(cost, tasks, strict=True)]
+        cost = [
+            c * (PROFILED if t.wide and "stribeck_speed" in t.free else 1) for c, t in zip(cost, tasks, strict=True)
+        ]
     if sum(cost) < (FEW_FREE if swings_free(swing) else FEW_RUNS) or len(tasks) < 2:
         return fit_together(swing, tasks, iterations)
     order = sorted(range(len(tasks)), key=lambda k: bool(set(LOW_SPEED) & set(tasks[k].free)))
