@@ -14,7 +14,7 @@ import pytest
 from rig_bench import ARM, HEAD, Motion, balance, recorded, two_sines, written
 
 from hand_model.report.rig_effort import _turn
-from hand_model.rig import diagnose_rig, load_rig
+from hand_model.rig import diagnose_rig, load_rig, trial_balance
 from hand_model.rig.diagnose import _rank, trusted_fit
 from hand_model.rig.findings import Finding
 from hand_model.rig.name.beside import Beside, score
@@ -46,7 +46,9 @@ def rig_fit(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
     path: Path = tmp_path_factory.mktemp("bench") / "s"
     rig = load_rig(read_session(recorded(path, ARM, 5, torque, 0.01)))
-    return rig, trusted_fit(rig)[0]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(trial_balance, "ENOUGH_SAMPLES", 0)  # on a coarse grid, as a long recording has it
+        return rig, trusted_fit(rig)[0]
 
 
 def test_a_rival_is_held_to_what_stands_with_its_shapes_moved_for_it(rig_fit: Any) -> None:
