@@ -7,7 +7,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from rig_bench import HEAD
+from rig_bench import RIG as HEAD
 
 from hand_model.rig.declared import fit_declared
 from hand_model.rig.model import RigModel, load_rig
@@ -36,7 +36,7 @@ def recorded(
     angles = np.stack([1.2 * np.cos(7 * t), 0.9 * np.cos(7 * t)], 1) if angles is None else angles
     (folder / "log").mkdir(parents=True)
     (folder / "rig.xml").write_text(RIG.format(bodies=bodies))
-    text = HEAD.split("[signals]")[0] + '[signals]\nposition = "joint:axis:position"\n'
+    text = HEAD + 'position = "joint:axis:position"\n'
     for k, q in enumerate(angles.T):
         np.savetxt(
             folder / f"log/{k}.csv", np.stack([t[: len(q)], q], 1), delimiter=",", header="time,position", comments=""

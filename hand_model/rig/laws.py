@@ -23,7 +23,8 @@ ALL_TURNING = f"{TURNING}, with what does not grow with it"
 MORE, MOTOR_MORE, GEAR_MORE = (f"{side}more at low speed" for side in ("", f"{MOTOR}, ", f"{GEAR}, "))
 BRISTLES = "bristles that hold more while it is slow"
 # Of recordings that declare Coulomb levels of their own.
-BY_LEVEL, WITH_LEVEL = "a level for each that trials declare", "in proportion to the levels that trials declare"
+BY_LEVEL = "a level for each that trials declare"
+BRISTLES_BY_LEVEL = f"{BRISTLES}, in proportion to the levels that trials declare"
 # of a spring where none is declared: its stiffness, and what it gives at the joint's zero
 LINE, PRELOAD = "linear_stiffness", "preload"
 UNDECLARED, PRELOADED = "no spring is declared", "no spring is declared, at rest anywhere"
@@ -62,7 +63,7 @@ def law(record: Mapping[str, Any]) -> Law | None:
         return Warming(shape, record.get("amplitude", {}))
     if name == "load_dependent_friction":
         return _by_load(variant, shape, *size)
-    if BY_LEVEL in variant or WITH_LEVEL in variant:
+    if variant in (BY_LEVEL, BRISTLES_BY_LEVEL):
         return None  # a trial's own level is not known here
     if name == "elastoplastic_hysteresis":
         return _Stop(shape, size[0])
@@ -157,9 +158,8 @@ class _Stop:
         self.last = now.position
         if self.abrupt:
             self.state = min(max(self.state + moved / self.reach, -1.0), 1.0)
-        elif moved:
-            way = math.copysign(1.0, moved)
-            self.state = way + (self.state - way) * math.exp(-abs(moved) / self.reach)
+        else:
+            self.state = _built_up(self.state, moved, self.reach)
         by = math.exp(-((now.velocity / self.slow) ** 2)) * (abs(now.load) if self.by_load else 1.0)
         return (self.base + self.size * by) * self.state, 0.0
 
@@ -176,12 +176,18 @@ class _Bristles:
         """Effort of the present state, no further friction."""
         moved = 0.0 if math.isnan(self.last) else now.position - self.last
         self.last = now.position
-        if moved:
-            level = 1.0 + self.ratio * math.exp(-((now.velocity / self.slow) ** 2))
-            holds, way = math.copysign(level, moved), math.copysign(1.0, moved)
-            self.more = holds + (self.more - holds) * math.exp(-abs(moved) / (self.reach * level))
-            self.plain = way + (self.plain - way) * math.exp(-abs(moved) / self.reach)
+        level = 1.0 + self.ratio * math.exp(-((now.velocity / self.slow) ** 2))
+        self.more = _built_up(self.more, moved, self.reach, level)
+        self.plain = _built_up(self.plain, moved, self.reach)
         return self.size * (self.more - self.plain), 0.0
+
+
+def _built_up(state: float, moved: float, reach: float, level: float = 1.0) -> float:
+    """State of bristles that hold `level` while they slide, after a way moved [rad or m] with a reach."""
+    if not moved:
+        return state
+    holds = math.copysign(level, moved)
+    return holds + (state - holds) * math.exp(-abs(moved) / (reach * level))
 
 
 class Warming:

@@ -33,7 +33,7 @@ MAX_RATE_HZ = 250.0  # faster recordings are thinned to this: joints move below 
 MOST_ENDS = 0.05  # of a recording are left out at most at each end
 RINGING = 1e-2  # of a joint's mean speed [rms]: what a filter leaves of it in a pause, which is no motion
 GAP = 0.25  # of what the filter reaches: a shorter stretch without samples is bridged
-PER_PERIOD, ENOUGH_SAMPLES = (12.0, 48.0), 20_000
+PER_PERIOD, ENOUGH_SAMPLES = (12.0, 48.0), 20_000  # of the cut-off, as many as make so many of a session
 MAX_SAMPLES = 4000  # per trial: residuals are correlated over far longer than this spacing
 
 

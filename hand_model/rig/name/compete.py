@@ -153,10 +153,10 @@ def _settled_down(
     """Terms in their best shapes beside each other, without those from `first` on that no longer pay, and which of
     these stay. been:
     sets of names that stood before, to which there is no way back."""
-    stays, whole = [True] * (len(terms) - first), terms
+    stays = [True] * (len(terms) - first)
     while len(terms) - first > 1:
         terms = refit(problem, terms, first)
-        terms = in_other_forms(problem, terms, first) if len(terms) == len(whole) else terms
+        terms = in_other_forms(problem, terms, first) if all(stays) else terms
         weak = _superfluous(problem, terms, first)
         if weak is None or _names(rest := terms[:weak] + terms[weak + 1 :]) in been:
             break

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +12,7 @@ from ...effects.base import Shape
 from ...effects.path import dahl, lugre
 from ..balance import Rows
 from ..declared import DeclaredFit
-from ..laws import ALL_TURNING, BRISTLES, BY_LEVEL, TURNING, WITH_LEVEL
+from ..laws import ALL_TURNING, BRISTLES, BRISTLES_BY_LEVEL, BY_LEVEL, TURNING
 from ..model import RigModel
 from .candidate import Candidate
 
@@ -31,7 +31,8 @@ def turning_round(
 ) -> list[Candidate]:
     """Friction that needs a distance to turn round: a constant one, one in proportion to the load, both together (the
     declared dry friction is then none that turns at once), one that falls with speed (the bristles of a LuGre model,
-    Canudas de Wit et al. 1995, slow against their own state), and where trials declare Coulomb levels, one for each.
+    Canudas de Wit et al. 1995, slow against their own state), what these hold while slow beside one that does not fall, and where trials declare
+    Coulomb levels, one for each.
     stop: the constant one as the catalogue has it."""
     span = max(float(np.ptp(state.position)) for state in train)
     wider = replace(stop.shapes["reach"], low=SHORTEST * REACHES[0] * span)
@@ -40,6 +41,7 @@ def turning_round(
         grid=tuple({"form": form, "reach": float(share * span)} for form in (0.0, 1.0) for share in REACHES),
         shapes={**stop.shapes, "reach": wider},
     )
+    slow = tuple({"reach": float(share * span), **knee} for share in REACHES[::2] for knee in knees(rows))
     load = {r.trial: np.abs(r.load(fit.theta))[:, None] for r in fit.rows if r.joint == joint}
     found = [
         stop,
@@ -62,13 +64,11 @@ def turning_round(
             effect="stribeck_friction",
             variant=TURNING,
             amplitudes=(("static_excess", rig.effort_unit(joint), 0.0, np.inf),),
-            grid=tuple(
-                {"form": 0.0, "reach": float(share * span), **knee} for share in REACHES[::2] for knee in knees(rows)
-            ),
+            grid=tuple({"form": 0.0, **shape} for shape in slow),
             columns=lambda r, s: stop.columns(r, s) * np.exp(-((r.velocity / s["stribeck_speed"]) ** 2))[:, None],
         ),
     ]
-    slack = _bristles(stop, span, rows)
+    slack = _bristles(stop, slow)
     found.append(slack)
     key = f"joint:{joint}:frictionloss"
     level = {t.name: float(np.atleast_1d(t.set[key])[0]) for t in rig.trials if key in t.set}
@@ -86,16 +86,17 @@ def turning_round(
         found.append(
             replace(
                 slack,
-                variant=f"{BRISTLES}, {WITH_LEVEL}",
+                variant=BRISTLES_BY_LEVEL,
                 columns=lambda r, s: level[r.trial] / levels.mean() * slack.columns(r, s),
             )
         )
     return found
 
 
-def _bristles(stop: Candidate, span: float, rows: list[Rows]) -> Candidate:
+def _bristles(stop: Candidate, slow: Sequence[Mapping[str, float]]) -> Candidate:
     """What the bristles of a LuGre model hold while slow beyond those that always hold the same: beside friction that
-    turns round over the same way, the whole model (Canudas de Wit et al. 1995)."""
+    turns round over the same way, the whole model (Canudas de Wit et al. 1995). slow: reaches and Stribeck speeds to
+    begin with."""
 
     def columns(row: Rows, shape: Mapping[str, float]) -> np.ndarray:
         level = 1.0 + shape["static_ratio"] * np.exp(-((row.velocity / shape["stribeck_speed"]) ** 2))
@@ -107,12 +108,7 @@ def _bristles(stop: Candidate, span: float, rows: list[Rows]) -> Candidate:
         effect="stribeck_friction",
         variant=BRISTLES,
         amplitudes=(("static_excess", stop.amplitudes[0][1], 0.0, np.inf),),
-        grid=tuple(
-            {"reach": float(share * span), **knee, "static_ratio": ratio}
-            for share in REACHES[::2]
-            for knee in knees(rows)
-            for ratio in STATIC_RATIOS
-        ),
+        grid=tuple({**shape, "static_ratio": ratio} for shape in slow for ratio in STATIC_RATIOS),
         shapes={"reach": stop.shapes["reach"], "static_ratio": Shape("static_ratio", "1", *ENDS, STATIC_RATIOS)},
         columns=columns,
     )

@@ -69,17 +69,14 @@ def fit_apart(swing: Swing, tasks: Sequence[Task], iterations: int = 14) -> list
     """`fit_together` in two halves, one a core: tasks that need low-speed friction together, since all runs of a batch
     pay for what one of them has (of free swings none does). Few runs stay together: a step costs them hardly less than
     many."""
-    cost = [len(t.stretches) * (len(t.free) + 1) for t in tasks]
-    if swings_free(swing):
-        cost = [
-            c * (PROFILED if t.wide and "stribeck_speed" in t.free else 1) for c, t in zip(cost, tasks, strict=True)
-        ]
-    if sum(cost) < (FEW_FREE if swings_free(swing) else FEW_RUNS) or len(tasks) < 2:
+    free = swings_free(swing)
+    cost = [len(t.stretches) * (len(t.free) + 1) * (PROFILED if free and t.profiles else 1) for t in tasks]
+    if sum(cost) < (FEW_FREE if free else FEW_RUNS) or len(tasks) < 2:
         return fit_together(swing, tasks, iterations)
     order = sorted(range(len(tasks)), key=lambda k: bool(set(LOW_SPEED) & set(tasks[k].free)))
     done = np.cumsum([cost[k] for k in order])
     half = min(int(np.searchsorted(done, 0.5 * done[-1])) + 1, len(order) - 1)
-    halves = [h for h in (order[:half], order[half:]) if h]
+    halves = order[:half], order[half:]
     calls = Background(fit_together, [(swing, [tasks[k] for k in h], iterations) for h in halves])
     fits = {k: f for h, result in zip(halves, calls.results(), strict=True) for k, f in zip(h, result, strict=True)}
     return [fits[k] for k in range(len(tasks))]

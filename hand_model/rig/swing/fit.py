@@ -75,7 +75,7 @@ def fit_together(swing: Swing, tasks: Sequence[Task], iterations: int = 14) -> l
     low, high = lowest(swing), highest(swing)
     size = [sum(swing.lanes[i].used.sum() for i in t.stretches) for t in tasks]
     if swings_free(swing):
-        wide = [t.wide and "stribeck_speed" in t.free for t in tasks]
+        wide = [t.profiles for t in tasks]
         plain, bent = (iter(run(swing, [t for t, w in zip(tasks, wide, strict=True) if w == w_], unit, low, iterations))
                        for w_, run in ((False, descend), (True, profiled)))  # fmt: skip
         ends = [next(bent if w else plain) for w in wide]

@@ -77,12 +77,14 @@ def _forces(swing: Swing, theta: Array, lanes: Array) -> Forces:
 def _beside_spring(weight: Array, phase: Array, stiffness: Array, offset: Array, rest: Array) -> tuple[Array, Array]:
     """Where weight, spring and offset balance (L,) [rad], by Newton's steps from rest (L,), and what pulls back there (L,)
     [N m/rad]: a step of a fit may ask for a spring that pushes harder than the weight pulls, and swings nowhere."""
-    least = LEAST_PULL * weight
+
+    def pull(at: Array) -> Array:
+        return np.maximum(weight * np.cos(at + phase) + stiffness, LEAST_PULL * weight)
+
     for _ in range(NEWTON_STEPS):
-        slope = np.maximum(weight * np.cos(rest + phase) + stiffness, least)
         left = offset - weight * np.sin(rest + phase) - stiffness * rest
-        rest = rest + np.clip(left / slope, -0.5, 0.5)
-    return rest, np.maximum(weight * np.cos(rest + phase) + stiffness, least)
+        rest = rest + np.clip(left / pull(rest), -0.5, 0.5)
+    return rest, pull(rest)
 
 
 __all__ = ["free_errors", "swings_free"]

@@ -37,6 +37,11 @@ class Task:
     stretches: tuple[int, ...]
     wide: bool = False
 
+    @property
+    def profiles(self) -> bool:
+        """Whether it is one for `profiled`."""
+        return self.wide and not set(BENT).isdisjoint(self.free)
+
 
 @dataclass
 class Descent:

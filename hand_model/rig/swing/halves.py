@@ -45,8 +45,8 @@ class Forces:
 
     weight, phase: weight(q) = -weight sin(q + phase) [N m], a spring's stiffness [N m/rad] besides; offset [N m]; inertia
     [kg m2]; rest: where these balance [rad]; still: dry friction's bound at rest over their slope there [rad]; rate
-    [rad/s] of small swings without friction; step_s: of the leapfrog that this stands for (0: of the law itself); wet(v, external), dry(v, external):
-    damping [N m s/rad] and dry friction [N m].
+    [rad/s] of small swings without friction; step_s: of the leapfrog that this stands for (0: of the law itself);
+    wet(v, external), dry(v, external): damping [N m s/rad] and dry friction [N m].
     """
 
     weight: Array

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..dynamics import inertial_columns, inertial_parameters
 from ..mjcf import find, number, parse, serialise, write_effects
 from ..model import RigModel
 from ..overrides import body_records, compile_model
@@ -30,12 +29,11 @@ def write_swing(rig: RigModel, swing: Swing, theta: Array) -> bytes:
     joint = rig.joints[0]
     root = parse(rig.xml)
     element = find(root, "joint", joint)
-    bodies = _body_inertia(rig)
-    if value["inertia"] >= bodies:
-        element.set("armature", number(value["inertia"] - bodies))
+    if value["inertia"] >= swing.bodies:
+        element.set("armature", number(value["inertia"] - swing.bodies))
     else:
         element.set("armature", number(0.0))
-        _scale_bodies(root, rig, value["inertia"] / bodies)
+        _scale_bodies(root, rig, value["inertia"] / swing.bodies)
     effects = {k: v for k, v in value.items() if k not in DECLARED and _matters(k, v, value)}
     drag = effects.pop("drag", 0.0)
     element.set("damping", number(value["damping"], drag) if drag else number(value["damping"]))
@@ -57,12 +55,6 @@ def _matters(name: str, value: float, all_values: dict[str, float]) -> bool:
     if name in NEUTRAL:
         return any(all_values[k] for k in (RIPPLE if name == "ripple_period" else LOW_SPEED))
     return value != 0.0
-
-
-def _body_inertia(rig: RigModel) -> float:
-    model = compile_model(rig)
-    zero = np.zeros((1, 1))
-    return float(np.sum(inertial_columns(model, zero, zero, zero + 1, np.zeros(3))[0, 0] * inertial_parameters(model)))
 
 
 def _scale_bodies(root: Any, rig: RigModel, share: float) -> None:
